@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ...model.effect import Values
@@ -15,21 +17,28 @@ from ..engine.specification import Form, Kind, TransducerArray, scalar
 def gaussian(values: Values, transducers: TransducerArray) -> CouplingMatrix:
     """Weights ``exp(−r²/2s²)``."""
     width = max(scalar(values, "width"), 1e-9)
-    return coupling_matrix(transducers.position, lambda r: np.exp(-0.5 * (r / width) ** 2), 5.0 * width, transducers.area)
+    return _spread(transducers, lambda r: np.exp(-0.5 * (r / width) ** 2), 5.0 * width)
 
 
 def exponential(values: Values, transducers: TransducerArray) -> CouplingMatrix:
     """Weights ``exp(−r/s)``."""
     width = max(scalar(values, "width"), 1e-9)
-    return coupling_matrix(transducers.position, lambda r: np.exp(-r / width), 12.0 * width, transducers.area)
+    return _spread(transducers, lambda r: np.exp(-r / width), 12.0 * width)
 
 
 def half_space(values: Values, transducers: TransducerArray) -> CouplingMatrix:
     """Weights ``(1 + r²/h²)^(−5/2)``."""
     thickness = max(scalar(values, "thickness"), 1e-9)
-    return coupling_matrix(
-        transducers.position, lambda r: (1.0 + (r / thickness) ** 2) ** -2.5, 12.0 * thickness, transducers.area
-    )
+    return _spread(transducers, lambda r: (1.0 + (r / thickness) ** 2) ** -2.5, 12.0 * thickness)
+
+
+def _spread(transducers: TransducerArray, weight: Callable[[np.ndarray], np.ndarray], reach: float) -> CouplingMatrix:
+    """Weights that preserve the sum, with which all texels count alike.
+
+    They are equally stiff, so the smaller area of a vertex at the rim of a mesh takes no smaller share. As one number for all
+    it changes nothing.
+    """
+    return coupling_matrix(transducers.position, weight, reach, np.full_like(transducers.area, np.median(transducers.area)))
 
 
 _WIDTH = Parameter("width", "m", 0.003, 0.0, 0.1, "How far a point load spreads, s.")

@@ -471,7 +471,8 @@ class _TrialReader:
             if kind == "force" and "x" in columns:  # a known weight at a known place, wherever its z is
                 place = [columns["x"], columns["y"], np.zeros(len(time))]
                 position, quaternion = np.stack(place, axis=1), _turns(columns, file)
-        unknown, said = _gaps_filled([position, quaternion, level, slide], time, file)
+        stimuli = [(POSE, position), (TURN, quaternion), ((kind,), level), (SLIDE, slide)]
+        unknown, said = _gaps_filled(stimuli, time, file)
         reading, force = (_known_responses(part, unknown) for part in (reading, force))
         if reading is None and force is None:
             raise FileError(
@@ -617,8 +618,10 @@ def _turns(columns: Mapping[str, np.ndarray], file: Path) -> np.ndarray:
     return turns
 
 
-def _gaps_filled(stimuli: list[np.ndarray | None], time: np.ndarray, file: Path) -> tuple[np.ndarray, list[str]]:
-    """Interpolate missing values of the stimulus in place.
+def _gaps_filled(
+    stimuli: list[tuple[tuple[str, ...], np.ndarray | None]], time: np.ndarray, file: Path
+) -> tuple[np.ndarray, list[str]]:
+    """Interpolate missing values of the stimulus in place; its columns are given with their names.
 
     Returns
     -------
@@ -628,10 +631,11 @@ def _gaps_filled(stimuli: list[np.ndarray | None], time: np.ndarray, file: Path)
         Remarks.
     """
     unknown, total = np.zeros(len(time), bool), 0
-    for column in (column for values in stimuli if values is not None for column in values.reshape(len(time), -1).T):
+    given = [(names, values.reshape(len(time), -1).T) for names, values in stimuli if values is not None]
+    for name, column in (pair for names, columns in given for pair in zip(names, columns, strict=True)):
         missing = np.isnan(column)
         if missing.all():
-            raise FileError(f"Every cell of a column of the stimulus in '{file.name}' is empty: record the trial again.")
+            raise FileError(f"Every cell of column '{name}' in '{file.name}' is empty: record the trial again.")
         if missing.any():
             total += int(missing.sum())
             unknown |= np.isnan(bridged(time, column))

@@ -24,6 +24,8 @@ OUTLIER_VARIANCE = 2.0
 """Texels with more than this many times the median variance do not count in the autocovariance."""
 WHITE_CORRELATION = 0.05
 """Autocorrelation below which samples count as uncorrelated."""
+LEAST_DIFFERENCES = 3
+"""Least number of known second differences from which the noise of a column is measured."""
 MAD_TO_DEVIATION = 1.4826
 """Standard deviation of a normal distribution divided by its median absolute deviation."""
 DEAD_BAND, LEAST_BAND = 5.0, 1e-4
@@ -86,12 +88,12 @@ def reading_noise(predictors: Sequence[Predictor], full: float) -> ChannelNoise:
         for start, stop in _unloaded_stretches(predictor):
             for texels in _unloaded_texels(predictor, start, stop):
                 part = reading[start:stop][:, texels]
-                part = part[:, np.isfinite(part).all(axis=0)]
+                part = part[:, np.isfinite(part).sum(axis=0) >= SHORTEST_STRETCH]
                 if part.shape[1]:
-                    variance, curve = _variance_and_autocovariance(part)
+                    variance, curve, known = _variance_and_autocovariance(part)
                     variances += list(variance)
-                    weights += [float(stop - start)] * len(variance)
-                    curves.append(curve * (stop - start) * part.shape[1])
+                    weights += list(known)
+                    curves.append(curve * known.sum())
     smallest = SMALLEST_NOISE * full
     alive = np.array(variances) > smallest**2
     if alive.sum() >= 1:
@@ -100,17 +102,14 @@ def reading_noise(predictors: Sequence[Predictor], full: float) -> ChannelNoise:
         share = np.cumsum(weight[order]) / weight.sum()
         middle = values[order][np.searchsorted(share, 0.5)]
         return ChannelNoise(float(np.sqrt(middle)), integral_time(curves), "stretches without load")
-    second = [_white_noise_deviation(p.trial.reading) for p in predictors if p.trial.reading is not None]
-    deviation = float(np.median(np.concatenate(second))) if second else 0.0
+    deviation = _median_deviation([p.trial.reading for p in predictors if p.trial.reading is not None])
     return ChannelNoise(max(deviation, smallest), 1.0, "differences between samples")
 
 
 def force_noise(predictors: Sequence[Predictor], full: float) -> ChannelNoise:
     """Measure the noise of the force sensor from second differences: there is no other channel to compare with."""
-    second = [_white_noise_deviation(p.trial.force) for p in predictors if p.trial.force is not None]
-    deviation = float(np.nanmedian(np.concatenate(second))) if second else 0.0
-    smallest = SMALLEST_NOISE * full
-    return ChannelNoise(max(deviation if np.isfinite(deviation) else 0.0, smallest), 1.0, "differences between samples")
+    deviation = _median_deviation([p.trial.force for p in predictors if p.trial.force is not None])
+    return ChannelNoise(max(deviation, SMALLEST_NOISE * full), 1.0, "differences between samples")
 
 
 def _unloaded_stretches(predictor: Predictor) -> list[tuple[int, int]]:
@@ -130,23 +129,35 @@ def _unloaded_texels(predictor: Predictor, start: int, stop: int) -> list[np.nda
     return [texels] if len(texels) else []
 
 
-def _variance_and_autocovariance(part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Variance of each column (c,) about a line and the common mode, and the mean autocovariance (64,).
+def _variance_and_autocovariance(part: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Variance of each column (c,) about a line and the common mode, the mean autocovariance (64,), and known values (c,).
 
-    The autocovariance is computed up to lags of a quarter of the samples.
+    Missing values are NaN. The autocovariance is computed up to lags of a quarter of the samples, over pairs of known values.
     """
     samples, columns = part.shape
     if columns >= MANY_TEXELS:
-        part = part - np.median(part, axis=1, keepdims=True)
-    t = np.linspace(-1.0, 1.0, samples)[:, None]
-    part = part - part.mean(axis=0) - t * (t * part).sum(axis=0) / (t * t).sum()
-    variance = (part * part).sum(axis=0) / (samples - 2)
-    lags = np.arange(AUTOCOVARIANCE_LAGS)
-    curve = np.zeros(len(lags))
+        together = np.isfinite(part).sum(axis=1) >= MANY_TEXELS // 2
+        part = np.where(together[:, None], part, np.nan)
+        part[together] -= np.nanmedian(part[together], axis=1, keepdims=True)
+    known = np.isfinite(part)
+    part = part[:, known.sum(axis=0) >= SHORTEST_STRETCH]
+    known = np.isfinite(part)
+    count = known.sum(axis=0)
+    part = np.where(known, part, 0.0)
+    t = np.linspace(-1.0, 1.0, samples)[:, None] * known
+    t = np.where(known, t - t.sum(axis=0) / count, 0.0)
+    part = np.where(known, part - part.sum(axis=0) / count, 0.0)
+    part = part - t * (t * part).sum(axis=0) / (t * t).sum(axis=0)
+    variance = (part * part).sum(axis=0) / (count - 2)
+    curve = np.zeros(AUTOCOVARIANCE_LAGS)
+    if len(variance) == 0:
+        return variance, curve, count
     kept = variance <= np.median(variance) * OUTLIER_VARIANCE + 1e-300
-    for lag in lags[: samples // 4 + 1]:
-        curve[lag] = float((part[: samples - lag, kept] * part[lag:, kept]).sum() / max(samples - lag, 1)) / max(kept.sum(), 1)
-    return variance, curve
+    for lag in range(min(AUTOCOVARIANCE_LAGS, samples // 4 + 1)):
+        first, second = slice(0, samples - lag), slice(lag, samples)
+        pairs = float((known[first] & known[second])[:, kept].sum())
+        curve[lag] = float((part[first, kept] * part[second, kept]).sum()) / max(pairs, 1.0)
+    return variance, curve, count
 
 
 def integral_time(curves: list[np.ndarray]) -> float:
@@ -161,12 +172,21 @@ def integral_time(curves: list[np.ndarray]) -> float:
 
 
 def _white_noise_deviation(values: np.ndarray) -> np.ndarray:
-    """Standard deviation of white noise in each column (c,), on top of any smooth signal."""
-    values = values[np.isfinite(values).all(axis=1)]
-    if len(values) < 5:
-        return np.zeros(values.shape[1])
+    """Standard deviation of white noise in each column (c,), on top of any smooth signal; NaN if too few values are known."""
     second = values[2:] - 2.0 * values[1:-1] + values[:-2]
-    return MAD_TO_DEVIATION * np.median(np.abs(second), axis=0) / np.sqrt(6.0)
+    deviations = np.full(values.shape[1], np.nan)
+    for column, changes in enumerate(np.abs(second).T):
+        known = changes[np.isfinite(changes)]
+        if len(known) >= LEAST_DIFFERENCES:
+            deviations[column] = MAD_TO_DEVIATION * np.median(known) / np.sqrt(6.0)
+    return deviations
+
+
+def _median_deviation(values: Sequence[np.ndarray]) -> float:
+    """Median of the deviations of all columns of which enough values are known; 0 if there are none."""
+    deviations = np.concatenate([np.zeros(0), *map(_white_noise_deviation, values)])
+    known = deviations[np.isfinite(deviations)]
+    return float(np.median(known)) if len(known) else 0.0
 
 
 @dataclass(frozen=True)

@@ -29,8 +29,9 @@ class GapErrors:
     Attributes
     ----------
     base, amended : dict of str to (float or None)
+        If recordings have levels and gains of their own, the base model is the one without them.
     stages : list of float or None
-        Of the models of `Diagnosis.stages` on the fitted trials.
+        Of the models of `Diagnosis.stages` on the fitted trials. The first one, the base model, has the levels and gains.
     frictionless : dict of str to (float or None), or None
         Of the base model without friction; None if nothing slides or no net force was measured.
     noise_floor : float
@@ -47,12 +48,13 @@ class GapErrors:
 def gap_errors(result: Diagnosis) -> GapErrors:
     """Compute the errors of all models of a diagnosis, once for summary, sentences and pictures."""
 
-    def by_use(model: Model) -> dict[str, float | None]:
-        return {use: nrmse(result.of(use), model, result.full) for use in USES}
+    def by_use(one: Diagnosis, model: Model) -> dict[str, float | None]:
+        return {use: nrmse(one.of(use), model, one.full) for use in USES}
 
+    before = result.alike or result
     return GapErrors(
-        base=by_use(result.base.model),
-        amended=by_use(result.best.model),
+        base=by_use(before, before.base.model),
+        amended=by_use(result, result.best.model),
         stages=[nrmse(result.of("fit"), model, result.full) for model in result.stages],
         frictionless=frictionless_nrmse(result),
         noise_floor=noise_floor_nrmse(result),
@@ -88,6 +90,28 @@ def nrmse(predictors: Sequence[Predictor], model: Model, full: tuple[float, floa
             square += float(error @ error)
             count += len(error)
     return float(np.sqrt(square / count)) if count else None
+
+
+def closed_share(errors: GapErrors, use: str) -> float | None:
+    """Return the share of the squared gap, noise removed, that closes in the recordings of one use; None without a gap."""
+    before, after, floor = errors.base[use], errors.amended[use], errors.noise_floor
+    if before is None or after is None or before <= floor:
+        return None
+    return float(round(min((before**2 - after**2) / (before**2 - floor**2), 1.0), 4))
+
+
+def recording_errors(result: Diagnosis, use: str) -> list[dict[str, Any]]:
+    """Return the NRMSE of base and amended model in each recording of one use, as under ``fitted`` in gap.json."""
+    before = result.alike or result
+    pairs = zip(before.of(use), result.of(use), strict=True)
+    return [
+        {
+            "trial": own.trial.name,
+            "before": nrmse([plain], before.base.model, result.full),
+            "after": nrmse([own], result.best.model, result.full),
+        }
+        for plain, own in pairs
+    ]
 
 
 def frictionless_nrmse(result: Diagnosis) -> dict[str, float | None] | None:

@@ -15,6 +15,7 @@ from ...model.sensor_parameters import unit_of
 from ..fitting.least_squares import BASE
 from ..forward.contact_phases import FEATURES
 from ..selection.findings import Diagnosis
+from .comparison import recording_errors
 from .plan_files import planned_sentence
 from .plots import CAPTIONS
 from .sentences import interval_ends, said_confidence
@@ -66,7 +67,7 @@ def html_report(result: Diagnosis, found: dict[str, Any], headline: str, picture
         varies_with=_structure_table(found),
         ruled_out=_ruled_out_table(found),
         recordings=_recordings_table(result),
-        trials=_trials_table(result),
+        trials=_trials_table(result, found),
     )
 
 
@@ -199,10 +200,12 @@ def _recordings_table(result: Diagnosis) -> Table:
     return Table(["", ""], rows)
 
 
-def _trials_table(result: Diagnosis) -> Table:
-    """One row for each trial."""
-    rows = [
-        [t.name, t.use, t.stimulus, f"{len(t.time)}", f"{t.time[-1] - t.time[0]:.3g} s", f"{1.0 / t.step:.4g} Hz"]
-        for t in result.rig.trials
-    ]
-    return Table(["trial", "use", "stimulus", "samples", "length", "rate"], rows, {3, 4, 5})
+def _trials_table(result: Diagnosis, found: dict[str, Any]) -> Table:
+    """One row for each trial, with its errors."""
+    errors = {one["trial"]: one for one in (*found["fitted"], *recording_errors(result, "check"))}
+    rows = []
+    for t in result.rig.trials:
+        length, one = f"{t.time[-1] - t.time[0]:.3g} s", errors[t.name]
+        left = [f"{one[key]:.3%}" if one[key] is not None else "–" for key in ("before", "after")]
+        rows.append([t.name, t.use, t.stimulus, f"{len(t.time)}", length, f"{1.0 / t.step:.4g} Hz", *left])
+    return Table(["trial", "use", "stimulus", "samples", "length", "rate", "base", "amended"], rows, {3, 4, 5, 6, 7})

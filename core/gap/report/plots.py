@@ -159,9 +159,9 @@ def phase_bars(result: Diagnosis, errors: GapErrors) -> Figure:
     """Squared error by phase of base and amended model, as shares of that of the base model."""
     figure = new_figure(WIDTHS["single"], 2.3)
     axes = figure.add_axes((0.17, 0.27, 0.8, 0.6))
-    base = errors.base["fit"] or 1.0
+    base = errors.stages[0] or 1.0
     for offset, (label, model, colour) in enumerate(_models(result)):
-        error = errors.base["fit"] if model is result.base.model else errors.amended["fit"]
+        error = errors.stages[0] if model is result.base.model else errors.amended["fit"]
         left = ((error or 0.0) / base) ** 2
         shares = {entry["phase"]: entry["share"] for entry in error_location(result, model) if "phase" in entry}
         heights = [100.0 * left * shares[phase] for phase in PHASES]
@@ -224,7 +224,8 @@ def _base_squared_error(predictor: Predictor, result: Diagnosis) -> np.ndarray:
 
 
 CAPTIONS = {
-    "gap": "The gap before and after. Check trials were never fitted, and took no part in choosing.",
+    "gap": "The gap before and after. Check trials were never fitted. A further effect that makes them worse was dropped, and "
+    "they decide whether the rest is borne out.",
     "curves": "What was measured and what the models say, where the base model errs most in each trial.",
     "loops": "The same over what was done to the sensor: the shape by which an effect is known.",
     "map": "Root mean square error of each texel on the fitted trials.",

@@ -12,11 +12,12 @@ from ..forward.contact_phases import FEATURES
 from ..selection.check_recordings import CHECK_CLOSED
 from ..selection.confidence import SURE
 from ..selection.findings import Diagnosis, Finding
-from ..selection.gap_sizes import FORCES, READINGS
+from ..selection.gap_sizes import FORCES, READINGS, friction_kinds
+from ..selection.silenced_texels import silenced_texels
 from ..selection.wear_or_drift import CLOCK, NOTHING, TEXELS, USE
 from .comparison import GapErrors, nrmse
 from .experiments import LOUD_NOISE
-from .recording_differences import recording_differences
+from .recording_differences import LEAST_GAIN, LEAST_LEVEL, recording_differences
 
 MOST_SAID = 0.99
 """Largest confidence that is said as a number: a few hundred cases do not tell one wrong name in a thousand from none."""
@@ -66,13 +67,26 @@ def _outcome(result: Diagnosis, errors: GapErrors) -> str:
         said += f" ({shrinks}). {NOT_TOLD}"
     else:
         said = f"Missing: {own.name} between recordings, of which each has a level and a gain of its own; {shrinks}."
-        said += f"{TOLD_BY[own.told_by]} Name their session to learn more."
+        said += f"{TOLD_BY[own.told_by]}{_odd_one(result)} Name their session to learn more."
     return f"{said} Beside that: {_effects(result, errors)}" if result.findings else said
+
+
+def _odd_one(result: Diagnosis) -> str:
+    """A sentence on the recording that alone differs from all others; empty if there is none."""
+    odd = result.between.odd_recording(result.full[READINGS]) if result.between is not None else None
+    if odd is None:
+        return ""
+    said = []
+    if abs(odd.level) > LEAST_LEVEL:
+        said.append(f"reads {abs(odd.level):.1%} of the range {'more' if odd.level > 0 else 'less'} than the others")
+    if abs(odd.gain) > LEAST_GAIN:
+        said.append(f"responds {abs(odd.gain):.0%} {'more' if odd.gain > 0 else 'less'} than they do")
+    return f" Only '{odd.name}' differs: it {' and '.join(said)}." if said else ""
 
 
 def _effects(result: Diagnosis, errors: GapErrors) -> str:
     """The missing effects in one sentence."""
-    before, after = errors.base["fit"] or 0.0, errors.amended["fit"] or 0.0
+    before, after = errors.stages[0] or 0.0, errors.amended["fit"] or 0.0
     findings = by_share_closed(result)
     sure = [one for one in findings if one.confidence >= SURE]
     if result.verdict == "no gap":
@@ -171,12 +185,17 @@ def _unexplained(result: Diagnosis, errors: GapErrors, sure: list[Finding]) -> s
         said = f"nothing that was looked at predicts what is left ({after:.2%} of the range)"
     else:
         said = f"what is left ({after:.2%} of the range) varies most with {FEATURES[structure.strongest]}"
-    return f"Unexplained: {said}.{part}{_friction(errors)}"
+    return f"Unexplained: {said}.{part}{_friction(result, errors)}"
 
 
-def _friction(errors: GapErrors) -> str:
-    """A sentence on how much of the error the base model's own friction removes; empty if that is little."""
+def _friction(result: Diagnosis, errors: GapErrors) -> str:
+    """A sentence on how much of the error the base model's own friction removes; empty if that is little.
+
+    Nor is it said where an effect on friction was found: then friction is part of what is missing.
+    """
     frictionless = (errors.frictionless or {}).get("fit") or 0.0
+    if any(one.name in friction_kinds() for one in result.findings):
+        return ""
     if frictionless < FRICTION_MATTERS * (errors.base["fit"] or 0.0):
         return ""
     return f" Friction is not missing: the base model has it, and without it the error would be {frictionless:.2%}."
@@ -196,7 +215,7 @@ def evidence(result: Diagnosis, errors: GapErrors) -> list[str]:
         before, after = left[one.effect], left[min(one.effect + 1, len(left) - 1)]
         confidence = said_confidence(one.confidence)
         said.append(f"{one.name} ({one.form}): {before:.2%} → {after:.2%}, confidence {confidence}{rivals}")
-        said += [f"{one.name}: {why}, so its name is not sure" for why in one.unsettled]
+        said += [f"{one.name}: {why}, so its name is not sure" for why in (*one.unsettled, *one.doubts)]
     if result.of("check") and result.findings:
         before, after = errors.base["check"] or 0.0, errors.amended["check"] or 0.0
         said.append(f"never fitted: {before:.2%} → {after:.2%}; noise alone is {errors.noise_floor:.2%}")
@@ -235,6 +254,11 @@ def warnings(result: Diagnosis) -> list[str]:
         said.append(
             f"Texel {one.texel} of the check recording '{one.recording}' has {one.times:.0f} times the squared error of any "
             "texel in the fitted recordings, and keeps it: it is in the errors, and is not held against the amended sensor."
+        )
+    for silenced in silenced_texels(result.predictors, result.base.model, result.noise[READINGS].deviation):
+        said.append(
+            f"Texel {silenced.texel} answers no more from {silenced.seconds:.3g} s of '{silenced.recording}' on, whatever "
+            f"presses on it: repair it, or leave its readings empty from there on."
         )
     overpressed = max((p.stimulus.overpressed for p in result.predictors), default=0)
     if overpressed:

@@ -19,9 +19,9 @@ from ..forward.predictor import Model
 from ..planning.experiment_plan import PlannedExperiment, plan_after
 from ..selection.check_recordings import CheckedRecording
 from ..selection.findings import Diagnosis, Finding
-from ..selection.gap_sizes import FORCES, READINGS
+from ..selection.gap_sizes import FORCES, READINGS, friction_kinds
 from .amended_sensor import amended_sensor, with_mean_gain_moved
-from .comparison import GapErrors, error_location, gap_errors
+from .comparison import USES, GapErrors, closed_share, error_location, gap_errors, recording_errors
 from .experiments import next_experiment
 from .html_report import html_report
 from .plan_files import NEXT_TRAJECTORY, experiment_words, write_trajectory
@@ -60,7 +60,13 @@ def summary(result: Diagnosis, errors: GapErrors, experiment: PlannedExperiment 
             "numbers": dict(model.recordings),
             "intervals": {one.name: [one.low, one.high] for one in recordings},
         },
-        "gap": {"before": errors.base, "after": errors.amended, "noise_floor": errors.noise_floor, "closed": _closed(result)},
+        "gap": {
+            "before": errors.base,
+            "after": errors.amended,
+            "noise_floor": errors.noise_floor,
+            "closed": _closed(result, errors),
+        },
+        "fitted": recording_errors(result, "fit"),
         "check": [_checked(one, result) for one in result.check.recordings],
         "where": error_location(result, result.base.model),
         "varies_with": {key: round(value, 4) for key, value in result.base_structure.shares.items()},
@@ -98,9 +104,19 @@ def _between(result: Diagnosis) -> dict[str, Any] | None:
     }
 
 
-def _closed(result: Diagnosis) -> dict[str, Any] | None:
-    """Shares of the squared gap that are closed, of readings or else of forces; None without a gap or an effect."""
-    quantity = next((q for q in (READINGS, FORCES) if result.closed.least(q) is not None), None)
+def _closed(result: Diagnosis, errors: GapErrors) -> dict[str, Any] | None:
+    """Shares of the squared gap that are closed, of readings or else of forces; None without a gap, or if nothing was found.
+
+    They are those of the quantity by which an effect was judged. Levels and gains of recordings count as found: the shares are
+    then those of the errors, and nothing is known of left-out parts.
+    """
+    if result.between is not None:
+        shares = {use: closed_share(errors, use) for use in USES}
+        known = [share for share in shares.values() if share is not None]
+        return {"fit": shares["fit"], "left_out": None, "check": shares["check"], "least": min(known)} if known else None
+    only_friction = bool(result.findings) and all(one.name in friction_kinds() for one in result.findings)
+    order = (FORCES, READINGS) if only_friction else (READINGS, FORCES)
+    quantity = next((q for q in order if result.closed.least(q) is not None), None)
     if quantity is None or not result.findings:
         return None
     parts = {"fit": result.closed.fitted, "left_out": result.closed.left_out, "check": result.closed.check}
@@ -134,6 +150,7 @@ def _found(one: Finding, model: Model, result: Diagnosis, errors: GapErrors) -> 
         "confidence": one.confidence,
         "closes": one.closes,
         "unsettled": list(one.unsettled),
+        "doubts": list(one.doubts),
         "gap_before": errors.stages[one.effect],
         "gap_after": errors.stages[min(one.effect + 1, len(errors.stages) - 1)],
         "next_best": {"effect": one.next_best, "leaves": round(one.leaves, 3)} if one.next_best else None,

@@ -12,6 +12,7 @@ __all__ = [
     "findings",
     "gap_sizes",
     "identifiability",
+    "silenced_texels",
     "unfitted",
     "wear_or_drift",
 ]

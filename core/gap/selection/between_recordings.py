@@ -37,7 +37,11 @@ WEAR = only_name_where(lambda kind: kind.gain_falls_with == USE)
 DRIFT = only_name_where(lambda kind: kind.gain_falls_with == CLOCK)
 """The effect that lowers the gain with use, and the one that lowers it with time."""
 WEAR_ORDER = -0.5
-"""Rank correlation of the factors with the order of the recordings below which they fall as of wear."""
+"""Correlation of the factors, or of their ranks, with the order of the recordings below which they fall as of wear."""
+
+ODD_TIMES = 5.0
+"""A recording alone differs if its distance from the middle gain and level is this many times that of any other. It sets a
+sentence and no name."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +73,32 @@ class RecordingDifferences:
     zeros: dict[str, float]
     told_by: str = NOTHING
     rival: str = ""
+
+    def odd_recording(self, full: float) -> OddRecording | None:
+        """Return the recording that alone differs from the others; None if several do, or none.
+
+        Parameters
+        ----------
+        full : float
+            Range of the readings.
+        """
+        names = list(self.factors)
+        gains, levels = np.array([self.factors[n] for n in names]), np.array([self.zeros.get(n, 0.0) for n in names]) / full
+        gains, levels = gains / np.median(gains) - 1.0, levels - np.median(levels)
+        apart = np.hypot(gains, levels)
+        first, second = np.argsort(apart)[::-1][:2]
+        if not apart[first] > ODD_TIMES * apart[second]:
+            return None
+        return OddRecording(names[first], float(gains[first]), float(levels[first]))
+
+
+@dataclass(frozen=True)
+class OddRecording:
+    """The one recording that differs: its gain relative to the others less 1, and its level above theirs in ranges."""
+
+    name: str
+    gain: float
+    level: float
 
 
 def may_differ(rig: Rig) -> bool:
@@ -130,7 +160,8 @@ def differences(
     confidence = round(0.5 + 0.5 * float(np.clip(closes, 0.0, 1.0)), 3)
     drift = RecordingDifferences(DRIFT, closes, confidence, before, factors, zeros)
     gain, level = np.array(list(factors.values())), np.array(list(zeros.values()))
-    falls = float(np.corrcoef(np.argsort(np.argsort(gain)), np.arange(len(gain)))[0, 1]) < WEAR_ORDER
+    order_of_gains = np.argsort(np.argsort(gain)), gain  # a gain that falls once has an order of chance on either side
+    falls = any(float(np.corrcoef(one, np.arange(len(gain)))[0, 1]) < WEAR_ORDER for one in order_of_gains if np.ptp(one) > 0)
     if not falls or float(gain.std()) * full <= float(level.std()):
         return drift
     stimuli = [one.stimulus for one in order]

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -111,14 +112,21 @@ def companded_steps(values: np.ndarray) -> list[CompandedSteps]:
     values : (n,) float
         Readings less the reading without load, in the sensor's unit.
     """
+    return list(_companded_steps_kept(np.ascontiguousarray(values, float).tobytes()))
+
+
+@lru_cache(maxsize=2)
+def _companded_steps_kept(raw: bytes) -> tuple[CompandedSteps, ...]:
+    """The same of readings as bytes. Several forms ask for the steps of the same readings."""
+    values = np.frombuffer(raw)
     size = np.abs(values)
     above = values[size > 0.0] if len(values) else values
     if len(above) < LEAST_READINGS:
-        return []
+        return ()
     above = above * np.sign(np.quantile(above, 0.99) + np.quantile(above, 0.01))
     above = np.sort(above[above > LOWEST * above.max()])
     if len(above) < LEAST_READINGS or 1.0 - len(np.unique(above)) / len(above) < LEAST_REPEATED:
-        return []
+        return ()
     best: list[CompandedSteps] = []
     for seed in _seeds(above):
         grown = [_grown(above, replace(seed, logarithmic=logarithmic)) for logarithmic in (False, True)]
@@ -127,7 +135,7 @@ def companded_steps(values: np.ndarray) -> list[CompandedSteps]:
             best = found
         if best and best[0].strength >= CLEAR:
             break
-    return best
+    return tuple(best)
 
 
 def _fundamental(above: np.ndarray, steps: CompandedSteps) -> CompandedSteps:

@@ -16,7 +16,6 @@ from ...effects.engine.declarations import STEPS
 from ...effects.engine.registry import form_of, kind_of, names_found_by
 from ...model.effect import Effect
 from ..fitting.least_squares import Fit
-from ..kinds.search import KNOWN_KINDS
 from .candidates import DIRECTLY_ESTIMATED, is_spatial, parameters_at_bounds
 from .direct_estimates import coarsest_step
 from .findings import Diagnosis
@@ -101,23 +100,26 @@ def least_share(name: str, leaves: dict[str, float]) -> float:
     return PARTLY_EXPLAINED if apart else EXPLAINED
 
 
-def is_doubtful(effect: Effect, state: SelectionState, fitted: Sequence[Effect], gap_sizes: GapSizes) -> bool:
-    """Return whether one of several effects may only be the misfit of another one's formula."""
+def misfit_of_another(effect: Effect, state: SelectionState, fitted: Sequence[Effect], gap_sizes: GapSizes) -> str:
+    """Return in words why one of several effects may only be the misfit of another one's formula; empty if nothing says so."""
     improvement, step = state.improvements.get(effect.name), state.steps.get(effect.name)
-    if _describes_dead_texels(effect, fitted) or _larger_effect_of_same_kind(effect, state, fitted, gap_sizes):
-        return True
+    if _describes_dead_texels(effect, fitted):
+        return "it varies mostly over texels that are dead"
+    if _larger_effect_of_same_kind(effect, state, fitted, gap_sizes):
+        return "it may make up for the formula of a similar effect that closes more"
     if step is not None and step.times_worse(step.remaining_repeated, effect.name) < REPEATED_RATIO:
-        return True
+        return "a second effect of a kind that is in the model does nearly as well in its place"
     if improvement is None or improvement.of_gap >= SMALL_SHARE:
-        return False
+        return ""
+    little = f"it closes {max(improvement.of_gap, 0.0):.1%} of the gap, and the misfit of another formula may close as much"
     if improvement.of_remaining < NEARLY_ALL:
-        return True
+        return little
     own = [np.asarray(value) for value in effect.values.values() if isinstance(value, tuple)]
     if own and any(is_spatial(form_of(other.name, other.form)) for other in fitted if other is not effect):
-        return True  # texels at the rim have fewer neighbours: a misfit there looks like parameters of single texels
+        return little  # texels at the rim have fewer neighbours: a misfit there looks like parameters of single texels
     others = [np.asarray(v) for other in fitted if other is not effect for v in other.values.values() if isinstance(v, tuple)]
     pairs = [np.corrcoef(a, b)[0, 1] for a in own for b in others if np.ptp(a) > 0 and np.ptp(b) > 0]
-    return any(abs(r) > SAME_PATTERN for r in pairs)
+    return "it has the pattern of another effect over the texels" if any(abs(r) > SAME_PATTERN for r in pairs) else ""
 
 
 def may_absorb_misfit(effect: Effect, state: SelectionState) -> bool:
@@ -128,15 +130,6 @@ def may_absorb_misfit(effect: Effect, state: SelectionState) -> bool:
     mine = state.improvements[effect.name].of_gap if effect.name in state.improvements else 0.0
     larger = any(improvement.of_gap > mine for name, improvement in state.improvements.items() if name != effect.name)
     return larger and effect.name not in DIRECTLY_ESTIMATED and _has_texel_numbers(effect)
-
-
-def kinds_can_settle(effect: Effect) -> bool:
-    """Return whether the search by kinds tells anything about an effect.
-
-    It has no dictionary of friction, for example. Numbers of single texels absorb what another kind leaves, whether that is a
-    formula or not.
-    """
-    return effect.name in KNOWN_KINDS and not _has_texel_numbers(effect)
 
 
 def _has_texel_numbers(effect: Effect) -> bool:
@@ -199,8 +192,8 @@ def _describes_dead_texels(effect: Effect, fitted: Sequence[Effect]) -> bool:
     return False
 
 
-def unsure_names(result: Diagnosis, view_set: ViewSet, state: SelectionState, gap_sizes: GapSizes) -> set[str]:
-    """Return the names of effects that are not sure because of other effects, or of gaps in the recordings.
+def unsure_names(result: Diagnosis, view_set: ViewSet, state: SelectionState, gap_sizes: GapSizes) -> dict[str, str]:
+    """Return the effects that are not sure because of other effects, or of gaps in the recordings, each with why, in words.
 
     - Effects that close little of the gap, if the recordings leave rivals.
     - All effects, if the recordings cannot distinguish some effect from another; any measured curve could belong to either.
@@ -210,28 +203,31 @@ def unsure_names(result: Diagnosis, view_set: ViewSet, state: SelectionState, ga
     - Effects on friction, if the normal force is off by more than they close: friction is proportional to it.
     """
     small = {name for name, improvement in state.improvements.items() if improvement.of_gap < SMALL_SHARE}
-    unsure = small if result.ambiguous else set()
+    unsure = dict.fromkeys(small, "it closes little of the gap, and these recordings do not tell a larger effect from others")
+    unsure = unsure if result.ambiguous else {}
     names = {one.name for one in result.findings}
     curvature = curvature_ratio(result.of("fit"), result.best.model)
     ambiguous = {name for name in names if indistinguishable(result.coverage, name, curvature)}
     if ambiguous:
         main = {name for name in names - ambiguous if _closes_most(name, ambiguous, state, gap_sizes)}
-        unsure |= names - set(DIRECTLY_ESTIMATED) - main
+        why = f"these recordings do not tell {' and '.join(sorted(ambiguous))} from other effects, of which this may be a part"
+        unsure |= dict.fromkeys(names - set(DIRECTLY_ESTIMATED) - main, why)
     if result.coverage.unloaded_share < LEAST_UNLOADED_SHARE and {name for pair in result.ambiguous for name in pair} & set(
         MOVING_BY_THEMSELVES
     ):
-        unsure |= set(MOVING_BY_THEMSELVES)
+        unsure |= dict.fromkeys(MOVING_BY_THEMSELVES, "nothing is at rest in these recordings for long")
     step = coarsest_step(view_set.whole, result.base.model)
     size = {
         name: abs(improvement.of_gap) * gap_sizes.gap(gap_sizes.main_quantity)
         for name, improvement in state.improvements.items()
     }
     if not names & set(names_found_by(STEPS)) and gap_sizes.main_quantity == READINGS:
-        unsure |= {name for name, square in size.items() if square < (step / result.noise[READINGS].deviation) ** 2}
+        fine = [name for name, square in size.items() if square < (step / result.noise[READINGS].deviation) ** 2]
+        unsure |= dict.fromkeys(fine, "it changes the readings by less than one of their steps")
     for name in names & set(friction_kinds()) if gap_sizes.both else ():
         closed = state.improvements[name].of_gap * gap_sizes.gap(FORCES) * gap_sizes.count[FORCES]
         if closed < _normal_squares(view_set, state.fit, float(gap_sizes.noise[FORCES])):
-            unsure.add(name)
+            unsure[name] = "the normal force is off by more than it closes, and friction is proportional to it"
     return unsure
 
 

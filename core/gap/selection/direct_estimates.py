@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -132,6 +133,13 @@ def _roundings(candidate: Candidate, values: dict[str, float]) -> list[Effect]:
 
 def even_steps(values: np.ndarray, noise: float) -> float | None:
     """Return the even step of readings by their characteristic function, in the sensor's unit; None if none is seen."""
+    return _even_steps_kept(np.ascontiguousarray(values, float).tobytes(), noise)
+
+
+@lru_cache(maxsize=2)
+def _even_steps_kept(raw: bytes, noise: float) -> float | None:
+    """The same of readings as bytes. Several forms ask for the steps of the same readings."""
+    values = np.frombuffer(raw)
     full = float(np.ptp(values))
     if full == 0.0:
         return None

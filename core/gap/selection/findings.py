@@ -15,7 +15,6 @@ from ..fitting.noise_floor import ChannelNoise, Coverage
 from ..fitting.residual_tests import ResidualStructure
 from ..fitting.spectral_lines import SpectralLine
 from ..forward.predictor import Model, Predictor
-from ..kinds.decision import NamedKind
 from .between_recordings import LOAD_HISTORY, RecordingDifferences
 from .candidates import Scales
 from .check_recordings import CheckedRecording, CheckOutcome
@@ -44,6 +43,8 @@ class Finding:
         Share of the whole gap that it closed when it joined.
     unsettled : tuple of str
         What is wrong with its parameters, in words: those at a bound, and those that the recordings leave open.
+    doubts : tuple of str
+        Why else its name is not sure, in words; rivals and `unsettled` say their own.
     """
 
     effect: int
@@ -55,6 +56,7 @@ class Finding:
     leaves: float = np.inf
     closes: float = 0.0
     unsettled: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -118,6 +120,8 @@ class Diagnosis:
         Faults of the data, whether they were put right or not.
     between : RecordingDifferences or None
         Levels and gains by which the recordings differ, if the search was better with them; they are part of both models.
+    alike : Diagnosis or None
+        The same recordings without levels and gains of their own, if `between` is given: what the gap was before them.
     assumed_session : bool
         Whether the recordings, of which the rig names no session, are explained as one session in their order.
     check : CheckOutcome
@@ -128,8 +132,6 @@ class Diagnosis:
         How much of the gaps the amended model closes.
     unlike_fitted : list of CheckedRecording
         Check recordings that the base model fits far worse than the fitted ones.
-    chosen_kinds : dict of str to NamedKind
-        Kinds that the search by kinds named, if the effects are those among them that the forms bear out; else empty.
     """
 
     rig: Rig
@@ -151,12 +153,12 @@ class Diagnosis:
     line: SpectralLine | None = None
     faults: list[DataFault] = field(default_factory=list)
     between: RecordingDifferences | None = None
+    alike: Diagnosis | None = None
     assumed_session: bool = False
     check: CheckOutcome = field(default_factory=CheckOutcome)
     outlying: list[OutlyingChannel] = field(default_factory=list)
     closed: ClosedShares = field(default_factory=ClosedShares)
     unlike_fitted: list[CheckedRecording] = field(default_factory=list)
-    chosen_kinds: dict[str, NamedKind] = field(default_factory=dict)
 
     @property
     def carried_over(self) -> Finding | None:

@@ -11,24 +11,24 @@ from ...effects.engine.declarations import SILENT_TEXELS
 from ...effects.engine.registry import kind_of, library
 from ...model.effect import Effect
 from ..fitting.repeat_noise import MEASURED_REPEATS, is_scatter_of_repeats
-from ..fitting.residual_tests import LEAST_STRUCTURE
+from ..fitting.residual_tests import LEAST_STRUCTURE, ResidualStructure
 from .candidates import NOT_FITTED, candidates
 from .check_recordings import CheckedRecording
 from .confidence import (
     EXPLAINED,
+    SURE,
     UNLIKELY_CONFIDENCE,
     UNSURE_CONFIDENCE,
-    is_doubtful,
-    kinds_can_settle,
     least_share,
     may_absorb_misfit,
+    misfit_of_another,
     probability,
     unsettled_parameters,
     unsure_names,
 )
 from .findings import ClosedShares, Diagnosis, Finding
 from .forward_selection import SelectionState, SelectionStep, means_of
-from .gap_sizes import FORCES, LEAST_IMPROVEMENT, READINGS, GapSizes
+from .gap_sizes import FORCES, LEAST_IMPROVEMENT, READINGS, GapSizes, friction_kinds
 from .identifiability import SPREADING, curvature_ratio, hardly_distinguishable, indistinguishable, unidentifiable
 from .plausibility import HEIGHT_ALONE, is_height_alone
 from .view_set import ViewSet
@@ -42,6 +42,10 @@ RIVAL_EXPONENT = -4.0
 """Weight of an effect among n others that are r₁ … rₙ times as bad: 1 / (1 + Σ rᵢ⁻⁴), as of likelihoods that fall fast."""
 UNRESOLVED_TIMES = 2.0
 """A spreading effect that leaves less than this many times what no fit can resolve has the sensor's own formula."""
+FAULTY = "the data have faults that were not put right"
+REFUTED = "the check recordings do not bear the amended model out"
+ABSORBS = "much of the gap is left, and numbers of single texels may have absorbed a part of it"
+"""Why a name is not sure, in words."""
 MOST_MEAN_SQUARE = 2.0
 """Mean square of the base model's residual, in units of the noise, up to which a residual without structure is no gap. In a
 check recording it may also be as many times that of the fitted ones."""
@@ -53,9 +57,11 @@ def conclude(result: Diagnosis, view_set: ViewSet, state: SelectionState, gap_si
     result.unlike_fitted = _unlike_fitted(result, gap_sizes)
     _judge_effects(result, view_set, state, gap_sizes)
     unsure = unsure_names(result, view_set, state, gap_sizes)
+    if result.misleading_faults:
+        unsure = {one.name: FAULTY for one in result.findings} | unsure
     result.findings = [
-        replace(one, confidence=min(one.confidence, UNSURE_CONFIDENCE))
-        if one.name in unsure or result.misleading_faults
+        replace(one, confidence=min(one.confidence, UNSURE_CONFIDENCE), doubts=(*one.doubts, unsure[one.name]))
+        if one.name in unsure
         else one
         for one in result.findings
     ]
@@ -95,13 +101,13 @@ def _judge_effects(result: Diagnosis, view_set: ViewSet, state: SelectionState, 
     fitted = result.best.model.fitted_effects
     left_out = [gap_sizes.closed_share(state.means, quantity) for quantity in (READINGS, FORCES)]
     closed = [_least_share_closed(result, left_out, quantity) for quantity in (READINGS, FORCES)]
-    is_open = any(gap_sizes.has_gap(quantity) and left_out[quantity] < EXPLAINED for quantity in (READINGS, FORCES))
+    is_open = any(
+        gap_sizes.has_gap(quantity) and left_out[quantity] < EXPLAINED and not _is_out_of_reach(result, gap_sizes, quantity)
+        for quantity in (READINGS, FORCES)
+    )
     result.verdict = _verdict(result, gap_sizes, is_open or (bool(fitted) and result.check.is_refuted))
     for index, effect in enumerate(effects):
-        chosen = result.chosen_kinds.get(effect.name) if kinds_can_settle(effect) else None
         times_worse, leaves = _alternatives(effect, state, {e.name for e in effects})
-        if chosen is not None:  # no formula has taken part in this comparison
-            times_worse = leaves = chosen.leaves
         rivals = _rivals(effect, state, result, times_worse, gap_sizes)
         weight = 1.0 / (1.0 + sum(ratio**RIVAL_EXPONENT for ratio in times_worse.values()))
         quantity = gap_sizes.quantity_for(effect.name)
@@ -110,24 +116,60 @@ def _judge_effects(result: Diagnosis, view_set: ViewSet, state: SelectionState, 
         only_height = is_height_alone(result.best.model, index, view_set)
         unsettled += (HEIGHT_ALONE,) if only_height else ()
         support = weight * (0.5 + 0.5 * share if share >= least_share(effect.name, leaves) else 0.5 * share)
-        absorbs = is_open and may_absorb_misfit(effect, state)
-        misfits = chosen is None and len(fitted) > 1 and (absorbs or is_doubtful(effect, state, fitted, gap_sizes))
-        unborne = (unsettled and chosen is None) or only_height or (fitted and result.check.refutes(quantity))
-        confidence = min(support, UNSURE_CONFIDENCE) if rivals or misfits or unborne else probability(support)
+        doubts = _doubts(effect, result, state, gap_sizes, is_open)
+        doubts += (REFUTED,) if fitted and result.check.is_refuted else ()
+        lowered = rivals or doubts or only_height or unsettled
+        confidence = min(support, UNSURE_CONFIDENCE) if lowered else probability(support)
+        if confidence < SURE and not lowered:
+            doubts = (_low_support(share, least_share(effect.name, leaves)),)
         if rivals:
             result.ambiguous.append((effect.name, *rivals))
         nearest = min(times_worse, key=lambda name: times_worse[name], default="")
         closes = state.improvements[effect.name].of_gap if effect.name in state.improvements else 0.0
         near = nearest, leaves.get(nearest, np.inf)
         result.findings.append(
-            Finding(index, effect.name, effect.form, round(confidence, 3), rivals, *near, round(closes, 4), unsettled)
+            Finding(index, effect.name, effect.form, round(confidence, 3), rivals, *near, round(closes, 4), unsettled, doubts)
         )
+
+
+def _doubts(effect: Effect, result: Diagnosis, state: SelectionState, gap_sizes: GapSizes, is_open: bool) -> tuple[str, ...]:
+    """Why an effect may only make up for another one's formula, in words; empty if it is alone, or if nothing says so."""
+    fitted = result.best.model.fitted_effects
+    if len(fitted) < 2:
+        return ()
+    absorbs = is_open and may_absorb_misfit(effect, state)
+    why = ABSORBS if absorbs else misfit_of_another(effect, state, fitted, gap_sizes)
+    return (why,) if why else ()
+
+
+def _low_support(share: float, least: float) -> str:
+    """Why the support of an effect is low, in words."""
+    if share < least:
+        return f"the amended model closes {max(share, 0.0):.0%} of the squared gap, and a sure name needs {least:.0%}"
+    return "other kinds together do nearly as well in its place"
 
 
 def _least_share_closed(result: Diagnosis, left_out: list[float], quantity: int) -> float:
     """Smallest share of a gap that is closed: in left-out parts, in the fitted recordings, and in the check recordings."""
     least = result.closed.least(quantity)
     return left_out[quantity] if least is None else float(np.clip(least, 0.0, 1.0))
+
+
+def _is_out_of_reach(result: Diagnosis, gap_sizes: GapSizes, quantity: int) -> bool:
+    """Whether effects on friction are all there is, and what readings leave would be no gap by itself.
+
+    Friction cannot change readings, so it is not held against it that little of them closes.
+    """
+    fitted = result.best.model.fitted_effects
+    only_friction = bool(fitted) and all(effect.name in friction_kinds() for effect in fitted)
+    return only_friction and quantity == READINGS and gap_sizes.both and _is_quiet(result, result.structure, gap_sizes)
+
+
+def _is_quiet(result: Diagnosis, structure: ResidualStructure, gap_sizes: GapSizes) -> bool:
+    """Whether the base model's residual is small, or little more than noise, and what is left of it has no structure."""
+    mean, gap = float(gap_sizes.base[gap_sizes.main_quantity]), gap_sizes.gap(gap_sizes.main_quantity)
+    small = (mean < MOST_MEAN_SQUARE or gap < LEAST_IMPROVEMENT) and not result.unlike_fitted
+    return structure.total < LEAST_STRUCTURE and small and result.line is None
 
 
 def _verdict(result: Diagnosis, gap_sizes: GapSizes, is_open: bool) -> str:
@@ -139,9 +181,7 @@ def _verdict(result: Diagnosis, gap_sizes: GapSizes, is_open: bool) -> str:
         return "unexplained" if is_open else "explained"
     if is_scatter_of_repeats(result.noise, result.base.sse, result.base.count) and not result.unlike_fitted:
         return "no gap"
-    mean, gap = float(gap_sizes.base[gap_sizes.main_quantity]), gap_sizes.gap(gap_sizes.main_quantity)
-    small = (mean < MOST_MEAN_SQUARE or gap < LEAST_IMPROVEMENT) and not result.unlike_fitted
-    quiet = result.base_structure.total < LEAST_STRUCTURE and small and result.line is None
+    quiet = _is_quiet(result, result.base_structure, gap_sizes)
     return "no gap" if quiet and not (gap_sizes.both and gap_sizes.has_gap(FORCES)) else "unexplained"
 
 

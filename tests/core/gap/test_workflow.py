@@ -154,6 +154,27 @@ def test_a_search_of_load_spreading_does_not_begin_where_nothing_spreads(form):
     assert 0.2 * cases.PITCH < free.low < 0.3 * cases.PITCH
 
 
+def test_loads_spread_alike_on_a_mesh_whose_rim_has_small_vertices():
+    """Each vertex is a texel of one stiffness: those at the rim take as much of a load as their distance says."""
+    width = 1.2 * cases.PITCH
+    rig = cases.rig(trials=1, seconds=1.0)
+    apart = np.linalg.norm(rig.texels.position[:, None] - rig.texels.position[None], axis=2)
+    kernel = np.exp(-0.5 * (apart / width) ** 2)
+    kernel /= kernel.sum(axis=0)
+    rig = cases.rig(change=lambda r, t: r @ kernel.T, noise=1e-4, seed=14, trials=3, seconds=6.0, stated=80.0)
+    near = (apart < 1.1 * cases.PITCH).sum(axis=0)  # with the vertex itself: 3 at a corner, 4 at a side
+    texels = replace(rig.texels, area=rig.texels.area * np.where(near == 3, 0.25, np.where(near == 4, 0.5, 1.0)))
+    rig = replace(rig, texels=texels)
+    form = kind_of("load-spreading").forms[0]
+    start = Model(rig.parameters, (effect("load-spreading", form.name, width=0.8 * width),))
+    free = [*free_base_parameters(rig.parameters, ("k", "cn"), 1.0), FreeParameter(0, "width", 1e-4, 0.1)]
+    noise = 1e-4 * max(float(trial.reading.max()) for trial in rig.trials)
+    found = fit(views_of(rig, noise), start, free, max_steps=40, tolerance=1e-8)
+    assert found.mean < 1.5  # the noise alone is 1; by areas of the vertices it was 8e5
+    assert found.model.parameters.k == pytest.approx(80.0, rel=0.005)
+    assert found.model.effects[0].values["width"] == pytest.approx(width, rel=0.005)
+
+
 def test_nothing_hidden_but_wrong_parameters_is_no_gap():
     result = diagnosed(cases.rig(seed=6, colour=0.8, stated=130.0))
     assert result.verdict == "no gap" and not result.findings and not result.ambiguous

@@ -201,6 +201,13 @@ def test_a_missing_rig_and_missing_stimulus_values(tmp_path):
     z = rig.trials[0].position[:, 2]
     assert z[9] == pytest.approx(0.5 * (z[8] + z[10]))
     assert any("interpolated" in warning for warning in rig.warnings)
+    lines = write(tmp_path).with_name("press.csv").read_text().splitlines()
+    at = lines[0].split(",").index("z")
+    for i in range(1, len(lines)):
+        cells = lines[i].split(",")
+        lines[i] = ",".join([*cells[:at], "", *cells[at + 1 :]])
+    with pytest.raises(PalpateError, match="Every cell of column 'z' in 'press.csv' is empty"):
+        read_rig(write(tmp_path, press="\n".join(lines) + "\n"))
 
 
 def test_columns_without_meaning_are_said(tmp_path):

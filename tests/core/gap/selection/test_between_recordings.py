@@ -110,6 +110,12 @@ def test_gains_that_fall_alike_in_recordings_that_are_alike_are_wear_or_drift(mo
         patch.setattr(between_recordings, "texels_can_tell", lambda order: True)
         of_all_texels = differing(falling, [4] * 6, True)
     assert (of_all_texels.name, of_all_texels.rival, of_all_texels.told_by) == ("drift", "", TEXELS)
+    once = differing(np.array([0.999, 1.0, 1.001, 1.002, 0.9, 0.903]), [4] * 6, False)
+    assert (once.name, once.rival, once.told_by) == ("drift", "wear", NOTHING), (
+        "a fall from one recording on is told by nothing"
+    )
+    scattered = differing(np.array([1.0, 0.9, 1.05, 0.95, 1.1, 0.97]), [4] * 6, False)
+    assert (scattered.name, scattered.rival) == ("drift", "")
     amounts = [2, 16, 2, 2, 20, 4]
     used = (np.cumsum(amounts) - 0.5 * np.array(amounts)) / sum(amounts)
     worn = differing(np.exp(-0.4 * used), amounts, False)

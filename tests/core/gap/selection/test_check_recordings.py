@@ -15,6 +15,7 @@ from palpate.core.gap.fitting.least_squares import Fit, FreeParameter, TrialView
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.report import sentences, summary
 from palpate.core.gap.report.comparison import gap_errors
+from palpate.core.gap.selection import diagnosis
 from palpate.core.gap.selection.candidates import parameters_at_bounds
 from palpate.core.gap.selection.check_recordings import CheckedRecording, CheckOutcome, checked
 from palpate.core.gap.selection.confidence import CLEAR_LEAD, _closes_most, unsettled_parameters
@@ -22,6 +23,7 @@ from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.forward_selection import SelectionState, SelectionStep
 from palpate.core.gap.selection.gap_sizes import GapSizes, Improvement
 from palpate.core.gap.selection.harmful_effects import without_harmful_effects
+from palpate.core.gap.selection.verdict import FAULTY, REFUTED, conclude
 from palpate.core.jobs.job_runner import run_job
 from palpate.core.model.sensor_parameters import SensorParameters
 
@@ -82,8 +84,9 @@ def test_a_check_that_fails_is_said_with_what_differs(tmp_path):
     rig = with_check(cases.rig(contact=cases.relaxing(), seed=7, trials=4, seconds=9.0), 0.6)
     result = diagnosed(rig)
     assert [one.name for one in result.findings] == ["creep"] and result.findings[0].confidence < 0.5
-    assert result.verdict == "unexplained"
+    assert result.verdict == "unexplained" and result.findings[0].doubts == (REFUTED,)
     errors = gap_errors(result)
+    assert f"creep: {REFUTED}, so its name is not sure" in sentences.evidence(result, errors)
     said = sentences.headline(result, errors)
     assert "creep fits the fitted recordings" in said and "'t3'" in said and "40% less" in said
     assert sentences.caution(result) in sentences.warnings(result)
@@ -183,3 +186,27 @@ def test_a_share_of_all_is_no_bound():
 def test_a_loop_that_unloads_as_it_loads_is_no_bound(beta, at_bound):
     model = Model(SensorParameters(), (effect("hysteresis", "bouc-wen", beta=beta),))
     assert parameters_at_bounds(model, (FreeParameter(0, "beta", 0.5, 1.0),), 0) == at_bound
+
+
+@pytest.mark.slow("a whole diagnosis, judged again with a check that fails and with faults")
+def test_no_name_is_in_doubt_without_a_reason_and_a_failed_check_leaves_none_sure(monkeypatch):
+    rig = cases.rig(contact=cases.relaxing(), seed=7, trials=4, seconds=9.0)
+    judged, seen = [], []
+
+    def concluding(result, *rest):
+        conclude(result, *rest)
+        judged.append(result.findings)
+        for change in (
+            {"check": CheckOutcome((recording(10.0, 20.0),), (-1.0, None))},
+            {"faults": [SimpleNamespace(put_right=False, kind="clock")]},
+        ):
+            other = replace(result, findings=[], ambiguous=[], ruled_out=[], **change)
+            conclude(other, *rest)
+            seen.append(other.findings)
+
+    monkeypatch.setattr(diagnosis, "conclude", concluding)
+    diagnosed(rig)
+    (sure,) = judged[0]
+    assert sure.name == "creep" and sure.confidence > 0.5 and not sure.doubts
+    for (found,), why in zip(seen[:2], (REFUTED, FAULTY), strict=True):
+        assert found.name == "creep" and found.confidence < 0.5 and found.doubts == (why,)

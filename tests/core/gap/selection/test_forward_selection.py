@@ -12,7 +12,7 @@ from palpate.core.gap.fitting.least_squares import FRICTION_LEVEL, free_base_par
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.selection.base_model import friction_parameters_to_search
 from palpate.core.gap.selection.candidates import Candidate, FittedCandidate
-from palpate.core.gap.selection.confidence import EXPLAINED, REPEATED_RATIO, is_doubtful, least_share, may_absorb_misfit
+from palpate.core.gap.selection.confidence import EXPLAINED, REPEATED_RATIO, least_share, may_absorb_misfit, misfit_of_another
 from palpate.core.gap.selection.direct_estimates import companding_starts, few_levels
 from palpate.core.gap.selection.forward_selection import SelectionState, SelectionStep
 from palpate.core.gap.selection.gap_sizes import FORCES, READINGS, GapSizes, Improvement, friction_kinds
@@ -76,20 +76,20 @@ def test_what_dead_texels_still_answer_is_no_further_effect():
     for offset, doubt in (((0.0, 0.3, 0.01, 0.0), True), ((0.1, 0.3, -0.3, 0.2), False)):
         other = effect("offset", "listed", offset=offset)
         state = SelectionState(None, None, {}, {"offset": Improvement(0.3, 0.9)})
-        assert is_doubtful(other, state, [dead, other], WITH_FORCES) == doubt
+        assert bool(misfit_of_another(other, state, [dead, other], WITH_FORCES)) == doubt
 
 
 def test_of_two_that_pass_loads_on_one_may_be_what_the_other_lacks():
     both = [effect("crosstalk", "neighbours"), effect("load-spreading", "gaussian")]
     state = SelectionState(None, None, {}, {"crosstalk": Improvement(0.7, 0.7), "load-spreading": Improvement(0.2, 0.7)})
-    assert [is_doubtful(one, state, both, WITH_FORCES) for one in both] == [False, True]
+    assert [bool(misfit_of_another(one, state, both, WITH_FORCES)) for one in both] == [False, True]
 
 
 def test_without_net_forces_a_law_of_contact_and_a_readout_bend_one_curve():
     both = [effect("stiffening", "foam"), effect("saturation", "rational")]
     state = SelectionState(None, None, {}, {"stiffening": Improvement(0.7, 0.7), "saturation": Improvement(0.2, 0.7)})
-    assert not any(is_doubtful(one, state, both, WITH_FORCES) for one in both)
-    assert [is_doubtful(one, state, both, READ_ALONE) for one in both] == [False, True]
+    assert not any(misfit_of_another(one, state, both, WITH_FORCES) for one in both)
+    assert [bool(misfit_of_another(one, state, both, READ_ALONE)) for one in both] == [False, True]
 
 
 def step(left, **values):
@@ -105,7 +105,7 @@ def doubtful(second, improvement, repeated=np.inf, first=None, **values):
     other = effect(*second, **values)
     found = step({other.name: 1.0}, remaining_repeated=repeated)
     state = SelectionState(None, None, {other.name: found}, {other.name: improvement})
-    return is_doubtful(other, state, [first, other], WITH_FORCES)
+    return bool(misfit_of_another(other, state, [first, other], WITH_FORCES))
 
 
 def test_a_small_effect_is_sure_where_it_closes_nearly_all_that_is_left():

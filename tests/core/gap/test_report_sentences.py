@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a report says of recordings that differ, of texels that fall silent, and of what its check recordings did."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import gap_cases as cases
+import numpy as np
+import pytest
+
+from palpate.core.gap.dataset.rig import read_rig
+from palpate.core.gap.forward.predictor import Model, predictors_of
+from palpate.core.gap.report.comparison import gap_errors
+from palpate.core.gap.report.plots import CAPTIONS
+from palpate.core.gap.report.sentences import headline
+from palpate.core.gap.report.summary import summary
+from palpate.core.gap.selection import screening
+from palpate.core.gap.selection.between_recordings import RecordingDifferences
+from palpate.core.gap.selection.diagnosis import diagnose, fit_base
+from palpate.core.gap.selection.silenced_texels import silenced_texels
+from palpate.core.jobs.job_runner import run_job
+
+
+@pytest.fixture
+def quick_search(monkeypatch):
+    """A search with few starting points."""
+    monkeypatch.setattr(screening, "THOROUGH", replace(screening.QUICK, most_first_fits=4, kinds=2, forms=1))
+
+
+def test_the_page_does_not_say_that_check_trials_chose_nothing():
+    assert "no part in choosing" not in CAPTIONS["gap"] and "dropped" in CAPTIONS["gap"]
+
+
+def shifted(gains, levels):
+    """What is found of recordings with such gains and levels."""
+    names = [f"t{i}" for i in range(len(gains))]
+    own = dict(zip(names, gains, strict=True)), dict(zip(names, levels, strict=True))
+    return RecordingDifferences("drift", 0.9, 0.95, 0.05, *own)
+
+
+@pytest.mark.parametrize(("gains", "levels", "odd"), [
+    ([1.0, 1.001, 0.9, 0.999], [0.0] * 4, "t2"),
+    ([1.0] * 4, [0.0, 2.0, 0.01, -0.01], "t1"),
+    ([1.0, 0.95, 0.9, 0.85], [0.0] * 4, None),
+])  # fmt: skip
+def test_one_odd_recording_is_told_from_several(gains, levels, odd):
+    found = shifted(gains, levels).odd_recording(10.0)
+    assert (found.name if found else None) == odd
+
+
+@pytest.mark.slow("a whole diagnosis of recordings of which one is shifted")
+@pytest.mark.usefixtures("quick_search")
+def test_a_shifted_recording_is_named_and_its_gap_is_that_before_it_was_shifted_back():
+    count = iter(range(5))
+    rig = cases.rig(lambda force, time: force + (0.01 if next(count) == 2 else 0.0), seed=1, trials=5, seconds=6.0)
+    result = run_job(diagnose(rig))
+    errors = gap_errors(result)
+    said, found = headline(result, errors), summary(result, errors)
+    assert result.between is not None and result.verdict == "explained"
+    assert "Only 't2' differs: it reads" in said and "more than the others" in said
+    gap = found["gap"]
+    assert gap["before"]["fit"] == pytest.approx(result.between.before) and gap["before"]["fit"] > 2 * gap["after"]["fit"]
+    assert gap["closed"]["fit"] > 0.9 and gap["closed"]["least"] <= gap["closed"]["fit"]
+    by_name = {one["trial"]: one for one in found["fitted"]}
+    assert list(by_name) == ["t0", "t1", "t2", "t3"]
+    assert max(by_name, key=lambda name: by_name[name]["before"]) == "t2"
+    assert by_name["t2"]["after"] < 0.5 * by_name["t2"]["before"]
+
+
+@pytest.mark.parametrize("fades", [0.0, 0.9, 1.0])
+def test_a_texel_that_dies_midway_is_named_with_the_time(fades):
+    rig = cases.rig(seed=3, stated=80.0, trials=3, seconds=8.0, noise=1e-4)
+    texel = int(np.argmax(np.min([t.reading.max(axis=0) for t in rig.trials], axis=0)))  # loaded in all recordings
+    trials = list(rig.trials)
+    for number, one in enumerate(trials):
+        dies = np.full(len(one.time), number > 1) | ((number == 1) & (one.time > 4.0))
+        reading = one.reading.copy()
+        reading[dies, texel] *= 1.0 - fades
+        trials[number] = replace(one, reading=reading)
+    found = silenced_texels(predictors_of(tuple(trials), rig), Model(rig.parameters), 1e-5)
+    if fades == 0.0:
+        assert not found
+        return
+    (one,) = found
+    assert one.texel == texel and (one.recording == "t2" or (one.recording == "t1" and one.seconds > 4.0))
+
+
+@pytest.mark.slow("the base model of the sample rig")
+def test_the_end_of_a_release_is_no_death():
+    """The sample rig creeps: late in a release its texels read nothing where the base model says a small load."""
+    result = run_job(fit_base(read_rig(Path(__file__).parents[3] / "docs" / "sample-rig" / "rig.toml")))
+    assert not silenced_texels(result.predictors, result.base.model, result.noise[0].deviation)
