@@ -106,4 +106,5 @@ KIND = Kind(
     drawing=Drawing("texel"),
     known_from=("places",),
     variants=(Variant(30, texel_columns=("gain",)),),
+    cost=0.5,
 )
