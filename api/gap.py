@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 RigOrFile = Rig | str | os.PathLike[str]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Interval:
     """A fitted value with its 95 % interval; `low` and `high` are None where there is one value for each texel.
 
@@ -52,8 +52,11 @@ class Interval:
             return f"{len(self.value)} values from {min(self.value):.3g} to {max(self.value):.3g}"
         return f"{self.value:.3g}" + ("" if self.low is None else f" ({self.low:.3g} to {self.high:.3g})")
 
+    def __repr__(self) -> str:
+        return f"<Interval: {self}>"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class FoundEffect:
     """An effect that the model lacks.
 
@@ -73,6 +76,11 @@ class FoundEffect:
     confidence: float
     parameters: dict[str, Interval]
     rivals: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        words = [f"{name} {value}" for name, value in self.parameters.items()]
+        words += [f"or {rival}" for rival in self.rivals]
+        return f"<FoundEffect: {self.name} ({self.form}), {self.confidence:.0%}{''.join(f', {word}' for word in words)}>"
 
 
 class Gap:

@@ -105,6 +105,11 @@ class PressedSensor:
         self.residual = np.zeros(0)
         self.reset(sensor_pose, target_pose)
 
+    def __repr__(self) -> str:
+        targets = self._out.poses.shape[1] - 1
+        count = f"{targets} target{'s' if targets > 1 else ''}"
+        return f"<PressedSensor: {self._model.texels} texels, {count}, step {1e3 / self._model.rate:.4g} ms>"
+
     @property
     def displacement(self) -> np.ndarray:
         """Of the target from its pose at the last step (6,), metres and rad."""

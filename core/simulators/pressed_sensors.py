@@ -129,6 +129,10 @@ class PressedSensors:
         """Return the number of environments."""
         return len(self._environments)
 
+    def __repr__(self) -> str:
+        size = f"{len(self._environments)} environments, {self._model.texels} texels"
+        return f"<PressedSensors: {size}, step {1e3 / self._model.rate:.4g} ms>"
+
     @property
     def displacement(self) -> np.ndarray:
         """Of the targets from their poses at the last step (E, 6), metres and rad."""

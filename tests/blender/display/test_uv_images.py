@@ -124,4 +124,4 @@ def test_another_image_makes_the_bake_stale(tmp_path, change):
     else:
         setattr(obj.palpate, change, {"image_size": 128, "image_filter": "NEAREST"}[change])
     scene.frame_set(3)
-    assert "out of date" in frame_status.status_of(scene).text
+    assert "The scene has changed since this bake" in frame_status.status_of(scene).text

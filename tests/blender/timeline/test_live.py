@@ -526,5 +526,5 @@ def test_a_bake_that_is_out_of_date_says_so(tmp_path, change):
     pad.data.update()
     bpy.context.view_layer.update()
     play(scene, 2)
-    assert frame_status.status_of(scene).text.startswith("The bake is out of date")
+    assert frame_status.status_of(scene).text.startswith("The scene has changed since this bake")
     assert frame_status.status_of(scene).frame is not None  # it is still shown

@@ -53,7 +53,7 @@ def test_a_bake_is_out_of_date_at_once(tmp_path, change):
     assert frame_status.status_of(scene).text == "Frame 2 of the bake."
     change(scene, pad, target)
     second_look.look_again(scene)
-    assert "out of date" in frame_status.status_of(scene).text and scene.frame_current == 2
+    assert "The scene has changed since this bake" in frame_status.status_of(scene).text and scene.frame_current == 2
 
 
 def test_a_baked_file_that_was_opened_shows_its_numbers_at_once(tmp_path):

@@ -29,6 +29,7 @@ def test_a_gap_names_effects_with_intervals(gap):
     names = [effect.name for effect in gap.effects]
     assert names and all(0 < effect.confidence <= 1 for effect in gap.effects)
     for effect in gap.effects:
+        assert repr(effect).startswith(f"<FoundEffect: {effect.name} (") and len(repr(effect)) < 200
         for one in effect.parameters.values():
             assert one.low is None or one.low <= one.value <= one.high
     assert all(name in gap.headline and name in repr(gap) for name in names)

@@ -70,6 +70,7 @@ def test_a_pressed_sensor_takes_a_sensor_and_a_body():
     pad = pp.Sensor.grid(14, 6, 4e-3, k=1000.0, cn=0.0)
     box = pp.Body.box(0.05, position=(0, 0, 0.026))
     pressed = pp.PressedSensor(pad, box, dt=1e-3)
+    assert repr(pressed) == f"<PressedSensor: {len(pad.texels)} texels, 1 target, step 1 ms>"
     level = (1.0, 0.0, 0.0, 0.0)
     for _ in range(2):
         contact = pressed.step(((0, 0, 0), level), ((0, 0, 0.0249), level))

@@ -202,6 +202,7 @@ def test_environments_have_the_bits_of_single_sensors_under_loads():
 
 def test_a_bad_pose_or_load_is_one_environment_that_measures_nothing():
     many = PressedSensors(pad(6, 6, **LAW), box(SIZE, SIZE, SIZE), 0.005, 4, 1)
+    assert repr(many) == "<PressedSensors: 4 environments, 36 texels, step 5 ms>"
     poses, loads = np.tile(at(), (4, 1)), np.tile([0.0, 0.0, WEIGHT], (4, 1))
     poses[1, 2], loads[2, 0] = np.nan, np.inf
     contacts = many.step(LEVEL, poses, wrench=loads)

@@ -61,7 +61,7 @@ def road(ui):
     yield from ui.becomes(lambda: not bpy.data.is_dirty, "Ctrl S saves the file")
 
     press.obj("Pad").palpate.mus = 0.123
-    yield from ui.becomes(says(scene, "out of date"), "a changed friction makes it out of date at once")
+    yield from ui.becomes(says(scene, "has changed since this bake"), "a changed friction makes it out of date at once")
     yield 1.0
     yield from ui.screenshot("out-of-date")
 
