@@ -25,7 +25,7 @@ from ...core.model.scenario import Scenario
 from ...core.model.sensor import Sensor
 from ...core.model.target import Target
 from ..properties import start_transforms
-from ..session import animation_time, identity, units
+from ..session import animation_time, identity, session_state, units
 from . import (
     attached_objects,
     body_poses,
@@ -43,6 +43,8 @@ from .scene_reading import FrameSample, SceneReading
 def read_scene(scene) -> Generator[Progress, None, SceneReading]:
     """Read a scene over its whole frame range, frame by frame, and return it to the frame where it stood.
 
+    The timeline does not simulate meanwhile.
+
     Raises
     ------
     PalpateError
@@ -50,7 +52,7 @@ def read_scene(scene) -> Generator[Progress, None, SceneReading]:
     """
     before = scene.frame_current, scene.frame_subframe
     try:
-        with animation_time.without_time_stretching(scene):
+        with session_state.suspended(), animation_time.without_time_stretching(scene):
             return (yield from _read_frames(scene))
     finally:
         with suppress(ReferenceError):  # the scene was deleted while its frames were read

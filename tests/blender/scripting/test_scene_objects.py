@@ -10,6 +10,7 @@ import pytest
 from blender_scenes import press, save
 
 import palpate as pp
+from palpate.addon.timeline import live_cache
 from palpate.core.io.bake_reader import read_bake
 
 
@@ -27,6 +28,18 @@ def test_a_scene_is_simulated_and_read_back(tmp_path):
         pp.simulate(pp.scenario_of(scene), duration=1.0)
     with pytest.raises(pp.PalpateError, match="does not say where its texels are"):
         pp.read_recording(tmp_path / "palpate-bake" / "Pad" / "recording.npz").show(t=0.0)
+
+
+def test_a_scene_is_read_without_being_simulated(monkeypatch):
+    """Frames change while it is read, which simulates a scene that is played."""
+    scene, _, _ = press()
+    simulated, advance = [], live_cache.advance
+    monkeypatch.setattr(live_cache, "advance", lambda *words: simulated.append(words) or advance(*words))
+    assert len(pp.scenario_of(scene).bodies[1].motion.times) == scene.frame_end
+    assert not simulated
+    for frame in (1, 2):
+        scene.frame_set(frame)
+    assert len(simulated) == 1, "playing simulates the frame"
 
 
 def test_a_sensor_is_taken_from_an_object(tmp_path):
