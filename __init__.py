@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .api.gap import find_gap as find_gap
     from .api.gap import read_rig as read_rig
     from .api.loop import PressedSensor as PressedSensor
+    from .api.loop import PressedSensors as PressedSensors
     from .api.recordings import Recording as Recording
     from .api.recordings import read_bake as read_bake
     from .api.recordings import read_recording as read_recording
@@ -43,6 +44,7 @@ _PUBLIC = {
     "PalpateError": "core.errors",
     "Plan": "api.experiment",
     "PressedSensor": "api.loop",
+    "PressedSensors": "api.loop",
     "Recording": "api.recordings",
     "Rig": "core.gap.dataset.rig",
     "Scenario": "core.model.scenario",

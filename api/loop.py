@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A sensor inside the loop of another simulator."""
+"""A sensor, or many, inside the loop of another simulator."""
 
 from __future__ import annotations
 
 from ..core.geometry.mesh import TriangleMesh
-from ..core.simulators import pressed_sensor
+from ..core.simulators import pressed_sensor, pressed_sensors
 from ..core.simulators.sensor_on_mesh import SensorOnMesh
 from . import arguments
 from .arguments import ArgumentError
@@ -55,3 +55,39 @@ class PressedSensor(pressed_sensor.PressedSensor):
             super().__init__(sensor, target, dt, sensor_pose or own, target_pose)
         else:
             raise ArgumentError(f"target is {arguments.brief(target)}: give a Body.")
+
+
+class PressedSensors(pressed_sensors.PressedSensors):
+    """A sensor and one thing that presses on it in many environments, moved by another program.
+
+    ``pressed.step(sensor_poses, target_poses)`` goes on by one step in all environments; poses are (E, 7): position, m, and
+    quaternion (w, x, y, z). Each environment gives the bits of a :class:`PressedSensor`.
+
+    Parameters
+    ----------
+    sensor : Sensor
+    target : Body
+        Its shape counts; the other program moves it.
+    environments : int
+    dt : float, seconds
+        Step of the other program.
+    threads : int, optional
+        How many to compute with; by default as many as pay off.
+
+    Raises
+    ------
+    PalpateError
+        The sensor, the body or the step makes no run, or memory does not suffice.
+    """
+
+    def __init__(
+        self, sensor: SensorOnMesh, target: Body | TriangleMesh, environments: int, dt: float, threads: int | None = None
+    ):
+        if not isinstance(sensor, SensorOnMesh):
+            raise ArgumentError(f"sensor is {arguments.brief(sensor)}: give a Sensor.")
+        mesh = target.mesh if isinstance(target, Body) else target
+        if not isinstance(mesh, TriangleMesh):
+            raise ArgumentError(f"target is {arguments.brief(target)}: give a Body.")
+        count = arguments.count(environments, "environments")
+        prepare_solver()
+        super().__init__(sensor, mesh, dt, count, threads)

@@ -75,3 +75,8 @@ def test_a_pressed_sensor_takes_a_sensor_and_a_body():
     for _ in range(2):
         contact = pressed.step(((0, 0, 0), level), ((0, 0, 0.0249), level))
     assert contact.force_on_target == pytest.approx([0, 0, 72 * 1000.0 * 1e-4])
+    many = pp.PressedSensors(pad, box, environments=3, dt=1e-3)
+    poses = np.tile([0, 0, 0.0249, *level], (3, 1))
+    for _ in range(2):
+        contacts = many.step([0, 0, 0, *level], poses)
+    assert (contacts.wrench[:, :3] == contact.force_on_target).all()

@@ -162,6 +162,9 @@ REFUSED = [
     (lambda: pp.simulate(pad(), cube(), motion=[[0, 0, np.nan]]), r"motion of 'box' is NaN or infinite at \[0, 2\]"),
     (lambda: pp.PressedSensor("pad", cube(), 1e-3), "sensor is 'pad': give a Sensor"),
     (lambda: pp.PressedSensor(pad(), "cube", 1e-3), "target is 'cube': give a Body"),
+    (lambda: pp.PressedSensors("pad", cube(), 2, 1e-3), "sensor is 'pad': give a Sensor"),
+    (lambda: pp.PressedSensors(pad(), "cube", 2, 1e-3), "target is 'cube': give a Body"),
+    (lambda: pp.PressedSensors(pad(), cube(), 0, 1e-3), "environments is 0: give a whole number above zero"),
 ]
 
 
