@@ -48,6 +48,7 @@ def files_of(folder) -> dict[str, str]:
     return found
 
 
+@pytest.mark.slow("computes a study in three orders")
 def test_a_run_has_the_same_bytes_in_any_batch(tmp_path):
     """One by one in processes that know nothing of each other, all at once, and backwards in batches of three."""
     opened = [begin_study(write_study(tmp_path / name, 7), tmp_path / name / "out", lambda *_: None) for name in "abc"]
