@@ -35,7 +35,7 @@ LEVEL = 0.95
 
 
 @dataclass(frozen=True)
-class Estimate:
+class ContactEstimate:
     """What drove a sensor, from its readings.
 
     Attributes
@@ -110,7 +110,7 @@ class ReadoutFit:
     floor: np.ndarray
     best: MethodResult
 
-    def estimate(self, time: np.ndarray, readings: np.ndarray, result: MethodResult | None = None) -> Estimate:
+    def estimate(self, time: np.ndarray, readings: np.ndarray, result: MethodResult | None = None) -> ContactEstimate:
         """Return what drove the sensor.
 
         Parameters
@@ -134,7 +134,7 @@ class ReadoutFit:
         own = result or self.best
         return _estimate(own.predictor, own.times, own.factor, self.floor, time, readings[:, self.data.channels])
 
-    def estimate_of(self, recording: ReadoutRecording) -> Estimate:
+    def estimate_of(self, recording: ReadoutRecording) -> ContactEstimate:
         """Return what drove the sensor in one of the recordings of `data`, by the method that is proposed."""
         own = self.best
         return _estimate(own.predictor, own.times, own.factor, self.floor, recording.time, recording.readings)
@@ -256,18 +256,18 @@ def _estimate(
     floor: np.ndarray,
     time: np.ndarray,
     readings: np.ndarray,
-) -> Estimate:
+) -> ContactEstimate:
     known = np.isfinite(readings).all(axis=1)
     found = np.full((3, len(time), len(floor)), np.nan)
     if known.any():
         memory = memory_of(time, readings, times)
         value, deviation = predictor(readings[known], memory[known])
         found[:, known] = np.maximum(np.stack([value, value - factor * deviation, value + factor * deviation]), floor)
-    return Estimate(*found)
+    return ContactEstimate(*found)
 
 
 def _check(
-    data: ReadoutData, estimate: Callable[[ReadoutRecording], Estimate]
+    data: ReadoutData, estimate: Callable[[ReadoutRecording], ContactEstimate]
 ) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
     """Root mean square and median error on the check recordings, and the share inside of intervals."""
     errors, inside = [], []
