@@ -177,7 +177,7 @@ class Gap:
 
 
 def read_rig(path: str | os.PathLike[str]) -> Rig:
-    """Read a rig: what was measured (docs/gap.md), with all its recordings.
+    """Read a rig: what was measured (docs/rig-format.md), with all its recordings.
 
     Raises
     ------

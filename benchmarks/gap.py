@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """``palpate gap`` on recordings with something hidden in them (``_hidden``): what it says, held against the sealed answers.
 
-The confusion matrix goes to build/gap/confusion.txt, the table of docs/gap.md to build/gap/table.md.
+The confusion matrix goes to build/gap/confusion.txt, the table of docs/gap-results.md to build/gap/table.md.
 
 The whole matrix is 390 cases, an hour and a half of one core; a fifth of it is run by default. Results are kept in build/gap/,
 one line a case, and a run goes on where the last one stopped, as long as neither the workflow nor the generator has changed.
@@ -216,7 +216,7 @@ def confusion(results: list[dict]) -> str:
 
 
 def table(results: list[dict]) -> str:
-    """Return what docs/gap.md says of a whole run, in Markdown."""
+    """Return what docs/gap-results.md says of a whole run, in Markdown."""
     words = {"right": "right", "part": "one of them", "wrong": "wrong", "ambiguous": "`ambiguous`"}
     text = ["| hidden | cases | outcome | aim |", "| --- | ---: | --- | --- |"]
     for kind, (what, aim) in ROWS.items():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rigs: a TOML file that describes a measurement, and one CSV file for each trial (docs/gap.md describes both).
+"""Rigs: a TOML file that describes a measurement, and one CSV file for each trial (docs/rig-format.md describes both).
 
 Every mistake in a rig raises an error here, in one sentence, before anything is computed.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The rig of docs/gap.md for two specimens and two loggers finds what is known of its recordings."""
+"""The rig of docs/rig-format.md for two specimens and two loggers finds what is known of its recordings."""
 
 import re
 from pathlib import Path
@@ -12,7 +12,7 @@ from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.jobs.job_runner import run_job
 
-PAGE = Path(__file__).parents[3] / "docs" / "gap.md"
+PAGE = Path(__file__).parents[3] / "docs" / "rig-format.md"
 LATE, FACTORS = 40, (1.0, 1.0, 1.5, 1.5)
 """Samples by which the responses' logger was started later, and what the readings of each recording are multiplied by."""
 

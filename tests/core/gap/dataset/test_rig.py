@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rigs are read as docs/gap.md says, and each bad one gets a sentence that names what, where, and what to do."""
+"""Rigs are read as docs/rig-format.md says, and each bad one gets a sentence that names what, where, and what to do."""
 
 import json
 from dataclasses import asdict
