@@ -30,7 +30,7 @@ DIFFERENCE = 1e-6
 TRIALS, HALVINGS = 60, 12
 """Most steps of the search, and of the approach where nothing touches. Contacts that are released one by one took up to 30."""
 ENOUGH, SLOW = 1e-4, 0.3
-"""A trial is accepted if the difference falls by this share, and the Jacobian is made anew if it falls by less than to SLOW."""
+"""A trial is accepted if the difference falls by this share. Unless it falls to SLOW, the Jacobian is computed again."""
 LEAST_DAMPING, DAMPING_FACTOR, MOST_DAMPING = 1e-12, 10.0, 1e4
 """Of Levenberg and Marquardt's method, relative to the mean square of the Jacobian's columns."""
 
@@ -263,7 +263,7 @@ class _Search:
         return loaded & ~open_
 
     def _differentiate(self, chosen: np.ndarray) -> np.ndarray:
-        """Make the Jacobian of some environments anew; return them."""
+        """Compute the Jacobian of some environments again; return them."""
         if chosen.any():
             small = DIFFERENCE * self._balance.limit
             for column in range(self._jacobian.shape[2]):

@@ -476,7 +476,7 @@ class _TrialReader:
         reading, force = (_known_responses(part, unknown) for part in (reading, force))
         if reading is None and force is None:
             raise FileError(
-                f"No response in '{file.name}' has a stimulus beside it: record both at the same time, or cut the file."
+                f"No response in '{file.name}' has a stimulus at the same time: record both at the same time, or cut the file."
             )
         if quaternion is not None:
             quaternion = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)

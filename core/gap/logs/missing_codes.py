@@ -61,7 +61,7 @@ def without_missing_codes(log: LogFile) -> LogFile:
                 share = float((values == code).mean())
                 notes.append(
                     f"'{log.path.name}': {code:g} in '{table.full_name(name)}' ({share:.0%} of its samples) counts as missing, "
-                    "because the values beside it are far away."
+                    "because the neighbouring values are far away."
                 )
         tables.append(replace(table, columns=columns))
     return replace(log, tables=tuple(tables), notes=(*log.notes, *notes)) if notes else log

@@ -126,7 +126,7 @@ def _what_stays(result: Diagnosis, errors: GapErrors) -> str:
 
 
 def check_failure(result: Diagnosis) -> str:
-    """Return in a sentence why the check recordings do not bear the amended model out; empty if they do."""
+    """Return in a sentence why the amended model fails on the check recordings; empty if it does not."""
     worst = result.check.worst
     if worst is None or all(map(_is_noise, result.findings)):
         return ""
@@ -153,7 +153,7 @@ def caution(result: Diagnosis) -> str:
     """Return what to know before the amended sensor is used; empty if nothing speaks against it."""
     failure = check_failure(result)
     if failure:
-        return f"The check recordings do not bear the amended sensor out: {failure}."
+        return f"The amended sensor fails on the check recordings: {failure}."
     if result.verdict == "unexplained" and result.findings:
         return "The amended sensor explains only a part of the gap."
     return ""

@@ -72,13 +72,13 @@ class CheckOutcome:
     closed: tuple[float | None, float | None] = (None, None)
 
     def refutes(self, quantity: int) -> bool:
-        """Return whether readings or forces of the check recordings do not bear the amended model out."""
+        """Return whether the amended model fails on readings or forces of the check recordings."""
         share = self.closed[quantity]
         return (share is not None and share < CHECK_CLOSED) or any(one.is_worse(quantity) for one in self.recordings)
 
     @property
     def is_refuted(self) -> bool:
-        """Whether readings or forces do not bear the amended model out."""
+        """Whether the amended model fails on readings or forces."""
         return self.refutes(READINGS) or self.refutes(FORCES)
 
     @property

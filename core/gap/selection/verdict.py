@@ -44,7 +44,7 @@ RIVAL_EXPONENT = -4.0
 UNRESOLVED_TIMES = 2.0
 """A spreading effect that leaves less than this many times what no fit can resolve has the sensor's own formula."""
 FAULTY = "the data have faults that were not put right"
-REFUTED = "the check recordings do not bear the amended model out"
+REFUTED = "the amended model fails on the check recordings"
 ABSORBS = "much of the gap is left, and numbers of single texels may have absorbed a part of it"
 """Why a name is not sure, in words."""
 MOST_MEAN_SQUARE = 2.0

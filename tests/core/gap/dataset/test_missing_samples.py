@@ -90,5 +90,5 @@ def test_a_stimulus_without_a_response_beside_it_is_refused(tmp_path):
         'format = "palpate-rig/1"\n[sensor]\ngrid = { rows = 1, columns = 1, pitch = [0.01, 0.01] }\n'
         '[[trial]]\nfile = "press.csv"\nuse = "fit"\n'
     )
-    with pytest.raises(PalpateError, match="No response in 'press.csv' has a stimulus beside it"):
+    with pytest.raises(PalpateError, match="No response in 'press.csv' has a stimulus at the same time"):
         read_rig(tmp_path / "rig.toml")
