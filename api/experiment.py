@@ -43,7 +43,7 @@ class Plan:
     def sentence(self) -> str:
         """What the planned experiment is good for."""
         if self.outlook.experiment is None:
-            return "These recordings tell all of these effects from each other: no further one is planned."
+            return "These recordings distinguish all of these effects: no further one is planned."
         return plan_files.planned_sentence(plan_files.experiment_words(self.outlook.experiment, plan_files.TRAJECTORY))
 
     @property

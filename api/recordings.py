@@ -47,7 +47,7 @@ class Recording:
     With several sensors each is ``recording["its name"]``, which is a recording of its own.
     """
 
-    normal_force: np.ndarray = _channel("normal_force", "(T, n) float, N: along the normal of what touches.")
+    normal_force: np.ndarray = _channel("normal_force", "(T, n) float, N: along the contact normal.")
     shear: np.ndarray = _channel("shear", "(T, n, 2) float, N: along the x and y axes of each texel.")
     reading: np.ndarray = _channel("reading", "(T, n) float, in `unit`: what the sensor reports.")
     friction: np.ndarray = _channel("friction", "(T, n) float, N: magnitude of the friction force.")
@@ -56,7 +56,7 @@ class Recording:
     contact: np.ndarray = _channel("contact", "(T, n) bool.")
     net_force: np.ndarray = _channel("net_force", "(T, 3) float, N.")
     net_torque: np.ndarray = _channel("net_torque", "(T, 3) float, N·m, about the origin of the sensor's body.")
-    centre_of_pressure: np.ndarray = _channel("centre_of_pressure", "(T, 3) float, m; zero while nothing touches.")
+    centre_of_pressure: np.ndarray = _channel("centre_of_pressure", "(T, 3) float, m; zero without contact.")
 
     def __init__(self, bake: bake_reader.Bake):
         self.bake = bake

@@ -93,7 +93,7 @@ def _require_nothing_else(bodies: Any, duration: Any, motion: Any, dt: Any) -> N
     given = {"bodies": bodies or None, "duration": duration, "motion": motion, "dt": dt}
     for name, value in given.items():
         if value is not None:
-            raise ArgumentError(f"{name} is given beside a scenario, which has its own: leave it out.")
+            raise ArgumentError(f"{name} is part of the scenario: leave it out.")
 
 
 def _paths(

@@ -257,7 +257,7 @@ def _net_features(name: str, arrays: SensorRecording) -> Iterator[tuple[Feature,
     yield _vector(f"observation.net_force.{name}", "N", f"Net force on the sensor, {frame}."), arrays.net_force
     about = f"Net torque on the sensor about the origin of its body, {frame}."
     yield _vector(f"observation.net_torque.{name}", "N m", about), arrays.net_torque
-    about = f"Force-weighted mean of the contact points, {frame}; zero while nothing touches."
+    about = f"Force-weighted mean of the contact points, {frame}; zero without contact."
     yield _vector(f"contact.centre_of_pressure.{name}", "m", about), arrays.centre_of_pressure
 
 

@@ -145,7 +145,7 @@ def _check(obj, chosen: np.ndarray, source: str) -> None:
     reason = {
         "SELECTION": "Nothing is selected",
         "GROUP": f"No vertex has a weight of {obj.palpate.threshold:g} or more in the active vertex group",
-        "MATERIAL": "No face wears the active material",
+        "MATERIAL": "No face has the active material",
         "FACE_SET": "No face is in that face set",
         "MESH": "There are no vertices",
     }[source]

@@ -133,7 +133,7 @@ def read_properties(path: str | os.PathLike) -> dict[str, SceneProperty]:
         It cannot be read, or is damaged.
     """
     try:
-        found, _ = read_json(path, _PropertiesFile, PROPERTIES_FORMAT, "begin the study anew")
+        found, _ = read_json(path, _PropertiesFile, PROPERTIES_FORMAT, "start the study again")
     except FileNotFoundError:
         return {}
     return {row.name: row for row in found.properties}

@@ -199,7 +199,7 @@ def study_of(table: Mapping[str, Any], name: str) -> Study:
     study = read_words(words, Study, f"'{name}'", A_STUDY, others, design=design, is_job=JOB in table)
     for word in _OF_SCENES if study.is_job else ():
         if word in table:
-            raise FileError(f"{word} of '{name}' means nothing beside a job: leave it out.")
+            raise FileError(f"{word} of '{name}' has no meaning for a job: leave it out.")
     if design.kind == GRID and "samples" in table:
         raise FileError(f"'{name}' has a grid and samples: a grid takes all combinations, so leave samples out, or use random.")
     if design.kind != GRID and not design.samples:

@@ -323,7 +323,7 @@ def test_ctrl_c_keeps_the_earlier_bake(delay, tmp_path, demo_blend):
     words, err = process.communicate(timeout=120)
     assert process.returncode == 130
     assert words == ""
-    assert err == "palpate bake: stopped; an earlier bake is still as it was.\n"
+    assert err == "palpate bake: stopped; an earlier bake is unchanged.\n"
     assert contents(out) == before
 
 

@@ -159,7 +159,7 @@ def test_advice_at_its_bounds_names_no_share_of_the_limit(mass, dt, which):
     advised = advise(cube_on_pad(mass, dt=None))
     assert advised.dt == dt and "%" not in advised.reason
     assert (
-        f": the {which} that is advised; the explicit stability limit of 'cube' is {advised.limit * 1e3:.3g} ms."
+        f": the {which} recommended step; the explicit stability limit of 'cube' is {advised.limit * 1e3:.3g} ms."
         in advised.reason
     )
 

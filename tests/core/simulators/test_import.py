@@ -59,7 +59,7 @@ def test_a_tactile_is_placed_through_its_bodies(tmp_path):
     assert found.name == "skin" and len(found.position) == 4
     assert found.frame_position == pytest.approx([1.0, 2.5, 3.0])
     assert Rotation.from_quat(np.roll(found.frame_quaternion, -1)).as_rotvec() == pytest.approx([0, 0, np.pi / 2])
-    assert any("contact and joints were not taken over" in note for note in found.notes)
+    assert any("contact and joints were not imported" in note for note in found.notes)
 
 
 def test_a_touch_grid_has_its_bins_where_mujoco_puts_a_contact(tmp_path):
