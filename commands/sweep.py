@@ -125,7 +125,7 @@ def _part(text: str) -> tuple[int, int]:
     """Return number and count of "I/N"."""
     number, _, count = text.partition("/")
     if not (number.isdigit() and count.isdigit() and 1 <= int(number) <= int(count)):
-        raise argparse.ArgumentTypeError(f"{text} is no part: write it as 2/8, the second of eight")
+        raise argparse.ArgumentTypeError(f"{text} is not a part: write it as 2/8, the second of eight")
     return int(number), int(count)
 
 

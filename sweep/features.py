@@ -177,7 +177,7 @@ def _read_sensor(folder: Path, shared: SharedResults) -> SensorRun:
     recording = load_recording(folder / RECORDING_NAME)
     texels, painted = _read_texels(folder / SENSOR_NAME, shared)
     if len(recording.sensors) != 1 or len(recording.frames) == 0:
-        raise FileError(f"'{folder / RECORDING_NAME}' is no recording of one sensor: delete the run and sweep again.")
+        raise FileError(f"'{folder / RECORDING_NAME}' is not a recording of one sensor: delete the run and sweep again.")
     (arrays,) = recording.sensors.values()
     if arrays.normal_force.shape[1] != len(texels):
         raise FileError(f"'{folder}' holds a recording and a sensor of different runs: delete the run and sweep again.")

@@ -233,7 +233,7 @@ def _sources(study: Study, base: Path) -> dict[str, Path]:
         if not file.is_file():
             raise FileError(f"There is no scene '{file}': check its name; it is counted from the study's folder.")
         if study.is_job and file.suffix != program.SUFFIX:
-            raise FileError(f"The job '{file}' is no Python file: give one that ends with {program.SUFFIX}.")
+            raise FileError(f"The job '{file}' is not a Python file: give one that ends with {program.SUFFIX}.")
         if not study.is_job and file.suffix not in (BLEND, SCENARIO):
             raise FileError(f"The scene '{file}' is neither a .blend nor a scenario (.npz): give one of these.")
     stems: dict[str, Path] = {}

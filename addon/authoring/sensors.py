@@ -49,7 +49,7 @@ def make_sensor(obj, source: str, role: str = "SENSOR") -> int:
         The region has no vertices or no face. Nothing was changed then.
     """
     if obj.type != "MESH":
-        raise SensorError(f"'{obj.name}' is no mesh: convert it with Object › Convert › Mesh before it becomes a sensor.")
+        raise SensorError(f"'{obj.name}' is not a mesh: convert it with Object › Convert › Mesh before it becomes a sensor.")
     settings = obj.palpate
     if source == "SELECTION":
         chosen = selected_vertices(obj)

@@ -142,7 +142,7 @@ def _mesh_arrays(model: _Model, mesh: ElementTree.Element, name: str) -> tuple[n
     position = values.reshape(-1, 3) * vector_in(path, mesh, "scale", "1 1 1") - vector_in(path, mesh, "refpos", "0 0 0")
     corners, normals = numbers_in(path, mesh, "face", ""), numbers_in(path, mesh, "normal", "")
     if len(corners) % 3 or (corners % 1).any():
-        raise FileError(f"The faces of '{name}' in '{path}' are no triples of whole numbers: correct them.")
+        raise FileError(f"The faces of '{name}' in '{path}' are not triples of whole numbers: correct them.")
     per_vertex = len(normals) // len(values) if len(normals) % len(values) == 0 else 0
     if len(normals) and per_vertex not in (1, 3):
         raise FileError(f"The mesh of '{name}' in '{path}' has {len(normals) // 3} normals for {len(position)} vertices.")

@@ -111,7 +111,7 @@ def read_overrides(path: str | os.PathLike) -> dict[str, Any]:
     for key in table[OVERRIDES]:
         if not is_scene_property(key):
             raise ParameterError(
-                f"'{key:.80}' in '{name}' is no path of a property: write it as bpy.data.objects[\"Name\"].property."
+                f"'{key:.80}' in '{name}' is not the path of a property: write it as bpy.data.objects[\"Name\"].property."
             )
     return dict(table[OVERRIDES])
 

@@ -414,7 +414,7 @@ def _distribution(found: Variable, entry: Mapping[str, Any]) -> Distribution:
     if kind == CHOICE:
         return Distribution(CHOICE, tuple(found.read(word) for word in numbers))
     if not isinstance(found.specification, Parameter):
-        raise ParameterError(f"{found.name} is no number that can be {kind}: use choice.")
+        raise ParameterError(f"{found.name} is not a number that can be {kind}: use choice.")
     if isinstance(found.specification, WholeNumber):
         raise ParameterError(f"{found.name} is a whole number, which cannot be {kind}: use choice.")
     first, second = numbers

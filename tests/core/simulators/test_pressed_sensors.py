@@ -182,7 +182,7 @@ def test_environments_without_poses_are_flagged_and_the_others_go_on():
         if step == 1:
             assert not found.texels[1].any() and not found.wrench[1].any() and not found.contact[1].any()
             assert found.fault() == (
-                "1 of 3 environments have a pose that is no position and quaternion of finite numbers (1): "
+                "1 of 3 environments have a pose that is not a position and quaternion of finite numbers (1): "
                 "reset them in the simulation."
             )
         else:
