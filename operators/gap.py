@@ -128,7 +128,7 @@ class PALPATE_OT_gap_plan(modal_job.ModalJob, bpy.types.Operator):
             return
         sensor = bpy.data.objects[self._sensor]
         probe = planned_probe.put_on_probe(bpy.context, sensor, experiment, rig)
-        sure = f"expected confidence {experiment.sure_after:.0%}, {experiment.sure_before:.0%} without it"
+        sure = f"confidence {experiment.sure_after:.0%} with it, {experiment.sure_before:.0%} without"
         self.report({"INFO"}, f"'{probe.name}' separates {' from '.join(experiment.kinds)}: {sure}")
 
 
