@@ -108,7 +108,7 @@ class Recording:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What one should know about the run, one sentence each."""
+        """Warnings of the run, one sentence each."""
         return self.bake.recording.warnings
 
     @property
@@ -119,7 +119,7 @@ class Recording:
     def channels(
         self, skin: MagneticSkin, shear_stiffness: float | None = None, ambient: ArrayLike | None = None
     ) -> VectorReadings:
-        """Return what the magnetometers of a skin show: readings of three signed channels each.
+        """Return the readings of the magnetometers of a skin: three signed channels each.
 
         Parameters
         ----------
@@ -306,7 +306,7 @@ def read_recording(path: str | os.PathLike[str]) -> Recording:
 
 
 def read_bake(folder: str | os.PathLike[str]) -> Recording:
-    """Read what Blender or ``palpate bake`` wrote: a bake folder, or the folder of one sensor in it.
+    """Read a bake of Blender or ``palpate bake``: a bake folder, or the folder of one sensor in it.
 
     Raises
     ------
