@@ -92,7 +92,7 @@ def examined(kind: str, number: int) -> dict[str, Any]:
             case = cases.draw(kind, number)
             path = cases.write(case, Path(folder))
         rig, began = read_rig(path), time.process_time()
-        result = run_job(diagnose(rig))
+        result = run_job(diagnose(rig, by_kinds="kinds" in os.environ.get("PALPATE_ONE_METHOD", "now")))
         seconds = time.process_time() - began
     said = [[one.name, one.form, one.confidence] for one in result.findings]
     if " " not in kind:

@@ -48,10 +48,13 @@ class Decision:
     ----------
     chosen : ScoredSet
     named : tuple of NamedKind
+    without_kinds : float
+        What the base model alone leaves above the noise.
     """
 
     chosen: ScoredSet
     named: tuple[NamedKind, ...]
+    without_kinds: float = 0.0
 
     @property
     def kinds(self) -> frozenset[str]:
@@ -87,4 +90,4 @@ def decided(search: KindSearch) -> Decision:
             for name, one in zip(names, others, strict=True)
         }
         named.append(NamedKind(kind, search.support(kind), tuple(rivals), leaves))
-    return Decision(chosen, tuple(named))
+    return Decision(chosen, tuple(named), search.none.solution.excess)

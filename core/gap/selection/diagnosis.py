@@ -47,6 +47,7 @@ from .confidence import CLEAR_LEAD, EXPLAINED, UNSURE_CONFIDENCE, kinds_can_sett
 from .contact_heights import with_starting_heights
 from .findings import Diagnosis, Finding
 from .forms_at_bounds import without_bounds_of_forms
+from .forms_of_kinds import supported, with_forms
 from .forward_selection import ForwardSelection, SelectionState
 from .gap_sizes import FORCES, READINGS, UNRESOLVED_SQUARE, GapSizes, friction_kinds
 from .harmful_effects import without_harmful_effects
@@ -74,8 +75,14 @@ NOT_NEEDED = "the kinds that were found explain the recordings without it"
 Outcome = TypeVar("Outcome")
 
 
-def diagnose(rig: Rig) -> Job[Diagnosis]:
+def diagnose(rig: Rig, by_kinds: bool = False) -> Job[Diagnosis]:
     """Find out what the base model misses in a rig.
+
+    Parameters
+    ----------
+    rig : Rig
+    by_kinds : bool
+        Whether the search by kinds alone decides which effects are named; the library's forms are then only fitted. A trial.
 
     Yields
     ------
@@ -87,11 +94,12 @@ def diagnose(rig: Rig) -> Job[Diagnosis]:
     Diagnosis
     """
     plain = yield from _begun(rig)
+    plain.result.by_kinds = by_kinds
     yield from _selected(plain, SELECTION_BEGINS, OTHER_SEARCHES_BEGIN if may_differ(rig) else SECOND_OPINION_BEGINS)
     best = plain
     if may_differ(rig) and not _is_settled(plain):
         best = yield from _best_of_other_searches(plain)
-    if best is plain and _is_doubtful(plain.result):
+    if not by_kinds and best is plain and _is_doubtful(plain.result):
         best = yield from _second_opinion(plain)
     best.result.stages = _stages(best.result, best.views)
     return best.result
@@ -247,10 +255,12 @@ def _search_of(
     noise: tuple[ChannelNoise, ChannelNoise],
     full: tuple[float, float],
     faults: list[DataFault],
+    by_kinds: bool = False,
 ) -> _Search:
     """A search that has the fitted base model alone."""
     result, views = _with_base_model(rig, predictors, noise, full)
     result.faults = faults
+    result.by_kinds = by_kinds
     return _Search(result, views)
 
 
@@ -260,7 +270,7 @@ def _search_with_own_numbers(plain: _Search) -> _Search:
     made = []
     for rig in (with_common_zero(result.rig), with_own_numbers(result.rig)):
         twins = [one.with_numbers_of(trial) for one, trial in zip(result.predictors, rig.trials, strict=True)]
-        made.append(_search_of(rig, twins, result.noise, result.full, result.faults))
+        made.append(_search_of(rig, twins, result.noise, result.full, result.faults, result.by_kinds))
     common, own = made
     before, after = min(plain.left_of_base, common.left_of_base), own.left_of_base
     own.closes = 1.0 - after / before
@@ -274,7 +284,7 @@ def _search_of_one_session(plain: _Search) -> _Search | None:
     rig = as_one_session(result.rig)
     if rig is None or plain.left_of_base <= LEAST_LOWERED:
         return None
-    session = _search_of(rig, predictors_of(rig.trials, rig), result.noise, result.full, result.faults)
+    session = _search_of(rig, predictors_of(rig.trials, rig), result.noise, result.full, result.faults, result.by_kinds)
     fitted = [view.predictor for view in session.views.whole]
     forms = [one for one in candidates(fitted, session.result.base.model) if one.name in LOAD_HISTORY]
     ranked: list[FittedCandidate] = []
@@ -381,8 +391,13 @@ def _select_effects(result: Diagnosis, view_set: ViewSet) -> Generator[tuple[str
     gap_sizes = GapSizes(start, noise, result.base.count.sum(axis=0).astype(float))
     kinds = result.chosen_kinds.keys() | (library().keys() - KNOWN_KINDS) if result.chosen_kinds else None
     selection = ForwardSelection(view_set, result.scales, result.coverage, gap_sizes, kinds)
+    decision = None
     if is_scatter_of_repeats(result.noise, result.base.sse, result.base.count):
         state = base
+    elif result.by_kinds:
+        decision = yield from choose_kinds(view_set, result.base, result.noise)
+        state = yield from with_forms(selection, base, decision)
+        state = without_bounds_of_forms(view_set.whole, state, result.scales)
     else:
         state = yield from selection.run(base, partial(_structure, view_set))
         state = without_bounds_of_forms(view_set.whole, state, result.scales)
@@ -390,7 +405,8 @@ def _select_effects(result: Diagnosis, view_set: ViewSet) -> Generator[tuple[str
     check = check_views(result.predictors, deviations)
     result.outlying = outlying_channels(view_set.whole, check, result.base.model, state.fit.model)
     check = without_channels(check, result.outlying)
-    state = without_harmful_effects(view_set.whole, check, state, gap_sizes)
+    if not result.by_kinds:
+        state = without_harmful_effects(view_set.whole, check, state, gap_sizes)
     state = replace(state, fit=_with_base_refitted(result, view_set, state.fit))
     result.best, result.structure = state.fit, _structure(view_set, state.fit)
     result.line = strongest_line(view_set.whole, state.fit.model)
@@ -406,6 +422,8 @@ def _select_effects(result: Diagnosis, view_set: ViewSet) -> Generator[tuple[str
     memory = result.noise[READINGS].correlation_time, result.noise[FORCES].correlation_time
     result.check = checked(check, result.base.model, result.best.model, gap_sizes, memory)
     conclude(result, view_set, state, gap_sizes)
+    if decision is not None:
+        supported(result, decision)
 
 
 def _stages(result: Diagnosis, view_set: ViewSet) -> list[Model]:

@@ -135,6 +135,8 @@ class Diagnosis:
         Check recordings that the base model fits far worse than the fitted ones.
     chosen_kinds : dict of str to NamedKind
         Kinds that the search by kinds named, if the effects are those among them that the forms bear out; else empty.
+    by_kinds : bool
+        Whether the search by kinds alone decides.
     """
 
     rig: Rig
@@ -163,6 +165,7 @@ class Diagnosis:
     closed: ClosedShares = field(default_factory=ClosedShares)
     unlike_fitted: list[CheckedRecording] = field(default_factory=list)
     chosen_kinds: dict[str, NamedKind] = field(default_factory=dict)
+    by_kinds: bool = False
 
     @property
     def carried_over(self) -> Finding | None:

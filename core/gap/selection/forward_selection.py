@@ -201,9 +201,9 @@ class ForwardSelection:
             `base` itself if no effect joins.
         """
         state = base
-        lone = yield from self._best_next(base, 0.0, 0.25, first=True)
+        lone = yield from self.best_next(base, 0.0, 0.25, first=True)
         base.first = lone
-        state = self._extended(base, lone, first=True)
+        state = self.extended(base, lone, first=True)
         if _is_displaced(state):
             self.gap_sizes.placed = state.means
         if state is not base:
@@ -213,8 +213,8 @@ class ForwardSelection:
                 and self._effect_count(state) < MOST_EFFECTS
                 and self._is_gap_open(state, structure)
             ):
-                step = yield from self._best_next(state, 0.6, 0.2)
-                longer = self._extended(state, step)
+                step = yield from self.best_next(state, 0.6, 0.2)
+                longer = self.extended(state, step)
                 if longer is state:
                     break
                 state = longer
@@ -222,12 +222,12 @@ class ForwardSelection:
                 state = yield from self._first_reconsidered(state)
         state.first = lone
         if self.gap_sizes.both:
-            state = yield from self._friction(state)
+            state = yield from self.friction(state)
         return state
 
     # --- one effect more
 
-    def _best_next(
+    def best_next(
         self, state: SelectionState, start: float, share: float, first: bool = False, friction: bool = False
     ) -> StepSearch:
         """Judge every effect that is not in the model yet on top of it."""
@@ -307,7 +307,7 @@ class ForwardSelection:
             best = settled[0] if settled else best
         return best
 
-    def _extended(
+    def extended(
         self, state: SelectionState, step: SelectionStep, first: bool = False, choice: FittedCandidate | None = None
     ) -> SelectionState:
         """The state with the best candidate of a step, or the same state if the candidate does not improve it enough."""
@@ -369,12 +369,12 @@ class ForwardSelection:
             name = one.candidate.name
             fresh = name not in self.confounded_kinds and all(name not in state.improvements for state in firsts)
             if len(firsts) < BEAM_WIDTH and left < BEAM_RATIO * least and fresh:
-                other = self._extended(base, lone, first=True, choice=one)
+                other = self.extended(base, lone, first=True, choice=one)
                 firsts += [other] if other is not base else []
         ends = []
         for number, state in enumerate(firsts):
-            step = yield from self._best_next(state, 0.25 + 0.35 * number / len(firsts), 0.35 / len(firsts))
-            longer = self._extended(state, step)
+            step = yield from self.best_next(state, 0.25 + 0.35 * number / len(firsts), 0.35 / len(firsts))
+            longer = self.extended(state, step)
             ends += [longer] if longer is not state or state is single else []  # another first effect counts only in a pair
         remaining = self._remaining([end.means for end in ends], self.gap_sizes.main_quantity)
         best = int(np.argmin(remaining))
@@ -391,7 +391,7 @@ class ForwardSelection:
         steps = {name: step for name, step in state.steps.items() if name != first}
         improvements = {name: improvement for name, improvement in state.improvements.items() if name != first}
         without = SelectionState(other, held_out_squares(self.view_set.whole, other), steps, improvements)
-        step = yield from self._best_next(without, 0.8, 0.1)
+        step = yield from self.best_next(without, 0.8, 0.1)
         lost = float(without.means[quantity] - state.means[quantity])
         if lost < max(LEAST_IMPROVEMENT, UNNEEDED_SHARE * self.gap_sizes.gap(quantity)):  # the later effects do all of its work
             return without
@@ -411,19 +411,19 @@ class ForwardSelection:
         improvements = {**state.improvements, first: self.gap_sizes.improvement(without.means, state.means, quantity)}
         return replace(state, steps={**state.steps, first: told}, improvements=improvements)
 
-    def _friction(self, state: SelectionState) -> Generator[tuple[str, float], None, SelectionState]:
+    def friction(self, state: SelectionState) -> Generator[tuple[str, float], None, SelectionState]:
         """Add effects on friction, judged by forces alone."""
         said = state.first.passed_over
         for _ in friction_kinds():
             if state.means[FORCES] < (1.0 + LEAST_FORCE_IMPROVEMENT) * self.gap_sizes.noise[FORCES]:
                 said |= {name: "the net forces leave nothing for it to explain" for name in friction_kinds()}
                 break
-            step = yield from self._best_next(state, 0.9, 0.05, first=True, friction=True)
+            step = yield from self.best_next(state, 0.9, 0.05, first=True, friction=True)
             said |= step.passed_over
             for one in reversed(step.ranked):
                 share = self.gap_sizes.improvement(state.means, means_of(one.held_out, one.fit), FORCES).of_remaining
                 said[one.candidate.name] = f"it closes {max(share, 0.0):.0%} of what is left of the net forces on unseen trials"
-            longer = self._extended(state, step)
+            longer = self.extended(state, step)
             if longer is state:
                 break
             state = replace(longer, first=state.first)
