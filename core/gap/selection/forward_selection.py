@@ -10,7 +10,7 @@ The thresholds below were set on simulated sensors whose hidden effects follow o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence, Set
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -165,15 +165,12 @@ class ForwardSelection:
     scales : Scales
     coverage : Coverage
     gap_sizes : GapSizes
-    kinds : set of str or None
-        The kinds that may join; None for all.
     """
 
     view_set: ViewSet
     scales: Scales
     coverage: Coverage
     gap_sizes: GapSizes
-    kinds: Set[str] | None = None
 
     def __post_init__(self) -> None:
         self.confounded_kinds = confounded(self.coverage)
@@ -201,9 +198,9 @@ class ForwardSelection:
             `base` itself if no effect joins.
         """
         state = base
-        lone = yield from self.best_next(base, 0.0, 0.25, first=True)
+        lone = yield from self._best_next(base, 0.0, 0.25, first=True)
         base.first = lone
-        state = self.extended(base, lone, first=True)
+        state = self._extended(base, lone, first=True)
         if _is_displaced(state):
             self.gap_sizes.placed = state.means
         if state is not base:
@@ -213,8 +210,8 @@ class ForwardSelection:
                 and self._effect_count(state) < MOST_EFFECTS
                 and self._is_gap_open(state, structure)
             ):
-                step = yield from self.best_next(state, 0.6, 0.2)
-                longer = self.extended(state, step)
+                step = yield from self._best_next(state, 0.6, 0.2)
+                longer = self._extended(state, step)
                 if longer is state:
                     break
                 state = longer
@@ -222,12 +219,12 @@ class ForwardSelection:
                 state = yield from self._first_reconsidered(state)
         state.first = lone
         if self.gap_sizes.both:
-            state = yield from self.friction(state)
+            state = yield from self._friction(state)
         return state
 
     # --- one effect more
 
-    def best_next(
+    def _best_next(
         self, state: SelectionState, start: float, share: float, first: bool = False, friction: bool = False
     ) -> StepSearch:
         """Judge every effect that is not in the model yet on top of it."""
@@ -235,8 +232,6 @@ class ForwardSelection:
         forms = candidates([s.predictor for s in self.view_set.whole], state.fit.model)
         forms = [c for c in forms if c.name not in taken or may_repeat(c)]
         forms = [c for c in forms if not is_free_already(c, state.fit.free) and (first or c.name not in self.confounded_kinds)]
-        if self.kinds is not None:
-            forms = [c for c in forms if c.name in self.kinds and c.name not in taken]
         if self.gap_sizes.both:
             forms = [c for c in forms if (c.form.friction_law is not None) == friction]
         ranked: list[FittedCandidate] = []
@@ -307,7 +302,7 @@ class ForwardSelection:
             best = settled[0] if settled else best
         return best
 
-    def extended(
+    def _extended(
         self, state: SelectionState, step: SelectionStep, first: bool = False, choice: FittedCandidate | None = None
     ) -> SelectionState:
         """The state with the best candidate of a step, or the same state if the candidate does not improve it enough."""
@@ -369,12 +364,12 @@ class ForwardSelection:
             name = one.candidate.name
             fresh = name not in self.confounded_kinds and all(name not in state.improvements for state in firsts)
             if len(firsts) < BEAM_WIDTH and left < BEAM_RATIO * least and fresh:
-                other = self.extended(base, lone, first=True, choice=one)
+                other = self._extended(base, lone, first=True, choice=one)
                 firsts += [other] if other is not base else []
         ends = []
         for number, state in enumerate(firsts):
-            step = yield from self.best_next(state, 0.25 + 0.35 * number / len(firsts), 0.35 / len(firsts))
-            longer = self.extended(state, step)
+            step = yield from self._best_next(state, 0.25 + 0.35 * number / len(firsts), 0.35 / len(firsts))
+            longer = self._extended(state, step)
             ends += [longer] if longer is not state or state is single else []  # another first effect counts only in a pair
         remaining = self._remaining([end.means for end in ends], self.gap_sizes.main_quantity)
         best = int(np.argmin(remaining))
@@ -391,7 +386,7 @@ class ForwardSelection:
         steps = {name: step for name, step in state.steps.items() if name != first}
         improvements = {name: improvement for name, improvement in state.improvements.items() if name != first}
         without = SelectionState(other, held_out_squares(self.view_set.whole, other), steps, improvements)
-        step = yield from self.best_next(without, 0.8, 0.1)
+        step = yield from self._best_next(without, 0.8, 0.1)
         lost = float(without.means[quantity] - state.means[quantity])
         if lost < max(LEAST_IMPROVEMENT, UNNEEDED_SHARE * self.gap_sizes.gap(quantity)):  # the later effects do all of its work
             return without
@@ -411,19 +406,19 @@ class ForwardSelection:
         improvements = {**state.improvements, first: self.gap_sizes.improvement(without.means, state.means, quantity)}
         return replace(state, steps={**state.steps, first: told}, improvements=improvements)
 
-    def friction(self, state: SelectionState) -> Generator[tuple[str, float], None, SelectionState]:
+    def _friction(self, state: SelectionState) -> Generator[tuple[str, float], None, SelectionState]:
         """Add effects on friction, judged by forces alone."""
         said = state.first.passed_over
         for _ in friction_kinds():
             if state.means[FORCES] < (1.0 + LEAST_FORCE_IMPROVEMENT) * self.gap_sizes.noise[FORCES]:
                 said |= {name: "the net forces leave nothing for it to explain" for name in friction_kinds()}
                 break
-            step = yield from self.best_next(state, 0.9, 0.05, first=True, friction=True)
+            step = yield from self._best_next(state, 0.9, 0.05, first=True, friction=True)
             said |= step.passed_over
             for one in reversed(step.ranked):
                 share = self.gap_sizes.improvement(state.means, means_of(one.held_out, one.fit), FORCES).of_remaining
                 said[one.candidate.name] = f"it closes {max(share, 0.0):.0%} of what is left of the net forces on unseen trials"
-            longer = self.extended(state, step)
+            longer = self._extended(state, step)
             if longer is state:
                 break
             state = replace(longer, first=state.first)
