@@ -78,5 +78,5 @@ KIND = Kind(
     experiment="go on to the highest load that the sensor may bear",
     drawing=Drawing("force"),
     families=("nonlinear",),
-    variants=(Variant(50, missing_above, is_static=True),),
+    variants=(Variant(50, missing_above),),
 )
