@@ -66,7 +66,7 @@ def couplings(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]
 KIND = Kind(
     name="crosstalk",
     title="Crosstalk",
-    text="Texels leak into the readings of others that share their wires or lie beside them.",
+    text="The signal of a texel leaks into that of its neighbours or lines.",
     site="readout",
     order=50,
     forms=(
