@@ -55,7 +55,7 @@ a frame reads the same played, baked or computed alone. Time counts from the fir
 
 *fₑ* is the elastic force (`k d`, or Hunt and Crossley's), to which damping is added after the effects of the pad; *f* the
 resulting force, *r* the reading, *r₀* the reading before the effect. \\* marks one number per texel, or one for all.
-Tooltips in the panel state the bounds.
+Tooltips state the bounds.
 """
 
 

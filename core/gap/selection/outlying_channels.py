@@ -19,7 +19,7 @@ from ..forward.predictor import Model
 
 TIMES_THE_WORST = 10.0
 """Least mean square of a channel under the base model, in units of that of the worst channel of any fitted recording. The
-texel of the insole that jumps (docs/gap-real.md) has 13.6 to 123 times as much; the number was chosen after these had been
+texel of the insole that jumps (benchmarks/RESULTS.md) has 13.6 to 123 times as much; the number was chosen after these had been
 seen."""
 LEAST_STAYS = 0.5
 """Least share of its squares that stays with the amended model. What an effect explains is no jump."""
