@@ -86,7 +86,7 @@ def test_a_check_that_fails_is_said_with_what_differs(tmp_path):
     assert [one.name for one in result.findings] == ["creep"] and result.findings[0].confidence < 0.5
     assert result.verdict == "unexplained" and result.findings[0].doubts == (REFUTED,)
     errors = gap_errors(result)
-    assert f"creep: {REFUTED}, so its name is not sure" in sentences.evidence(result, errors)
+    assert f"creep: {REFUTED}, so its name is in doubt" in sentences.evidence(result, errors)
     said = sentences.headline(result, errors)
     assert "creep fits the fitted recordings" in said and "'t3'" in said and "40% less" in said
     assert sentences.caution(result) in sentences.warnings(result)
