@@ -106,7 +106,7 @@ def _plan(arguments: argparse.Namespace) -> int:
         limits = {name: getattr(arguments, name) for name in WISHES if name != "between"}
         with console.shown_progress("plan") as show:
             plan = plan_experiment(rig, limits, tuple(arguments.between or ()), show)
-    print(console.text_table([("effect", "may be taken for"), *plan.rows], "<<"))
+    print(console.text_table([("effect", "may be confused with"), *plan.rows], "<<"))
     print()
     print(plan.sentence)
     for text in rig.warnings:
