@@ -69,7 +69,7 @@ SETTLED_SHARE = 0.05
 """Share of the base model's gap. If a search explains more than the rest of it, no search asks how recordings differ."""
 LEAST_NOISE = 0.8
 """Least mean square of the noise in units of its estimate: the estimate is not trusted to be too large by more than this."""
-NOT_NEEDED = "the kinds that were found explain the recordings without it"
+NOT_NEEDED = "the effects found explain the recordings without it"
 
 Outcome = TypeVar("Outcome")
 
@@ -335,7 +335,7 @@ def _name_differences(own: _Search, plain: _Search, session: _Search | None) -> 
 
 def _in_doubt(one: Finding) -> Finding:
     """A finding that is not sure: what falls within recordings as from one to the next is wear or drift as that is."""
-    why = "gains fall from recording to recording, and nothing tells whether with use or with time"
+    why = "gains fall from recording to recording, and the recordings do not show whether with use or time"
     return replace(one, confidence=min(one.confidence, UNSURE_CONFIDENCE), doubts=(*one.doubts, why))
 
 
