@@ -152,7 +152,7 @@ def _sensor_in_scene(arguments: argparse.Namespace) -> Any:
 
 
 def _put_into_scene(arguments: argparse.Namespace, sensor: Any) -> None:
-    """Put the amended sensor on a sensor of a .blend and save it; opened anew, because it may have been edited meanwhile."""
+    """Put the amended sensor on a sensor of a .blend and save it; opened again, because it may have been edited meanwhile."""
     with console.blender_output_hidden():
         target = _sensor_in_scene(arguments)
         from ..addon.measured import gap_results

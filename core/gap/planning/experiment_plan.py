@@ -207,7 +207,7 @@ def _planned(space: DesignSpace, question: Question, begins: int) -> Generator[P
 
 
 def _check_kinds(names: Sequence[str], compared: frozenset[str]) -> None:
-    """Raise if some kinds cannot be told apart by any planned trajectory."""
+    """Raise if no planned trajectory can distinguish some of the kinds."""
     for name in names:
         if name not in library():
             raise ParameterError(f"There is no effect '{name}': choose from {', '.join(sorted(compared))}.")

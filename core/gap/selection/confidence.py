@@ -48,7 +48,7 @@ the others leave: the misfit of a formula seldom looks just like another effect.
 UNSURE_CONFIDENCE = 0.45
 """Highest confidence of an effect that is not sure."""
 UNLIKELY_CONFIDENCE = 0.33
-"""The same without a rival: then the effect only makes up for what another formula lacks, or is not borne out. Of such names
+"""The same without a rival: then the effect only compensates for another formula, or fails a test. Of such names
 7 of 32 were right in the cases of benchmarks/_hidden numbered from 23000 on, and 16 of 45 in those from 31000 on without the
 third family; of names that have rivals 11 of 16, and 11 of 19."""
 SURE = 0.5
@@ -124,7 +124,7 @@ def misfit_of_another(effect: Effect, state: SelectionState, fitted: Sequence[Ef
 
 
 def may_absorb_misfit(effect: Effect, state: SelectionState) -> bool:
-    """Return whether parameters of single texels may have absorbed what is left unexplained.
+    """Return whether parameters of single texels may have absorbed the unexplained part.
 
     They may if a larger effect was found beside them and much of the gap is left.
     """

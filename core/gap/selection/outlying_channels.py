@@ -3,7 +3,7 @@
 
 A texel whose converter jumps to another level in one recording may have a hundred times the error of all others, whatever the
 model. Then the sum of squares of the check recordings is this texel's, and no effect closes half of it. Such a channel of such
-a recording is set aside where the check recordings are held against an amended model, and the report says which. This never
+a recording is set aside where the check recordings judge an amended model, and the report says which. This never
 hides an error that rises: then nothing of the recording is set aside.
 """
 

@@ -137,7 +137,7 @@ def _judge_effects(result: Diagnosis, view_set: ViewSet, state: SelectionState, 
 
 
 def _doubts(effect: Effect, result: Diagnosis, state: SelectionState, gap_sizes: GapSizes, is_open: bool) -> tuple[str, ...]:
-    """Why an effect may only make up for another one's formula, in words; empty if it is alone, or if nothing says so."""
+    """Why an effect may only compensate for the formula of another one; empty if there is no reason."""
     fitted = result.best.model.fitted_effects
     if len(fitted) < 2:
         return ()
@@ -162,7 +162,7 @@ def _least_share_closed(result: Diagnosis, left_out: list[float], quantity: int)
 def _is_out_of_reach(result: Diagnosis, gap_sizes: GapSizes, quantity: int) -> bool:
     """Whether effects on friction are all there is, and what readings leave would be no gap by itself.
 
-    Friction cannot change readings, so it is not held against it that little of them closes.
+    Friction cannot change readings, so the share of their gap that it closes does not count.
     """
     fitted = result.best.model.fitted_effects
     only_friction = bool(fitted) and all(effect.name in friction_kinds() for effect in fitted)
@@ -170,7 +170,7 @@ def _is_out_of_reach(result: Diagnosis, gap_sizes: GapSizes, quantity: int) -> b
 
 
 def _is_quiet(result: Diagnosis, structure: ResidualStructure, gap_sizes: GapSizes) -> bool:
-    """Whether the base model's residual is small, or little more than noise, and what is left of it has no structure."""
+    """True if the base model's residual is small, or little more than noise, and has no structure."""
     mean, gap = float(gap_sizes.base[gap_sizes.main_quantity]), gap_sizes.gap(gap_sizes.main_quantity)
     small = (mean < MOST_MEAN_SQUARE or gap < LEAST_IMPROVEMENT) and not result.unlike_fitted
     return structure.total < LEAST_STRUCTURE and small and result.line is None
