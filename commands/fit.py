@@ -103,7 +103,7 @@ def _friction(arguments: argparse.Namespace) -> None:
     print(console.text_table(rows, "<>><"))
     print(f"\nroot mean square residual: {fit.residual:.3g} N")
     if fit.unidentifiable:
-        print(f"These measurements do not tell {', '.join(fit.unidentifiable)}: add some at other velocities.")
+        print(f"These measurements do not identify {', '.join(fit.unidentifiable)}: add some at other velocities.")
     if arguments.plot:
         from ..core.gap.calibration.plots import plot_friction
 

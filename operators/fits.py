@@ -135,7 +135,7 @@ class PALPATE_OT_friction_fit(MeasurementFit, bpy.types.Operator):
         self.report({"INFO"}, values)
         if fit.unidentifiable:
             names = ", ".join(fit.unidentifiable)
-            self.report({"WARNING"}, f"These measurements do not tell {names}: add some at other velocities")
+            self.report({"WARNING"}, f"These measurements do not identify {names}: add some at other velocities")
 
 
 CLASSES = (PALPATE_OT_stiffness_fit, PALPATE_OT_friction_fit)

@@ -124,12 +124,12 @@ class PALPATE_OT_gap_plan(modal_job.ModalJob, bpy.types.Operator):
     def done(self, result):
         experiment, rig = result
         if experiment is None:
-            self.report({"INFO"}, "The recordings tell all effects from each other: nothing is planned")
+            self.report({"INFO"}, "The recordings distinguish all effects: nothing is planned")
             return
         sensor = bpy.data.objects[self._sensor]
         probe = planned_probe.put_on_probe(bpy.context, sensor, experiment, rig)
-        sure = f"about {experiment.sure_after:.0%} sure with it, {experiment.sure_before:.0%} without"
-        self.report({"INFO"}, f"'{probe.name}' tells {' from '.join(experiment.kinds)}: {sure}")
+        sure = f"confidence {experiment.sure_after:.0%} with it, {experiment.sure_before:.0%} without"
+        self.report({"INFO"}, f"'{probe.name}' separates {' from '.join(experiment.kinds)}: {sure}")
 
 
 class PALPATE_OT_gap_add(support.ErrorReporting, bpy.types.Operator):
