@@ -9,7 +9,7 @@ from . import support
 
 
 class PALPATE_OT_probe_add(support.ErrorReporting, bpy.types.Operator):
-    """Add something that presses on the middle of the active sensor, holds and goes, over the scene's frame range"""
+    """Add an object that presses on the middle of the active sensor, holds and retracts within the scene's frame range"""
 
     bl_idname = "palpate.probe_add"
     bl_label = "Add Probe"
@@ -33,7 +33,7 @@ class PALPATE_OT_probe_add(support.ErrorReporting, bpy.types.Operator):
     )
     depth: FloatProperty(
         name="Depth (m)",
-        description="How deep it presses, m; 0 is a quarter of the maximum penetration",
+        description="Depth of the press, m; 0 is a quarter of the maximum penetration",
         min=0.0,
         precision=5,
         step=0.01,

@@ -49,7 +49,7 @@ def make_sensor(obj, source: str, role: str = "SENSOR") -> int:
         The region has no vertices or no face. Nothing was changed then.
     """
     if obj.type != "MESH":
-        raise SensorError(f"'{obj.name}' is no mesh: convert it with Object › Convert › Mesh before it becomes a sensor.")
+        raise SensorError(f"'{obj.name}' is not a mesh: convert it with Object › Convert › Mesh before it becomes a sensor.")
     settings = obj.palpate
     if source == "SELECTION":
         chosen = selected_vertices(obj)
@@ -145,7 +145,7 @@ def _check(obj, chosen: np.ndarray, source: str) -> None:
     reason = {
         "SELECTION": "Nothing is selected",
         "GROUP": f"No vertex has a weight of {obj.palpate.threshold:g} or more in the active vertex group",
-        "MATERIAL": "No face wears the active material",
+        "MATERIAL": "No face has the active material",
         "FACE_SET": "No face is in that face set",
         "MESH": "There are no vertices",
     }[source]

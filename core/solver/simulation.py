@@ -434,7 +434,8 @@ class Simulation:
             what = "texels" if all(sensor.parameters.points_per_texel == 1 for sensor in sensors) else "contact points"
             self.warnings.append(
                 f"Frame {self.frame}: {total} {what} are pressed past their maximum penetration by "
-                f"{', '.join(dict.fromkeys(pressed))} and do not act; press less deep, or raise k or the maximum penetration."
+                f"{', '.join(dict.fromkeys(pressed))} and exert no force; "
+                "reduce the depth, or raise k or the maximum penetration."
             )
 
     def _count_too_deep(self, pair: int) -> int:
