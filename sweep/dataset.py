@@ -16,6 +16,7 @@ from ..core.model.shared_results import SharedResults
 from ..core.study.run_files import RUNS, STUDY_NAME
 from ..core.study.run_record import read_run_record
 from ..core.study.study_file import Run, read_study
+from .encoded_run import encode_run
 from .exchange import exchange_folder, require_own
 from .features import read_frames
 from .finished_runs import failures, run_order, study_name
@@ -81,11 +82,11 @@ def _write_parts(folder: Path, order: list[tuple[int, str]], hidden: Path) -> Pa
     try:
         for _, digest in order:
             run = read_run_record(folder / RUNS / digest)
-            frames = read_frames(run, shared)
-            writer = writers.get(frames.layout_digest)
+            frames = encode_run(read_frames(run, shared))
+            writer = writers.get(frames.layout.digest)
             if writer is None:
-                writer = LeRobotWriter(parts / f"part-{len(writers):03d}", frames, task)
-                writers[frames.layout_digest] = writer
+                writer = LeRobotWriter(parts / f"part-{len(writers):03d}", frames.layout, task)
+                writers[frames.layout.digest] = writer
             writer.add(run, frames)
         for writer in writers.values():
             writer.finish()

@@ -8,7 +8,7 @@ other gives lists in the order of its texels, whose places are in ``meta/texels.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -35,6 +35,7 @@ from ..core.study.run_record import RunRecord
 POSE_AXES = ("x", "y", "z", "qw", "qx", "qy", "qz")
 CHANNELS = ("normal_force", "shear_x", "shear_y")
 AXES = ("x", "y", "z")
+VARIED = "varied."
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,11 @@ class Feature:
     @property
     def is_constant(self) -> bool:
         """True for what is the same in all frames of a run."""
-        return self.name.startswith("varied.")
+        return self.name.startswith(VARIED)
+
+
+TIMESTAMP = Feature("timestamp", "float32", (1,), (), "s", "Time since the first frame.")
+"""A column that LeRobot expects in every dataset."""
 
 
 @dataclass(frozen=True)
@@ -85,28 +90,48 @@ class SensorRun:
 
 
 @dataclass(frozen=True)
+class Layout:
+    """What the frames of all runs in one dataset have in common.
+
+    Attributes
+    ----------
+    features : tuple of Feature
+    fps : float
+    texels : dict of str to Texels
+        By sensor.
+    digest : str
+        Equal for the same features, the same texels and the same rate.
+    """
+
+    features: tuple[Feature, ...]
+    fps: float
+    texels: dict[str, Texels]
+    digest: str
+
+    @property
+    def frame_features(self) -> tuple[Feature, ...]:
+        """Time and features that change from frame to frame, in their order."""
+        return (TIMESTAMP, *(item for item in self.features if not item.is_constant))
+
+
+@dataclass(frozen=True)
 class RunFrames:
     """The frames of a run as columns.
 
     Attributes
     ----------
-    features : tuple of Feature
-    columns : dict of str to (F, …) ndarray or str
-        By name of the feature; a value that is the same in all frames may be a single text.
-    times : (F,) float, s
-    fps : float
-    texels : dict of str to Texels
-        By sensor.
-    layout_digest : str
-        Equal for runs whose frames may stand in one dataset: the same features, the same texels, the same rate.
+    layout : Layout
+    columns : dict of str to (F, …) ndarray
+        By the names of the layout's `frame_features`.
     """
 
-    features: tuple[Feature, ...]
-    columns: dict[str, Any]
-    times: np.ndarray
-    fps: float
-    texels: dict[str, Texels] = field(default_factory=dict)
-    layout_digest: str = ""
+    layout: Layout
+    columns: dict[str, np.ndarray]
+
+    @property
+    def rows(self) -> int:
+        """Number of frames."""
+        return len(self.columns[TIMESTAMP.name])
 
 
 def read_frames(run: RunRecord, shared: SharedResults | None = None) -> RunFrames:
@@ -158,14 +183,15 @@ def _frames(shared: SharedResults, sensors: dict[str, SensorRun], varied: Mappin
     """Return the frames of some sensors of one run; `too_large` ends the sentence about a number that 32 bits cannot hold."""
     first = next(iter(sensors.values())).recording
     features: list[Feature] = []
-    columns: dict[str, Any] = {}
-    for feature, values in _all_features(varied, first, sensors):
+    columns = {TIMESTAMP.name: (first.times - first.times[0]).astype(TIMESTAMP.dtype)}
+    for feature, values in _all_features(first, sensors):
         features.append(feature)
-        columns[feature.name] = values if isinstance(values, str) else _narrowed(too_large, feature, values)
+        columns[feature.name] = _narrowed(too_large, feature, values)
+    features += [_varied_feature(name, value) for name, value in varied.items()]
     fps = _frame_rate(first.times)
     texels = {name: sensor.texels for name, sensor in sensors.items()}
     digest = _layout_digest(tuple(features), fps, tuple(texels), tuple(shared.of(digest_of, own) for own in texels.values()))
-    return RunFrames(tuple(features), columns, first.times - first.times[0], fps, texels, digest)
+    return RunFrames(Layout(tuple(features), fps, texels, digest), columns)
 
 
 @lru_cache(maxsize=64)
@@ -209,20 +235,21 @@ def _narrowed(too_large: str, feature: Feature, values: np.ndarray) -> np.ndarra
     return np.ascontiguousarray(values, dtype=feature.dtype)
 
 
-def _all_features(
-    varied: Mapping[str, Any], recording: Recording, sensors: dict[str, SensorRun]
-) -> Iterator[tuple[Feature, Any]]:
+def _all_features(recording: Recording, sensors: dict[str, SensorRun]) -> Iterator[tuple[Feature, np.ndarray]]:
     for name, sensor in sensors.items():
         yield from _texel_features(name, sensor)
         yield from _net_features(name, sensor.arrays)
     yield from _pose_features(recording)
-    for name, value in varied.items():
-        about = "What was varied; the same in all frames of a run."
-        plain = f"varied.{name.replace('/', '_')}"  # LeRobot allows no slash
-        if isinstance(value, str):
-            yield Feature(plain, "string", (1,), (), "", about), value
-        else:
-            yield Feature(plain, "float64", (1,), (), "", about), np.full(len(recording.frames), value)
+
+
+def varied_name(name: str) -> str:
+    """Return the column of what was varied; LeRobot allows no slash."""
+    return f"{VARIED}{name.replace('/', '_')}"
+
+
+def _varied_feature(name: str, value: Any) -> Feature:
+    about = "What was varied; the same in all frames of a run."
+    return Feature(varied_name(name), "string" if isinstance(value, str) else "float64", (1,), (), "", about)
 
 
 def _texel_features(name: str, sensor: SensorRun) -> Iterator[tuple[Feature, np.ndarray]]:
