@@ -27,6 +27,7 @@ from ..core.io.regular_file import read_bytes
 from ..core.io.sensor_npz import SENSOR_NAME, load_sensor, unpack_sensor
 from ..core.model.digest import digest_of
 from ..core.model.recording import Recording, SensorRecording
+from ..core.model.scenario import Scenario
 from ..core.model.sensor_parameters import Painted, SensorParameters
 from ..core.model.shared_results import SharedResults
 from ..core.response import metrics
@@ -156,6 +157,27 @@ def read_frames(run: RunRecord, shared: SharedResults | None = None) -> RunFrame
     return _frames(shared, sensors, run.values, f"the run '{run.folder}' is no 32-bit number: delete the run and sweep again.")
 
 
+def solved_frames(
+    scenario: Scenario, recording: Recording, varied: Mapping[str, Any], shared: SharedResults, index: int
+) -> RunFrames:
+    """Return the frames of a run as it was solved.
+
+    Raises
+    ------
+    FileError
+        A number of it is too large for 32 bits.
+    """
+    names = folder_names(recording.sensors)
+    sensors = {
+        names[own.name]: SensorRun(
+            own.texels, own.painted, recording, recording.sensors[own.name], own.parameters, own.parameters.unit
+        )
+        for own in scenario.sensors
+        if own.readout
+    }
+    return _frames(shared, sensors, varied, f"run {index} is no 32-bit number: vary less widely.")
+
+
 def bake_frames(bake: Bake) -> RunFrames:
     """Return the frames of a bake, as of a run of which nothing was varied.
 
@@ -242,6 +264,24 @@ def _all_features(recording: Recording, sensors: dict[str, SensorRun]) -> Iterat
     yield from _pose_features(recording)
 
 
+def tactile_name(sensor: str) -> str:
+    """Return the column of the forces on the texels."""
+    return f"observation.tactile.{sensor}"
+
+
+def net_force_name(sensor: str) -> str:
+    """Return the column of the force on a sensor."""
+    return f"observation.net_force.{sensor}"
+
+
+def by_texel(values: np.ndarray, texels: Texels) -> np.ndarray:
+    """Return (F, rows, columns, 3) or (F, n, 3) forces in the order of the texels, (F, n, 3)."""
+    if values.ndim < 4:
+        return values
+    assert isinstance(texels.layout, GridLayout)  # which alone gives pictures
+    return values[:, texels.layout.row, texels.layout.column]
+
+
 def varied_name(name: str) -> str:
     """Return the column of what was varied; LeRobot allows no slash."""
     return f"{VARIED}{name.replace('/', '_')}"
@@ -267,7 +307,7 @@ def _texel_features(name: str, sensor: SensorRun) -> Iterator[tuple[Feature, np.
 
     force = np.concatenate([arrays.normal_force[:, :, None], arrays.shear], axis=2)
     about = "Forces on the texels: along the normal, and shear along the texel's x and y axes."
-    image = Feature(f"observation.tactile.{name}", "float32", (*shape, 3), (*names, "channel"), "N", about, CHANNELS)
+    image = Feature(tactile_name(name), "float32", (*shape, 3), (*names, "channel"), "N", about, CHANNELS)
     yield image, placed(force)
     about = "Readings of the texels, in the sensor's unit."
     yield Feature(f"observation.reading.{name}", "float32", shape, names, sensor.unit, about), placed(arrays.reading)
@@ -281,7 +321,7 @@ def _texel_features(name: str, sensor: SensorRun) -> Iterator[tuple[Feature, np.
 
 def _net_features(name: str, arrays: SensorRecording) -> Iterator[tuple[Feature, np.ndarray]]:
     frame = "in the frame of the sensor's body"
-    yield _vector(f"observation.net_force.{name}", "N", f"Net force on the sensor, {frame}."), arrays.net_force
+    yield _vector(net_force_name(name), "N", f"Net force on the sensor, {frame}."), arrays.net_force
     about = f"Net torque on the sensor about the origin of its body, {frame}."
     yield _vector(f"observation.net_torque.{name}", "N m", about), arrays.net_torque
     about = f"Force-weighted mean of the contact points, {frame}; zero while nothing touches."

@@ -9,9 +9,10 @@ from pathlib import Path
 
 from ..core.errors import FileError, os_error_reason
 from ..core.io.regular_file import read_bytes
-from ..core.study.run_files import FAILED, RUNS, STUDY_NAME, done_runs, failed_runs
-from ..core.study.run_record import RunRecord, Value, read_run_record, values_read
+from ..core.study.run_files import FAILED, STUDY_NAME, done_runs, failed_runs
+from ..core.study.run_record import RunRecord, Value, values_read
 from ..core.study.study_file import Run, read_study
+from .stored_runs import StoredRuns
 
 UNNAMED_STUDY = "study of a tactile sensor"
 """Name of a study whose file gives none. The name of its folder does not serve, so that equal studies give equal files."""
@@ -49,7 +50,8 @@ def run_order(folder: Path, planned: Sequence[Run] = ()) -> list[tuple[int, str]
     done = done_runs(folder)
     order = [(run.index, run.digest) for run in planned if run.digest in done]
     known = {digest for _, digest in order}
-    return sorted(order + [(read_run_record(folder / RUNS / digest).index, digest) for digest in done - known])
+    runs = StoredRuns(folder)
+    return sorted(order + [(runs.record(digest).index, digest) for digest in done - known])
 
 
 def finished_runs(folder: Path, order: list[tuple[int, str]] | None = None) -> Iterator[RunRecord]:
@@ -67,8 +69,9 @@ def finished_runs(folder: Path, order: list[tuple[int, str]] | None = None) -> I
     FileError
         As :func:`run_order`.
     """
+    runs = StoredRuns(folder)
     for _, digest in run_order(folder) if order is None else order:
-        yield read_run_record(folder / RUNS / digest)
+        yield runs.record(digest)
 
 
 def failures(folder: Path, planned: Sequence[Run] = ()) -> list[FailedRun]:
