@@ -82,12 +82,12 @@ def _write_parts(folder: Path, order: list[tuple[int, str]], hidden: Path) -> Pa
     file_bytes = runs.bytes_in_shards // MOST_FILES
     try:
         for _, digest in order:
-            frames = runs.frames(digest)
+            run, frames = runs.run(digest)
             writer = writers.get(frames.layout.digest)
             if writer is None:
                 writer = LeRobotWriter(parts / f"part-{len(writers):03d}", frames.layout, task, file_bytes)
                 writers[frames.layout.digest] = writer
-            writer.add(runs.record(digest), frames)
+            writer.add(run, frames)
         for writer in writers.values():
             writer.finish()
     except BaseException:

@@ -110,8 +110,8 @@ def record_of(start: Callable[[int], bytes], place: Path) -> RunRecord:
     return record_in(_text(content)[0], place)
 
 
-def unpack_run(content: bytes, layout_of: Callable[[str], Layout]) -> EncodedRun:
-    """Return the frames of a run in a shard; `layout_of` returns a layout by its name. Raises ValueError for a damaged one."""
+def unpack_run(content: bytes, place: Path, layout_of: Callable[[str], Layout]) -> tuple[RunRecord, EncodedRun]:
+    """Return a run in a shard; `layout_of` returns a layout by its name. Raises ValueError where it is damaged."""
     words, at = _text(content)
     whole, columns = memoryview(content), []
     for length, size, count in words["columns"]:
@@ -119,7 +119,7 @@ def unpack_run(content: bytes, layout_of: Callable[[str], Layout]) -> EncodedRun
         at += length
     if at != len(content):
         raise ValueError("its columns have other sizes than it says")
-    return EncodedRun(layout_of(words["layout"]), words["frames"], columns)
+    return record_in(words, place), EncodedRun(layout_of(words["layout"]), words["frames"], columns)
 
 
 def _text(content: bytes) -> tuple[dict[str, Any], int]:

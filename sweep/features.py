@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -109,7 +109,7 @@ class Layout:
     texels: dict[str, Texels]
     digest: str
 
-    @property
+    @cached_property
     def frame_features(self) -> tuple[Feature, ...]:
         """Time and features that change from frame to frame, in their order."""
         return (TIMESTAMP, *(item for item in self.features if not item.is_constant))

@@ -9,6 +9,7 @@ Source: ``README.md``, ``Encodings.md`` and ``parquet.thrift`` of Apache Parquet
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -26,7 +27,8 @@ LEVEL = 3
 """Of the compression with Zstandard."""
 PLAIN, RLE, BYTE_STREAM_SPLIT = 0, 3, 9
 ZSTD = 6
-_DATA_PAGE = 0
+_TO_SIZES, _NEXT, _TO_COUNT = b"\x15\0\x15", b"\x15", b"\x2c\x15"
+"""Of the header of a data page: a whole number that is 0, and sizes before and after compression; the count in a structure."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ def decode_column(feature: Feature, column: EncodedColumn) -> np.ndarray:
         The pages are damaged, or not such as :func:`encode_column` makes.
     """
     try:
-        parts = [_unpacked(feature, header, body) for header, body in _pages(column.content)]
+        parts = [_unpacked(feature, *page) for page in _pages(feature, column.content)]
     except (LookupError, TypeError, OSError) as error:
         raise ValueError(f"the column '{feature.name}' is damaged ({type(error).__name__}: {error})") from error
     found = np.concatenate(parts) if len(parts) != 1 else parts[0]
@@ -92,23 +94,24 @@ def _page(feature: Feature, values: np.ndarray) -> tuple[bytes, int]:
     """Return a page with its header, and its size before compression."""
     body = _levels(len(values), _shape(feature)) + _numbers(feature, values)
     packed = _codec().compress(body, asbytes=True)
-    header = thrift.write_struct(
-        {
-            1: (thrift.I32, _DATA_PAGE),
-            2: (thrift.I32, len(body)),
-            3: (thrift.I32, len(packed)),
-            5: (
-                thrift.STRUCT,
-                {
-                    1: (thrift.I32, values.size),
-                    2: (thrift.I32, encoding_of(feature)),
-                    3: (thrift.I32, RLE),
-                    4: (thrift.I32, RLE),
-                },
-            ),
-        }
+    header = b"".join(
+        (
+            _TO_SIZES,
+            thrift.whole_bytes(len(body)),
+            _NEXT,
+            thrift.whole_bytes(len(packed)),
+            _TO_COUNT,
+            thrift.whole_bytes(values.size),
+            _end_of_header(feature),
+        )
     )
     return header + packed, len(header) + len(body)
+
+
+@lru_cache(maxsize=64)
+def _end_of_header(feature: Feature) -> bytes:
+    """Return the last fields of a header: how numbers and levels are encoded."""
+    return b"".join(_NEXT + thrift.whole_bytes(encoding) for encoding in (encoding_of(feature), RLE, RLE)) + b"\0\0"
 
 
 def _numbers(feature: Feature, values: np.ndarray) -> bytes:
@@ -120,11 +123,10 @@ def _numbers(feature: Feature, values: np.ndarray) -> bytes:
     return own.tobytes()
 
 
-def _unpacked(feature: Feature, header: thrift.Struct, body: memoryview) -> np.ndarray:
+def _unpacked(feature: Feature, size: int, count: int, body: memoryview) -> np.ndarray:
     """Return the numbers of a page."""
-    size, count = header[2][1], header[5][1][1][1]
     content = _codec().decompress(body, size, asbytes=True)
-    width = max(1, int(np.prod(_shape(feature))))
+    width = math.prod(_shape(feature))
     if count % width:
         raise ValueError(f"the column '{feature.name}' is cut")
     start = len(_levels(count // width, _shape(feature)))
@@ -138,15 +140,21 @@ def _unpacked(feature: Feature, header: thrift.Struct, body: memoryview) -> np.n
     return np.frombuffer(content, kind, offset=start)
 
 
-def _pages(content: Any) -> Iterator[tuple[thrift.Struct, memoryview]]:
-    """Yield headers and bodies."""
-    whole, at = memoryview(content), 0
+def _pages(feature: Feature, content: Any) -> Iterator[tuple[int, int, memoryview]]:
+    """Yield size before compression, count of numbers and body of each page; its header is one of :func:`_page`."""
+    whole, at, end = memoryview(content), 0, _end_of_header(feature)
     while at < len(whole):
-        header, start = thrift.read_struct(whole, at)  # type: ignore[arg-type]
-        at = start + header[3][1]
-        if at > len(whole) or header[3][1] < 0 or header[2][1] < 0:
+        numbers = []
+        for words in (_TO_SIZES, _NEXT, _TO_COUNT):
+            if whole[at : at + len(words)] != words:
+                raise ValueError("the header of a page is damaged")
+            number, at = thrift.read_whole(whole, at + len(words))
+            numbers.append(number)
+        start = at + len(end)
+        at = start + numbers[1]
+        if whole[start - len(end) : start] != end or at > len(whole) or min(numbers) < 0:
             raise ValueError("a page is cut")
-        yield header, whole[start:at]
+        yield numbers[0], numbers[2], whole[start:at]
 
 
 @lru_cache(maxsize=64)
@@ -155,7 +163,7 @@ def _levels(rows: int, shape: tuple[int, ...]) -> bytes:
 
     Every list and every number counts as optional, as Arrow has them.
     """
-    count = rows * int(np.prod(shape))
+    count = rows * math.prod(shape)
     parts = []
     if shape:
         places = np.arange(count)

@@ -148,7 +148,7 @@ def _images(folder: Path, order: list[tuple[int, str]]) -> list[RunImage]:
     for index, digest in (order[i] for i in chosen):
         if not runs.record(digest).sensors:
             continue
-        frames = runs.frames(digest)
+        _, frames = runs.run(digest)
         (sensor, texels), *_ = frames.layout.texels.items()
         features = {item.name: item for item in frames.layout.features}
         force = np.linalg.norm(frames.decoded(features[net_force_name(sensor)]), axis=1)

@@ -53,8 +53,8 @@ class StoredRuns:
         except (ValueError, LookupError, TypeError) as error:
             raise damaged(path) from error
 
-    def frames(self, digest: str) -> EncodedRun:
-        """Return the frames of a run; those of a run with a folder are encoded now.
+    def run(self, digest: str) -> tuple[RunRecord, EncodedRun]:
+        """Return a run with its frames; those of a run with a folder are encoded now.
 
         Raises
         ------
@@ -62,12 +62,14 @@ class StoredRuns:
             It is missing or damaged, or has no sensor.
         """
         if digest not in self._shards:
-            return encode_run(read_frames(self.record(digest), self._shared))
+            record = self.record(digest)
+            return record, encode_run(read_frames(record, self._shared))
+        path = self._shards.path(digest)
         content = self._shards.read(digest)
         try:
-            return unpack_run(content, self._layout)
+            return unpack_run(content, path, self._layout)
         except (ValueError, LookupError, TypeError) as error:
-            raise damaged(self._shards.path(digest)) from error
+            raise damaged(path) from error
 
     def _layout(self, name: str) -> Layout:
         if name not in self._layouts:

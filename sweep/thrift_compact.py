@@ -34,7 +34,7 @@ def read_struct(content: bytes, at: int = 0) -> tuple[Struct, int]:
         if step:
             number += step
         else:
-            number, at = _read_whole(content, at)
+            number, at = read_whole(content, at)
         value, at = (None, at) if kind in (TRUE, FALSE) else _read_value(content, at, kind)
         found[number] = kind, value
     return found, at + 1
@@ -46,7 +46,7 @@ def write_struct(fields: Struct) -> bytes:
     before = 0
     for number, (kind, value) in sorted(fields.items()):
         step = number - before
-        parts.append(bytes((step << 4 | kind,)) if 0 < step < 16 else bytes((kind,)) + _whole(number))
+        parts.append(bytes((step << 4 | kind,)) if 0 < step < 16 else bytes((kind,)) + whole_bytes(number))
         if kind not in (TRUE, FALSE):
             parts.append(_value(kind, value))
         before = number
@@ -57,7 +57,7 @@ def _read_value(content: bytes, at: int, kind: int) -> tuple[Any, int]:
     if kind in (TRUE, FALSE, BYTE):  # in lists, where each has a byte
         return content[at], at + 1
     if kind in (I16, I32, I64):
-        return _read_whole(content, at)
+        return read_whole(content, at)
     if kind == DOUBLE:
         return struct.unpack_from("<d", content, at)[0], at + 8
     if kind == BINARY:
@@ -84,7 +84,7 @@ def _value(kind: int, value: Any) -> bytes:
     if kind in (TRUE, FALSE, BYTE):
         return bytes((value,))
     if kind in (I16, I32, I64):
-        return _whole(value)
+        return whole_bytes(value)
     if kind == DOUBLE:
         return struct.pack("<d", value)
     if kind == BINARY:
@@ -99,7 +99,7 @@ def _value(kind: int, value: Any) -> bytes:
     raise ValueError(f"the type {kind} is not used by Parquet")
 
 
-def _read_size(content: bytes, at: int) -> tuple[int, int]:
+def _read_size(content: bytes | memoryview, at: int) -> tuple[int, int]:
     """Return a number of seven bits a byte, the lowest first."""
     number = shift = 0
     while True:
@@ -125,11 +125,12 @@ def size_bytes(number: int) -> bytes:
     return bytes(found)
 
 
-def _read_whole(content: bytes, at: int) -> tuple[int, int]:
+def read_whole(content: bytes | memoryview, at: int) -> tuple[int, int]:
     """Return a number with a sign, which stands in its lowest bit."""
     number, at = _read_size(content, at)
     return number >> 1 ^ -(number & 1), at
 
 
-def _whole(number: int) -> bytes:
+def whole_bytes(number: int) -> bytes:
+    """Return a number with its sign in the lowest bit."""
     return size_bytes(number << 1 ^ number >> 63)

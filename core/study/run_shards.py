@@ -245,7 +245,7 @@ def _holds(keys: np.ndarray, key: np.uint64) -> bool:
 
 
 class ShardIndex:
-    """Where the runs in the shards of a folder are, in 40 bytes each.
+    """Where the runs in the shards of a folder are, in 48 bytes each.
 
     Parameters
     ----------
@@ -263,7 +263,7 @@ class ShardIndex:
         tables = [self._places(path, start, table) for path, start, table in ShardScan(runs).new_groups()]
         whole = np.concatenate(tables) if tables else np.zeros(0, _PLACE)
         self._table = whole[np.lexsort((whole["low"], whole["high"]))]
-        self._high = self._table["high"].astype(np.uint64)
+        self._high, self._low = self._table["high"].astype(np.uint64), self._table["low"].astype(np.uint32)
 
     def _places(self, path: Path, start: int, table: np.ndarray) -> np.ndarray:
         if not self._paths or self._paths[-1] != path:
@@ -325,14 +325,13 @@ class ShardIndex:
         return found
 
     def _row(self, digest: str) -> np.void | None:
-        high, low = int(digest[:16], 16), int(digest[16:], 16)
-        at = int(np.searchsorted(self._high, np.uint64(high)))
-        while at < len(self._table) and self._high[at] == high:
-            if self._table["low"][at] == low:
-                row: np.void = self._table[at]
-                return row
-            at += 1
-        return None
+        high, low = np.uint64(int(digest[:16], 16)), int(digest[16:], 16)
+        begin, end = (int(np.searchsorted(self._high, high, side)) for side in ("left", "right"))
+        at = begin + int(np.searchsorted(self._low[begin:end], np.uint32(low)))
+        if at == end or self._low[at] != low:
+            return None
+        row: np.void = self._table[at]
+        return row
 
 
 def _read(path: Path, offset: int, length: int) -> bytes:

@@ -102,7 +102,7 @@ def test_a_run_holds_what_it_promises(undisturbed, tmp_path):
     assert baked.manifests["Pad"].unit == baked.parameters["Pad"].unit == "N"
     runs = StoredRuns(undisturbed)
     assert asdict(runs.record(one.digest))["metrics"] == run["metrics"]
-    own, kept = StoredRuns(opened.folder).frames(one.digest), runs.frames(one.digest)
+    own, kept = StoredRuns(opened.folder).run(one.digest)[1], runs.run(one.digest)[1]
     assert [bytes(column.content) for column in own.columns] == [bytes(column.content) for column in kept.columns]
 
 
