@@ -24,7 +24,7 @@ from palpate.core.study.run_files import RUNS, done_runs, failed_runs, make_fold
 from palpate.core.study.run_shards import SUFFIX, ShardIndex, digests_in
 from palpate.sweep.child import DONE, UNWRITABLE, Scenes, answer_to
 from palpate.sweep.dataset import publish
-from palpate.sweep.stored_runs import StoredRuns
+from palpate.sweep.finished_runs import StoredRuns
 from palpate.sweep.study_folder import begin_study
 
 from .sample_bake import grid_texels

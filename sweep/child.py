@@ -16,10 +16,12 @@ import time
 import traceback
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TextIO
 
 from ..core.errors import FileError, PalpateError
+from ..core.model.recording import Recording
 from ..core.model.scenario import Scenario
 from ..core.model.shared_results import SharedResults
 from ..core.study.metrics import metrics_of
@@ -96,8 +98,6 @@ def compute_run(scenes: Scenes, run: Run, place: Path) -> None:
     PalpateError
         Its values make no run.
     """
-    from dataclasses import replace
-
     from ..core.solver.simulation import Simulation
 
     began = time.perf_counter()
@@ -119,10 +119,22 @@ def compute_run(scenes: Scenes, run: Run, place: Path) -> None:
     if scenes.study.has_folders:
         write_run(place, run, scenario, recording, metrics, seconds, scenes.study.images, scenes.shared)
         return
-    frames = encode_run(solved_frames(scenario, recording, values_read(dict(run.values)), scenes.shared, run.index))
-    record = RunRecord(place, run.digest, run.index, dict(run.values), metrics, seconds, tuple(recording.sensors), frames.rows)
+    numbers = RunRecord(place, run.digest, run.index, dict(run.values), metrics, seconds, tuple(recording.sensors))
+    pack_frames(scenes, place, run, scenario, recording, numbers)
+
+
+def pack_frames(scenes: Scenes, place: Path, run: Run, scenario: Scenario, recording: Recording, numbers: RunRecord) -> None:
+    """Encode the frames of a run and write them with its numbers into the folder of a batch, for a shard.
+
+    Raises
+    ------
+    FileError
+        The file cannot be written, or a number is too large for 32 bits.
+    """
+    frames = encode_run(solved_frames(scenario, recording, values_read(numbers.values), scenes.shared, run.index))
     common = scenes.shared.of(pack_layout, scenes.layout(frames.layout))
-    write_packed_run(place, run, pack_run(record, frames), layout_name(frames.layout), common)
+    content = pack_run(replace(numbers, frames=frames.rows), frames)
+    write_packed_run(place, run, content, layout_name(frames.layout), common)
 
 
 def answer_to(scenes: Scenes, run: Run, place: Path) -> dict[str, Any]:

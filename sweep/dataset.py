@@ -15,10 +15,9 @@ from ..core.io.temporary_folder import remove_unfinished, temporary_folder
 from ..core.study.run_files import STUDY_NAME
 from ..core.study.study_file import Run, read_study
 from .exchange import exchange_folder, require_own
-from .finished_runs import failures, run_order, study_name
+from .finished_runs import StoredRuns, failures, run_order, study_name
 from .lerobot_writer import LeRobotWriter
 from .run_table import write_run_table
-from .stored_runs import StoredRuns
 
 DATASET_FOLDER = "dataset"
 DATASET_FILES = re.compile(r"(part-\d{3,}/)?(README\.md|data/chunk-\d{3,}/file-\d{3,}\.parquet|meta/.+\.(parquet|json))")

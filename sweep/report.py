@@ -20,9 +20,8 @@ from ..core.io.temporary_folder import temporary_folder
 from ..core.study.study_file import Run
 from .dependencies import LEAST_RUNS, RUNS_PER_NAME, Dependency, dependencies
 from .features import by_texel, net_force_name, tactile_name
-from .finished_runs import FailedRun, failures, finished_runs, run_order, study_name
+from .finished_runs import FailedRun, StoredRuns, failures, finished_runs, run_order, study_name
 from .report_figures import MOST_METRICS, MOST_NAMES, MOST_PARAMETERS, RunImage, draw_image_sheet, draw_small_multiples
-from .stored_runs import StoredRuns
 
 REPORT_NAME = "report.html"
 TEMPLATE = Path(__file__).parent / "templates" / "sweep_report.html"

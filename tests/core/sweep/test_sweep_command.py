@@ -26,7 +26,7 @@ from palpate.core.io.tactile_exr import read_exr
 from palpate.core.study.run_files import SCENES, done_runs, make_folders, run_batch, write_failure
 from palpate.core.study.run_shards import RUN, ShardScan
 from palpate.sweep.driver import dask_client
-from palpate.sweep.stored_runs import StoredRuns
+from palpate.sweep.finished_runs import StoredRuns
 from palpate.sweep.study_folder import begin_study
 from palpate.sweep.worker import Child, Limits, compute_batch, end_children
 

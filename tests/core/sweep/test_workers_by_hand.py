@@ -14,7 +14,7 @@ from study_scenes import HEAD, tiny_scene
 
 from palpate.core.io.scenario_npz import save_scenario
 from palpate.core.study.run_files import done_runs
-from palpate.sweep.stored_runs import StoredRuns
+from palpate.sweep.finished_runs import StoredRuns
 from palpate.sweep.study_folder import begin_study
 from palpate.sweep.worker import compute_batch, end_children
 
