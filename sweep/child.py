@@ -28,12 +28,12 @@ from ..core.study.metrics import metrics_of
 from ..core.study.presses import Press
 from ..core.study.run_files import STUDY_NAME, write_failure, write_packed_run, write_run
 from ..core.study.run_placement import place_run
-from ..core.study.run_record import RunRecord, values_read
+from ..core.study.run_record import RunRecord
 from ..core.study.scene_property import is_scene_property, scene_values
 from ..core.study.study_file import SCENE, Plan, Run, Study, at_rate, read_study
 from ..core.study.variation import PRESS, varied_scenario
 from .encoded_run import encode_run, layout_name, pack_layout, pack_run
-from .features import Layout, solved_frames
+from .features import FrameStyle, Layout, solved_frames
 from .program import Program, frozen_program, require_allowed
 from .scene_evaluation import REFUSE, SceneReader
 from .study_scenes import frozen_meshes, plan_of
@@ -131,7 +131,7 @@ def pack_frames(scenes: Scenes, place: Path, run: Run, scenario: Scenario, recor
     FileError
         The file cannot be written, or a number is too large for 32 bits.
     """
-    frames = encode_run(solved_frames(scenario, recording, values_read(numbers.values), scenes.shared, run.index))
+    frames = encode_run(solved_frames(scenario, recording, numbers, scenes.shared, FrameStyle.of(scenes.study)))
     common = scenes.shared.of(pack_layout, scenes.layout(frames.layout))
     content = pack_run(replace(numbers, frames=frames.rows), frames)
     write_packed_run(place, run, content, layout_name(frames.layout), common)

@@ -16,7 +16,7 @@ from ..core.study.run_record import RunRecord, Value, read_run_record, values_re
 from ..core.study.run_shards import ShardIndex, damaged
 from ..core.study.study_file import Run, read_study
 from .encoded_run import EncodedRun, encode_run, record_of, unpack_layout, unpack_run
-from .features import Layout, read_frames
+from .features import FrameStyle, Layout, read_frames
 
 UNNAMED_STUDY = "study of a tactile sensor"
 """Name of a study whose file gives none. The name of its folder does not serve, so that equal studies give equal files."""
@@ -50,6 +50,10 @@ class StoredRuns:
     def _shards(self) -> ShardIndex:
         return ShardIndex(self._runs)
 
+    @cached_property
+    def _style(self) -> FrameStyle:
+        return FrameStyle.of(read_study(self._runs.parent / STUDY_NAME))
+
     @property
     def bytes_in_shards(self) -> int:
         """Bytes of the runs in shards."""
@@ -81,7 +85,7 @@ class StoredRuns:
         """
         if digest not in self._shards:
             record = self.record(digest)
-            return record, encode_run(read_frames(record, self._shared))
+            return record, encode_run(read_frames(record, self._shared, self._style))
         path = self._shards.path(digest)
         content = self._shards.read(digest)
         try:

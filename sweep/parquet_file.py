@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import pyarrow
 
 MAGIC = b"PAR1"
-_KINDS = {"bool": 0, "int64": 2, "float32": 4, "float64": 5}
+_KINDS = {"bool": 0, "int64": 2, "float32": 4, "float64": 5, "float16": 7}
 """Numbers of Parquet's physical types."""
 
 

@@ -66,7 +66,7 @@ FROZEN, JOB = "frozen", "job"
 A_STUDY = "a study"
 SCENE = "scene"
 """Name of the column that tells the scene of a run, where a study has several."""
-_OF_SCENES = ("fps", "images", "recordings", "press")
+_OF_SCENES = ("fps", "images", "recordings", "points", "half_precision", "press")
 """Words that mean nothing beside a job."""
 _DIRECTIONS = {"tilt_direction": "tilt", "slide_direction": "slide"}
 """Directions of a press, which are any as long as the study says nothing else, and what they direct."""
@@ -100,6 +100,10 @@ class Study:
         Whether runs have tactile images.
     recordings : bool
         Whether runs have files of their own, as a bake has; with images they do in any case.
+    points : bool
+        Whether the dataset has the texels of a grid as a list, too, and not as a picture.
+    half_precision : bool
+        Whether the dataset has forces and readings of texels in 16 bits.
     is_job : bool
         Whether a Python file computes the runs, and no solver a scene.
     frozen : mapping
@@ -116,6 +120,8 @@ class Study:
     name: Name = ""
     images: Switch = False
     recordings: Switch = False
+    points: Switch = False
+    half_precision: Switch = False
     is_job: bool = False
     frozen: Annotated[Mapping[str, Any], wanted("write it as a table, [frozen]")] = field(default_factory=dict)
 
@@ -490,7 +496,8 @@ def frozen_text(text: str, frozen: Mapping[str, Any]) -> str:
 def differences(before: Study, now: Study) -> list[str]:
     """Return what two studies say differently, one phrase each."""
     found = []
-    pairs = [(word, getattr(before, word), getattr(now, word)) for word in ("name", "scenes", "fps", "images", "recordings")]
+    words = ("name", "scenes", "fps", "images", "recordings", "points", "half_precision")
+    pairs = [(word, getattr(before, word), getattr(now, word)) for word in words]
     pairs += [(word, getattr(before.design, word), getattr(now.design, word)) for word in ("kind", "samples", "seed")]
     for name in dict.fromkeys([*before.vary, *now.vary]):
         pairs.append((name, before.vary.get(name), now.vary.get(name)))

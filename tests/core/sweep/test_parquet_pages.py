@@ -17,7 +17,7 @@ pyarrow = pytest.importorskip("pyarrow")
 parquet = pytest.importorskip("pyarrow.parquet")
 
 SHAPES = ((1,), (3,), (4, 1), (5, 3), (2, 3, 3), (3, 5, 7, 2))
-KINDS = ("float32", "float64", "int64", "bool")
+KINDS = ("float32", "float64", "float16", "int64", "bool")
 
 
 def feature_of(name: str, kind: str, shape: tuple[int, ...]) -> Feature:
