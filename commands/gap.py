@@ -106,7 +106,7 @@ def _plan(arguments: argparse.Namespace) -> int:
         limits = {name: getattr(arguments, name) for name in WISHES if name != "between"}
         with console.shown_progress("plan") as show:
             plan = plan_experiment(rig, limits, tuple(arguments.between or ()), show)
-    print(console.text_table([("effect", "may be taken for"), *plan.rows], "<<"))
+    print(console.text_table([("effect", "may be confused with"), *plan.rows], "<<"))
     print()
     print(plan.sentence)
     for text in rig.warnings:
@@ -152,7 +152,7 @@ def _sensor_in_scene(arguments: argparse.Namespace) -> Any:
 
 
 def _put_into_scene(arguments: argparse.Namespace, sensor: Any) -> None:
-    """Put the amended sensor on a sensor of a .blend and save it; opened anew, because it may have been edited meanwhile."""
+    """Put the amended sensor on a sensor of a .blend and save it; opened again, because it may have been edited meanwhile."""
     with console.blender_output_hidden():
         target = _sensor_in_scene(arguments)
         from ..addon.measured import gap_results

@@ -66,7 +66,7 @@ FROZEN, JOB = "frozen", "job"
 A_STUDY = "a study"
 SCENE = "scene"
 """Name of the column that tells the scene of a run, where a study has several."""
-_OF_SCENES = ("fps", "images", "press")
+_OF_SCENES = ("fps", "images", "recordings", "points", "half_precision", "press")
 """Words that have no meaning for a job."""
 _DIRECTIONS = {"tilt_direction": "tilt", "slide_direction": "slide"}
 """Directions of a press, which are any as long as the study says nothing else, and what they direct."""
@@ -98,6 +98,12 @@ class Study:
         For the report and the dataset; empty if the file gives none.
     images : bool
         Whether runs have tactile images.
+    recordings : bool
+        Whether runs have files of their own, as a bake has; with images they do in any case.
+    points : bool
+        Whether the dataset has the texels of a grid as a list, too, and not as a picture.
+    half_precision : bool
+        Whether the dataset has forces and readings of texels in 16 bits.
     is_job : bool
         Whether a Python file computes the runs, and no solver a scene.
     frozen : mapping
@@ -113,8 +119,16 @@ class Study:
     run_memory: Positive | None = None
     name: Name = ""
     images: Switch = False
+    recordings: Switch = False
+    points: Switch = False
+    half_precision: Switch = False
     is_job: bool = False
     frozen: Annotated[Mapping[str, Any], wanted("write it as a table, [frozen]")] = field(default_factory=dict)
+
+    @property
+    def has_folders(self) -> bool:
+        """Whether each run has a folder of its own, and not a place in a shard with others."""
+        return self.images or self.recordings or self.is_job
 
 
 @dataclass(frozen=True)
@@ -482,7 +496,8 @@ def frozen_text(text: str, frozen: Mapping[str, Any]) -> str:
 def differences(before: Study, now: Study) -> list[str]:
     """Return the differences of two studies, one phrase each."""
     found = []
-    pairs = [(word, getattr(before, word), getattr(now, word)) for word in ("name", "scenes", "fps", "images")]
+    words = ("name", "scenes", "fps", "images", "recordings", "points", "half_precision")
+    pairs = [(word, getattr(before, word), getattr(now, word)) for word in words]
     pairs += [(word, getattr(before.design, word), getattr(now.design, word)) for word in ("kind", "samples", "seed")]
     for name in dict.fromkeys([*before.vary, *now.vary]):
         pairs.append((name, before.vary.get(name), now.vary.get(name)))

@@ -48,7 +48,7 @@ SIGNATURES = {
 NEEDS = {
     "temperature": "temperatures that were recorded and vary",
     "clock": "recordings of which a session says how the time went on between them",
-    "no clock": "recordings of which each begins anew",
+    "no clock": "recordings of which each begins with an untouched sensor",
 }
 """What recordings must hold for an effect, or a form of it, to be a candidate."""
 GAIN_FALLS_WITH = {"use": "what the sensor was pressed", "clock": "the time"}
