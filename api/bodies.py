@@ -19,6 +19,9 @@ from .paths import LEVEL, Path, PathLike, path_of, standing
 SPHERE_SUBDIVISIONS = 4
 """Of an icosahedron: 5120 faces, whose shading is smooth, so that texels meet the normals of the sphere."""
 
+CAPSULE_RINGS = 24
+"""Rings of vertices in each half sphere of a capsule, and a quarter of those around it: as fine as the sphere."""
+
 
 class Placement(TypedDict, total=False):
     """Further arguments of the functions that make bodies; see :meth:`Body.from_mesh`."""
@@ -134,15 +137,11 @@ class Body:
         position : (3,) float, metres
         **placement
         """
-        import trimesh
-
         radius, length = (
             arguments.number(value, name, above_zero=True) for value, name in ((radius, "radius"), (length, "length"))
         )
-        mesh = trimesh.creation.capsule(height=length, radius=radius, count=[64, 64])
-        mesh.apply_translation(-mesh.bounds.mean(axis=0))
         placement.setdefault("name", "capsule")
-        made = cls._of(mesh, "radius", mass, position, placement)
+        made = cls._of(_capsule_mesh(radius, length), "radius", mass, position, placement)
         return replace(made, smooth=True, shape=shapes.capsule(radius, length))
 
     @classmethod
@@ -242,3 +241,20 @@ class Body:
         size = " × ".join(f"{1e3 * edge:.3g}" for edge in np.ptp(self.mesh.vertices, axis=0))
         how = "fixed" if len(self.path.positions) == 1 else f"moved through {len(self.path.positions)} poses"
         return f"<Body '{self.name}': {size} mm, {f'free, {self.mass:g} kg' if self.mass is not None else how}>"
+
+
+def _capsule_mesh(radius: float, length: float) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and triangles of a closed capsule along z: rings of vertices between two poles."""
+    around = 4 * CAPSULE_RINGS
+    turn, angle = 0.5 * np.pi * np.arange(CAPSULE_RINGS) / CAPSULE_RINGS, 2 * np.pi * np.arange(around) / around
+    wide, high = radius * np.cos(turn), 0.5 * length + radius * np.sin(turn)
+    wide, high = np.concatenate([wide[::-1], wide]), np.concatenate([-high[::-1], high])
+    rings = np.stack(np.broadcast_arrays(wide[:, None] * np.cos(angle), wide[:, None] * np.sin(angle), high[:, None]), axis=2)
+    pole = 0.5 * length + radius
+    vertices = np.concatenate([rings.reshape(-1, 3), [[0.0, 0.0, -pole], [0.0, 0.0, pole]]])
+    here, beside = np.arange(around), np.roll(np.arange(around), -1)
+    rows = around * np.arange(len(wide) - 1)[:, None]
+    a, b = (rows + here).ravel(), (rows + beside).ravel()
+    last, bottom, top = around * (len(wide) - 1), np.full(around, len(vertices) - 2), np.full(around, len(vertices) - 1)
+    sides = [(a, b, b + around), (a, b + around, a + around), (beside, here, bottom), (last + here, last + beside, top)]
+    return vertices, np.concatenate([np.stack(side, axis=1) for side in sides])
