@@ -15,6 +15,7 @@ __all__ = [
     "point_surface",
     "rotations",
     "sampling",
+    "shapes",
     "smooth_grid",
     "smooth_mesh",
     "texels",
