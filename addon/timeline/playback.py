@@ -163,6 +163,19 @@ def compute_to_present_frame(scene) -> Generator[Progress, None, None]:
             session_state.session.catching_up = False
 
 
+def file_is_open() -> None:
+    """Compute up to the present frame of a file that was saved at a later one than its first."""
+    if not bpy.app.background:
+        bpy.app.timers.register(_compute_opened_file, first_interval=0.1)
+
+
+def _compute_opened_file() -> None:
+    """Timer after a file was opened."""
+    scene = bpy.context.scene
+    if scene is not None and scene.frame_current > scene.frame_start:
+        _offer_to_compute()
+
+
 def _offer_to_compute() -> None:
     """Timer after a jump on the timeline: compute the missing frames with progress. The handler itself must return at once."""
     scene = bpy.context.scene
