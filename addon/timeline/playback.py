@@ -238,7 +238,7 @@ def show(scene, run) -> None:
             _write_force(obj, sensor.texels.vertex, frame.sensors[sensor.name].normal_force)
     overlays.show(scene, run, frame)
     warnings = run.reading.warnings + tuple(run.simulation.warnings)
-    frame_status.set_status(scene, " ".join(warnings) or f"Frame {number} computed.", frame, run.simulation.step_reason)
+    frame_status.set_status(scene, f"Frame {number} computed.", frame, run.simulation.step_reason, " ".join(warnings))
 
 
 def _place(run, obj, placement, index: int, number: int, part: float) -> None:
