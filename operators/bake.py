@@ -35,11 +35,11 @@ class PALPATE_OT_bake(modal_job.ModalJob, bpy.types.Operator):
         return bake(context.scene)
 
     def done(self, baked):
-        for warning in (*baked.recording.warnings, *baked.notes):
-            self.report({"WARNING"}, warning)
         frames = baked.recording.frames
         names = ", ".join(f"'{name}'" for name in baked.folders)
         self.report({"INFO"}, f"Baked frames {frames[0]} to {frames[-1]} of {names}")
+        for warning in (*baked.notes, *baked.recording.warnings):  # the status bar shows the last
+            self.report({"WARNING"}, warning)
 
 
 def is_of_hands(event) -> bool:

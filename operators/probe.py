@@ -4,7 +4,7 @@
 import bpy
 from bpy.props import EnumProperty, FloatProperty
 
-from ..addon.authoring import probes
+from ..addon.authoring import probes, sensors
 from . import support
 
 
@@ -45,9 +45,12 @@ class PALPATE_OT_probe_add(support.ErrorReporting, bpy.types.Operator):
 
     def run(self, context):
         support.leave_edit_mode(context)
+        note = sensors.follow_size(context.scene, context.object)  # of a region that was painted
         probe = probes.add_probe(context, context.object, self.shape, self.size, self.depth)
         context.scene.frame_set(context.scene.frame_start)
-        self.report({"INFO"}, f"'{probe.name}' presses on '{context.object.name}': press Space to play")
+        self.report(
+            {"INFO"}, f"'{probe.name}' presses on '{context.object.name}': press Space to play. {note}".removesuffix(". ")
+        )
 
 
 CLASSES = (PALPATE_OT_probe_add,)

@@ -48,7 +48,9 @@ class PALPATE_OT_sensor_add(support.ErrorReporting, bpy.types.Operator):
         source = sensors.automatic_source(obj, obj.mode) if self.source == "AUTO" else self.source
         support.leave_edit_mode(context)
         count = sensors.make_sensor(obj, source, self.role)
-        self.report({"INFO"}, f"'{obj.name}' is a {self.role.lower()} of {count} texels")
+        note = sensors.follow_size(context.scene, obj)
+        said = f"'{obj.name}' is a {self.role.lower()} of {count} texels"
+        self.report({"INFO"}, f"{said}. {note}" if note else said)
 
 
 class PALPATE_OT_role_set(support.ErrorReporting, bpy.types.Operator):

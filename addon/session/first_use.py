@@ -199,7 +199,8 @@ def _change_over() -> None:
 def _show(text: str | None) -> None:
     for manager in bpy.data.window_managers:
         for window in manager.windows:
-            window.workspace.status_text_set(text)
+            with bpy.context.temp_override(window=window):  # Blender crashes without one, as just after a timer opened a file
+                window.workspace.status_text_set(text)
 
 
 def stop() -> None:
