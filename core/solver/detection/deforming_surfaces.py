@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The deforming targets and sensors of a scenario, frame by frame.
-
-The kernels of :mod:`palpate.core.solver.detection.deformation` read them.
-"""
+"""The deforming targets and sensors of a scenario, frame by frame, for the kernels of :mod:`.detection.deformation`."""
 
 from __future__ import annotations
 
