@@ -39,6 +39,9 @@ NOT_TOLD = (
     "The gains fall, and the recordings do not say whether with what was loaded or with the time: name their session and when "
     "they started, and load the sensor far more in some recordings than in others."
 )
+CHANGED_ONCE = (
+    "Neither what was loaded nor the time says when: see what was done to the sensor or its electronics before that recording."
+)
 FRICTION_MATTERS = 1.5
 """The headline mentions the base model's friction if without it the error would be at least this many times as large."""
 
@@ -62,7 +65,10 @@ def _outcome(result: Diagnosis, errors: GapErrors) -> str:
         return _effects(result, errors)
     own, after = result.between, errors.amended["fit"] or 0.0
     shrinks = f"the error shrinks from {own.before:.2%} to {after:.2%} of the range"
-    if own.rival:
+    if own.changed_from:
+        said = f"Between recordings the gain changes once, by {own.change_of_gain:+.0%} from '{own.changed_from}' on"
+        said += f" ({shrinks}). {CHANGED_ONCE}"
+    elif own.rival:
         said = f"Not told apart between recordings, of which each has a level and a gain of its own: {own.name} or {own.rival}"
         said += f" ({shrinks}). {NOT_TOLD}"
     else:
