@@ -39,7 +39,7 @@ def missing_below(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndar
 KIND = Kind(
     name="dead-zone",
     title="Dead Zone",
-    text="Does not feel loads below a threshold.",
+    text="Loads below a threshold are not measured.",
     site="readout",
     order=35,
     forms=(

@@ -57,7 +57,7 @@ def _spread(transducers: TransducerArray, weight: Callable[[np.ndarray], np.ndar
     return coupling_matrix(transducers.position, weight, reach, np.full_like(transducers.area, np.median(transducers.area)))
 
 
-_WIDTH = Parameter("width", "m", 0.003, 0.0, 0.1, "How far a point load spreads, s.")
+_WIDTH = Parameter("width", "m", 0.003, 0.0, 0.1, "Spread s of a point load.")
 
 
 _WIDTHS, _OPEN_WIDTHS = (0.4, 0.55, 0.75, 1.0, 1.4, 2.2), (0.55, 1.0, 2.2)
@@ -79,7 +79,7 @@ def kernels(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
 KIND = Kind(
     name="load-spreading",
     title="Load Spreading",
-    text="A cover shares the load of a texel with its neighbours, so that small things look wider.",
+    text="A cover shares the load of a texel with its neighbours.",
     site="readout",
     order=10,
     forms=(
@@ -116,7 +116,7 @@ KIND = Kind(
             coupling=open_rim,
         ),
     ),
-    experiment="press single texels with a pin that is narrower than a texel",
+    experiment="press single texels with a pin narrower than a texel",
     drawing=Drawing("row"),
     known_from=("places",),
     families=("spreading",),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All numbers that decide which kinds recordings can tell apart, each with what set it.
+"""All numbers that decide which kinds recordings can distinguish, each with what set it.
 
 Where it says "by eye", the number was chosen while looking at the development cases, which are those of benchmarks/_hidden
 numbered 600 to 627, and no other values were tried on fresh ones.

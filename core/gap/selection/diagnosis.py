@@ -281,7 +281,7 @@ def _name_differences(own: _Search, plain: _Search, session: _Search | None) -> 
 
 def _in_doubt(one: Finding) -> Finding:
     """A finding that is not sure: what falls within recordings as from one to the next is wear or drift as that is."""
-    why = "gains fall from recording to recording, and nothing tells whether with use or with time"
+    why = "gains fall from recording to recording, and the recordings do not show whether with use or time"
     return replace(one, confidence=min(one.confidence, UNSURE_CONFIDENCE), doubts=(*one.doubts, why))
 
 

@@ -127,7 +127,7 @@ class Diagnosis:
     check : CheckOutcome
         What the check recordings say of the amended model, or of the base model if there are no effects.
     outlying : list of OutlyingChannel
-        Channels of check recordings that jump: they are not held against the amended model.
+        Channels of check recordings that jump: they do not count against the amended model.
     closed : ClosedShares
         How much of the gaps the amended model closes.
     unlike_fitted : list of CheckedRecording

@@ -67,7 +67,7 @@ UNNEEDED_SHARE = 0.02
 REPLACED_SHARE = 0.98
 """Another first effect must leave less than this share of what the present one leaves."""
 
-NO_SIGNATURE = "fitted to these recordings, its characteristic signature is not in them"
+NO_SIGNATURE = "its characteristic signature is not in these recordings"
 
 StepSearch = Generator[tuple[str, float], None, "SelectionStep"]
 StructureOfFit = Callable[[Fit], ResidualStructure]
@@ -411,13 +411,15 @@ class ForwardSelection:
         said = state.first.passed_over
         for _ in friction_kinds():
             if state.means[FORCES] < (1.0 + LEAST_FORCE_IMPROVEMENT) * self.gap_sizes.noise[FORCES]:
-                said |= {name: "the net forces leave nothing for it to explain" for name in friction_kinds()}
+                said |= {name: "the net forces leave no gap for it to explain" for name in friction_kinds()}
                 break
             step = yield from self._best_next(state, 0.9, 0.05, first=True, friction=True)
             said |= step.passed_over
             for one in reversed(step.ranked):
                 share = self.gap_sizes.improvement(state.means, means_of(one.held_out, one.fit), FORCES).of_remaining
-                said[one.candidate.name] = f"it closes {max(share, 0.0):.0%} of what is left of the net forces on unseen trials"
+                said[one.candidate.name] = (
+                    f"it closes {max(share, 0.0):.0%} of the remaining gap of the net forces on unseen trials"
+                )
             longer = self._extended(state, step)
             if longer is state:
                 break

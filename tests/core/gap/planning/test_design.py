@@ -174,9 +174,9 @@ def test_a_trajectory_that_tells_no_more_is_not_recommended():
         "sure_before": 0.5,
         "sure_after": 0.9,
     }
-    assert planned_sentence(words).endswith("about 90% sure with it, 50% without.")
+    assert planned_sentence(words).endswith("confidence 90% with it, 50% without.")
     said = planned_sentence(words | {"sure_after": 0.52})
-    assert said.startswith("No trajectory within these limits tells creep from lag better") and "allow more depth" in said
+    assert said.startswith("No trajectory within these limits separates creep from lag better") and "allow more depth" in said
 
 
 def test_options_of_a_plan_that_do_not_go_together_are_refused(rig, tmp_path, capsys):
