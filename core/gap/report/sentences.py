@@ -39,6 +39,7 @@ NOT_TOLD = (
     "The gains fall, and the recordings do not show whether with the accumulated load or with time: name their session and "
     "when they started, and load the sensor far more in some recordings than in others."
 )
+CHANGED_ONCE = "It follows neither the accumulated load nor time: check what was done to the sensor or its electronics before."
 FRICTION_MATTERS = 1.5
 """The headline mentions the base model's friction if without it the error would be at least this many times as large."""
 
@@ -62,7 +63,10 @@ def _outcome(result: Diagnosis, errors: GapErrors) -> str:
         return _effects(result, errors)
     own, after = result.between, errors.amended["fit"] or 0.0
     shrinks = f"the error shrinks from {own.before:.2%} to {after:.2%} of the range"
-    if own.rival:
+    if own.changed_from:
+        said = f"Between recordings the gain changes once, by {own.change_of_gain:+.0%} from '{own.changed_from}' on"
+        said += f" ({shrinks}). {CHANGED_ONCE}"
+    elif own.rival:
         said = f"Indistinguishable between recordings (each with its own level and gain): {own.name} or {own.rival}"
         said += f" ({shrinks}). {NOT_TOLD}"
     else:

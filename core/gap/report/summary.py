@@ -101,6 +101,7 @@ def _between(result: Diagnosis) -> dict[str, Any] | None:
         "confidence": own.confidence,
         "told_by": own.told_by or None,
         "rival": own.rival or None,
+        "changed_from": own.changed_from or None,
     }
 
 

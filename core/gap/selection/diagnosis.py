@@ -271,7 +271,8 @@ def _name_differences(own: _Search, plain: _Search, session: _Search | None) -> 
         result.ambiguous.append(tuple(named))
         result.findings = [_in_doubt(one) if one.name in (*LOAD_HISTORY, DRIFT) else one for one in result.findings]
     result.ruled_out = [(name, why) for name, why in result.ruled_out if name not in named]
-    if result.misleading_faults or result.between.rival or result.check.is_refuted:
+    in_doubt = result.misleading_faults or result.between.rival or result.between.changed_from
+    if in_doubt or result.check.is_refuted:
         result.between = replace(result.between, confidence=min(result.between.confidence, UNSURE_CONFIDENCE))
     most = 1.0 - own.left / plain.left_of_base
     if result.verdict == "no gap" or (most >= EXPLAINED and not result.check.is_refuted):

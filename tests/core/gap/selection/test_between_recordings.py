@@ -24,7 +24,15 @@ from palpate.core.gap.selection.between_recordings import (
 )
 from palpate.core.gap.selection.confidence import SURE
 from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.gap.selection.wear_or_drift import CLOCK, NOTHING, TEXELS, USE, texels_can_tell, told_by_courses
+from palpate.core.gap.selection.wear_or_drift import (
+    CLOCK,
+    NOTHING,
+    TEXELS,
+    USE,
+    change_of_level,
+    texels_can_tell,
+    told_by_courses,
+)
 from palpate.core.jobs.job_runner import run_job
 from palpate.core.model.sensor_parameters import SensorParameters
 
@@ -71,6 +79,35 @@ def test_gains_that_fall_with_use_and_with_the_clock_are_told_apart_where_use_is
     assert told_by_courses(np.array([1.0, -0.1, 0.5, 0.4, 0.3, 0.2]), uses, clocks) == NOTHING
 
 
+def test_a_gain_that_changes_once_goes_with_neither_use_nor_clock():
+    used, passed = np.array([0.02, 0.3, 0.34, 0.75, 0.8, 0.97]), (np.arange(6) + 0.5) / 6
+    uses, clocks = np.array([used, used**1.1]), np.array([passed, passed])
+    tremble = 0.002 * np.random.default_rng(0).normal(size=6)
+    for first in (1, 3, 5):
+        for size in (-0.15, 0.1):
+            gains = 1.0 + size * (np.arange(6) >= first) + tremble
+            assert change_of_level(gains, uses, clocks) == first
+            assert change_of_level(gains[1:], uses[:, 1:], clocks[:, 1:]) == (first - 1 or None)
+    for course in (used, passed, np.sqrt(used), 1.0 - np.exp(-3.0 * passed)):
+        assert change_of_level(1.0 - 0.3 * course + tremble, uses, clocks) is None
+    scattered = [
+        change_of_level(1.0 + 0.1 * rng.normal(size=6), uses, clocks) for rng in map(np.random.default_rng, range(300))
+    ]
+    assert sum(one is not None for one in scattered) < 0.1 * 300  # two levels and a parabola are equally free
+
+
+@pytest.mark.slow("a whole diagnosis of six recordings")
+def test_a_gain_that_falls_once_is_no_sure_drift():
+    count = iter(range(6))
+    rig = cases.rig(lambda force, time: force * (1.0 if next(count) < 4 else 0.85), seed=2, trials=6, seconds=8.0)
+    result = run_job(diagnose(rig))
+    assert result.between is not None and result.between.changed_from == "t4" and result.between.confidence < SURE
+    assert result.verdict == "explained" and not any(one.confidence >= SURE for one in result.findings)
+    errors = gap_errors(result)
+    assert headline(result, errors).startswith("Between recordings the gain changes once, by -15% from 't4' on")
+    assert summary(result, errors)["between_recordings"]["changed_from"] == "t4"
+
+
 def test_steps_drawn_at_random_are_hardly_ever_taken_for_use():
     rng, said = np.random.default_rng(3), []
     for _ in range(300):
@@ -114,6 +151,8 @@ def test_gains_that_fall_alike_in_recordings_that_are_alike_are_wear_or_drift(mo
     assert (once.name, once.rival, once.told_by) == ("drift", "wear", NOTHING), (
         "a fall from one recording on is told by nothing"
     )
+    assert once.changed_from == "t4" and alike.changed_from == "" == differing(falling[::-1], [4] * 6, False).changed_from
+    assert once.change_of_gain == pytest.approx(-0.0989, abs=1e-3)
     scattered = differing(np.array([1.0, 0.9, 1.05, 0.95, 1.1, 0.97]), [4] * 6, False)
     assert (scattered.name, scattered.rival) == ("drift", "")
     amounts = [2, 16, 2, 2, 20, 4]
