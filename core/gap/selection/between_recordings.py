@@ -21,7 +21,7 @@ from ..dataset.sessions import COMMON, TrialHistory, on_common_clocks
 from ..dataset.trial import Trial
 from ..forward.predictor import Model, Predictor, number_name
 from .identifiability import LOSING
-from .wear_or_drift import CLOCK, NOTHING, TEXELS, USE, texels_can_tell, told_by_recordings
+from .wear_or_drift import CLOCK, NOTHING, TEXELS, USE, evidence_of_recordings, texels_can_tell
 
 LEAST_RECORDINGS = 3
 """Number of fitted recordings from which on they are compared: of two, each may be the odd one."""
@@ -59,7 +59,7 @@ class RecordingDifferences:
         NRMSE on the fitted recordings of the base model without them.
     factors, zeros : dict of str to float
         Of the fitted recordings, in order of the rig; zeros in the sensor's unit.
-    told_by : str
+    evidence : str
         What tells gains that fall apart as wear or drift (see :mod:`.wear_or_drift`); empty if nothing does, or if none fall.
     rival : str
         The other name, if gains fall and nothing tells which it is.
@@ -71,7 +71,7 @@ class RecordingDifferences:
     before: float
     factors: dict[str, float]
     zeros: dict[str, float]
-    told_by: str = NOTHING
+    evidence: str = NOTHING
     rival: str = ""
 
     def odd_recording(self, full: float) -> OddRecording | None:
@@ -166,7 +166,7 @@ def differences(
         return drift
     stimuli = [one.stimulus for one in order]
     by_texels = TEXELS if texels_alike and texels_can_tell(stimuli) else NOTHING
-    told_by = told_by_recordings(stimuli, factors) or by_texels
-    if told_by == NOTHING:
+    evidence = evidence_of_recordings(stimuli, factors) or by_texels
+    if evidence == NOTHING:
         return replace(drift, rival=WEAR)
-    return replace(drift, name=WEAR if told_by == USE else DRIFT, told_by=told_by)
+    return replace(drift, name=WEAR if evidence == USE else DRIFT, evidence=evidence)

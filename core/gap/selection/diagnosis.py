@@ -56,7 +56,7 @@ from .outlying_channels import outlying_channels, without_channels
 from .screening import screen
 from .verdict import conclude
 from .view_set import ViewSet, view_set_of
-from .wear_or_drift import USE, texels_can_tell, told_by_recordings
+from .wear_or_drift import USE, evidence_of_recordings, texels_can_tell
 
 TOTAL_WORK = 1000
 BASE_MODEL_BEGINS, SELECTION_BEGINS = 40, 60
@@ -308,7 +308,7 @@ def _doubt_wear(session: _Search, own: _Search) -> None:
     }
     by_texels = texels_can_tell(stimuli) and session.left < MOST_LEFT * own.left_of_base
     wears = any(one.name == WEAR and one.confidence > UNSURE_CONFIDENCE for one in result.findings)
-    if wears and not by_texels and told_by_recordings(stimuli, factors) != USE:
+    if wears and not by_texels and evidence_of_recordings(stimuli, factors) != USE:
         result.findings = [_in_doubt(one) if one.name == WEAR else one for one in result.findings]
         result.ambiguous.append((WEAR, DRIFT))
 

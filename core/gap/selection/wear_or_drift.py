@@ -50,8 +50,8 @@ def texels_can_tell(order: Sequence[Stimulus]) -> bool:
     return bool(high >= LEAST_RATIO_OF_LOADS * low)
 
 
-def told_by_recordings(order: Sequence[Stimulus], gains: dict[str, float]) -> str:
-    """Return whether gains of recordings follow use or clock, as :func:`told_by_courses` does.
+def evidence_of_recordings(order: Sequence[Stimulus], gains: dict[str, float]) -> str:
+    """Return whether gains of recordings follow use or clock, as :func:`evidence_of_courses` does.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def told_by_recordings(order: Sequence[Stimulus], gains: dict[str, float]) -> st
     clocks = [pauses, lengths, [length + same for length in lengths]]
     values = np.array([gains[order[i].trial.name] for i in chosen])
     uses, times = (np.array([_middles(one)[chosen] for one in several]) for several in ([rises, impulses], clocks))
-    return told_by_courses(values, uses, times)
+    return evidence_of_courses(values, uses, times)
 
 
 def _middles(amounts: Sequence[float]) -> np.ndarray:
@@ -79,7 +79,7 @@ def _middles(amounts: Sequence[float]) -> np.ndarray:
     return found
 
 
-def told_by_courses(gains: np.ndarray, uses: np.ndarray, clocks: np.ndarray) -> str:
+def evidence_of_courses(gains: np.ndarray, uses: np.ndarray, clocks: np.ndarray) -> str:
     """Return what gains that fall go with.
 
     Parameters
