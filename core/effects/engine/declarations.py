@@ -141,8 +141,6 @@ class Variant:
         Whether it acts after damping was added and the force was clipped at zero, so that a texel can pull.
     texel_columns : tuple of str
         Of which parameters of single texels it consists besides: "gain", "offset", "rate", "fading".
-    is_static : bool
-        Whether it only bends the curve of reading over load.
     needs_neighbours : bool
         Whether it passes something from texel to texel.
     displaces : bool
@@ -160,7 +158,6 @@ class Variant:
     in_contact: bool = False
     after_clip: bool = False
     texel_columns: tuple[str, ...] = ()
-    is_static: bool = False
     needs_neighbours: bool = False
     displaces: bool = False
     kind: str = ""

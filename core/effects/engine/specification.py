@@ -224,10 +224,7 @@ class Kind:
     families : tuple of str
         Which effects resemble it, of :data:`.declarations.FAMILIES`.
     variants : tuple of Variant
-        What it can add to a signal whatever its formula. Without one, the search for kinds and the plans of experiments leave
-        it out.
-    cost : float, optional
-        Its price in that search, if it differs from the usual one: higher for what absorbs what others leave.
+        What it can add to a signal whatever its formula. Without one, the plans of experiments leave it out.
     found_by : str
         How it is found in recordings, one of :data:`.declarations.FOUND_BY`.
     signature : str
@@ -252,7 +249,6 @@ class Kind:
     known_from: tuple[str, ...] = ()
     families: tuple[str, ...] = ()
     variants: tuple[Variant, ...] = ()
-    cost: float | None = None
     found_by: str = FIT
     signature: str = ""
     needs: str = ""

@@ -205,7 +205,7 @@ KIND = Kind(
     known_from=("unloading",),
     variants=(
         Variant(70, unloading_pull, name="unloading", in_contact=True, after_clip=True),
-        Variant(80, steady_pull, name="steady", in_contact=True, after_clip=True, is_static=True),
+        Variant(80, steady_pull, name="steady", in_contact=True, after_clip=True),
     ),
     signature="pull",
 )

@@ -71,5 +71,5 @@ KIND = Kind(
     experiment="approach slowly, with many samples at the first touch, with a flat and with a round indenter",
     drawing=Drawing("force", values={form: {"threshold": 0.4} for form in ("hard", "soft", "step")}),
     families=("nonlinear",),
-    variants=(Variant(40, missing_below, is_static=True),),
+    variants=(Variant(40, missing_below),),
 )

@@ -104,6 +104,5 @@ KIND = Kind(
     known_from=("timing", "rest"),
     families=("moving",),
     variants=(Variant(90, functions_of_time, -1.0, 1.0, texel_columns=("rate",)),),
-    cost=0.3,
     gain_falls_with="clock",
 )

@@ -106,5 +106,4 @@ KIND = Kind(
     drawing=Drawing("texel"),
     known_from=("places",),
     variants=(Variant(30, texel_columns=("gain",)),),
-    cost=0.5,
 )

@@ -99,5 +99,4 @@ KIND = Kind(
     ),
     known_from=("places",),
     variants=(Variant(0, low=-1.0, high=1.0, in_contact=True, displaces=True),),
-    cost=0.4,
 )

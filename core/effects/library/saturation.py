@@ -78,5 +78,5 @@ KIND = Kind(
     experiment="press to the highest permitted load",
     drawing=Drawing("force"),
     families=("nonlinear",),
-    variants=(Variant(50, missing_above, is_static=True),),
+    variants=(Variant(50, missing_above),),
 )

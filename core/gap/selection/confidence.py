@@ -16,7 +16,6 @@ from ...effects.engine.declarations import STEPS
 from ...effects.engine.registry import form_of, kind_of, names_found_by
 from ...model.effect import Effect
 from ..fitting.least_squares import Fit
-from ..kinds.search import KNOWN_KINDS
 from .candidates import DIRECTLY_ESTIMATED, is_spatial, parameters_at_bounds
 from .direct_estimates import coarsest_step
 from .findings import Diagnosis
@@ -131,15 +130,6 @@ def may_absorb_misfit(effect: Effect, state: SelectionState) -> bool:
     mine = state.improvements[effect.name].of_gap if effect.name in state.improvements else 0.0
     larger = any(improvement.of_gap > mine for name, improvement in state.improvements.items() if name != effect.name)
     return larger and effect.name not in DIRECTLY_ESTIMATED and _has_texel_numbers(effect)
-
-
-def kinds_can_settle(effect: Effect) -> bool:
-    """Return whether the search by kinds tells anything about an effect.
-
-    It has no dictionary of friction, for example. Numbers of single texels absorb what another kind leaves, whether that is a
-    formula or not.
-    """
-    return effect.name in KNOWN_KINDS and not _has_texel_numbers(effect)
 
 
 def _has_texel_numbers(effect: Effect) -> bool:

@@ -10,7 +10,7 @@ The thresholds below were set on simulated sensors whose hidden effects follow o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence, Set
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -165,15 +165,12 @@ class ForwardSelection:
     scales : Scales
     coverage : Coverage
     gap_sizes : GapSizes
-    kinds : set of str or None
-        The kinds that may join; None for all.
     """
 
     view_set: ViewSet
     scales: Scales
     coverage: Coverage
     gap_sizes: GapSizes
-    kinds: Set[str] | None = None
 
     def __post_init__(self) -> None:
         self.confounded_kinds = confounded(self.coverage)
@@ -235,8 +232,6 @@ class ForwardSelection:
         forms = candidates([s.predictor for s in self.view_set.whole], state.fit.model)
         forms = [c for c in forms if c.name not in taken or may_repeat(c)]
         forms = [c for c in forms if not is_free_already(c, state.fit.free) and (first or c.name not in self.confounded_kinds)]
-        if self.kinds is not None:
-            forms = [c for c in forms if c.name in self.kinds and c.name not in taken]
         if self.gap_sizes.both:
             forms = [c for c in forms if (c.form.friction_law is not None) == friction]
         ranked: list[FittedCandidate] = []

@@ -19,7 +19,6 @@ from .confidence import (
     SURE,
     UNLIKELY_CONFIDENCE,
     UNSURE_CONFIDENCE,
-    kinds_can_settle,
     least_share,
     may_absorb_misfit,
     misfit_of_another,
@@ -108,10 +107,7 @@ def _judge_effects(result: Diagnosis, view_set: ViewSet, state: SelectionState, 
     )
     result.verdict = _verdict(result, gap_sizes, is_open or (bool(fitted) and result.check.is_refuted))
     for index, effect in enumerate(effects):
-        chosen = result.chosen_kinds.get(effect.name) if kinds_can_settle(effect) else None
         times_worse, leaves = _alternatives(effect, state, {e.name for e in effects})
-        if chosen is not None:  # no formula has taken part in this comparison
-            times_worse = leaves = chosen.leaves
         rivals = _rivals(effect, state, result, times_worse, gap_sizes)
         weight = 1.0 / (1.0 + sum(ratio**RIVAL_EXPONENT for ratio in times_worse.values()))
         quantity = gap_sizes.quantity_for(effect.name)
@@ -120,11 +116,11 @@ def _judge_effects(result: Diagnosis, view_set: ViewSet, state: SelectionState, 
         only_height = is_height_alone(result.best.model, index, view_set)
         unsettled += (HEIGHT_ALONE,) if only_height else ()
         support = weight * (0.5 + 0.5 * share if share >= least_share(effect.name, leaves) else 0.5 * share)
-        doubts = _doubts(effect, result, state, gap_sizes, is_open) if chosen is None else ()
+        doubts = _doubts(effect, result, state, gap_sizes, is_open)
         doubts += (REFUTED,) if fitted and result.check.is_refuted else ()
-        lowered = rivals or doubts or only_height or (unsettled and chosen is None)
+        lowered = rivals or doubts or only_height or unsettled
         confidence = min(support, UNSURE_CONFIDENCE) if lowered else probability(support)
-        if confidence < SURE and not (lowered or unsettled):
+        if confidence < SURE and not lowered:
             doubts = (_low_support(share, least_share(effect.name, leaves)),)
         if rivals:
             result.ambiguous.append((effect.name, *rivals))

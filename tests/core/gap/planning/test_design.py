@@ -16,8 +16,8 @@ from palpate.core.errors import ParameterError
 from palpate.core.gap.fitting.noise_floor import ChannelNoise
 from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.kinds.cascade import Cascade, Point
+from palpate.core.gap.kinds.distinguishability import possible_variants
 from palpate.core.gap.kinds.recorded import planned, recorded
-from palpate.core.gap.kinds.search import possible_variants
 from palpate.core.gap.planning.design import DesignSpace, best_design
 from palpate.core.gap.planning.experiment_plan import Wishes, plan_experiment
 from palpate.core.gap.planning.limits import limits_of
