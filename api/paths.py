@@ -43,17 +43,17 @@ class Path:
         return Motion(times, self.positions, self.quaternions)
 
     def duration(self, fps: float) -> float:
-        """Return how long the path lasts, seconds; 0 for a body that stays where it is."""
+        """Return the duration of the path, seconds; 0 for a body at rest."""
         return float(self.motion(fps).times[-1])
 
 
 def standing(position: ArrayLike, turn: ArrayLike) -> Path:
-    """Return the path of a body that stays where it is."""
+    """Return the path of a body at rest."""
     return Path(None, numbers(position, (3,), "position")[None], quaternion(turn, "quaternion")[None])
 
 
 def path_of(value: Any, argument: str, turn: ArrayLike = LEVEL) -> Path:
-    """Return a path from what users give.
+    """Return a path from a user's argument.
 
     Parameters
     ----------

@@ -144,7 +144,7 @@ def _curves(axes, kind, x, base, of_form, xlabel, ylabel):
     if base is not None:
         axes.plot(x, base, color=GREY, lw=1.0, label="_")
     for form, colour in zip(kind.forms, SERIES, strict=False):
-        if any(parameter.per_texel for parameter in form.parameters):
+        if any(parameter.per_texel for parameter in form.parameters) and form.name not in kind.drawing.values:
             continue
         item = effect(kind.name, form.name, **{"seed": 1, **kind.drawing.values.get(form.name, {})})
         axes.plot(x, of_form(item), color=colour, lw=1.1, label=form.name)

@@ -28,7 +28,7 @@ from ..model.shared_results import SharedResults
 from ..response.readings import ReadoutChain
 from .detection.deformation import refit_boxes, set_moment
 from .detection.deforming_surfaces import DeformingSurfaces
-from .detection.detection_data import DetectionData
+from .detection.detection_data import DetectionData, TargetShapes
 from .detection.narrow_phase import count_too_deep
 from .detection.neighbour_lists import neighbour_lists_for
 from .dynamics.drive_commands import DriveCommands
@@ -109,6 +109,7 @@ class Simulation:
         self._readers = [ReadoutChain.of(sensor) for sensor in scenario.sensors]
         self._drive_commands = DriveCommands(scenario)
         self._texel_start = texel_starts(scenario)
+        self._shapes = TargetShapes.of([None] * len(scenario.targets))
         self._detection: DetectionData | None = None
         self._fast_crossings = FastCrossings(scenario, self._center)
         self._surroundings = Surroundings(np.array(self._closed, np.bool_), self._fast_crossings.limits)
@@ -116,7 +117,7 @@ class Simulation:
     @property
     def arrays(self) -> tuple[SolverModel, DetectionData, State, Workspace]:
         """The structures that the kernels work on."""
-        parts = (self._tree, self._neighbour_lists, self._surface_motion)
+        parts = (self._tree, self._neighbour_lists, self._surface_motion, self._shapes)
         if self._detection is None or any(now is not then for now, then in zip(parts, self._detection, strict=True)):
             self._detection = DetectionData(*parts)
         arrays = self._model, self._detection, self._state, self._workspace
@@ -434,7 +435,8 @@ class Simulation:
             what = "texels" if all(sensor.parameters.points_per_texel == 1 for sensor in sensors) else "contact points"
             self.warnings.append(
                 f"Frame {self.frame}: {total} {what} are pressed past their maximum penetration by "
-                f"{', '.join(dict.fromkeys(pressed))} and do not act; press less deep, or raise k or the maximum penetration."
+                f"{', '.join(dict.fromkeys(pressed))} and exert no force; "
+                "reduce the depth, or raise k or the maximum penetration."
             )
 
     def _count_too_deep(self, pair: int) -> int:

@@ -22,7 +22,7 @@ from .dynamics.effect_memory import commit_effect_memory
 from .dynamics.modes import move, place, prescribe_velocity, write_inertia
 from .fast_crossings import BodiesInFrame, CrossingLimits, may_cross
 from .implicit_velocities import solve_velocities
-from .parallel_loops import UPDATE_FRICTION, find_all_contacts, run_parallel_loop
+from .parallel_loops import UPDATE_FRICTION, find_all_contacts, run_parallel_loop, write_all_contacts
 from .solver_model import SolverModel, State
 from .texel_readout import TexelReadout, read_texels
 from .workspace import Workspace
@@ -117,6 +117,7 @@ def advance_steps(
     detection: DetectionData,
     state: State,
     workspace: Workspace,
+    known: bool,
 ) -> int:
     """Run some of the substeps of one frame; the state is brought forward in place.
 
@@ -130,6 +131,8 @@ def advance_steps(
     detection : DetectionData
     state : State
     workspace : Workspace
+    known : bool
+        The state has the contacts at the beginning of the first step, which need not be found then.
 
     Returns
     -------
@@ -147,7 +150,11 @@ def advance_steps(
         _set_prescribed_velocities(step, dt, path, model, state, workspace)
         if deforms:
             set_moment(step, step + 1, dt, model, surfaces)
-        too_deep = find_all_contacts(dt, model, detection, state, workspace)
+        too_deep = 0
+        if known and step == first:
+            write_all_contacts(dt, model, detection, state, workspace)
+        else:
+            too_deep = find_all_contacts(dt, model, detection, state, workspace)
         if too_deep > worst:
             worst = too_deep
             for pair in range(len(model.pairs.sensor)):
@@ -207,7 +214,7 @@ def advance_frames(
     for frame in range(len(seen.may_cross)):
         own = FramePath(path.position[frame], path.quaternion[frame], path.velocity[frame], path.commands[frame])
         if last > first:
-            worst = advance_steps(dt, first, last, own, model, detection, state, workspace)
+            worst = advance_steps(dt, first, last, own, model, detection, state, workspace, False)
             before = 0
             for pair in range(len(model.pairs.sensor)):
                 before += seen.too_deep_between[frame, pair]

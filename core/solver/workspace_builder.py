@@ -50,7 +50,7 @@ def workspace_for(model: SolverModel, state: State, surfaces: SurfaceMotion, que
         energy=_energy_work(model, deforming),
         step=np.zeros(1),
         queue=queue,
-        pair_loops=np.zeros(5, np.int64),
+        pair_loops=np.zeros(6, np.int64),
     )
 
 

@@ -49,6 +49,8 @@ NEEDS = {
     "temperature": "temperatures that were recorded and vary",
     "clock": "recordings of which a session says how the time went on between them",
     "no clock": "recordings of which each begins with an untouched sensor",
+    "signed channels": "channels of which some rise and others fall under the same load",
+    "axes": "the same, with a number of channels that is a multiple of three",
 }
 """What recordings must hold for an effect, or a form of it, to be a candidate."""
 GAIN_FALLS_WITH = {"use": "what the sensor was pressed", "clock": "the time"}

@@ -49,7 +49,7 @@ class TexelInput(NamedTuple):
     slope : float, N/m
         Derivative of `force` with respect to the depth at the end of the step.
     depth : float, m
-        Penetration at the end of the step, zero while nothing touches. Zero for a readout law.
+        Penetration at the end of the step, zero without contact. Zero for a readout law.
     slide : float, m
         Distance slid during the step. Zero for a readout law.
     """
