@@ -130,7 +130,7 @@ class Comparison:
         further : Trial, optional
             One recording more, of which only the stimulus counts.
         wanted : set of (str, str), optional
-            Directions of kinds and the other kinds that they are to be told from; all of them if it is left out.
+            Directions of kinds and the kinds to distinguish them from; all of them by default.
         """
         equations = self._equations
         if further is not None:
