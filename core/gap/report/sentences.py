@@ -113,7 +113,7 @@ def by_share_closed(result: Diagnosis) -> list[Finding]:
 
 
 def _is_noise(finding: Finding) -> bool:
-    """Whether a finding is noise, of which no model predicts a sample."""
+    """True if a finding is noise, of which no model predicts a sample."""
     return kind_of(finding.name).found_by == SCATTER
 
 

@@ -152,7 +152,7 @@ def differences(
     full : float
         Range of the readings.
     texels_alike : bool
-        Whether gains that all texels share describe the recordings far better than what each texel was loaded with.
+        True if gains that all texels share describe the recordings far better than what each texel was loaded with.
     """
     names = [one.trial.name for one in order if one.trial.use == "fit"]
     factors = {name: model.recordings.get(number_name("factor", name), 1.0) for name in names}
