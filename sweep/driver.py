@@ -142,6 +142,7 @@ def run_study(
     limits: Limits,
     on_progress: Callable[[Tally], object],
     scripts: str = REFUSE,
+    own_disks: bool = False,
 ) -> Tally:
     """Compute runs and return what became of them.
 
@@ -149,7 +150,7 @@ def run_study(
     ----------
     client : distributed.Client
     folder : Path
-        Of the study, under the same path on all machines.
+        Of the study, under the same path on all machines unless they have disks of their own.
     runs : sequence of Run
         Those that are not done.
     limits : Limits
@@ -158,6 +159,8 @@ def run_study(
         Called several times a second. An exception that it raises, KeyboardInterrupt included, stops the study.
     scripts : str
         What is done about the Python in a .blend, one of :data:`.scene_evaluation.SCRIPTS`.
+    own_disks : bool
+        Whether the workers do not see the folder: they get a copy of the study, and runs come back (:mod:`.own_disks`).
 
     Raises
     ------
@@ -166,14 +169,42 @@ def run_study(
     PalpateError
         Workers are lost again and again.
     """
-    return _Dispatch(client, folder, runs, limits, scripts).run(on_progress)
+    if not own_disks:
+        words = (os.fspath(folder), limits, scripts)
+        return _Dispatch(client, runs, lambda batch: (compute_batch, words[0], batch, *words[1:]), list).run(on_progress)
+    from .own_disks import ReturnedBatch, StudyCopy, compute_apart, keep
+
+    copy = StudyCopy(folder)
+    client.register_plugin(copy)
+
+    def kept(found: ReturnedBatch) -> list[dict[str, Any]]:
+        keep(folder, found)
+        return found.answers
+
+    return _Dispatch(client, runs, lambda batch: (compute_apart, copy.name, batch, limits, scripts), kept).run(on_progress)
 
 
 class _Dispatch:
-    """Batches at the workers and those to come."""
+    """Batches at the workers and those to come.
 
-    def __init__(self, client: Any, folder: Path, runs: Sequence[Run], limits: Limits, scripts: str):
-        self.client, self.folder, self.runs, self.limits, self.scripts = client, folder, runs, limits, scripts
+    Parameters
+    ----------
+    client : distributed.Client
+    runs : sequence of Run
+    task : callable
+        Returns a function and its arguments for the fields of the runs of a batch.
+    answers : callable
+        Returns what became of the runs of a batch from the result of its task.
+    """
+
+    def __init__(
+        self,
+        client: Any,
+        runs: Sequence[Run],
+        task: Callable[[list[dict[str, Any]]], tuple[Any, ...]],
+        answers: Callable[[Any], list[dict[str, Any]]],
+    ):
+        self.client, self.runs, self.task, self.answers = client, runs, task, answers
         self.index_of = {run.digest: run.index for run in runs}
         self.next = 0
         self.batch = 1
@@ -218,8 +249,7 @@ class _Dispatch:
             self.next += size
 
     def _send(self, runs: Sequence[Run], losses: int) -> None:
-        words = [asdict(run) for run in runs]
-        future = self.client.submit(compute_batch, os.fspath(self.folder), words, self.limits, self.scripts, pure=False)
+        future = self.client.submit(*self.task([asdict(run) for run in runs]), pure=False)
         self.waiting[future] = runs, losses
 
     def _take(self, future: Any) -> None:
@@ -237,7 +267,7 @@ class _Dispatch:
                 )
             self._send(runs, losses + 1)
             return
-        answers = future.result()
+        answers = self.answers(future.result())
         for answer in answers:
             if answer["status"] == UNWRITABLE:
                 raise FileError(answer["sentence"])

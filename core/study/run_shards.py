@@ -318,6 +318,10 @@ class ShardIndex:
         path, offset, length, checksum = self._common[name]
         return _checked(path, _read(path, offset, length), checksum)
 
+    def all_common(self) -> dict[str, bytes]:
+        """Return all that runs have in common, by name; raises as :meth:`read`."""
+        return {name: self.common(name) for name in self._common}
+
     def _known(self, digest: str) -> np.void:
         found = self._row(digest)
         if found is None:
