@@ -54,6 +54,22 @@ class Tally:
         return self.done + self.failed
 
 
+@dataclass(frozen=True)
+class Way:
+    """How batches go to workers and come back.
+
+    Attributes
+    ----------
+    task : callable
+        Returns a function and its arguments for the fields of the runs of a batch.
+    answers : callable
+        Returns what became of these runs from the result of the task.
+    """
+
+    task: Callable[[list[dict[str, Any]]], tuple[Any, ...]]
+    answers: Callable[[Any], list[dict[str, Any]]]
+
+
 def require_dask() -> None:
     """Raise :class:`PalpateError` where Dask is missing."""
     try:
@@ -142,7 +158,7 @@ def run_study(
     limits: Limits,
     on_progress: Callable[[Tally], object],
     scripts: str = REFUSE,
-    own_disks: bool = False,
+    way: Way | None = None,
 ) -> Tally:
     """Compute runs and return what became of them.
 
@@ -159,8 +175,8 @@ def run_study(
         Called several times a second. An exception that it raises, KeyboardInterrupt included, stops the study.
     scripts : str
         What is done about the Python in a .blend, one of :data:`.scene_evaluation.SCRIPTS`.
-    own_disks : bool
-        Whether the workers do not see the folder: they get a copy of the study, and runs come back (:mod:`.own_disks`).
+    way : Way, optional
+        Of batches to the workers and back, where these do not see the folder.
 
     Raises
     ------
@@ -169,19 +185,9 @@ def run_study(
     PalpateError
         Workers are lost again and again.
     """
-    if not own_disks:
-        words = (os.fspath(folder), limits, scripts)
-        return _Dispatch(client, runs, lambda batch: (compute_batch, words[0], batch, *words[1:]), list).run(on_progress)
-    from .own_disks import ReturnedBatch, StudyCopy, compute_apart, keep
-
-    copy = StudyCopy(folder)
-    client.register_plugin(copy)
-
-    def kept(found: ReturnedBatch) -> list[dict[str, Any]]:
-        keep(folder, found)
-        return found.answers
-
-    return _Dispatch(client, runs, lambda batch: (compute_apart, copy.name, batch, limits, scripts), kept).run(on_progress)
+    if way is None:
+        way = Way(lambda batch: (compute_batch, os.fspath(folder), batch, limits, scripts), list)
+    return _Dispatch(client, runs, way).run(on_progress)
 
 
 class _Dispatch:
@@ -191,20 +197,11 @@ class _Dispatch:
     ----------
     client : distributed.Client
     runs : sequence of Run
-    task : callable
-        Returns a function and its arguments for the fields of the runs of a batch.
-    answers : callable
-        Returns what became of the runs of a batch from the result of its task.
+    way : Way
     """
 
-    def __init__(
-        self,
-        client: Any,
-        runs: Sequence[Run],
-        task: Callable[[list[dict[str, Any]]], tuple[Any, ...]],
-        answers: Callable[[Any], list[dict[str, Any]]],
-    ):
-        self.client, self.runs, self.task, self.answers = client, runs, task, answers
+    def __init__(self, client: Any, runs: Sequence[Run], way: Way):
+        self.client, self.runs, self.way = client, runs, way
         self.index_of = {run.digest: run.index for run in runs}
         self.next = 0
         self.batch = 1
@@ -249,7 +246,7 @@ class _Dispatch:
             self.next += size
 
     def _send(self, runs: Sequence[Run], losses: int) -> None:
-        future = self.client.submit(*self.task([asdict(run) for run in runs]), pure=False)
+        future = self.client.submit(*self.way.task([asdict(run) for run in runs]), pure=False)
         self.waiting[future] = runs, losses
 
     def _take(self, future: Any) -> None:
@@ -267,7 +264,7 @@ class _Dispatch:
                 )
             self._send(runs, losses + 1)
             return
-        answers = self.answers(future.result())
+        answers = self.way.answers(future.result())
         for answer in answers:
             if answer["status"] == UNWRITABLE:
                 raise FileError(answer["sentence"])

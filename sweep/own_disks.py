@@ -27,6 +27,7 @@ from ..core.study.run_files import FAILED, RUNS, SCENES, STUDY_NAME, make_folder
 from ..core.study.study_file import read_study
 from .child import DONE, UNWRITABLE
 from .child import FAILED as RUN_FAILED
+from .driver import Way
 from .scene_evaluation import REFUSE
 from .worker import NO_LIMITS, Limits, compute_batch
 
@@ -166,3 +167,15 @@ def keep(folder: Path, batch: ReturnedBatch) -> None:
     for digest in batch.runs:
         with suppress(OSError):
             (folder / FAILED / f"{digest}.txt").unlink(missing_ok=True)
+
+
+def way_to(client: Any, folder: Path, limits: Limits, scripts: str) -> Way:
+    """Give all workers of a client a copy of a study, and return the way of batches to them; raises as :class:`StudyCopy`."""
+    copy = StudyCopy(folder)
+    client.register_plugin(copy)
+
+    def kept(found: ReturnedBatch) -> list[dict[str, Any]]:
+        keep(folder, found)
+        return found.answers
+
+    return Way(lambda batch: (compute_apart, copy.name, batch, limits, scripts), kept)

@@ -132,7 +132,12 @@ def compute_runs(opened: OpenStudy, how: Computing, show: Callable[[Progress], o
     workers = min(how.workers or count_of_cores(), len(left))
     with driver.dask_client(how.scheduler, workers, how.make_cluster) as client:
         limits = Limits.of(opened.study)
-        tally = driver.run_study(client, opened.folder, left, limits, show_tally, how.scripts, how.own_disks)
+        way = None
+        if how.own_disks:
+            from .own_disks import way_to
+
+            way = way_to(client, opened.folder, limits, how.scripts)
+        tally = driver.run_study(client, opened.folder, left, limits, show_tally, how.scripts, way)
     return tally.failures
 
 
