@@ -21,7 +21,8 @@ from .worker import Limits, compute_batch
 
 BATCH_SECONDS = 2.0
 """Length of a batch: long beside the milliseconds that Dask needs for a task, short for who waits for Ctrl-C."""
-LARGEST_BATCH = 500
+FIRST_BATCH, LARGEST_BATCH = 1, 500
+"""Runs of the first batches, as nobody knows how long they take, and the most of any."""
 BATCHES_AHEAD = 2
 """Batches that wait at each worker, so that it is never idle."""
 MOST_LOSSES = 20
@@ -204,7 +205,7 @@ class _Dispatch:
         self.client, self.runs, self.way = client, runs, way
         self.index_of = {run.digest: run.index for run in runs}
         self.next = 0
-        self.batch = 1
+        self.batch = FIRST_BATCH
         self.waiting: dict[Any, tuple[Sequence[Run], int]] = {}
         self.tally = Tally()
 
