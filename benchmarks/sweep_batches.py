@@ -14,39 +14,41 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 from unittest import mock
 
+from palpate.core.study.study_file import Run
 from palpate.sweep import driver
 from palpate.sweep.worker import Limits
 
 from .sweep import begun, processor_seconds
 
 SIZES, WORKERS = (1, 3, 10, 30, 100), (1, 2)
-RUNS = 300
+RUNS = 600
 """In each measurement."""
 HOLD = 0.55
 """Rest after the press, s: runs of 60 frames."""
 
 
-def throughput(size: int, workers: int) -> tuple[float, float]:
-    """Return runs per second of the clock, and of the processor."""
-    with tempfile.TemporaryDirectory() as place, driver.dask_client(None, workers) as client:
-        folder = Path(place)
-        runs = begun(folder, HOLD, RUNS)
-        warm = [replace(runs[0], index=RUNS + number, digest=f"f{number:023x}") for number in range(4 * workers)]
-        driver.run_study(client, folder, warm, Limits(), lambda tally: None)
-        chosen = mock.patch.multiple(driver, LARGEST_BATCH=size, BATCH_SECONDS=1e9, FIRST_BATCH=size)
-        began, before = time.perf_counter(), processor_seconds()
-        with chosen:
-            driver.run_study(client, folder, runs, Limits(), lambda tally: None)
-        return RUNS / (time.perf_counter() - began), RUNS / (processor_seconds() - before)
-
-
 def measured() -> Iterator[tuple[int, int, float, float]]:
     """Yield workers, size of the batches, and runs per second of the clock and of the processor."""
     for workers in WORKERS:
-        for size in SIZES:
-            yield workers, size, *throughput(size, workers)
+        with tempfile.TemporaryDirectory() as place, driver.dask_client(None, workers) as client:
+            folder = Path(place)
+            runs = begun(folder, HOLD, RUNS * len(SIZES))
+            warm = [replace(runs[0], index=len(runs) + number, digest=f"f{number:023x}") for number in range(4 * workers)]
+            driver.run_study(client, folder, warm, Limits(), lambda tally: None)
+            for number, size in enumerate(SIZES):
+                part = runs[number * RUNS : (number + 1) * RUNS]
+                yield workers, size, *throughput(client, folder, part, size)
+
+
+def throughput(client: Any, folder: Path, runs: Sequence[Run], size: int) -> tuple[float, float]:
+    """Return runs per second of the clock, and of the processor."""
+    began, before = time.perf_counter(), processor_seconds()
+    with mock.patch.multiple(driver, LARGEST_BATCH=size, BATCH_SECONDS=1e9, FIRST_BATCH=size):
+        driver.run_study(client, folder, runs, Limits(), lambda tally: None)
+    return len(runs) / (time.perf_counter() - began), len(runs) / (processor_seconds() - before)
 
 
 def rows_of(workers: int, size: int, clock: float, processor: float) -> list[dict]:
