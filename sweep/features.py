@@ -261,7 +261,7 @@ def _read_sensor(folder: Path, shared: SharedResults) -> SensorRun:
     recording = load_recording(folder / RECORDING_NAME)
     texels, painted = _read_texels(folder / SENSOR_NAME, shared)
     if len(recording.sensors) != 1 or len(recording.frames) == 0:
-        raise FileError(f"'{folder / RECORDING_NAME}' is no recording of one sensor: delete the run and sweep again.")
+        raise FileError(f"'{folder / RECORDING_NAME}' is not a recording of one sensor: delete the run and sweep again.")
     (arrays,) = recording.sensors.values()
     if arrays.normal_force.shape[1] != len(texels):
         raise FileError(f"'{folder}' holds a recording and a sensor of different runs: delete the run and sweep again.")
@@ -365,7 +365,7 @@ def _net_features(name: str, arrays: SensorRecording) -> Iterator[tuple[Feature,
     yield _vector(net_force_name(name), "N", f"Net force on the sensor, {frame}."), arrays.net_force
     about = f"Net torque on the sensor about the origin of its body, {frame}."
     yield _vector(f"observation.net_torque.{name}", "N m", about), arrays.net_torque
-    about = f"Force-weighted mean of the contact points, {frame}; zero while nothing touches."
+    about = f"Force-weighted mean of the contact points, {frame}; zero without contact."
     yield _vector(f"contact.centre_of_pressure.{name}", "m", about), arrays.centre_of_pressure
 
 

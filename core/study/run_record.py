@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``run.json``: what a run was, and the numbers that sum it up; written with its recordings, read for tables and datasets."""
+"""``run.json``: values and metrics of a run; written with its recordings, read for tables and datasets."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ RUN_FORMAT = "palpate-run/1"
 RUN_NAME = "run.json"
 
 Value = float | str
-"""What a run may vary, as it is read: a number, or a name from a choice. Whole numbers and switches count as numbers."""
+"""A varied value, as it is read: a number, or a name from a choice. Whole numbers and switches count as numbers."""
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The file of a study: which scene, which design, and what varies over what.
+"""The file of a study: scene, design, and the distributions of the varied parameters.
 
 ::
 
@@ -67,7 +67,7 @@ A_STUDY = "a study"
 SCENE = "scene"
 """Name of the column that tells the scene of a run, where a study has several."""
 _OF_SCENES = ("fps", "images", "recordings", "points", "half_precision", "press")
-"""Words that mean nothing beside a job."""
+"""Words that have no meaning for a job."""
 _DIRECTIONS = {"tilt_direction": "tilt", "slide_direction": "slide"}
 """Directions of a press, which are any as long as the study says nothing else, and what they direct."""
 LARGEST_LEVELS = 10_000
@@ -213,7 +213,7 @@ def study_of(table: Mapping[str, Any], name: str) -> Study:
     study = read_words(words, Study, f"'{name}'", A_STUDY, others, design=design, is_job=JOB in table)
     for word in _OF_SCENES if study.is_job else ():
         if word in table:
-            raise FileError(f"{word} of '{name}' means nothing beside a job: leave it out.")
+            raise FileError(f"{word} of '{name}' has no meaning for a job: leave it out.")
     if design.kind == GRID and "samples" in table:
         raise FileError(f"'{name}' has a grid and samples: a grid takes all combinations, so leave samples out, or use random.")
     if design.kind != GRID and not design.samples:
@@ -239,7 +239,7 @@ def plan_for(
     properties: Mapping[str, SceneProperty] | None = None,
     meshes: Mapping[str, TriangleMesh] | None = None,
 ) -> Plan:
-    """Return what a study means on a scene.
+    """Return the plan of a study on a scene.
 
     Parameters
     ----------
@@ -428,7 +428,7 @@ def _distribution(found: Variable, entry: Mapping[str, Any]) -> Distribution:
     if kind == CHOICE:
         return Distribution(CHOICE, tuple(found.read(word) for word in numbers))
     if not isinstance(found.specification, Parameter):
-        raise ParameterError(f"{found.name} is no number that can be {kind}: use choice.")
+        raise ParameterError(f"{found.name} is not a number that can be {kind}: use choice.")
     if isinstance(found.specification, WholeNumber):
         raise ParameterError(f"{found.name} is a whole number, which cannot be {kind}: use choice.")
     first, second = numbers
@@ -494,7 +494,7 @@ def frozen_text(text: str, frozen: Mapping[str, Any]) -> str:
 
 
 def differences(before: Study, now: Study) -> list[str]:
-    """Return what two studies say differently, one phrase each."""
+    """Return the differences of two studies, one phrase each."""
     found = []
     words = ("name", "scenes", "fps", "images", "recordings", "points", "half_precision")
     pairs = [(word, getattr(before, word), getattr(now, word)) for word in words]

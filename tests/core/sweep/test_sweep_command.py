@@ -160,7 +160,7 @@ def test_a_stopped_study_goes_on_where_it_was(undisturbed, tmp_path, number):
     stderr = process.communicate(timeout=LONGEST)[1]
     assert process.returncode == (130 if number == signal.SIGINT else -9), stderr
     if number == signal.SIGINT:
-        assert stderr.splitlines()[-1] == "palpate sweep: stopped; the same command goes on where it was.", stderr
+        assert stderr.splitlines()[-1] == "palpate sweep: stopped; the same command continues.", stderr
         assert "Traceback" not in stderr
     earlier = done_runs(folder)
     before = {path: path.read_bytes() for path in (folder / "runs").glob("*.shard")}
