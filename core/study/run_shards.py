@@ -151,8 +151,8 @@ class ShardScan:
             if sizes[name] > self._ends.get(name, 0):
                 path = self._runs / name
                 try:
-                    with open(path, "rb") as file:
-                        yield from self._groups_of(path, file, sizes[name])
+                    with open(path, "rb") as file:  # a network file system knows the size best when a file is opened
+                        yield from self._groups_of(path, file, os.fstat(file.fileno()).st_size)
                 except OSError as error:
                     raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): check its permissions.") from error
 
