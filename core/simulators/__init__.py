@@ -6,4 +6,12 @@ from there. :mod:`.pressed_sensor` computes Palpate's forces inside the loop of 
 those of many environments. :mod:`.probe_list` has all that they need of a sensor.
 """
 
-__all__ = ["pressed_sensor", "pressed_sensors", "probe_list", "registry", "sensor_format", "sensor_on_mesh"]
+__all__ = [
+    "environment_parameters",
+    "pressed_sensor",
+    "pressed_sensors",
+    "probe_list",
+    "registry",
+    "sensor_format",
+    "sensor_on_mesh",
+]

@@ -16,6 +16,7 @@ from ..geometry.mesh import TriangleMesh
 from ..geometry.shapes import Shape
 from ..solver.pressed_model import PressedModel
 from ..solver.pressing import PressedTexels, Presser, StepMemory
+from .environment_parameters import Columns, sensors_of
 from .load_balance import LoadBalance
 from .sensor_on_mesh import SensorOnMesh
 
@@ -78,6 +79,9 @@ class PressedSensors:
     dt : float, seconds
         Step of the other program.
     environments : int
+    parameters : mapping of str to (E,) float, optional
+        Parameters and effects' parameters in which the sensors of environments differ, by name: ``k``, ``mus``,
+        ``effect.creep.amount`` (see :mod:`.environment_parameters`).
     threads : int, optional
         How many to compute with; by default the environment variable ``PALPATE_THREADS``, or as many as pay off.
 
@@ -95,7 +99,7 @@ class PressedSensors:
 
     Notes
     -----
-    Effects draw the same random numbers in every environment.
+    Effects draw the same random numbers in every environment, unless `parameters` has seeds.
     """
 
     def __init__(
@@ -105,6 +109,7 @@ class PressedSensors:
         dt: float,
         environments: int,
         threads: int | None = None,
+        parameters: Columns | None = None,
     ):
         if environments < 1:
             raise ParameterError(f"There are {environments} environments: ask for one at least.")
@@ -114,7 +119,8 @@ class PressedSensors:
         n = model.texels
         _check_memory(environments, model.bytes_of_environment() + n * BYTES_OF_TEXEL)
         self._out = PressedTexels.zero(environments, n, len(targets))
-        self._environments = model.environments(environments)
+        sensors = sensors_of(item.sensor, parameters, environments) if parameters else []
+        self._environments, self._sensors = model.environments(environments, sensors), sensors
         self._threads = [
             model.presser(StepMemory.zero(n, len(targets)), self._out, self._environments, model.workspace())
             for _ in range(model.threads(environments, threads))
@@ -250,7 +256,8 @@ class PressedSensors:
         for number in np.flatnonzero(self._out.valid):
             chain = self._chains[number]
             if fresh[number]:
-                chain = self._chains[number] = self._model.readout_chain()
+                sensor = self._sensors[number] if self._sensors else None
+                chain = self._chains[number] = self._model.readout_chain(sensor)
             assert chain is not None
             time, force = self._steps[number] / self._model.rate, np.ascontiguousarray(self._out.texels[number, :, 0])
             self._out.readings[number] = chain.step(float(time), force)
