@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bodies that press on sensors or carry them: boxes, spheres and meshes."""
+"""Bodies in contact with sensors or carrying them: boxes, spheres and meshes."""
 
 from __future__ import annotations
 

@@ -201,7 +201,7 @@ class PressedSensor:
             load = np.zeros(0)
         if load.shape not in ((1,), (3,), (6,)) or not np.isfinite(load).all():
             raise ParameterError(
-                "The wrench is no 1, 3 or 6 finite numbers: give a normal force, a force, or force and torque."
+                "The wrench is not 1, 3 or 6 finite numbers: give a normal force, a force, or force and torque."
             )
         if self._balance is None:
             self._balance = LoadBalance(self._model, self._out, self._environments, self._press)
@@ -239,4 +239,6 @@ class PressedSensor:
     def _no_pose(self, number: int) -> ParameterError:
         """Return the error for a body whose pose is none."""
         whose = "sensor" if number == 0 else "target" if self._one_target else f"target {number}"
-        return ParameterError(f"The pose of the {whose} is no position and quaternion of finite numbers: check its simulation.")
+        return ParameterError(
+            f"The pose of the {whose} is not a position and quaternion of finite numbers: check its simulation."
+        )

@@ -59,7 +59,7 @@ class Contacts:
             return ""
         which = ", ".join(map(str, bad[:8])) + (" …" if len(bad) > 8 else "")
         return (
-            f"{len(bad)} of {len(self.valid)} environments have a pose that is no position and quaternion of finite numbers "
+            f"{len(bad)} of {len(self.valid)} environments have a pose that is not a position and quaternion of finite numbers "
             f"({which}): reset them in the simulation."
         )
 

@@ -74,7 +74,7 @@ class PressedModel:
         if not (np.isfinite(dt) and dt > 0):
             raise ParameterError(f"The step is {dt:g} s: give a number above zero.")
         if not targets:
-            raise ParameterError(f"Nothing presses on '{sensor.name}': give a target's mesh, or several.")
+            raise ParameterError(f"There is no target for '{sensor.name}': give a mesh, or several.")
         if sensor.deformation is not None:
             raise ParameterError(f"'{sensor.name}' deforms by prescription: take a sensor that keeps its shape in this loop.")
         meshes = [target.stand_in if isinstance(target, Shape) else target for target in targets]

@@ -149,7 +149,7 @@ def test_environments_without_poses_are_flagged_and_the_others_go_on():
         if step == 1:
             assert not found.texels[1].any() and not found.wrench[1].any() and not found.contact[1].any()
             assert found.fault() == (
-                "1 of 3 environments have a pose that is no position and quaternion of finite numbers (1): "
+                "1 of 3 environments have a pose that is not a position and quaternion of finite numbers (1): "
                 "reset them in the simulation."
             )
         else:
@@ -183,7 +183,7 @@ def test_what_makes_no_environments_is_one_sentence(monkeypatch):
     item, mesh = pad(4, 4), box(SIZE, SIZE, SIZE)
     with pytest.raises(ParameterError, match="There are 0 environments"):
         PressedSensors(item, mesh, DT, 0)
-    with pytest.raises(ParameterError, match="Nothing presses on 'Pad'"):
+    with pytest.raises(ParameterError, match="There is no target for 'Pad'"):
         PressedSensors(item, [], DT, 2)
     many = PressedSensors(item, mesh, DT, 2)
     with pytest.raises(ParameterError, match=r"The poses of the target are float64 of shape \(3, 7\): .* \(2, 7\)\."):
