@@ -184,7 +184,10 @@ class PressedSensors:
         ParameterError
             Poses or loads have another shape. Those that are not finite are no error (see :attr:`Contacts.valid`).
         """
-        e, t = len(self), self._out.wrench.shape[1]
+        e, t, o = len(self), self._out.wrench.shape[1], self._out
+        found = Contacts(o.texels, o.readings, o.contact, o.wrench[:, 0] if self._one_target else o.wrench, o.too_deep, o.valid)
+        if out is not None:
+            _check_room(out, found)
         self._take("sensor", sensor_poses, [(e, 7), (7,)], self._out.poses[:, 0])
         if self._one_target:
             self._take("target", target_poses, [(e, 7)], self._out.poses[:, 1])
@@ -199,9 +202,6 @@ class PressedSensors:
         else:
             self._press_under(wrench)
         self._read(fresh)
-        wrench = self._out.wrench[:, 0] if self._one_target else self._out.wrench
-        o = self._out
-        found = Contacts(o.texels, o.readings, o.contact, wrench, o.too_deep, o.valid)
         if out is None:
             return found
         for name in CONTACT_FIELDS:
@@ -266,6 +266,16 @@ class PressedSensors:
 CONTACT_FIELDS = tuple(Contacts.__dataclass_fields__)
 BYTES_OF_TEXEL = 3 * 8 + 8 + 1
 """What the results of a texel take in memory."""
+
+
+def _check_room(out: Contacts, found: Contacts) -> None:
+    """Raise :class:`.ParameterError` where arrays to write into are not like those to be written."""
+    for name in CONTACT_FIELDS:
+        values, wanted = np.asarray(getattr(out, name)), getattr(found, name)
+        if values.shape != wanted.shape or values.dtype != wanted.dtype:
+            raise ParameterError(
+                f"'{name}' of out is {values.dtype} of shape {values.shape}: give {wanted.dtype} of shape {wanted.shape}."
+            )
 
 
 def _check_memory(environments: int, size: int) -> None:
