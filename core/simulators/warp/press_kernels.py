@@ -209,8 +209,9 @@ def press_texel(
             law = read_law(sensor.law, world % sensor.law.shape[0])
             if worlds.fresh[world]:
                 _begin_point(world, point, slots)
-                for target in range(count):
-                    _find_contact(world, target, point, sensor, targets, tree, worlds, slots)
+                if HAS_EFFECTS == 1:  # which remember the depth at rest
+                    for target in range(count):
+                        _find_contact(world, target, point, sensor, targets, tree, worlds, slots)
             _advance_point(world, point, law, sensor, worlds, slots)
             for target in range(count):
                 _find_contact(world, target, point, sensor, targets, tree, worlds, slots)
