@@ -405,7 +405,7 @@ class _Rewriter:
         names: list[ast.expr] = []
         after: list[ast.stmt] = []
         for one, kind in zip(target.elts, _kinds_of_results(annotation, len(target.elts)), strict=True):
-            name = one.id if isinstance(one, ast.Name) else self._temporary()
+            name = one.id if isinstance(one, ast.Name) and one.id != "_" else self._temporary()
             self._kinds[name] = kind
             names.append(ast.Name(name, ast.Store()))
             if not isinstance(one, ast.Name):
