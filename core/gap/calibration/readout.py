@@ -191,12 +191,12 @@ class _Samples:
         return self.readings[chosen], self.memory[chosen], self.targets[chosen]
 
 
-def _samples(recordings: Sequence[ReadoutRecording], times: Sequence[float], most: int) -> _Samples:
-    """Return the complete samples of recordings, at most so many, evenly taken."""
+def _samples(recordings: Sequence[ReadoutRecording], times: Sequence[float], most: int, of_targets: bool = False) -> _Samples:
+    """Return the complete samples of recordings, at most so many, evenly taken; with the memory of targets, if wanted."""
     rows: list[tuple[np.ndarray, ...]] = []
     stretches = PARTS if len(recordings) < 3 else 1
     for number, one in enumerate(recordings):
-        memory = memory_of(one.time, one.readings, times)
+        memory = memory_of(one.time, one.targets if of_targets else one.readings, times)
         (known,) = np.nonzero(np.isfinite(one.readings).all(axis=1) & np.isfinite(one.targets).all(axis=1))
         part = number * stretches + np.arange(len(known)) * stretches // max(len(known), 1)
         rows.append((one.readings[known], memory[known], one.targets[known], part))
@@ -283,12 +283,26 @@ def _check(
 
 
 def _forward_check(data: ReadoutData) -> float | None:
-    """Error of polynomials of each channel on the check recordings, as a share of the range of all readings."""
+    """Error of each channel's curve over the target on the check recordings, as a share of the range of all readings.
+
+    A curve is a polynomial, and beside it a share of what the skin remembers of the target. How long it remembers is chosen
+    by leaving out parts of the fitted recordings.
+    """
     if len(data.targets) > 1 or not data.check:
         return None
-    fit, check = _samples(data.fit, (), MOST_SAMPLES * 10), _samples(data.check, (), MOST_SAMPLES * 10)
-    expected, _ = forward_curves(fit.readings, fit.targets[:, 0], check.targets[:, 0])
-    return float(np.sqrt(np.mean((check.readings - expected) ** 2)) / np.ptp(check.readings))
+
+    def squares(fitted: _Samples, chosen: np.ndarray, other: _Samples, out: np.ndarray) -> float:
+        curves = forward_curves(fitted.readings[chosen], fitted.targets[chosen, 0], fitted.memory[chosen])
+        return float(np.mean((other.readings[out] - curves(other.targets[out, 0], other.memory[out])) ** 2))
+
+    def left_out(times: tuple[float, ...]) -> float:
+        own = _samples(data.fit, times, MOST_SAMPLES, of_targets=True)
+        return float(np.mean([squares(own, own.part != k, own, own.part == k) for k in np.unique(own.part)]))
+
+    times = min(_usable_times(data), key=left_out)
+    fit, check = (_samples(own, times, MOST_SAMPLES * 10, of_targets=True) for own in (data.fit, data.check))
+    error = squares(fit, np.ones(len(fit.part), bool), check, np.ones(len(check.part), bool))
+    return float(np.sqrt(error) / np.ptp(check.readings))
 
 
 def _reasons(data: ReadoutData, best: MethodResult, floor: np.ndarray) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ import numpy as np
 
 Prediction = tuple[np.ndarray, np.ndarray]
 Predictor = Callable[[np.ndarray, np.ndarray], Prediction]
+ForwardCurves = Callable[[np.ndarray, np.ndarray], np.ndarray]
 MOST_SQUARED = 40
 """Channels up to which the ridge takes all products of two; of more it takes the squares."""
 ASINH = 2.0
@@ -150,7 +151,9 @@ class ForwardInverse:
         """Return the predictor; its standard deviation is that of the most likely value (Cramér and Rao)."""
         low, high = float(targets.min()), float(targets.max())
         grid = np.linspace(low - BEYOND * (high - low), high + BEYOND * (high - low), GRID)
-        curve, residual = forward_curves(readings, targets[:, 0], grid)
+        nothing = np.zeros((len(targets), 0))
+        curves = forward_curves(readings, targets[:, 0], nothing)
+        curve, residual = curves(grid, np.zeros((GRID, 0))), readings - curves(targets[:, 0], nothing)
         covariance = np.atleast_2d(np.cov(residual.T)) + FLOOR * np.diag(readings.var(axis=0))
         whitening = np.linalg.inv(np.linalg.cholesky(covariance))
         expected = curve @ whitening.T
@@ -172,12 +175,26 @@ class ForwardInverse:
         return predict
 
 
-def forward_curves(readings: np.ndarray, target: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return each channel's polynomial over a target at some values, (m, c), and its residuals, (T, c)."""
+def forward_curves(readings: np.ndarray, target: np.ndarray, memory: np.ndarray) -> ForwardCurves:
+    """Fit each channel as a polynomial of a target, and its memory times a line in the target.
+
+    Parameters
+    ----------
+    readings : (T, c) float
+    target : (T,) float
+    memory : (T, m) float
+        The target behind low passes, less the target; m may be zero.
+
+    Returns
+    -------
+    function
+        From target and memory to readings.
+    """
     middle, half = 0.5 * (target.max() + target.min()), 0.5 * float(np.ptp(target))
 
-    def powers(values: np.ndarray) -> np.ndarray:
-        return np.polynomial.chebyshev.chebvander((values - middle) / half, DEGREE)
+    def terms(values: np.ndarray, past: np.ndarray) -> np.ndarray:
+        powers, scaled = np.polynomial.chebyshev.chebvander((values - middle) / half, DEGREE), past / half
+        return np.column_stack([powers, scaled, powers[:, 1:2] * scaled])  # where the curve is steeper, creep shows more
 
-    weights = np.linalg.lstsq(powers(target), readings, rcond=None)[0]
-    return powers(at) @ weights, readings - powers(target) @ weights
+    weights = np.linalg.lstsq(terms(target, memory), readings, rcond=None)[0]
+    return lambda values, past: terms(values, past) @ weights

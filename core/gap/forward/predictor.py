@@ -54,12 +54,12 @@ class Model:
 
     @cached_property
     def fitted_effects(self) -> tuple[Effect, ...]:
-        """Effects without noise, which is found in what is left."""
+        """Effects without noise, which is found in the residual."""
         return tuple(e for e in self.effects if kind_of(e.name).found_by != SCATTER)
 
     @cached_property
     def is_stepped(self) -> bool:
-        """Whether readings come in steps."""
+        """True if readings come in steps."""
         return any(kind_of(e.name).found_by == STEPS for e in self.effects)
 
     @cached_property
@@ -314,7 +314,7 @@ class Predictor:
         subset : (c,) int, optional
             Only these texels. This is right only if no effect couples texels.
         with_forces : bool
-            Whether the net force is wanted, if it was measured.
+            True if the net force is wanted, if it was measured.
         """
         wanted = with_forces and self.trial.force is not None
         reading = self.responses.reading(model, subset)[self.samples]

@@ -37,6 +37,14 @@ AT_BOUND = 0.01
 """A parameter is at a bound if it differs from it by less than this share of the bound."""
 LEAST_WARMTH = 1.0
 """Range of temperatures (K) from which on what follows them can be told from what does not. Chosen by eye."""
+INVERSE_FORCES = {1: "1/N", 2: "1/N²", 3: "1/N³", 4: "1/N⁴"}
+"""Units of coefficients by the power of the force in them."""
+SIGNED_CORRELATION, LEAST_SIGNED = 0.5, 0.1
+"""Channels are signed if at least this share of them follows the load with this correlation, and as many with its negative.
+Chosen by eye: of eFlesh's channels 12 rise and 3 fall under a normal force, and 8 and 19 in shear; the texels of each other
+set of benchmarks/_foreign.py all go one way."""
+THREES = "axes"
+"""What forms need, of :data:`.declarations.NEEDS`, that are only defined for the channels of all magnetometers."""
 START_COUNT = 8
 """Number of starting points of a candidate."""
 COUPLING_PITCH, COUPLING_LOAD = 0.003, 0.05
@@ -128,7 +136,7 @@ def search_range(parameter: Parameter, scales: Scales) -> tuple[float, float]:
         "m/s": (0.02 * scales.speed, 2.0 * scales.speed),
         "N·s": (0.1 * scales.force * scales.seconds, 50.0 * scales.force * scales.seconds),
         "J": (0.1 * scales.force * scales.depth, 50.0 * scales.force * scales.speed * scales.seconds),
-        "1/N": (0.02 / scales.force, 2.0 / scales.force),
+        **{unit: (0.02 / scales.force**power, 2.0 / scales.force**power) for power, unit in INVERSE_FORCES.items()},
         "s/m": (0.02 / scales.speed, 2.0 / scales.speed),
         "unit/s": (-0.5 * scales.reading / scales.seconds, 0.5 * scales.reading / scales.seconds),
         "rad": (-0.1, 0.1),
@@ -166,7 +174,7 @@ class Candidate:
 
     @property
     def has_texel_parameters(self) -> bool:
-        """Whether it has parameters of single texels."""
+        """True if it has parameters of single texels."""
         return any(p.per_texel for p in self.form.parameters)
 
     def free_parameters(self, index: int, scales: Scales, gain: float) -> list[FreeParameter]:
@@ -291,7 +299,7 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
     """Return the candidates that could show in these recordings at all.
 
     A gain that changes by itself is a warm-up where a session says how the time went on from recording to recording. Elsewhere
-    each recording begins anew, and such a gain is a form of drift.
+    each recording begins with an untouched sensor, and such a gain is a form of drift.
     """
     posed = any(p.trial.stimulus == "pose" for p in predictors)
     dragged = any(p.trial.force is not None and p.stimulus.slide.any() for p in predictors)
@@ -303,7 +311,10 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
     on_clock = all(p.session is not None and p.trial.session != COMMON for p in predictors)
     warmed = _warmth(predictors) >= LEAST_WARMTH
     heights_open = all(isinstance(p.trial.contact_height, str) for p in predictors if p.trial.stimulus == "pose")
+    signed = has_signed_channels(predictors, model)
+    in_threes = signed and len(predictors[0].rig.texels) % 3 == 0
     lacking = {"temperature": not warmed, "clock": not on_clock, "no clock": on_clock}
+    lacking |= {"signed channels": not signed, THREES: not in_threes}
     found = []
     for kind in library().values():
         if kind.name in NOT_FITTED or kind.name in cannot:
@@ -332,6 +343,22 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
     return found
 
 
+def has_signed_channels(predictors: Sequence[Predictor], model: Model) -> bool:
+    """Return whether some channels rise and others fall under load, as the axes of magnetometers do."""
+    sums = np.zeros((3, len(predictors[0].rig.texels)))
+    for predictor in predictors:
+        if predictor.trial.reading is None:
+            continue
+        load, reading = predictor.normal_force(model), predictor.trial.reading
+        good = np.isfinite(reading) & np.isfinite(load)
+        count = np.maximum(good.sum(axis=0), 1)
+        x, y = (np.where(good, v - np.where(good, v, 0.0).sum(axis=0) / count, 0.0) for v in (load, reading))
+        sums += [(x * y).sum(axis=0), (x * x).sum(axis=0), (y * y).sum(axis=0)]
+    follows = sums[0] / np.sqrt(np.maximum(sums[1] * sums[2], 1e-300))
+    least = max(1.0, LEAST_SIGNED * len(follows))
+    return bool((follows >= SIGNED_CORRELATION).sum() >= least and (follows <= -SIGNED_CORRELATION).sum() >= least)
+
+
 def _without_height(form: Form) -> Form:
     """A form that moves texels without its height, which belongs to the base model if contact heights are free."""
     return form if form.placement is None else _without(form, ("z",))
@@ -343,7 +370,7 @@ def _without(form: Form, names: Sequence[str]) -> Form:
 
 
 def _needs_rows(form: Form) -> bool:
-    """Whether a form is only defined for texels in rows and columns."""
+    """True if a form is only defined for texels in rows and columns."""
     if form.memoryless is None or any(p.per_texel for p in form.parameters):
         return False
     site = TransducerArray(np.zeros((1, 3)), np.full(1, 9e-6))
@@ -355,7 +382,7 @@ def _needs_rows(form: Form) -> bool:
 
 
 def is_spatial(form: Form) -> bool:
-    """Return whether a form couples texels: it is tested by loading one of three."""
+    """Return whether a form couples texels or needs them all: it is tested by loading one of three, and one alone."""
     if form.coupling is not None:
         return True
     if form.memoryless is None:
@@ -368,4 +395,4 @@ def is_spatial(form: Form) -> bool:
             values[p.name] = tuple([float(values[p.name])] * 3)  # type: ignore[arg-type]
     time = np.zeros(2)
     alone, loaded = (form.memoryless(np.array([[0.0, x, 0.0]] * 2), time, values, site, 0)[0] for x in (0.0, COUPLING_LOAD))
-    return bool(np.abs(loaded - alone)[[0, 2]].max() > 1e-9)
+    return bool(np.abs(loaded - alone)[[0, 2]].max() > 1e-9) or form.needs == THREES

@@ -20,7 +20,7 @@ def without_harmful_effects(
 ) -> SelectionState:
     """Drop further effects that make the check recordings worse.
 
-    The effect that closes most stays: the verdict says whether the check recordings bear it out.
+    The effect that closes most stays: the verdict says whether it passes the check recordings.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def without_harmful_effects(
 
 
 def _is_worse_in_all(check: Sequence[TrialView], without: Model, beside: Model, gap_sizes: GapSizes, quantity: int) -> bool:
-    """Whether an effect raises the mean square of all check recordings together by more than their noise."""
+    """True if an effect raises the mean square of all check recordings together by more than their noise."""
     outcomes = [checked_recording(view, without, beside, gap_sizes, (1.0, 1.0)) for view in check]
     count = np.array([one.count[quantity] for one in outcomes])
     if not count.any():

@@ -18,6 +18,7 @@ import numpy as np
 from ...effects.engine.compiled_program import TexelMotion
 from ...geometry.bvh import Segment, Tree, segment_entry
 from ...geometry.rotations import write_backward_step_motion, write_rotation, write_step_motion, write_velocity
+from ...geometry.shapes import BOX, CAPSULE, MESH, PLANE, SPHERE
 from ...laws.contact_law import ContactLaw, read_law, scaled_law, whole_texel_law, with_friction
 from ...laws.friction import (
     bristle_rate,
@@ -33,19 +34,7 @@ from ...solver.dynamics.contact_assembly import LinearContact, Tangent, linearis
 from ...solver.dynamics.effect_kernels import NOW, STEP
 from ...solver.dynamics.relative_kinematics import relative_motion, velocity_at
 from .effect_functions import force_with_effects, friction_with_effects, reading_with_effects
-from .press_arrays import (
-    BOX,
-    CAPSULE,
-    MESH,
-    PLANE,
-    SPHERE,
-    BoolArray,
-    Results,
-    SensorArrays,
-    Slots,
-    TargetArrays,
-    Worlds,
-)
+from .press_arrays import BoolArray, Results, SensorArrays, Slots, TargetArrays, Worlds
 from .shapes import box_entry, capsule_entry, plane_entry, sphere_entry
 
 NO_CONTACT, TOO_DEEP = -1.0, -2.0

@@ -247,6 +247,32 @@ def test_crosstalk():
     assert found[7, 3] == pytest.approx(1 + 0.6 / COLUMNS + 0.6 / ROWS) and found[0, 0] == 0.0
     found = read(effect("crosstalk", "common", share=0.5), image(texel))[0]
     assert found[0] == pytest.approx(0.5 / N)
+    found = read(effect("crosstalk", "previous", share=0.3), image(texel))[0]
+    np.testing.assert_allclose(found, image(texel)[0] + 0.3 * np.eye(N)[texel + 1], atol=1e-15)
+
+
+def test_a_cover_beyond_the_rim_loses_what_falls_outside():
+    """The array is a part of a large one: the same readings as if the texels outside were there and were not read."""
+    wide, inner, pitch = 37, 5, 0.003  # few enough for a matrix of all pairs
+    y, x = np.mgrid[0:wide, 0:wide] * pitch
+    everywhere = np.stack([x.ravel(), y.ravel(), np.zeros(wide * wide)], axis=1)
+    first = (wide - inner) // 2
+    inside = (np.arange(wide) >= first) & (np.arange(wide) < first + inner)
+    kept = (inside[:, None] & inside[None]).ravel()
+    loads = np.zeros((1, wide * wide))
+    loads[0, kept] = np.random.default_rng(1).random(inner**2)
+    for width in (0.5 * pitch, 1.2 * pitch):
+        spread = [
+            readings(
+                (effect("load-spreading", form, width=width),),
+                TransducerArray(place, np.full(len(place), pitch**2)),
+                np.zeros(1),
+                load,
+            )
+            for form, place, load in (("gaussian", everywhere, loads), ("open", everywhere[kept], loads[:, kept]))
+        ]
+        np.testing.assert_allclose(spread[1][0], spread[0][0, kept], rtol=1e-6)
+        assert spread[1].sum() < 0.95 * loads.sum()
 
 
 def test_lines_need_rows_and_columns():
@@ -331,3 +357,60 @@ def test_any_moment_can_be_asked_for_by_itself(name, form):
     whole = read(item, force)
     for i in (500, 3, 77):
         np.testing.assert_array_equal(ReadoutChain((item,), GRID).step(TIME[i], force[i]), whole[i])
+
+
+# --- channels of magnetometers
+
+
+@pytest.mark.parametrize(("form", "names"), [("linear", ""), ("quadratic", "second"), ("cubic", "second third")])
+def test_each_channel_has_a_polynomial_of_its_own(form, names):
+    """Against numpy's polynomials, with either sign, before a gain and a zero."""
+    random = np.random.default_rng(4)
+    values = {name: random.normal(size=N) for name in ("offset", "factor", *names.split())}
+    force = np.linspace(-0.5, 2.0, len(TIME))[:, None] * np.ones(N)
+    array = TransducerArray(POSITION, GRID.area, gain=-3.0, zero=7.0)
+    found = read(effect("channel-curve", form, **values), force, transducers=array)
+    for texel in (0, 17, N - 1):
+        expected = np.polynomial.Polynomial([values[name][texel] for name in values])(force[:, texel])
+        np.testing.assert_allclose(found[:, texel], 7.0 - 3.0 * expected, rtol=1e-11, atol=1e-11)
+
+
+def test_a_quintic_contains_the_others():
+    force = np.linspace(-0.5, 2.0, len(TIME))[:, None] * np.ones(N)
+    values = {"factor": -0.4, "offset": 0.1, "second": 0.3, "third": -0.2}
+    less, more = (read(effect("channel-curve", form, **values), force) for form in ("cubic", "quintic"))
+    np.testing.assert_array_equal(less, more)
+    bent = read(effect("channel-curve", "quintic", **values, fourth=0.01, fifth=-0.02), force)
+    np.testing.assert_allclose(bent - less, 0.01 * force**4 - 0.02 * force**5, atol=1e-12)
+
+
+def test_a_magnetometer_that_is_mounted_askew_shows_a_turned_field():
+    from scipy.spatial.transform import Rotation
+
+    field = np.random.default_rng(5).normal(size=(len(TIME), N))
+    found = read(effect("axis-coupling", "rotation", x=0.3, y=-0.2, z=1.1), field)
+    turned = Rotation.from_rotvec([0.3, -0.2, 1.1]).apply(field.reshape(-1, 3))
+    np.testing.assert_allclose(found, turned.reshape(field.shape), atol=1e-13)
+
+
+def test_soft_iron_couples_alike_in_both_directions():
+    for i, j, share in ((0, 1, 0.2), (1, 2, -0.3), (0, 2, 0.1)):
+        assert read(effect("axis-coupling", "soft-iron", xy=0.2, yz=-0.3, xz=0.1), image(6 + i))[0, 6 + j] == share
+        assert read(effect("axis-coupling", "soft-iron", xy=0.2, yz=-0.3, xz=0.1), image(6 + j))[0, 6 + i] == share
+
+
+def test_all_magnetometers_share_the_ambient_field():
+    force = np.random.default_rng(6).normal(size=(len(TIME), N))
+    array = TransducerArray(POSITION, GRID.area, gain=2.0, zero=1.0)
+    plain = read(effect("ambient-field", "linear", x=0.0, y=0.0, z=0.0), force, transducers=array)
+    for form, factor in (("constant", 1.0), ("linear", TIME[:, None])):
+        found = read(effect("ambient-field", form, x=0.3, y=-0.2, z=0.5), force, transducers=array)
+        expected = np.tile([0.3, -0.2, 0.5], N // 3) * factor
+        np.testing.assert_allclose(found - plain, np.broadcast_to(expected, force.shape), atol=1e-12)
+
+
+@pytest.mark.parametrize(("name", "form"), [("axis-coupling", "soft-iron"), ("ambient-field", "linear")])
+def test_channels_that_do_not_come_in_threes_are_refused(name, form):
+    array = TransducerArray(POSITION[:4], GRID.area[:4], name="fingertip")
+    with pytest.raises(EffectError, match=f"'{name}' of sensor 'fingertip' needs three channels .* has 4 channels: use"):
+        read(effect(name, form), np.ones((len(TIME), 4)), transducers=array)

@@ -6,8 +6,10 @@ import pytest
 
 import palpate as pp
 from palpate.commands import main
+from palpate.core.gap.calibration.readout import _forward_check
 from palpate.core.gap.calibration.readout_data import readout_data
-from palpate.core.gap.calibration.readout_methods import ForwardInverse, GaussianProcess, Ridge, memory_of
+from palpate.core.gap.calibration.readout_methods import ForwardInverse, GaussianProcess, Ridge, forward_curves, memory_of
+from palpate.core.gap.dataset.rig import read_rig
 
 GAIN = np.array([1.0, -0.4, 0.7, -1.2])
 SAMPLES = 200
@@ -15,13 +17,13 @@ CURVE = np.array([0.2, 0.5, -0.3, 0.1])
 RIG = 'format = "palpate-rig/1"\n[sensor]\ngrid = { rows = 1, columns = 4, pitch = [0.01, 0.01] }\nunit = "uT"\n'
 
 
-def press(seed, scale=10.0, late=0.0, offset=0.0, noise=0.004):
-    """Times, forces (N) and four signed channels of 40 s; with `late` (s) the channels trail as behind a low pass."""
+def press(seed, scale=10.0, late=0.0, offset=0.0, noise=0.004, share=1.0):
+    """Times, forces (N) and four signed channels of 40 s; with `late` (s) a share of them trails as behind a low pass."""
     random = np.random.default_rng(seed)
     time = np.cumsum(random.uniform(0.15, 0.25, SAMPLES))
     force = scale * np.maximum(0.0, np.sin(2 * np.pi * time / random.uniform(6.0, 9.0) + random.uniform(0.0, 6.0))) ** 2
     seen = force[:, None] / 10.0
-    seen = seen + (memory_of(time, seen, (late,)) if late else 0.0)
+    seen = seen + (share * memory_of(time, seen, (late,)) if late else 0.0)
     readings = 100.0 * (seen * GAIN + seen**2 * CURVE + noise * random.normal(size=(len(time), 4))) + offset
     return time, force, readings
 
@@ -115,7 +117,30 @@ def test_the_inverse_of_a_linear_model_is_generalised_least_squares():
     assert np.median(deviation[inner]) == pytest.approx(1.0 / np.sqrt(GAIN @ inverse @ GAIN), rel=0.05)
 
 
+def test_a_curve_has_a_share_of_what_the_channel_remembers():
+    """A polynomial of the force and a part of its low pass are found exactly, and hold for another course of the force."""
+    (time, force, _), (other_time, other, _) = press(4), press(5, scale=8.0)
+
+    def channels(time, force):
+        past = memory_of(time, force[:, None], (1.0, 10.0))
+        straight, bent = (0.5 + 0.02 * force) * (force + past[:, 0]), 2.0 - force + 0.1 * force**3 - 0.2 * past[:, 1]
+        return past, np.stack([straight, bent], axis=1)
+
+    past, readings = channels(time, force)
+    other_past, expected = channels(other_time, other)
+    np.testing.assert_allclose(forward_curves(readings, force, past)(other, other_past), expected, atol=1e-9)
+
+
 # --- rigs
+
+
+@pytest.mark.parametrize("late", [0.0, 10.0])
+def test_the_forward_model_creeps_where_the_skin_does(tmp_path, late):
+    """Of channels of which a tenth trails, its error is that of the noise (0.2 % of the range), as of those that do not."""
+    recordings = [press(i, late=late, share=0.1) for i in range(4)]
+    data = readout_data(read_rig(write_rig(tmp_path, recordings, ["fit", "fit", "fit", "check"])))
+    noise = 0.4 / np.ptp(recordings[3][2])
+    assert 0.8 * noise < _forward_check(data) < 1.3 * noise
 
 
 @pytest.mark.slow("a read-out tries all candidates, each on parts that are left out")
