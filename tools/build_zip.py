@@ -64,7 +64,7 @@ MARKERS = {
 NUMPY = {"3.11": "1.24.3", "3.13": "2.2.4", "3.14": "2.3.2"}
 # The licence travels with the zip; everything else is in the package folders that pyproject.toml lists.
 ROOT_FILES = ["__init__.py", "LICENSE"]
-NOT_IN_ZIP = {"sweep"}  # needs packages that the zip does not carry
+NOT_IN_ZIP = {"plugins", "sweep", "core/simulators/warp"}  # need packages that the zip does not carry
 FIXED_TIME = (1980, 1, 1, 0, 0, 0)  # the earliest a zip can hold
 
 
@@ -82,7 +82,8 @@ def package_files() -> list[Path]:
             relative = path.relative_to(ROOT)
             hidden = any(part.startswith((".", "__pycache__")) for part in relative.parts)
             # `scene.blend1` is the copy Blender keeps of the file it saved over
-            if path.is_file() and not hidden and path.suffix not in {".pyc", ".blend1", ".blend2"}:
+            left_out = any(parent.as_posix() in NOT_IN_ZIP for parent in relative.parents)
+            if path.is_file() and not hidden and not left_out and path.suffix not in {".pyc", ".blend1", ".blend2"}:
                 files.append(relative)
     return files
 

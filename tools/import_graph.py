@@ -27,6 +27,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "panels": {"core", "addon", "operators"},
     "commands": {"core", "api", "addon", "paper", "sample_blends", "sweep"},
     "paper": {"core", "addon", "sample_blends"},
+    "plugins": {"core"},
     "sample_blends": {"core", "addon"},
     "sweep": {"core"},
     "": {"core", "api", "addon", "operators", "panels", "commands", "paper", "sample_blends"},

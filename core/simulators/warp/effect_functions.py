@@ -15,7 +15,7 @@ import numpy as np
 
 from ...effects.engine.compiled_program import TexelMotion
 from ...effects.engine.registry import complete_values, in_signal_order
-from ...effects.engine.specification import Form
+from ...effects.engine.specification import Form, TexelInput
 from ...errors import ParameterError
 from ...laws.contact_law import LINEAR_EXPONENT, ContactLaw
 from ...laws.normal_force import damped_force_derivatives, damping_coefficient, elastic_force, elastic_stiffness
@@ -124,7 +124,7 @@ def functions_of(sensor: Sensor, dt: float) -> EffectFunctions:
                 "take it away, or use PressedSensors."
             )
     clipped = [i for i, (_, form) in enumerate(forces) if not form.after_clip]
-    scope = {name: value for name, value in globals().items() if not name.startswith("__")}
+    scope = {name: value for name, value in globals().items() if not name.startswith("__")} | {"TexelInput": TexelInput}
     for prefix, chain in (("force", forces), ("friction", frictions), ("reading", readings)):
         scope |= {f"{prefix}_{i}": form.law or form.friction_law for i, (_, form) in enumerate(chain)}
     before, after = (

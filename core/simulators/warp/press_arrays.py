@@ -11,9 +11,6 @@ IntArray: TypeAlias = np.ndarray
 BoolArray: TypeAlias = np.ndarray
 """Arrays of integers and of truth values; the translation goes by these names."""
 
-MESH, SPHERE, BOX, CAPSULE, PLANE = range(5)
-"""Kinds of targets."""
-
 
 class SensorArrays(NamedTuple):
     """A sensor with n texels and N contact points.

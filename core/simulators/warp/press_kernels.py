@@ -18,6 +18,7 @@ import numpy as np
 from ...effects.engine.compiled_program import TexelMotion
 from ...geometry.bvh import Segment, Tree, segment_entry
 from ...geometry.rotations import write_backward_step_motion, write_rotation, write_step_motion, write_velocity
+from ...geometry.shapes import BOX, CAPSULE, MESH, PLANE, SPHERE
 from ...laws.contact_law import ContactLaw, read_law, scaled_law, whole_texel_law, with_friction
 from ...laws.friction import (
     bristle_rate,
@@ -33,19 +34,7 @@ from ...solver.dynamics.contact_assembly import LinearContact, Tangent, linearis
 from ...solver.dynamics.effect_kernels import NOW, STEP
 from ...solver.dynamics.relative_kinematics import relative_motion, velocity_at
 from .effect_functions import force_with_effects, friction_with_effects, reading_with_effects
-from .press_arrays import (
-    BOX,
-    CAPSULE,
-    MESH,
-    PLANE,
-    SPHERE,
-    BoolArray,
-    Results,
-    SensorArrays,
-    Slots,
-    TargetArrays,
-    Worlds,
-)
+from .press_arrays import BoolArray, Results, SensorArrays, Slots, TargetArrays, Worlds
 from .shapes import box_entry, capsule_entry, plane_entry, sphere_entry
 
 NO_CONTACT, TOO_DEEP = -1.0, -2.0
@@ -209,8 +198,9 @@ def press_texel(
             law = read_law(sensor.law, world % sensor.law.shape[0])
             if worlds.fresh[world]:
                 _begin_point(world, point, slots)
-                for target in range(count):
-                    _find_contact(world, target, point, sensor, targets, tree, worlds, slots)
+                if HAS_EFFECTS == 1:  # which remember the depth at rest
+                    for target in range(count):
+                        _find_contact(world, target, point, sensor, targets, tree, worlds, slots)
             _advance_point(world, point, law, sensor, worlds, slots)
             for target in range(count):
                 _find_contact(world, target, point, sensor, targets, tree, worlds, slots)

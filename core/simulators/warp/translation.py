@@ -33,8 +33,8 @@ KIND_OF_ANNOTATION = {"float": REAL, "int": INTEGER, "bool": BOOLEAN, "np.ndarra
 ARRAYS = {"np.ndarray": REAL, "IntArray": INTEGER, "BoolArray": BOOLEAN}
 """Names of annotations of arrays, and the kind of what they hold."""
 SAME_IN_WARP = ("min", "max", "abs", "range", "len")
-NATIVE = {name: f"#ifdef __CUDA_ARCH__\nreturn ::{name}(x);\n#else\nreturn __builtin_{name}(x);\n#endif" for name in ("expm1", "log1p")}  # fmt: skip  # noqa: E501
-"""Functions of C that Warp does not have."""
+NATIVE = {"expm1": "x", "log1p": "x", "hypot": "x, y"}
+"""Functions of C that Warp does not have, and their arguments."""
 
 
 class TranslationError(RuntimeError):
@@ -130,13 +130,13 @@ class Translation:
 
     def native(self, name: str) -> Any:
         """Return a function of C as a function of Warp."""
-        key = NATIVE[name], name
-        if key not in self._functions:
-            scope: dict[str, Any] = {"real": self.real, "__name__": self.name}
-            exec(f"def {name}(x: real) -> real: ...", scope)
-            scope[name].__annotations__ = {"x": self.real, "return": self.real}
-            self._functions[key] = self.warp.func_native(NATIVE[name])(scope[name])
-        return self._functions[key]
+        if name not in self._functions:
+            header = ", ".join(f"{one}: real" for one in NATIVE[name].split(", "))
+            calls = (f"return {prefix}{name}({NATIVE[name]});" for prefix in ("::", "__builtin_"))
+            snippet = "#ifdef __CUDA_ARCH__\n{}\n#else\n{}\n#endif\n".format(*calls)
+            text = f"@wp.func_native(snippet)\ndef {name}({header}) -> real: ...\n"
+            self._functions[name] = self._executed(text, name, {"snippet": snippet})
+        return self._functions[name]
 
     def _field(self, text: str, name: str, example: Any) -> Any:
         if text in ARRAYS:
@@ -159,12 +159,17 @@ class Translation:
         assert isinstance(header, ast.FunctionDef)
         header.body = body
         text = ast.unparse(ast.fix_missing_locations(header)) + "\n"
+        made = self._executed(text, name, rewriter.scope)
+        made.__annotations__ = {argument: annotations[argument] for argument in arguments}
+        return decorate(made)
+
+    def _executed(self, text: str, name: str, scope: Mapping[str, Any]) -> Any:
+        """Return the function that a text defines; Warp reads the text again."""
         file = f"<{self.name}.{name}>"
         linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
-        scope = {"wp": self.warp, "real": self.real, "__name__": self.name, **rewriter.scope}
-        exec(compile(text, file, "exec"), scope)
-        scope[name].__annotations__ = {argument: annotations[argument] for argument in arguments}
-        return decorate(scope[name])
+        known = {"wp": self.warp, "real": self.real, "__name__": self.name, **scope}
+        exec(compile(text, file, "exec"), known)
+        return known[name]
 
 
 class _Rewriter:
@@ -400,7 +405,7 @@ class _Rewriter:
         names: list[ast.expr] = []
         after: list[ast.stmt] = []
         for one, kind in zip(target.elts, _kinds_of_results(annotation, len(target.elts)), strict=True):
-            name = one.id if isinstance(one, ast.Name) else self._temporary()
+            name = one.id if isinstance(one, ast.Name) and one.id != "_" else self._temporary()
             self._kinds[name] = kind
             names.append(ast.Name(name, ast.Store()))
             if not isinstance(one, ast.Name):

@@ -12,6 +12,7 @@ import numpy as np
 from ...effects.engine.readout_chain import transducers_of
 from ...effects.engine.sensor_effects import check_scenario, mounted_texels
 from ...errors import ParameterError
+from ...geometry import shapes
 from ...geometry.bvh import build_tree
 from ...geometry.contact_points import ContactPoints, contact_points
 from ...geometry.mesh import TriangleMesh
@@ -26,7 +27,7 @@ from ..sensor_on_mesh import SensorOnMesh
 from . import press_kernels
 from .effect_functions import EffectFunctions, functions_of
 from .engine import require_warp
-from .press_arrays import BOX, CAPSULE, MESH, PLANE, SPHERE, Results, SensorArrays, Slots, TargetArrays, Worlds
+from .press_arrays import Results, SensorArrays, Slots, TargetArrays, Worlds
 from .translation import Translation
 
 
@@ -55,8 +56,14 @@ class Plane(NamedTuple):
     """All that is below z = 0 of its frame."""
 
 
-Shape = TriangleMesh | Sphere | Box | Capsule | Plane
-KINDS: dict[type, int] = {TriangleMesh: MESH, Sphere: SPHERE, Box: BOX, Capsule: CAPSULE, Plane: PLANE}
+Shape = TriangleMesh | shapes.Shape | Sphere | Box | Capsule | Plane
+KINDS: dict[type, int] = {
+    TriangleMesh: shapes.MESH,
+    Sphere: shapes.SPHERE,
+    Box: shapes.BOX,
+    Capsule: shapes.CAPSULE,
+    Plane: shapes.PLANE,
+}
 
 _TRANSLATIONS: dict[Any, Translation] = {}
 
@@ -70,7 +77,7 @@ class WarpSensors:
     Parameters
     ----------
     item : SensorOnMesh
-    target : TriangleMesh, Sphere, Box, Capsule or Plane, or a sequence of these
+    target : TriangleMesh, shapes.Shape, Sphere, Box, Capsule or Plane, or a sequence of these
         Each in the frame of what presses, metres.
     dt : float, seconds
         Step of the other program.
@@ -114,7 +121,8 @@ class WarpSensors:
         single: bool = False,
     ):
         warp = require_warp()
-        targets: list[Any] = [target] if type(target) in KINDS else list(target)  # type: ignore[arg-type]  # a shape is a tuple
+        single_target = type(target) in KINDS or isinstance(target, shapes.Shape)  # shapes of this module are tuples
+        targets: list[Any] = [target] if single_target else [*target]  # type: ignore[misc]
         _check(item.sensor, targets, dt, environments)
         self._warp, self.device = warp, _device(warp, device)
         self._environments, sensor = environments, item.sensor
@@ -224,6 +232,8 @@ def _check(sensor: Sensor, targets: Sequence[Shape], dt: float, environments: in
         raise ParameterError(f"'{sensor.name}' deforms by prescription: take a sensor that keeps its shape in this loop.")
     meshes = []
     for number, target in enumerate(targets, start=1):
+        if isinstance(target, shapes.Shape):
+            continue
         if type(target) not in KINDS:
             raise ParameterError(
                 f"Target {number} is a {type(target).__name__}: give a TriangleMesh, Sphere, Box, Capsule or Plane."
@@ -286,9 +296,11 @@ def _sensor_arrays(sensor: Sensor, points: ContactPoints, effects: EffectFunctio
 
 
 def _target_arrays(targets: Sequence[Shape]) -> TargetArrays:
-    kind = np.array([KINDS[type(target)] for target in targets])
+    kind = np.array([one.kind if isinstance(one, shapes.Shape) else KINDS[type(one)] for one in targets])
     size = np.zeros((len(targets), 3))
     for row, target in zip(size, targets, strict=True):
-        if not isinstance(target, TriangleMesh):
+        if isinstance(target, shapes.Shape):
+            row[:] = target.size
+        elif not isinstance(target, TriangleMesh):
             row[: len(target)] = target
-    return TargetArrays(kind, size, np.cumsum(kind == MESH) - 1)
+    return TargetArrays(kind, size, np.cumsum(kind == shapes.MESH) - 1)

@@ -15,6 +15,7 @@ from solver_scenes import box
 
 from palpate.core.effects.engine.registry import effect
 from palpate.core.errors import ParameterError
+from palpate.core.geometry import shapes as solids
 from palpate.core.geometry.bvh import Segment
 from palpate.core.simulators.pressed_sensors import PressedSensors
 from palpate.core.simulators.warp import shapes
@@ -76,6 +77,19 @@ def assert_agree(item, meshes, targets, poses, device="cpu"):
 def test_results_are_those_of_pressed_sensors(item, target):
     poses = random_poses(5, 6, 4, height=0.03 if item.name == "Ball" else SIZE / 2)
     assert assert_agree(item, [CUBE], [target], poses) > 1e-3
+
+
+@pytest.mark.slow("Warp compiles the kernels")
+@pytest.mark.parametrize(
+    "shape",
+    [solids.sphere(0.01), solids.capsule(0.01, 0.008), solids.box((SIZE, SIZE, SIZE)), solids.plane()],
+    ids=lambda shape: shape.kind,
+)
+def test_shapes_of_the_core_press_alike(shape):
+    poses = random_poses(11, 6, 4, height={solids.CAPSULE: 0.014, solids.PLANE: 0.0}.get(shape.kind, 0.01))
+    if shape.kind == solids.PLANE:
+        poses[:, :, 1, 3:] = [0.0, 1.0, 0.0, 0.0]  # its top downwards
+    assert assert_agree(pad(6, 6), [shape], [shape], poses) > 1e-3
 
 
 @pytest.mark.slow("Warp compiles the kernels")

@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A Palpate sensor in a scene of mjlab, on its ``Sensor`` base class."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..core.errors import ParameterError
+from ..core.geometry.mesh import TriangleMesh
+from ..core.simulators.sensor_on_mesh import SensorOnMesh
+from ..core.simulators.warp.engine import require_warp
+from ..core.simulators.warp.warp_sensors import Box, Capsule, Plane, Shape, Sphere, WarpSensors
+from .engines import require_engine
+
+require_engine("mjlab", "mjlab", (1, 6))
+wp: Any = require_warp()
+
+import mujoco  # noqa: E402  # the bases below are mjlab's, so it is needed to read this module
+from mjlab.sensor import Sensor, SensorCfg  # noqa: E402
+
+
+class TouchData(NamedTuple):
+    """What a sensor with n texels measures in E environments, as tensors of torch that share the sensor's memory.
+
+    Attributes
+    ----------
+    texels : (E, n, 3) torch.Tensor, N
+        Normal force, and shear along the texel's x and y axis.
+    readings : (E, n) torch.Tensor
+    contact : (E, n) torch.Tensor of bool
+    wrench : (E, T, 6) torch.Tensor, N and N·m
+        On each target in the world, about the origin of its geom.
+    """
+
+    texels: Any
+    readings: Any
+    contact: Any
+    wrench: Any
+
+
+@dataclass
+class TouchSensorCfg(SensorCfg):
+    """A tactile sensor on a body.
+
+    Attributes
+    ----------
+    name : str
+    sensor : Sensor
+        As ``palpate.read_sensor`` returns it.
+    body : str
+        Whose frame is that of the texels; in mjlab a name such as ``robot/fingertip``.
+    geoms : tuple of str
+        What presses: planes, spheres, capsules, boxes and meshes. MuJoCo's contact between them and the body has to be off if
+        forces are applied.
+    apply : bool
+        Write the wrench on the geoms' bodies, and its opposite on the sensor's, to ``xfrc_applied`` of these bodies; other
+        forces of theirs are overwritten.
+    single : bool
+        Compute in float32. MuJoCo Warp's poses are float32 in any case.
+    """
+
+    sensor: SensorOnMesh | None = None
+    body: str = ""
+    geoms: tuple[str, ...] = field(default_factory=tuple)
+    apply: bool = True
+    single: bool = False
+
+    def build(self) -> TouchSensor:
+        """Return the sensor."""
+        return TouchSensor(self)
+
+
+class TouchSensor(Sensor[TouchData]):
+    """The sensor of a :class:`TouchSensorCfg`; :attr:`data` is a :class:`TouchData`."""
+
+    def __init__(self, cfg: TouchSensorCfg):
+        super().__init__()
+        if cfg.sensor is None:
+            raise ParameterError(f"The sensor '{cfg.name}' has no texels: give `sensor`, as palpate.read_sensor returns it.")
+        self.cfg = cfg
+
+    def edit_spec(self, scene_spec: Any, entities: dict[str, Any]) -> None:
+        """Do nothing: MuJoCo knows nothing of the sensor."""
+
+    def initialize(self, mj_model: Any, model: Any, data: Any, device: str) -> None:
+        """Find body and geoms, and allocate the results.
+
+        Raises
+        ------
+        ParameterError
+            A name is none of the model, or a geom is of another kind.
+        """
+        body = _index(mj_model, mujoco.mjtObj.mjOBJ_BODY, "body", self.cfg.body)
+        geoms = [_index(mj_model, mujoco.mjtObj.mjOBJ_GEOM, "geom", name) for name in self.cfg.geoms]
+        targets = [_shape(mj_model, geom) for geom in geoms]
+        assert self.cfg.sensor is not None
+        step, worlds = float(mj_model.opt.timestep), int(data.nworld)
+        self._sensors = WarpSensors(self.cfg.sensor, targets, step, worlds, str(wp.get_device(device)), self.cfg.single)
+        self._data, self._body, self._step = getattr(data, "struct", data), body, step
+        self._geoms = wp.array(geoms, dtype=int, device=device)
+        self._bodies = wp.array([int(mj_model.geom_bodyid[geom]) for geom in geoms], dtype=int, device=device)
+        arrays = self._sensors.texels, self._sensors.readings, self._sensors.contact, self._sensors.wrench
+        self._tensors = TouchData(*(wp.to_torch(one) for one in arrays))
+
+    def reset(self, env_ids: Any = None) -> None:
+        """Let environments begin again with their next step."""
+        super().reset(env_ids)
+        if env_ids is None:
+            self._sensors.reset()
+            return
+        mask = self._tensors.contact.new_zeros(len(self._sensors))
+        mask[env_ids] = True
+        self._sensors.reset(wp.from_torch(mask, dtype=wp.bool))
+
+    def update(self, dt: float) -> None:
+        """Go on by one step of the simulation, to its present poses.
+
+        Raises
+        ------
+        ParameterError
+            `dt` is not the timestep of the model.
+        """
+        super().update(dt)
+        if abs(dt - self._step) > 1e-9 * self._step:
+            raise ParameterError(
+                f"'{self.cfg.name}' is updated after {dt:g} s, and the model's timestep is {self._step:g} s: "
+                "update the scene after each step."
+            )
+        from . import mjlab_kernels as kernels
+
+        d, e = self._data, len(self._sensors)
+        place = [self._body, self._geoms]
+        poses = [d.xpos, d.xquat, d.geom_xpos, d.geom_xmat, self._sensors.poses]
+        wp.launch(kernels.write_poses, dim=(e, 1 + len(self._geoms)), inputs=[*place, *poses], device=self._sensors.device)
+        self._sensors.step()
+        if self.cfg.apply:
+            inputs = [self._body, self._bodies, d.xipos, self._sensors.poses, self._sensors.wrench, d.xfrc_applied]
+            wp.launch(kernels.write_wrenches, dim=e, inputs=inputs, device=self._sensors.device)
+
+    def _compute_data(self) -> TouchData:
+        return self._tensors
+
+
+def _index(mj_model: Any, kind: Any, what: str, name: str) -> int:
+    found = mujoco.mj_name2id(mj_model, kind, name)
+    if found < 0:
+        count = mj_model.nbody if what == "body" else mj_model.ngeom
+        known = ", ".join(str(mujoco.mj_id2name(mj_model, kind, i)) for i in range(min(count, 8)))
+        raise ParameterError(f"The model has no {what} '{name}': take one of {known}.")
+    return int(found)
+
+
+def _shape(mj_model: Any, geom: int) -> Shape:
+    """Return a geom as a target."""
+    kind, size = mujoco.mjtGeom(mj_model.geom_type[geom]), mj_model.geom_size[geom].astype(float)
+    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+        return Sphere(size[0])
+    if kind == mujoco.mjtGeom.mjGEOM_BOX:
+        return Box(*size)
+    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+        return Capsule(size[0], size[1])
+    if kind == mujoco.mjtGeom.mjGEOM_PLANE:
+        return Plane()
+    if kind == mujoco.mjtGeom.mjGEOM_MESH:
+        mesh = mj_model.geom_dataid[geom]
+        vertex, face = mj_model.mesh_vertadr[mesh], mj_model.mesh_faceadr[mesh]
+        vertices = mj_model.mesh_vert[vertex : vertex + mj_model.mesh_vertnum[mesh]]
+        faces = mj_model.mesh_face[face : face + mj_model.mesh_facenum[mesh]]
+        return TriangleMesh(np.array(vertices, float), np.array(faces, np.int64))
+    raise ParameterError(f"Geom {geom} is a {kind.name}: take planes, spheres, capsules, boxes and meshes.")

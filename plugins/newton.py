@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A Palpate sensor in a model of Newton, in the manner of ``newton.sensors.SensorContact``."""
+
+from __future__ import annotations
+
+import fnmatch
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..core.errors import ParameterError
+from ..core.geometry.mesh import TriangleMesh
+from ..core.simulators.sensor_on_mesh import SensorOnMesh
+from ..core.simulators.warp.warp_sensors import Box, Capsule, Plane, Shape, Sphere, WarpSensors
+from .engines import require_engine
+
+Labels = str | Sequence[str] | re.Pattern[str] | Sequence[int]
+"""Shapes of a model: a glob pattern, several of them, a compiled regular expression, or indices."""
+
+
+class SensorTouch:
+    """A tactile sensor on shapes of a Newton model.
+
+    Each shape that `sensing_shapes` names carries the sensor: its frame is that of the texels. What presses on it are the
+    shapes of the same world, or of all worlds, that `counterpart_shapes` names. Between these, Newton's own contact has to be
+    off where :meth:`update` adds the wrench to the bodies, as by ``has_shape_collision=False`` in their configuration.
+
+    Parameters
+    ----------
+    model : newton.Model
+    sensor : Sensor
+        As ``palpate.read_sensor`` returns it.
+    dt : float, seconds
+        Between two updates: a substep of the solver.
+    sensing_shapes, counterpart_shapes : str, list of str, re.Pattern or list of int
+        By label or index.
+    apply : bool
+        Let :meth:`update` add the wrench on what presses, and its opposite on the sensor, to ``state.body_f``.
+    single : bool
+        Compute in float32. Newton's poses are float32 in any case.
+
+    Raises
+    ------
+    PalpateError
+        Newton is missing or too old, a label names no shape, or shapes differ from world to world or are of another kind than
+        plane, sphere, capsule, box and mesh.
+
+    Attributes
+    ----------
+    sensing_indices : list of int
+        Shape of each row of the results.
+    counterpart_indices : list of list of int
+        Shapes that press, for each row.
+    texels, readings, contact, wrench, too_deep, valid : warp.array
+        See :class:`.WarpSensors`, whose environments are the rows.
+    """
+
+    def __init__(
+        self,
+        model: Any,
+        sensor: SensorOnMesh,
+        dt: float,
+        *,
+        sensing_shapes: Labels,
+        counterpart_shapes: Labels,
+        apply: bool = True,
+        single: bool = False,
+    ):
+        newton = require_engine("newton", "newton", (1, 8))
+        self._model, self._apply = model, apply
+        self.sensing_indices = _matches(model, sensing_shapes, "sensing_shapes")
+        pressing = _matches(model, counterpart_shapes, "counterpart_shapes")
+        worlds = model.shape_world.numpy()
+        self.counterpart_indices = [
+            [one for one in pressing if worlds[one] in (worlds[row], -1) or worlds[row] == -1] for row in self.sensing_indices
+        ]
+        targets = [_shapes(newton, model, row) for row in self.counterpart_indices]
+        for row, found in zip(self.sensing_indices, targets, strict=True):
+            if not found or not _are_same(found, targets[0]):
+                raise ParameterError(
+                    f"What presses on shape '{model.shape_label[row]}' is other than in the first world: "
+                    "let counterpart_shapes name as many shapes, of equal sizes, in every world."
+                )
+        self._sensors = WarpSensors(sensor, targets[0], dt, len(targets), str(model.device), single)
+        self.texels, self.readings, self.contact = self._sensors.texels, self._sensors.readings, self._sensors.contact
+        self.wrench, self.too_deep, self.valid = self._sensors.wrench, self._sensors.too_deep, self._sensors.valid
+        import warp
+
+        from . import newton_kernels
+
+        rows = zip(self.sensing_indices, self.counterpart_indices, strict=True)
+        self._warp, self._kernels = warp, newton_kernels
+        self._indices = warp.array([[row, *others] for row, others in rows], dtype=int, device=model.device)
+
+    def __repr__(self) -> str:
+        return f"<SensorTouch: {len(self.sensing_indices)} × {self._sensors!r}>"
+
+    def update(self, state: Any) -> None:
+        """Go on by one step, to the poses of a state, and add the wrenches to ``state.body_f``.
+
+        Call it after ``state.clear_forces()`` and before the solver's step. It asks nothing of the host.
+
+        Parameters
+        ----------
+        state : newton.State
+        """
+        model, (rows, columns) = self._model, self._indices.shape
+        places = [self._indices, model.shape_body]
+        self._warp.launch(
+            self._kernels.write_poses, dim=(rows, columns), device=model.device,
+            inputs=[*places, model.shape_transform, state.body_q, self._sensors.poses],
+        )  # fmt: skip
+        self._sensors.step()
+        if self._apply:
+            self._warp.launch(
+                self._kernels.add_wrenches, dim=(rows, columns - 1), device=model.device,
+                inputs=[*places, model.body_com, state.body_q, self._sensors.poses, self.wrench, state.body_f],
+            )  # fmt: skip
+
+    def reset(self, mask: Any = None) -> None:
+        """Let rows begin again with their next update (see :meth:`.WarpSensors.reset`)."""
+        self._sensors.reset(mask)
+
+
+def _matches(model: Any, wanted: Labels, name: str) -> list[int]:
+    """Return the shapes with these labels, in ascending order."""
+    labels = list(model.shape_label)
+    if isinstance(wanted, re.Pattern):
+        found = [i for i, label in enumerate(labels) if wanted.fullmatch(label)]
+    elif isinstance(wanted, str):
+        found = [i for i, label in enumerate(labels) if fnmatch.fnmatch(label, wanted)]
+    else:
+        found = [i for i, label in enumerate(labels) for one in wanted if i == one or _is_named(label, one)]
+    if not found:
+        few = ", ".join(labels[:6])
+        raise ParameterError(f"{name} {wanted!r} is no shape of the model: take labels or indices of these: {few}.")
+    return sorted(set(found))
+
+
+def _is_named(label: str, pattern: str | int) -> bool:
+    return isinstance(pattern, str) and fnmatch.fnmatch(label, pattern)
+
+
+def _shapes(newton: Any, model: Any, indices: list[int]) -> list[Shape]:
+    """Return shapes of the model as targets."""
+    kinds, scales = model.shape_type.numpy(), model.shape_scale.numpy().astype(float)
+    found: list[Shape] = []
+    for index in indices:
+        kind, scale = newton.GeoType(int(kinds[index])), scales[index]
+        if kind == newton.GeoType.SPHERE:
+            found.append(Sphere(scale[0]))
+        elif kind == newton.GeoType.BOX:
+            found.append(Box(*scale))
+        elif kind == newton.GeoType.CAPSULE:
+            found.append(Capsule(scale[0], scale[1]))
+        elif kind == newton.GeoType.PLANE and not scale[:2].any():
+            found.append(Plane())
+        elif kind in (newton.GeoType.MESH, newton.GeoType.CONVEX_MESH):
+            mesh = model.shape_source[index]
+            vertices = np.array(mesh.vertices, float) * scale
+            found.append(TriangleMesh(vertices, np.array(mesh.indices, np.int64).reshape(-1, 3)))
+        else:
+            raise ParameterError(
+                f"Shape '{model.shape_label[index]}' is a {kind.name.lower()}: "
+                "take infinite planes, spheres, capsules, boxes and meshes, or give it a mesh."
+            )
+    return found
+
+
+def _are_same(these: list[Shape], others: list[Shape]) -> bool:
+    if len(these) != len(others):
+        return False
+    pairs = zip(these, others, strict=True)
+    return all(type(a) is type(b) and (_same_mesh(a, b) if isinstance(a, TriangleMesh) else a == b) for a, b in pairs)
+
+
+def _same_mesh(a: Any, b: Any) -> bool:
+    return np.array_equal(a.vertices, b.vertices) and np.array_equal(a.triangles, b.triangles)

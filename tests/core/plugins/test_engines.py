@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Plug-ins for engines: what a missing or old one says, and a cube on a slope where the engine is installed."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+import numpy as np
+import pytest
+from exported_sensors import pad
+
+from palpate.core.errors import PalpateError, ParameterError
+from palpate.plugins.engines import require_engine
+
+
+def test_an_engine_that_is_missing_or_old_is_one_sentence(monkeypatch):
+    with pytest.raises(PalpateError, match=r"needs no_engine, which is not installed: run 'pip install no-engine'\.$"):
+        require_engine("no_engine", "no-engine", (1, 0))
+    with pytest.raises(PalpateError, match=r"numpy is version .* needs 99\.0 or later: run 'pip install --upgrade numpy'\.$"):
+        require_engine("numpy", "numpy", (99, 0))
+    assert require_engine("numpy", "numpy", (1, 0)) is np
+    monkeypatch.setitem(sys.modules, "mjlab", None)
+    monkeypatch.delitem(sys.modules, "palpate.plugins.mjlab", raising=False)
+    with pytest.raises(PalpateError, match="needs mjlab, which is not installed: run 'pip install mjlab'"):
+        importlib.import_module("palpate.plugins.mjlab")
+
+
+def test_newton_that_is_missing_is_one_sentence(monkeypatch):
+    monkeypatch.setitem(sys.modules, "newton", None)
+    from palpate.plugins.newton import SensorTouch
+
+    with pytest.raises(PalpateError, match="needs newton, which is not installed: run 'pip install newton'"):
+        SensorTouch(None, pad(4, 4), 1e-3, sensing_shapes="a", counterpart_shapes="b")
+
+
+def plates_on_pads(newton, warp, tilt, **other):
+    """Return a model of two worlds, each with a plate of 1 kg that touches a pad."""
+    cfg = newton.ModelBuilder.ShapeConfig(density=0.0, has_shape_collision=False)
+    world, moment = newton.ModelBuilder(), 1e-3
+    world.add_shape_box(-1, hx=0.05, hy=0.05, hz=0.01, cfg=cfg, label="pad")
+    inertia = warp.mat33(moment, 0.0, 0.0, 0.0, moment, 0.0, 0.0, 0.0, moment)
+    body = world.add_body(xform=warp.transform((0.0, 0.0, 0.01), warp.quat_identity()), mass=1.0, inertia=inertia)
+    world.add_shape_box(body, hx=0.05, hy=0.05, hz=0.01, cfg=cfg, label="plate")
+    builder = newton.ModelBuilder()
+    builder.add_world(world)
+    builder.add_world(world)
+    model = builder.finalize(device="cpu")
+    model.set_gravity((0.0, -9.81 * np.sin(tilt), -9.81 * np.cos(tilt)))
+    return model
+
+
+@pytest.mark.long("Newton compiles its solver")
+def test_a_plate_on_a_slope_in_newton():
+    """Newton's poses are float32: 2e-9 m of a height of 10 mm, times the stiffness of all texels, is 1e-4 N."""
+    newton = pytest.importorskip("newton", reason="the engine of this plug-in: pip install newton")
+    import warp
+
+    from palpate.plugins.newton import SensorTouch
+
+    model, dt = plates_on_pads(newton, warp, np.radians(10.0)), 5e-4
+    item = pad(8, 8, k=1000.0, cn=10.0, sigma0=1000.0, sigma1=10.0)
+    touch = SensorTouch(model, item, dt, sensing_shapes="pad", counterpart_shapes=["pl?te"])
+    assert len(touch.sensing_indices) == 2 and "2 environments" in repr(touch)
+    solver = newton.solvers.SolverSemiImplicit(model)
+    now, after = model.state(), model.state()
+    for step in range(3000):
+        now.clear_forces()
+        touch.update(now)
+        solver.step(now, after, None, None, dt)
+        now, after = after, now
+        if step == 2000:
+            before = now.body_q.numpy()[:, :3].copy()
+    texels = touch.texels.numpy()
+    assert touch.contact.numpy().all()
+    assert texels[:, :, 0].sum(axis=1) == pytest.approx([9.6610] * 2, abs=1e-4)
+    assert np.abs(texels[:, :, 1:].sum(axis=1)).max(axis=1) == pytest.approx([1.7035] * 2, abs=1e-3)
+    assert np.abs(now.body_q.numpy()[:, :3] - before).max() < 1e-6
+    with pytest.raises(ParameterError, match="sensing_shapes 'hand' is no shape of the model: .* pad, plate"):
+        SensorTouch(model, item, dt, sensing_shapes="hand", counterpart_shapes="plate")
+
+
+@pytest.mark.long("mjlab and MuJoCo Warp compile their kernels")
+def test_a_plate_on_a_pad_in_mjlab():
+    pytest.importorskip("mjlab", reason="the engine of this plug-in: pip install mjlab")
+    import mujoco
+    from mjlab.entity import EntityCfg
+    from mjlab.scene import Scene, SceneCfg
+    from mjlab.sim import MujocoCfg, Simulation, SimulationCfg
+
+    from palpate.plugins.mjlab import TouchSensorCfg
+
+    def fixed():
+        spec = mujoco.MjSpec()
+        spec.worldbody.add_body(name="pad")
+        return spec
+
+    def plate():
+        spec = mujoco.MjSpec()
+        body = spec.worldbody.add_body(name="plate", pos=[0.0, 0.0, 0.01])
+        body.add_freejoint()
+        size = [0.05, 0.05, 0.01]
+        body.add_geom(name="plate", type=mujoco.mjtGeom.mjGEOM_BOX, size=size, mass=1.0, contype=0, conaffinity=0)
+        return spec
+
+    item = pad(8, 8, k=1000.0, cn=10.0, sigma0=1000.0, sigma1=10.0)
+    touch = TouchSensorCfg(name="touch", sensor=item, body="pad/pad", geoms=("plate/plate",))
+    entities = {
+        "pad": EntityCfg(spec_fn=fixed),
+        "plate": EntityCfg(spec_fn=plate),
+    }
+    scene = Scene(SceneCfg(num_envs=2, entities=entities, sensors=(touch,)), "cpu")
+    simulation = Simulation(2, SimulationCfg(mujoco=MujocoCfg(timestep=0.0005)), model=scene.compile(), device="cpu")
+    scene.initialize(simulation.mj_model, simulation.model, simulation.data)
+    simulation.forward()
+    for _ in range(2000):
+        simulation.step()
+        scene.update(0.0005)
+    data = scene["touch"].data
+    assert data.contact.all()
+    assert data.texels[:, :, 0].sum(dim=1).tolist() == pytest.approx([9.81] * 2, abs=1e-3)
+    with pytest.raises(ParameterError, match="update the scene after each step"):
+        scene["touch"].update(0.002)
