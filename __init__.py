@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from .api.sensors import export_sensor as export_sensor
     from .api.sensors import read_sensor as read_sensor
     from .api.simulation import simulate as simulate
+    from .api.skins import draw_channels as draw_channels
     from .api.skins import magnetic_skin as magnetic_skin
     from .api.study import run_study as run_study
     from .core.errors import PalpateError as PalpateError
@@ -49,6 +50,7 @@ _PUBLIC = {
     "Rig": "core.gap.dataset.rig",
     "Scenario": "core.model.scenario",
     "Sensor": "api.sensors",
+    "draw_channels": "api.skins",
     "export_sensor": "api.sensors",
     "find_gap": "api.gap",
     "fit_friction": "api.fits",
