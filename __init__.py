@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from .api.simulation import simulate as simulate
     from .api.skins import draw_channels as draw_channels
     from .api.skins import magnetic_skin as magnetic_skin
+    from .api.skins import save_channels as save_channels
     from .api.study import run_study as run_study
     from .core.errors import PalpateError as PalpateError
     from .core.gap.dataset.rig import Rig as Rig
@@ -63,6 +64,7 @@ _PUBLIC = {
     "read_rig": "api.gap",
     "read_sensor": "api.sensors",
     "run_study": "api.study",
+    "save_channels": "api.skins",
     "scenario_of": "addon.scripting.scene_objects",
     "sensor_of": "addon.scripting.scene_objects",
     "simulate": "api.simulation",

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -73,6 +75,11 @@ def magnetic_skin(
         moments = own_moment if moments is None else moments
         magnetometers = own_chips if magnetometers is None else magnetometers
         thickness = named.thickness if thickness is None else thickness
+    if moments is None or magnetometers is None or thickness is None:
+        named_skins = ", ".join(skin_presets.PRESETS)
+        raise ArgumentError(
+            f"A skin needs moments, magnetometers and a thickness: give them, or magnets as one of {named_skins}."
+        )
     place = arguments.numbers(magnets, (-1, 3), "magnets")
     chips = arguments.numbers(magnetometers, (-1, 3), "magnetometers")
     shape = (3,) if np.ndim(moments) == 1 else place.shape
@@ -112,3 +119,30 @@ def draw_channels(skin: MagneticSkin, seen: VectorReadings, frames: Sequence[int
     images = [1e3 * (seen.values[frame] - seen.values[rest]) for frame in frames]
     titles = [f"frame {int(frame) % count}" for frame in frames]
     return shown_in_notebooks(vector_figure(skin.magnetometers.place[:, :2], images, titles, f"m{seen.unit}"))
+
+
+def save_channels(seen: VectorReadings, folder: str | os.PathLike[str], rows: int, columns: int) -> list[Path]:
+    """Write what the magnetometers show as OpenEXR images, one for each frame, with the vector layer ``field`` (X, Y, Z).
+
+    Parameters
+    ----------
+    seen : VectorReadings
+        What ``Recording.channels(skin)`` returned.
+    folder : path
+        Is made if it is not there.
+    rows, columns : int
+        Of the magnetometers, which stand row by row, the row with the least y first.
+
+    Returns
+    -------
+    list of path
+
+    Raises
+    ------
+    PalpateError
+        There are not as many magnetometers, or a file cannot be written.
+    """
+    from ..core.io.vector_exr import write_vector_exrs
+
+    shape = arguments.count(rows, "rows"), arguments.count(columns, "columns")
+    return write_vector_exrs(Path(folder), seen.values, shape, seen.unit)

@@ -55,9 +55,16 @@ def vector_figure(places: np.ndarray, images: Sequence[np.ndarray], titles: Sequ
             *(1e3 * places.T), c=values[:, 2], cmap=SIGNED, vmin=-most, vmax=most, s=420, edgecolors="0.6", linewidths=0.6
         )
         axes.quiver(
-            *(1e3 * places.T), values[:, 0], values[:, 1], angles="xy", scale_units="xy", scale=longest / (0.9 * pitch), color=INK,
-            width=0.012, zorder=3,
-        )  # fmt: skip
+            *(1e3 * places.T),
+            values[:, 0],
+            values[:, 1],
+            angles="xy",
+            scale_units="xy",
+            scale=longest / (0.9 * pitch),
+            color=INK,
+            width=0.012,
+            zorder=3,
+        )
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
         axes.set_aspect("equal")

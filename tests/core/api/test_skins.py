@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import palpate as pp
+from palpate.core.io import exr_codec
 from palpate.core.response.layer import texel_displacements
 
 
@@ -67,6 +68,11 @@ def test_fields_of_the_surroundings_and_offsets_add(pressed):
 def test_arguments_that_cannot_be(pressed, changes, sentence):
     with pytest.raises(pp.PalpateError, match=sentence):
         skin(pressed[0], **changes)
+
+
+def test_a_skin_without_magnetometers_is_refused(pressed):
+    with pytest.raises(pp.PalpateError, match="needs moments, magnetometers and a thickness: give them, or .* one of uskin"):
+        pp.magnetic_skin(pressed[0], pressed[0].texels.position - [0, 0, 3e-3], [0, 0, 4e-3])
 
 
 def test_another_sensor_and_a_stiffness_that_cannot_be(pressed):
@@ -140,3 +146,16 @@ def test_a_vector_image_shows_changes_from_rest(pressed):
         pp.draw_channels(own, seen, frames=(99,))
     with pytest.raises(pp.PalpateError, match="A vector image has the shape"):
         pp.draw_channels(pp.magnetic_skin(pp.Sensor.grid(9, 9, 2.5e-3), "eflesh"), seen)
+
+
+def test_channels_are_saved_as_vector_images(pressed, tmp_path):
+    pad, rec = pressed
+    seen = rec.channels(skin(pad))
+    paths = pp.save_channels(seen, tmp_path / "images", 3, 3)
+    channels, attributes = exr_codec.read(paths[-1])
+    np.testing.assert_array_equal(channels["field.Z"][::-1].ravel(), seen.values[-1, :, 2].astype(np.float32))
+    assert len(paths) == len(rec) and attributes["palpate.unit"] == "T"
+    with pytest.raises(pp.PalpateError, match="4 × 4 places has 48 channels and these readings have 27"):
+        pp.save_channels(seen, tmp_path / "other", 4, 4)
+    with pytest.raises(pp.PalpateError, match="rows is 0"):
+        pp.save_channels(seen, tmp_path / "other", 0, 9)
