@@ -13,7 +13,8 @@ import numpy as np
 
 from ..errors import ParameterError
 from .exr_codec import in_order, write_all
-from .file_writing import atomic_write, writable_folder
+from .file_list import FileList
+from .file_writing import writable_folder, write_file
 
 LAYER, AXES = "field", "XYZ"
 """Name of the layer, and of its channels."""
@@ -22,7 +23,7 @@ DIGITS = 4
 
 
 def write_vector_exrs(folder: Path, values: np.ndarray, shape: tuple[int, int], unit: str) -> list[Path]:
-    """Write an image for each frame, ``field_0000.exr`` and so on.
+    """Write an image for each frame, ``field_0000.exr`` and so on, in the place of those of an earlier recording.
 
     Parameters
     ----------
@@ -53,9 +54,9 @@ def write_vector_exrs(folder: Path, values: np.ndarray, shape: tuple[int, int], 
     order = [AXES.index(name[-1]) for name in names]
     images = values.reshape(-1, rows, columns, 3)[:, ::-1, :, order]
     table = np.ascontiguousarray(np.moveaxis(images, 3, 2), dtype="<f4")
-    folder = writable_folder(folder, create=True)
-    paths = [folder / f"{LAYER}_{frame:0{DIGITS}d}.exr" for frame in range(len(table))]
-    for frame, path in enumerate(paths):
-        with atomic_write(path) as place:
-            write_all([place], names, table[frame : frame + 1], [{"palpate.unit": unit, "palpate.frame": str(frame)}])
-    return paths
+    about = [{"palpate.unit": unit, "palpate.frame": str(frame)} for frame in range(len(table))]
+    files = FileList(writable_folder(folder, create=True))
+    with files.new_files(LAYER) as new, write_file(new / LAYER, atomic=False):
+        paths = [new / f"{LAYER}_{frame:0{DIGITS}d}.exr" for frame in range(len(table))]
+        write_all(paths, names, table, about)
+        return files.replace(new, {LAYER: paths})

@@ -35,6 +35,13 @@ def test_equal_readings_give_equal_bytes(tmp_path):
     assert [path.read_bytes() for path in one] == [path.read_bytes() for path in other]
 
 
+def test_a_shorter_recording_leaves_no_image_of_the_longer_one(tmp_path):
+    write_vector_exrs(tmp_path, VALUES, (2, 3), "T")
+    (tmp_path / "field_0009.exr").write_bytes(b"of the user")
+    write_vector_exrs(tmp_path, VALUES[:1], (2, 3), "T")
+    assert sorted(path.name for path in tmp_path.glob("*.exr")) == ["field_0000.exr", "field_0009.exr"]
+
+
 def test_a_layout_of_4_x_4_for_15_channels_is_refused(tmp_path):
     with pytest.raises(ParameterError, match="4 × 4 places has 48 channels and these readings have 15: give the rows"):
         write_vector_exrs(tmp_path, VALUES[:, :5], (4, 4), "T")
