@@ -15,9 +15,9 @@ from ..core.geometry.mesh import TriangleMesh, checked_mesh
 from ..core.model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters, with_dependent_defaults
 
 LARGEST_SENSOR, LARGEST_BODY = 5.0, 10.0
-"""Metres. What is larger was almost certainly given in millimetres."""
+"""Metres. Larger values were almost certainly given in millimetres."""
 SMALLEST = 1e-7
-"""Metres. What is smaller is no surface that texels can tell from a point."""
+"""Metres. Smaller surfaces are points for texels."""
 
 
 def brief(value: Any) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bodies that press on sensors or carry them: boxes, spheres and meshes."""
+"""Bodies in contact with sensors or carrying them: boxes, spheres and meshes."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any, TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..core.geometry import shapes
 from ..core.geometry.mesh import TriangleMesh, mass_properties
 from ..core.model import body as model
 from . import arguments
@@ -17,6 +18,9 @@ from .paths import LEVEL, Path, PathLike, path_of, standing
 
 SPHERE_SUBDIVISIONS = 4
 """Of an icosahedron: 5120 faces, whose shading is smooth, so that texels meet the normals of the sphere."""
+
+CAPSULE_RINGS = 24
+"""Rings of vertices in each half sphere of a capsule, and a quarter of those around it: as fine as the sphere."""
 
 
 class Placement(TypedDict, total=False):
@@ -33,7 +37,7 @@ class Placement(TypedDict, total=False):
 class Body:
     """A rigid body: free when it has a mass, else moved along a path, else fixed.
 
-    Make one with :meth:`box`, :meth:`sphere` or :meth:`from_mesh`.
+    Make one with :meth:`box`, :meth:`sphere`, :meth:`capsule`, :meth:`plane` or :meth:`from_mesh`.
 
     Attributes
     ----------
@@ -47,6 +51,8 @@ class Body:
         Of a free body at the start.
     smooth : bool
         Contact normals are interpolated between vertices.
+    shape : Shape or None
+        What the mesh stands for; :class:`PressedSensor` and :class:`PressedSensors` compute contacts with it in closed form.
     """
 
     name: str
@@ -56,6 +62,7 @@ class Body:
     velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
     angular_velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
     smooth: bool = False
+    shape: shapes.Shape | None = None
 
     @classmethod
     def box(
@@ -81,7 +88,8 @@ class Body:
         edges = arguments.numbers(np.tile(size, 3) if np.ndim(size) == 0 else size, (3,), "size")
         arguments.number(edges.min(), "size", above_zero=True)
         placement.setdefault("name", "box")
-        return cls._of(trimesh.creation.box(edges), "size", mass, position, placement)
+        made = cls._of(trimesh.creation.box(edges), "size", mass, position, placement)
+        return replace(made, shape=shapes.box((float(edges[0]), float(edges[1]), float(edges[2]))))
 
     @classmethod
     def sphere(
@@ -106,7 +114,56 @@ class Body:
         radius = arguments.number(radius, "radius", above_zero=True)
         ball = trimesh.creation.icosphere(subdivisions=SPHERE_SUBDIVISIONS, radius=radius)
         placement.setdefault("name", "sphere")
-        return replace(cls._of(ball, "radius", mass, position, placement), smooth=True)
+        return replace(cls._of(ball, "radius", mass, position, placement), smooth=True, shape=shapes.sphere(radius))
+
+    @classmethod
+    def capsule(
+        cls,
+        radius: float,
+        length: float,
+        mass: float | None = None,
+        position: ArrayLike = (0.0, 0.0, 0.0),
+        **placement: Unpack[Placement],
+    ) -> Body:
+        """Return a capsule about the origin of its frame; arguments as of :meth:`from_mesh`.
+
+        Parameters
+        ----------
+        radius : float, metres
+        length : float, metres
+            Of its cylinder, along z, without the two half spheres.
+        mass : float, kg, optional
+            Makes it free.
+        position : (3,) float, metres
+        **placement
+        """
+        radius, length = (
+            arguments.number(value, name, above_zero=True) for value, name in ((radius, "radius"), (length, "length"))
+        )
+        placement.setdefault("name", "capsule")
+        made = cls._of(_capsule_mesh(radius, length), "radius", mass, position, placement)
+        return replace(made, smooth=True, shape=shapes.capsule(radius, length))
+
+    @classmethod
+    def plane(cls, size: float = 1.0, position: ArrayLike = (0.0, 0.0, 0.0), **placement: Unpack[Placement]) -> Body:
+        """Return the ground: all below the xy plane of its frame; arguments as of :meth:`from_mesh`.
+
+        It is unbounded in :class:`PressedSensor` and :class:`PressedSensors`; :func:`simulate` takes a block of a size.
+
+        Parameters
+        ----------
+        size : float, metres
+            Edge of the block's square upper side; it is a tenth as thick.
+        position : (3,) float, metres
+        **placement
+        """
+        import trimesh
+
+        size = arguments.number(size, "size", above_zero=True)
+        block = trimesh.creation.box((size, size, 0.1 * size))
+        block.apply_translation([0.0, 0.0, -0.05 * size])
+        placement.setdefault("name", "plane")
+        return replace(cls._of(block, "size", None, position, placement), shape=shapes.plane())
 
     @classmethod
     def from_mesh(
@@ -184,3 +241,20 @@ class Body:
         size = " × ".join(f"{1e3 * edge:.3g}" for edge in np.ptp(self.mesh.vertices, axis=0))
         how = "fixed" if len(self.path.positions) == 1 else f"moved through {len(self.path.positions)} poses"
         return f"<Body '{self.name}': {size} mm, {f'free, {self.mass:g} kg' if self.mass is not None else how}>"
+
+
+def _capsule_mesh(radius: float, length: float) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and triangles of a closed capsule along z: rings of vertices between two poles."""
+    around = 4 * CAPSULE_RINGS
+    turn, angle = 0.5 * np.pi * np.arange(CAPSULE_RINGS) / CAPSULE_RINGS, 2 * np.pi * np.arange(around) / around
+    wide, high = radius * np.cos(turn), 0.5 * length + radius * np.sin(turn)
+    wide, high = np.concatenate([wide[::-1], wide]), np.concatenate([-high[::-1], high])
+    rings = np.stack(np.broadcast_arrays(wide[:, None] * np.cos(angle), wide[:, None] * np.sin(angle), high[:, None]), axis=2)
+    pole = 0.5 * length + radius
+    vertices = np.concatenate([rings.reshape(-1, 3), [[0.0, 0.0, -pole], [0.0, 0.0, pole]]])
+    here, beside = np.arange(around), np.roll(np.arange(around), -1)
+    rows = around * np.arange(len(wide) - 1)[:, None]
+    a, b = (rows + here).ravel(), (rows + beside).ravel()
+    last, bottom, top = around * (len(wide) - 1), np.full(around, len(vertices) - 2), np.full(around, len(vertices) - 1)
+    sides = [(a, b, b + around), (a, b + around, a + around), (beside, here, bottom), (last + here, last + beside, top)]
+    return vertices, np.concatenate([np.stack(side, axis=1) for side in sides])

@@ -19,11 +19,11 @@ from .gap import RigOrFile, rig_of
 from .running import ShowProgress, finished
 
 LIMITS = ("depth", "speed", "duration", "area")
-"""What a plan may be limited in."""
+"""Limits of a plan."""
 
 
 class Plan:
-    """What recordings can tell apart, and the experiment that tells more: the result of :func:`plan_experiment`.
+    """Effects that recordings distinguish, and the next experiment: the result of :func:`plan_experiment`.
 
     Attributes
     ----------
@@ -36,19 +36,19 @@ class Plan:
 
     @property
     def rows(self) -> list[tuple[str, str]]:
-        """Each effect, and what it may be taken for."""
+        """Each effect, and the effects that it may be confused with."""
         return plan_files.table_rows(self.outlook)
 
     @property
     def sentence(self) -> str:
-        """What the planned experiment is good for."""
+        """Purpose of the planned experiment."""
         if self.outlook.experiment is None:
-            return "These recordings tell all of these effects from each other: no further one is planned."
+            return "These recordings distinguish all of these effects: no further one is planned."
         return plan_files.planned_sentence(plan_files.experiment_words(self.outlook.experiment, plan_files.TRAJECTORY))
 
     @property
     def is_complete(self) -> bool:
-        """True when the recordings tell all effects apart, so that nothing is planned."""
+        """True when the recordings distinguish all effects, so that nothing is planned."""
         return self.outlook.experiment is None
 
     @property
@@ -75,7 +75,7 @@ class Plan:
 def plan_experiment(
     rig: RigOrFile, limits: Mapping[str, Any] | None = None, between: Sequence[str] = (), progress: ShowProgress = False
 ) -> Plan:
-    """Say which effects the recordings of a rig can tell apart, and plan the recording that tells most of the rest.
+    """Return which effects the recordings of a rig distinguish, and plan the recording that separates most of the others.
 
     Parameters
     ----------

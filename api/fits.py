@@ -100,7 +100,7 @@ def fit_friction(
 
 
 def fit_readout(rig: Rig | str | os.PathLike[str]) -> ReadoutFit:
-    """Fit what a skin is for: force and place from its readings, with intervals.
+    """Fit the read-out of a skin: force and place from its readings, with intervals.
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the model of a sensor lacks against measurements."""
+"""Effects of a real sensor that its model lacks."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class FoundEffect:
 
 
 class Gap:
-    """What the model of a sensor lacks: the result of :func:`find_gap`.
+    """Effects that the model of a sensor lacks: the result of :func:`find_gap`.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ class Gap:
 
     @cached_property
     def effects(self) -> list[FoundEffect]:
-        """What the model lacks, each effect with its confidence and parameters."""
+        """The effects that the model lacks, with confidence and parameters."""
         found, stack = [], self.sensor.effects
         for one in self.diagnosis.findings:
             intervals = {own.name: own for own in self.diagnosis.intervals if own.effect == one.effect}
@@ -177,7 +177,7 @@ class Gap:
 
 
 def read_rig(path: str | os.PathLike[str]) -> Rig:
-    """Read a rig: what was measured (docs/rig-format.md), with all its recordings.
+    """Read a rig: the description of measurements (docs/rig-format.md) and all its recordings.
 
     Raises
     ------
@@ -188,7 +188,7 @@ def read_rig(path: str | os.PathLike[str]) -> Rig:
 
 
 def find_gap(rig: RigOrFile, progress: ShowProgress = False) -> Gap:
-    """Find what the model of a sensor lacks against the recordings of a rig.
+    """Find the effects in the recordings of a rig that the model of the sensor lacks.
 
     Parameters
     ----------
@@ -207,7 +207,7 @@ def find_gap(rig: RigOrFile, progress: ShowProgress = False) -> Gap:
 
 
 def search(rig: Rig) -> Job[Gap]:
-    """Find what the model lacks, as a job: windows run it a little at a time.
+    """Find the effects that the model lacks, as a job: windows run it a little at a time.
 
     Yields
     ------
@@ -224,7 +224,7 @@ def search(rig: Rig) -> Job[Gap]:
 
 
 def rig_of(rig: RigOrFile) -> Rig:
-    """Return a rig, which is read where a file is given."""
+    """Return a rig; a path is read."""
     if isinstance(rig, str | os.PathLike):
         return read_rig(rig)
     if not isinstance(rig, Rig):

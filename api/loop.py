@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from ..core.geometry.mesh import TriangleMesh
+from ..core.geometry.shapes import Shape
 from ..core.simulators import pressed_sensor, pressed_sensors
 from ..core.simulators.sensor_on_mesh import SensorOnMesh
 from . import arguments
@@ -25,7 +26,7 @@ class PressedSensor(pressed_sensor.PressedSensor):
     ----------
     sensor : Sensor
     target : Body
-        Its shape counts; the other program moves it.
+        Its shape counts; the other program moves it. Contacts with a box, sphere, capsule or plane are in closed form.
     dt : float, seconds
         Step of the other program.
     sensor_pose, target_pose : pose, optional
@@ -40,7 +41,7 @@ class PressedSensor(pressed_sensor.PressedSensor):
     def __init__(
         self,
         sensor: SensorOnMesh,
-        target: Body | TriangleMesh,
+        target: Body | TriangleMesh | Shape,
         dt: float,
         sensor_pose: Pose | None = None,
         target_pose: Pose | None = None,
@@ -50,8 +51,10 @@ class PressedSensor(pressed_sensor.PressedSensor):
         prepare_solver()
         own: Pose = sensor.world_pose() if isinstance(sensor, Sensor) else (sensor.position, sensor.quaternion)
         if isinstance(target, Body):
-            super().__init__(sensor, target.mesh, dt, sensor_pose or own, target_pose or (target.position, target.quaternion))
-        elif isinstance(target, TriangleMesh) and target_pose is not None:
+            super().__init__(
+                sensor, target.shape or target.mesh, dt, sensor_pose or own, target_pose or (target.position, target.quaternion)
+            )
+        elif isinstance(target, TriangleMesh | Shape) and target_pose is not None:
             super().__init__(sensor, target, dt, sensor_pose or own, target_pose)
         else:
             raise ArgumentError(f"target is {arguments.brief(target)}: give a Body.")
@@ -67,7 +70,7 @@ class PressedSensors(pressed_sensors.PressedSensors):
     ----------
     sensor : Sensor
     target : Body
-        Its shape counts; the other program moves it.
+        Its shape counts; the other program moves it. Contacts with a box, sphere, capsule or plane are in closed form.
     environments : int
     dt : float, seconds
         Step of the other program.
@@ -81,13 +84,18 @@ class PressedSensors(pressed_sensors.PressedSensors):
     """
 
     def __init__(
-        self, sensor: SensorOnMesh, target: Body | TriangleMesh, environments: int, dt: float, threads: int | None = None
+        self,
+        sensor: SensorOnMesh,
+        target: Body | TriangleMesh | Shape,
+        environments: int,
+        dt: float,
+        threads: int | None = None,
     ):
         if not isinstance(sensor, SensorOnMesh):
             raise ArgumentError(f"sensor is {arguments.brief(sensor)}: give a Sensor.")
-        mesh = target.mesh if isinstance(target, Body) else target
-        if not isinstance(mesh, TriangleMesh):
+        surface = (target.shape or target.mesh) if isinstance(target, Body) else target
+        if not isinstance(surface, TriangleMesh | Shape):
             raise ArgumentError(f"target is {arguments.brief(target)}: give a Body.")
         count = arguments.count(environments, "environments")
         prepare_solver()
-        super().__init__(sensor, mesh, dt, count, threads)
+        super().__init__(sensor, surface, dt, count, threads)

@@ -43,17 +43,17 @@ class Path:
         return Motion(times, self.positions, self.quaternions)
 
     def duration(self, fps: float) -> float:
-        """Return how long the path lasts, seconds; 0 for a body that stays where it is."""
+        """Return the duration of the path, seconds; 0 for a body at rest."""
         return float(self.motion(fps).times[-1])
 
 
 def standing(position: ArrayLike, turn: ArrayLike) -> Path:
-    """Return the path of a body that stays where it is."""
+    """Return the path of a body at rest."""
     return Path(None, numbers(position, (3,), "position")[None], quaternion(turn, "quaternion")[None])
 
 
 def path_of(value: Any, argument: str, turn: ArrayLike = LEVEL) -> Path:
-    """Return a path from what users give.
+    """Return a path from a user's argument.
 
     Parameters
     ----------
@@ -70,7 +70,10 @@ def path_of(value: Any, argument: str, turn: ArrayLike = LEVEL) -> Path:
     times = None
     if isinstance(value, tuple) and len(value) == 2 and np.ndim(value[1]) == 2:
         times, value = numbers(value[0], (-1,), f"the times of {argument}"), value[1]
-    columns = np.shape(value)[-1] if np.ndim(value) == 2 else 0
+    shape = _shape(value)
+    columns = shape[1] if len(shape) == 2 else 0
+    if shape and columns not in (3, 7):
+        raise ArgumentError(f"{argument} has the shape {shape}: give m × 3 positions, or m × 7 with the quaternions.")
     poses = numbers(value, (-1, 7 if columns == 7 else 3), argument)
     if not len(poses):
         raise ArgumentError(f"{argument} has no pose: give one at least.")
@@ -81,6 +84,14 @@ def path_of(value: Any, argument: str, turn: ArrayLike = LEVEL) -> Path:
     if columns != 7:
         return Path(times, poses, np.tile(quaternion(turn, "quaternion"), (len(poses), 1)))
     return Path(times, poses[:, :3], _unit(poses[:, 3:], argument))
+
+
+def _shape(value: Any) -> tuple[int, ...]:
+    """Return the shape of an array or of nested lists; that of a number where they are ragged or no numbers."""
+    try:
+        return np.shape(value)
+    except ValueError:
+        return ()
 
 
 def _unit(turns: np.ndarray, argument: str) -> np.ndarray:

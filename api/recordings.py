@@ -47,7 +47,7 @@ class Recording:
     With several sensors each is ``recording["its name"]``, which is a recording of its own.
     """
 
-    normal_force: np.ndarray = _channel("normal_force", "(T, n) float, N: along the normal of what touches.")
+    normal_force: np.ndarray = _channel("normal_force", "(T, n) float, N: along the contact normal.")
     shear: np.ndarray = _channel("shear", "(T, n, 2) float, N: along the x and y axes of each texel.")
     reading: np.ndarray = _channel("reading", "(T, n) float, in `unit`: what the sensor reports.")
     friction: np.ndarray = _channel("friction", "(T, n) float, N: magnitude of the friction force.")
@@ -56,7 +56,7 @@ class Recording:
     contact: np.ndarray = _channel("contact", "(T, n) bool.")
     net_force: np.ndarray = _channel("net_force", "(T, 3) float, N.")
     net_torque: np.ndarray = _channel("net_torque", "(T, 3) float, N·m, about the origin of the sensor's body.")
-    centre_of_pressure: np.ndarray = _channel("centre_of_pressure", "(T, 3) float, m; zero while nothing touches.")
+    centre_of_pressure: np.ndarray = _channel("centre_of_pressure", "(T, 3) float, m; zero without contact.")
 
     def __init__(self, bake: bake_reader.Bake):
         self.bake = bake
@@ -108,7 +108,7 @@ class Recording:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What one should know about the run, one sentence each."""
+        """Warnings of the run, one sentence each."""
         return self.bake.recording.warnings
 
     @property
@@ -119,7 +119,7 @@ class Recording:
     def channels(
         self, skin: MagneticSkin, shear_stiffness: float | None = None, ambient: ArrayLike | None = None
     ) -> VectorReadings:
-        """Return what the magnetometers of a skin show: readings of three signed channels each.
+        """Return the readings of the magnetometers of a skin: three signed channels each.
 
         Parameters
         ----------
@@ -306,7 +306,7 @@ def read_recording(path: str | os.PathLike[str]) -> Recording:
 
 
 def read_bake(folder: str | os.PathLike[str]) -> Recording:
-    """Read what Blender or ``palpate bake`` wrote: a bake folder, or the folder of one sensor in it.
+    """Read a bake of Blender or ``palpate bake``: a bake folder, or the folder of one sensor in it.
 
     Raises
     ------

@@ -291,6 +291,9 @@ def _chosen_vertices(region: ArrayLike | None, vertices: int) -> np.ndarray:
         return found
     if found.dtype.kind in "iu" and found.ndim == 1 and len(found) and found.min() >= 0 and found.max() < vertices:
         return np.isin(np.arange(vertices), found)
+    if found.dtype.kind in "iu" and found.ndim == 1 and len(found):
+        outside = found[(found < 0) | (found >= vertices)][0]
+        raise ArgumentError(f"region has vertex {outside}: the mesh has {vertices}, from 0 to {vertices - 1}.")
     raise ArgumentError(
         f"region has the shape {found.shape} and the type {found.dtype}: give a mask of {vertices} booleans, "
         "or numbers of vertices."

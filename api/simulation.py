@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Simulate sensors and the bodies that press on them."""
+"""Simulate sensors and the bodies in contact with them."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def simulate(
     gravity: ArrayLike = STANDARD_GRAVITY,
     progress: ShowProgress = False,
 ) -> Recording:
-    """Simulate sensors under bodies, and return what the sensors measure.
+    """Simulate sensors and bodies, and return the recording of the sensors.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def _require_nothing_else(bodies: Any, duration: Any, motion: Any, dt: Any) -> N
     given = {"bodies": bodies or None, "duration": duration, "motion": motion, "dt": dt}
     for name, value in given.items():
         if value is not None:
-            raise ArgumentError(f"{name} is given beside a scenario, which has its own: leave it out.")
+            raise ArgumentError(f"{name} is part of the scenario: leave it out.")
 
 
 def _paths(

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +21,10 @@ from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.model.target import Target
 from palpate.core.study.run_files import RUNS, done_runs, failed_runs, make_folders, run_batch
+from palpate.core.study.run_shards import SUFFIX, ShardIndex, digests_in
 from palpate.sweep.child import DONE, UNWRITABLE, Scenes, answer_to
 from palpate.sweep.dataset import publish
+from palpate.sweep.finished_runs import StoredRuns
 from palpate.sweep.study_folder import begin_study
 
 from .sample_bake import grid_texels
@@ -96,16 +99,33 @@ def sweep_here(file: Path, folder: Path, most: int | None = None) -> None:
         lock.release()
 
 
+def run_hashes(folder: Path) -> dict[str, str]:
+    """Return a hash of each run in the shards of a study, wherever it stands there; the seconds that it took are left out."""
+    shards = ShardIndex(folder / RUNS)
+    found = {}
+    runs = StoredRuns(folder)
+    for digest in digests_in(folder / RUNS):
+        record, frames = runs.record(digest), shards.read(digest)
+        about = asdict(record) | {"folder": "", "seconds": 0.0}
+        words, at = json.dumps(about, sort_keys=True).encode(), 8 + int.from_bytes(frames[:4], "little")
+        layout = shards.common(json.loads(frames[8:at])["layout"])
+        found[digest] = hashlib.sha256(b"".join((words, frames[at:], layout))).hexdigest()
+    return found
+
+
 def results(folder: Path) -> dict[str, str]:
     """Return what must be equal after any interruption: all files by their hashes, without times and without the report.
 
-    What is hidden is left out, except what a finished command should have removed.
+    Which runs stand in which shard depends on who computed them, so each run counts by itself. What is hidden is left out,
+    except what a finished command should have removed.
     """
-    found = {}
+    found = {f"{RUNS}/{digest}": run for digest, run in run_hashes(folder).items()}
     for name, digest in tree(folder).items():
         if name in ("timings.csv", "report.html") or name.startswith(".palpate/") or name == ".palpate":
             continue
         is_whole = not any(part.startswith(".") for part in name.split("/"))  # a kill leaves halves in hidden folders
+        if is_whole and name.startswith(f"{RUNS}/") and name.endswith(SUFFIX):
+            continue
         if is_whole and name.startswith(f"{RUNS}/") and name.endswith("run.json"):
             words = json.loads((folder / name).read_bytes())
             words.pop("seconds")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The hidden-effects benchmark for any method: cases as rigs, answers as CSV or JSON, and one table (docs/gap-benchmark.md).
+"""The hidden-effects benchmark for any method: cases as rigs, answers as CSV or JSON, and one table (docs/gap-results.md).
 
     python -m benchmarks gap --write DIR [--cases N] [--first N]
     python -m benchmarks gap --answer METHOD --of DIR --out ANSWERS.csv

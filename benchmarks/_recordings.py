@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Published recordings of real sensors and materials, converted into rigs; docs/gap-real.md says what they are."""
+"""Published recordings of real sensors and materials, converted into rigs; benchmarks/RESULTS.md says what they are."""
 
 from __future__ import annotations
 

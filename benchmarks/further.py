@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``palpate gap`` on further public recordings, beside a physical model made by hand and a learned one (docs/gap-real.md).
+"""``palpate gap`` on further public recordings, beside a physical model made by hand and a learned one (benchmarks/RESULTS.md).
 
 The repositories (``_further/sources.py``) are looked for in the folder ``PALPATE_FURTHER_DATA``, each in a folder of its own
 name; ``PALPATE_FURTHER_SETS`` names some of the sets. Rigs, reports and pictures go to build/further/.

@@ -6,7 +6,7 @@ The confusion matrix goes to build/gap/confusion.txt, the table of docs/gap-resu
 The whole matrix is 390 cases, an hour and a half of one core; a fifth of it is run by default. Results are kept in build/gap/,
 one line a case, and a run goes on where the last one stopped, as long as neither the workflow nor the generator has changed.
 With options (``python -m benchmarks gap --help``) it writes the cases as rigs for other methods, scores their answers, and
-compares them with the baselines: docs/gap-benchmark.md.
+compares them with the baselines: docs/gap-results.md.
 
 Environment:
 
@@ -193,7 +193,7 @@ def _miss(case: cases.Case, result: Any, model: Any) -> float:
 
 
 def command(arguments: list[str]) -> int:
-    """Write cases as rigs, have any method answer them, and score answers: docs/gap-benchmark.md."""
+    """Write cases as rigs, have any method answer them, and score answers: docs/gap-results.md."""
     from . import _entry
 
     return _entry.command(arguments)

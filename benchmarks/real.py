@@ -3,7 +3,7 @@
 
 The recordings are looked for in the folder ``PALPATE_REAL_DATA`` (../shared/data beside the checkout); ``PALPATE_REAL_SETS``
 names some of them, and ``PALPATE_REAL_SIZES`` the sizes of what is put on top of them. Rigs, reports and pictures go to
-build/real/. docs/gap-real.md says what each set is known to contain.
+build/real/. benchmarks/RESULTS.md says what each set is known to contain.
 """
 
 from __future__ import annotations

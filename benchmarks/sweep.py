@@ -32,10 +32,11 @@ from palpate.core.solver.simulation import Simulation
 from palpate.core.study import run_files
 from palpate.core.study.design import points_of
 from palpate.core.study.metrics import metrics_of
-from palpate.core.study.run_files import SCENES, STUDY_NAME, make_folders, run_batch, write_run
+from palpate.core.study.run_files import SCENES, STUDY_NAME, make_folders, run_batch
+from palpate.core.study.run_record import RunRecord
 from palpate.core.study.study_file import Run, plan_for, read_study
 from palpate.core.study.variation import varied_scenario
-from palpate.sweep.child import Scenes, compute_run
+from palpate.sweep.child import Scenes, compute_run, pack_frames
 from palpate.sweep.trial import count_of_cores
 
 from .solver import GRIDS, SLOPE, mujoco_weighing, pad, palpate_weighing
@@ -144,7 +145,7 @@ def shares(name: str, hold: float) -> Iterator[dict]:
 def parts() -> Iterator[dict]:
     """What a short run takes of the processor, by item; its files are in memory, where there is a folder for that."""
     memory = Path("/dev/shm")
-    taken: dict[str, list[float]] = {name: [] for name in ("values", "arrays", "steps", "metrics", "files")}
+    taken: dict[str, list[float]] = {name: [] for name in ("values", "arrays", "steps", "metrics", "frames")}
     with tempfile.TemporaryDirectory(dir=memory if memory.is_dir() else None) as place:
         folder = Path(place)
         runs = begun(folder, LENGTHS["50_ms"], RUNS * ROUNDS)
@@ -161,7 +162,8 @@ def parts() -> Iterator[dict]:
             moments.append(time.process_time())
             metrics = metrics_of(scenario, recording, plan.press)
             moments.append(time.process_time())
-            write_run(folder / run_files.RUNS, run, scenario, recording, metrics, 0.0, shared=scenes.shared)
+            numbers = RunRecord(folder, run.digest, run.index, dict(run.values), metrics, 0.0, tuple(recording.sensors))
+            pack_frames(scenes, folder / run_files.RUNS, run, scenario, recording, numbers)
             moments.append(time.process_time())
             for own, seconds in zip(taken.values(), np.diff(moments), strict=True):
                 own.append(float(seconds))
@@ -241,18 +243,16 @@ def against_mujoco() -> Iterator[dict]:
 
 
 def compressed_size(folder: Path, runs: list[Run]) -> int:
-    """Return the bytes of what is recorded of all runs, as a dataset has it: an array for each quantity, in one .npz file."""
+    """Return the bytes of all frames of a study, an array for each quantity, in one compressed .npz file."""
     import io
 
-    from palpate.core.io.recording_npz import load_recording
+    from palpate.sweep.finished_runs import StoredRuns
 
-    recordings = [load_recording(folder / "runs" / run.digest / "pad" / "recording.npz") for run in runs]
-    names = ("normal_force", "shear", "reading", "contact", "net_force", "net_torque", "centre_of_pressure")
-    columns = [np.concatenate([getattr(one.sensors["pad"], name) for one in recordings]) for name in names]
-    columns += [np.concatenate([getattr(one, name) for one in recordings]) for name in ("poses", "times")]
-    small = (values.astype(np.float32) if values.dtype.kind == "f" else values for values in columns)
+    stored = StoredRuns(folder)
+    frames = [stored.run(run.digest)[1] for run in runs]
+    columns = {item.name: np.concatenate([one.decoded(item) for one in frames]) for item in frames[0].layout.frame_features}
     with io.BytesIO() as packed:
-        np.savez_compressed(packed, *small)
+        np.savez_compressed(packed, **columns)
         return len(packed.getvalue())
 
 

@@ -1,27 +1,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What limits large studies: the driver's memory and time, files per folder, the scheduler, and the memory of a worker.
 
-Finished runs are played: a folder with its ``run.json``, as many as a driver has to look through when it goes on. Each figure
-is per run, to be multiplied. So are batches: a worker answers at once, so that what is left is the driver and the scheduler.
+Finished runs are played: the shards of a driver that goes on, in which one short run stands under many names. Each figure
+is per run, to be multiplied; what does not grow is measured with few and with many runs. Batches are played, too: a worker
+answers at once, so that what is left is the driver and the scheduler.
 """
 
 from __future__ import annotations
 
+import functools
 import gc
-import json
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 from unittest import mock
 
 from palpate.core.study.run_files import RUNS, done_runs, run_batch
-from palpate.core.study.run_record import RUN_FORMAT, RUN_NAME
+from palpate.core.study.run_shards import append
 from palpate.core.study.study_file import Run
 from palpate.sweep.child import DONE, Scenes
-from palpate.sweep.finished_runs import run_order
+from palpate.sweep.dataset import publish
+from palpate.sweep.encoded_run import layout_name, pack_layout, pack_run
+from palpate.sweep.finished_runs import StoredRuns, run_order
 from palpate.sweep.report import write_report
 from palpate.sweep.run_table import write_run_table
 from palpate.sweep.worker import Child, Limits
@@ -30,6 +33,8 @@ from .sweep import LENGTHS, begun, computed
 
 PLAYED = 100_000
 """Finished runs that are played."""
+GROUP = 200
+"""Of them that stand in a group: as many short runs as a worker computes in two seconds."""
 TASKS = 2_000
 """Empty tasks that the scheduler passes on, and batches that the driver gives out."""
 WORKERS = 16
@@ -54,18 +59,22 @@ def measured(work: Callable[[], object]) -> tuple[float, int]:
 
 
 def play_finished(folder: Path, runs: list[Run]) -> None:
-    """Write what a driver reads of finished runs."""
-    for run in runs:
-        place = folder / RUNS / run.digest
-        place.mkdir()
-        metrics = {f"metric_{i}": run.index * 0.1**i for i in range(12)}
-        about = {"values": dict(run.values), "metrics": metrics, "seconds": 0.004, "frames": 6, "sensors": []}
-        words = {"format": RUN_FORMAT, "digest": run.digest, "index": run.index, **about}
-        (place / RUN_NAME).write_text(json.dumps(words), encoding="utf-8")
+    """Write the shards of finished runs, all with the frames of the first one."""
+    computed(Scenes(folder), [replace(runs[0], index=len(runs), digest="f" * 24)])
+    numbers, frames = StoredRuns(folder).run("f" * 24)
+    for path in (folder / RUNS).iterdir():
+        path.unlink()
+    common = {layout_name(frames.layout): pack_layout(frames.layout)}
+    for at in range(0, len(runs), GROUP):
+        group = {
+            run.digest: pack_run(replace(numbers, digest=run.digest, index=run.index, values=dict(run.values)), frames)
+            for run in runs[at : at + GROUP]
+        }
+        append(folder / RUNS, folder, group, common)
 
 
 def driver() -> Iterator[dict]:
-    """Time and memory of what a driver does with all runs of a study."""
+    """Time and memory of what a driver does with all runs of a study, and how many files there are then."""
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         plans: list[list[Run]] = []
@@ -75,24 +84,34 @@ def driver() -> Iterator[dict]:
             "looking": lambda: done_runs(folder),
             "ordering": lambda: run_order(folder, plans[0]),
             "table": lambda: write_run_table(folder, run_order(folder, plans[0]), []),
+            "dataset": lambda: publish(folder, plans[0]),
             "report": lambda: write_report(folder, plans[0]),
         }
         taken = {"planning": planning} | {name: measured(work) for name, work in works.items()}
+        files = [path for path in folder.rglob("*") if path.is_file()]
+        size = sum(path.stat().st_size for path in files)
     for name, (seconds, grown) in taken.items():
         yield {"name": f"sweep_scale.{name}.time", "value": seconds / PLAYED * 1e6, "unit": "µs per run"}
         yield {"name": f"sweep_scale.{name}.memory", "value": max(0, grown) / PLAYED, "unit": "bytes per run"}
+    yield {"name": "sweep_scale.files", "value": len(files), "unit": f"files of {PLAYED} runs", "goal": 0.01 * PLAYED}
+    yield {"name": "sweep_scale.disk", "value": size / PLAYED, "unit": "bytes per run"}
 
 
-def files() -> Iterator[dict]:
-    """Files and folders of a run, which all lie in one folder, and what they take on the disk."""
-    with tempfile.TemporaryDirectory() as place:
-        folder = Path(place)
-        (run,) = begun(folder, LENGTHS["50_ms"], 1)
-        computed(Scenes(folder), [run])
-        found = [path for path in (folder / RUNS / run.digest).rglob("*")]
-        taken = sum(path.stat().st_blocks * 512 for path in (folder / RUNS / run.digest, *found))
-    yield {"name": "sweep_scale.files", "value": len(found) + 1, "unit": "files and folders per run"}
-    yield {"name": "sweep_scale.disk", "value": taken / 1e3, "unit": "kB per run"}
+def flat_memory() -> Iterator[dict]:
+    """By how much the memory of a process grows that publishes few runs, and a hundred times as many."""
+    grown = {}
+    for count in (PLAYED // 100, PLAYED):
+        with tempfile.TemporaryDirectory() as place:
+            folder = Path(place)
+            runs = begun(folder, LENGTHS["50_ms"], count)
+            play_finished(folder, runs)
+            publish(folder, runs[:1])  # loads what is loaded once
+            grown[count] = measured(functools.partial(publish, folder, runs))[1]
+    few, many = grown.values()
+    yield {
+        "name": "sweep_scale.dataset_memory", "value": many / 1e6, "unit": "MB",
+        "peer": f"{PLAYED // 100} runs", "peer_value": few / 1e6, "ratio": many / max(few, 1),
+    }  # fmt: skip
 
 
 def _empty(number: int) -> int:
@@ -150,8 +169,8 @@ def worker_memory() -> Iterator[dict]:
 
 
 def run() -> Iterator[dict]:
-    """Driver, files, scheduler and worker."""
+    """Driver, memory, scheduler and worker."""
     yield from driver()
-    yield from files()
+    yield from flat_memory()
     yield from scheduler()
     yield from worker_memory()

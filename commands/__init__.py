@@ -20,16 +20,16 @@ from ..core.version import VERSION
 from . import console, limits
 
 COMMANDS = {
-    "demo": "build, bake and render the demo scene, and print what the pads feel",
+    "demo": "build, bake and render the demo scene, and print the forces on the pads",
     "bake": "bake the sensors of a .blend to tactile images",
     "render": "make pictures, figures and a video of a baked scene",
     "export": "write a bake as CSV, NPZ, HDF5, PNG, MCAP or LeRobot dataset",
     "fit": "estimate stiffness and friction from measurements",
-    "gap": "find what the model misses against a real sensor",
-    "gap-table": "one table of what gap finds in many rigs, beside models made by hand",
+    "gap": "find the effects of a real sensor that its model lacks",
+    "gap-table": "one table of the gaps of many rigs, beside models made by hand",
     "rig": "make a rig for gap from logs of a real sensor: CSV, MCAP, ROS bags, HDF5, NPZ, MAT",
     "paper": "repeat the experiments of the paper",
-    "sweep": "compute a scene thousands of times with varied numbers, resumable",
+    "sweep": "simulate a scene thousands of times with varied parameters, resumable",
     "sensor": "write sensors for other simulators, and read theirs",
     "openrave": "read and write OpenRAVE sensor definitions",
 }
@@ -69,7 +69,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     int
         The exit status.
     """
-    prefix, stopped = "palpate:", "stopped; an earlier bake is still as it was."
+    prefix, stopped = "palpate:", "stopped; an earlier bake is unchanged."
     try:
         with console.Interrupt.noted():
             try:
@@ -123,7 +123,7 @@ def _say(prefix: str, message: object, status: int) -> int:
 def _reject_unknown(parser: argparse.ArgumentParser, command: str, rest: list[str]) -> None:
     """Exit with a message about arguments that a command does not know."""
     if any(word.startswith("-") for word in rest):
-        advice = f"palpate {command} --help lists what it knows"
+        advice = f"palpate {command} --help lists its options"
     else:
         advice = f"palpate {command} takes one file at a time, so run it once for each"
     parser.error(f"unrecognized arguments: {' '.join(rest)}: {advice}")
@@ -133,7 +133,7 @@ def _parser() -> argparse.ArgumentParser:
     """Return the parser of all commands. Each module has ``add_arguments(parser)`` and ``run(arguments)``."""
     parser = argparse.ArgumentParser(
         prog="palpate",
-        description="Make any mesh a tactile sensor: simulate, bake and render what it feels.",
+        description="Make any mesh a tactile sensor: simulate, bake and render contact forces.",
         epilog="palpate COMMAND --help says more about a command.",
     )
     parser.add_argument("--version", action="version", version=f"palpate {VERSION}")

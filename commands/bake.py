@@ -24,8 +24,8 @@ LAST_FRAME = 1048574
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("scene", metavar="SCENE.blend", help="file with sensors and what touches them")
-    parser.add_argument("--out", metavar="DIR", help="bake folder (default: the one in the file, beside it)")
+    parser.add_argument("scene", metavar="SCENE.blend", help="file with sensors and targets")
+    parser.add_argument("--out", metavar="DIR", help="bake folder (default: the one that the file names)")
     parser.add_argument(
         "--sensor",
         metavar="NAME",

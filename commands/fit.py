@@ -76,7 +76,7 @@ def _stiffness(arguments: argparse.Namespace) -> None:
     print(f"{number} measurements from '{arguments.file}', {arguments.texels} texels on {arguments.area:g} m²\n")
     print(console.text_table(rows, "<>>>"))
     if fit.offset_is_significant and fit.offset.value < 0:
-        print(f"\nThe foam gives way by {fit.dead_zone * 1e3:.3g} mm before it carries: a dead zone, which the model's line")
+        print(f"\nThe foam has a dead zone of {fit.dead_zone * 1e3:.3g} mm, which the model's line")
         print("through zero does not have; add the effect dead-zone to the sensor for it.")
     print(f"\nSuggested: k = {fit.k.value:.4g} N/m, cn = {DAMPING_PER_STIFFNESS * fit.k.value:.3g} N·s/m (1 % of k)")
     if arguments.plot:
@@ -103,7 +103,7 @@ def _friction(arguments: argparse.Namespace) -> None:
     print(console.text_table(rows, "<>><"))
     print(f"\nroot mean square residual: {fit.residual:.3g} N")
     if fit.unidentifiable:
-        print(f"These measurements do not tell {', '.join(fit.unidentifiable)}: add some at other velocities.")
+        print(f"These measurements do not identify {', '.join(fit.unidentifiable)}: add some at other velocities.")
     if arguments.plot:
         from ..core.gap.calibration.plots import plot_friction
 
@@ -130,11 +130,12 @@ def _readout(arguments: argparse.Namespace) -> None:
             name = f"{target} ({data.unit(target)})"
             rows.append((f"{mark}{one.method.name}" if i == 0 else "", name, memory, f"{one.left_out[i]:.3g}", *checked))
     print(console.text_table(rows, "<<<>>>>"))
-    print("\nErrors are root mean squares. * is proposed: the simplest within one standard error of the least error left out.")
+    print("\nErrors are root mean squares.")
+    print("* is recommended: the simplest within one standard error of the smallest cross-validation error.")
     if fit.forward_check is not None:
         print(f"forward model: {fit.forward_check:.2%} of the readings' range on the check recordings")
     if not data.check:
-        print('No recording has use = "check": how good a read-out is on another day is not known.')
+        print('No recording has use = "check": the read-outs are not validated.')
     for note in [*data.notes, *fit.reasons]:
         print(f"note: {note}")
     if arguments.plot:

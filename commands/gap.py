@@ -26,7 +26,7 @@ WISHES = ("between", "depth", "speed", "duration", "area")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("rig", metavar="RIG.toml", help="what was measured (docs/gap.md); its CSV files lie beside it")
+    parser.add_argument("rig", metavar="RIG.toml", help="description of the measurements (docs/gap.md), with its CSV files")
     parser.add_argument(
         "--out",
         metavar="DIR",
@@ -36,16 +36,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--sensor", metavar="NAME", help="the sensor in it (default: the only one)")
     plan = parser.add_argument_group("before anything is fitted")
     plan.add_argument(
-        "--plan", action="store_true", help="say which effects the recordings can tell apart, and what to record next"
+        "--plan", action="store_true", help="list the effects that the recordings distinguish, and plan the next recording"
     )
-    plan.add_argument("--between", nargs=2, metavar="EFFECT", help="the effects that the next recording is to tell apart")
-    plan.add_argument("--depth", type=float, metavar="M", help="how deep it may press (m; N where the rig knows forces)")
+    plan.add_argument("--between", nargs=2, metavar="EFFECT", help="effects that the next recording has to separate")
+    plan.add_argument("--depth", type=float, metavar="M", help="largest depth (m; N where the rig knows forces)")
     plan.add_argument(
-        "--speed", type=float, metavar="M/S", help="how fast the probe may move (m/s; N/s where the rig knows forces)"
+        "--speed", type=float, metavar="M/S", help="largest speed of the probe (m/s; N/s where the rig knows forces)"
     )
-    plan.add_argument("--duration", type=float, metavar="S", help="how long it may last")
+    plan.add_argument("--duration", type=float, metavar="S", help="longest duration")
     plan.add_argument(
-        "--area", type=float, nargs=4, metavar=("X0", "X1", "Y0", "Y1"), help="where it may press, in the sensor's frame, m"
+        "--area", type=float, nargs=4, metavar=("X0", "X1", "Y0", "Y1"), help="area of the presses, in the sensor's frame, m"
     )
     blender.add_script_arguments(parser)
 
@@ -84,7 +84,7 @@ def _check(arguments: argparse.Namespace) -> None:
     """Raise if options do not go with each other."""
     wishes = [name for name in WISHES if getattr(arguments, name) is not None]
     if arguments.plan and (arguments.blend or arguments.sensor):
-        raise SceneError("--plan only looks at the recordings: leave out --blend and --sensor.")
+        raise SceneError("--plan only reads the recordings: leave out --blend and --sensor.")
     if wishes and not arguments.plan:
         raise SceneError(f"--{wishes[0]} says what to plan: give --plan as well.")
     if not arguments.plan and not arguments.out:
@@ -106,7 +106,7 @@ def _plan(arguments: argparse.Namespace) -> int:
         limits = {name: getattr(arguments, name) for name in WISHES if name != "between"}
         with console.shown_progress("plan") as show:
             plan = plan_experiment(rig, limits, tuple(arguments.between or ()), show)
-    print(console.text_table([("effect", "may be taken for"), *plan.rows], "<<"))
+    print(console.text_table([("effect", "may be confused with"), *plan.rows], "<<"))
     print()
     print(plan.sentence)
     for text in rig.warnings:
@@ -152,7 +152,7 @@ def _sensor_in_scene(arguments: argparse.Namespace) -> Any:
 
 
 def _put_into_scene(arguments: argparse.Namespace, sensor: Any) -> None:
-    """Put the amended sensor on a sensor of a .blend and save it; opened anew, because it may have been edited meanwhile."""
+    """Put the amended sensor on a sensor of a .blend and save it; opened again, because it may have been edited meanwhile."""
     with console.blender_output_hidden():
         target = _sensor_in_scene(arguments)
         from ..addon.measured import gap_results

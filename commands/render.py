@@ -111,7 +111,7 @@ def run(arguments: argparse.Namespace) -> int:
             samples=arguments.samples,
             **given,
         )
-        stopped = "palpate render: stopped; earlier figures are as they were."
+        stopped = "palpate render: stopped; earlier figures are unchanged."
         with console.exit_on_interrupt(stopped, lambda: remove_unneeded(folder)):
             job = figure_export.make_figures(scene, folder, request)
             written = console.run_with_progress_bar("render", job, describe=lambda step: f"{step.stage}, frame {step.frame}")

@@ -29,9 +29,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     new.add_argument("--out", metavar="DIR", help="folder for rig.toml and its CSV files; needed without --preview")
     new.add_argument(
-        "--answers", metavar="FILE", help="what the columns are and what no log says; without it a template is written"
+        "--answers", metavar="FILE", help="meaning of the columns and missing information; without it a template is written"
     )
-    new.add_argument("--yes", action="store_true", help="take what is marked CHECK in the template as it is")
+    new.add_argument("--yes", action="store_true", help="accept the entries that are marked CHECK in the template")
     new.add_argument("--preview", action="store_true", help="list the columns of the logs and write nothing")
 
 

@@ -22,7 +22,7 @@ MOST_NAMED = 3
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.set_defaults(stopped="stopped; the same command goes on where it was.")
+    parser.set_defaults(stopped="stopped; the same command continues.")
     parser.epilog = (
         "Limits of the command concern its own process. In the study's file run_limit (seconds) and run_memory (MB) are those "
         "of each run: one that takes more is ended and counts as failed, and the others go on. --allow-scripts also runs the "
@@ -31,9 +31,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "study",
         metavar="STUDY.toml|DIR",
-        help="file of a study, or the folder of one that goes on; with --list also a scene, .blend or .npz",
+        help="file of a study, or the folder of one to continue; with --list also a scene, .blend or .npz",
     )
-    parser.add_argument("--out", metavar="DIR", help="output folder (default: beside the study, with its name)")
+    parser.add_argument("--out", metavar="DIR", help="output folder (default: next to the study, with its name)")
     parser.add_argument("--workers", metavar="N", type=_count, help="processes on this machine (default: one per core)")
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--slurm", metavar="JOBS", type=_count, help="compute in so many jobs of SLURM, by dask-jobqueue")
@@ -65,10 +65,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--begin", action="store_true", help="read the scenes and freeze the study, and compute no run yet")
     what.add_argument(
-        "--dry-run", action="store_true", help="say from five runs how long all take and how big they are, and keep nothing"
+        "--dry-run", action="store_true", help="estimate time and size of all runs from five of them, and keep nothing"
     )
-    what.add_argument("--status", action="store_true", help="say how far the study in the folder is; it may be running")
-    what.add_argument("--list", action="store_true", help="list what may vary in the scenes of the study, or in one scene")
+    what.add_argument(
+        "--status", action="store_true", help="show the progress of the study in the folder, which may be running"
+    )
+    what.add_argument(
+        "--list", action="store_true", help="list the parameters that can vary in the scenes of the study, or in one scene"
+    )
     blender.add_script_arguments(parser)
 
 
@@ -121,7 +125,7 @@ def _part(text: str) -> tuple[int, int]:
     """Return number and count of "I/N"."""
     number, _, count = text.partition("/")
     if not (number.isdigit() and count.isdigit() and 1 <= int(number) <= int(count)):
-        raise argparse.ArgumentTypeError(f"{text} is no part: write it as 2/8, the second of eight")
+        raise argparse.ArgumentTypeError(f"{text} is not a part: write it as 2/8, the second of eight")
     return int(number), int(count)
 
 

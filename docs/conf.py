@@ -19,7 +19,7 @@ extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 
 # The source folder is the repository, so that links between README.md and docs/ are the same here and in a clone.
 root_doc = "docs/index"
-include_patterns = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/**.md", "tests/ui/README.md"]
+include_patterns = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/**.md", "benchmarks/RESULTS.md", "tests/ui/README.md"]
 exclude_patterns = [".*", "build", "dist", "demo-output", "core", "addon", "**/node_modules", "*.egg-info"]
 
 myst_heading_anchors = 4

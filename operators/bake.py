@@ -13,7 +13,7 @@ from . import modal_job, support
 
 class PALPATE_OT_bake(modal_job.ModalJob, bpy.types.Operator):
     """Compute all frames of the scene and write tactile images, recordings, force arrows and heat maps. ESC stops it and keeps
-    what was there before"""
+    the earlier bake"""
 
     bl_idname = "palpate.bake"
     bl_label = "Bake"
@@ -26,7 +26,7 @@ class PALPATE_OT_bake(modal_job.ModalJob, bpy.types.Operator):
             return False
         return support.poll_idle(cls)
 
-    stopped = "Bake stopped; what was there before is unchanged"
+    stopped = "Bake stopped; the earlier bake is unchanged"
 
     def job(self, context):
         support.leave_edit_mode(context)
@@ -35,11 +35,11 @@ class PALPATE_OT_bake(modal_job.ModalJob, bpy.types.Operator):
         return bake(context.scene)
 
     def done(self, baked):
-        for warning in (*baked.recording.warnings, *baked.notes):
-            self.report({"WARNING"}, warning)
         frames = baked.recording.frames
         names = ", ".join(f"'{name}'" for name in baked.folders)
         self.report({"INFO"}, f"Baked frames {frames[0]} to {frames[-1]} of {names}")
+        for warning in (*baked.notes, *baked.recording.warnings):  # the status bar shows the last
+            self.report({"WARNING"}, warning)
 
 
 def is_of_hands(event) -> bool:
@@ -53,7 +53,7 @@ class PALPATE_OT_catch_up(modal_job.ModalJob, bpy.types.Operator):
     bl_idname = "palpate.catch_up"
     bl_label = "Compute to Here"
     bl_options = {"REGISTER"}
-    stopped = "Stopped; what was computed is kept"
+    stopped = "Stopped; computed frames are kept"
 
     by_itself: BoolProperty(
         name="By Itself",
@@ -64,7 +64,7 @@ class PALPATE_OT_catch_up(modal_job.ModalJob, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         if context.scene is None or not playback.missing_frames(context.scene):
-            cls.poll_message_set("Nothing is missing up to the present frame")
+            cls.poll_message_set("No frame is missing up to the current one")
             return False
         return support.poll_idle(cls)
 
@@ -87,7 +87,7 @@ class PALPATE_OT_catch_up(modal_job.ModalJob, bpy.types.Operator):
 
 
 class PALPATE_OT_bake_clear(support.ErrorReporting, bpy.types.Operator):
-    """Remove baked keyframes, force arrows and heat maps, and put free bodies back to their start. Files on disk stay"""
+    """Remove baked keyframes, force arrows and heat maps, and reset free bodies. Files on disk stay"""
 
     bl_idname = "palpate.bake_clear"
     bl_label = "Clear Bake"
@@ -107,7 +107,7 @@ class PALPATE_OT_bake_clear(support.ErrorReporting, bpy.types.Operator):
 
 
 class PALPATE_OT_reset(support.ErrorReporting, bpy.types.Operator):
-    """Forget what playing has computed and put free bodies back to where they start"""
+    """Discard the frames computed while playing and reset free bodies"""
 
     bl_idname = "palpate.reset"
     bl_label = "Reset"
@@ -128,7 +128,7 @@ class PALPATE_OT_reset(support.ErrorReporting, bpy.types.Operator):
 
 
 class PALPATE_OT_dress(support.ErrorReporting, bpy.types.Operator):
-    """Show the bake with the present colours, scales, arrows and markers; nothing is computed"""
+    """Show the bake with the current colours, scales, arrows and markers; nothing is computed"""
 
     bl_idname = "palpate.dress"
     bl_label = "Apply to Bake"

@@ -11,7 +11,7 @@ from . import support
 
 
 class PALPATE_OT_effect_add(support.ErrorReporting, bpy.types.Operator):
-    """Add what real sensors do and the base model does not: creep, hysteresis, noise and more"""
+    """Add an effect of real sensors that the base model lacks: creep, hysteresis, noise and more"""
 
     bl_idname = "palpate.effect_add"
     bl_label = "Add Effect"
@@ -46,7 +46,7 @@ class _OnEntry(support.ErrorReporting):
 
 
 class PALPATE_OT_effect_remove(_OnEntry, bpy.types.Operator):
-    """Take the effect off the sensor"""
+    """Remove the effect from the sensor"""
 
     bl_idname = "palpate.effect_remove"
     bl_label = "Remove Effect"
@@ -59,7 +59,7 @@ class PALPATE_OT_effect_remove(_OnEntry, bpy.types.Operator):
 
 
 class PALPATE_OT_effect_move(_OnEntry, bpy.types.Operator):
-    """Move the effect in the stack. Effects act in an order of their own; it counts only for two of a kind"""
+    """Move the effect in the stack. Different effects act in a fixed order; the stack orders effects of one kind"""
 
     bl_idname = "palpate.effect_move"
     bl_label = "Move Effect"

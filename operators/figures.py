@@ -8,12 +8,12 @@ from . import modal_job, support
 
 
 class PALPATE_OT_figures_make(modal_job.ModalJob, bpy.types.Operator):
-    """Make the figures that are chosen above, of what is baked: nothing is computed. ESC stops; earlier figures stay"""
+    """Make the chosen figures of the bake; nothing is computed. ESC stops; earlier figures stay"""
 
     bl_idname = "palpate.figures_make"
     bl_label = "Make Figures"
     bl_options = {"REGISTER"}
-    stopped = "Stopped; earlier figures are as they were"
+    stopped = "Stopped; earlier figures are unchanged"
 
     @classmethod
     def poll(cls, context):
@@ -32,7 +32,7 @@ class PALPATE_OT_figures_make(modal_job.ModalJob, bpy.types.Operator):
     def done(self, result):
         names = ", ".join(f"'{path.name}'" for path in result[:4])
         more = f" and {len(result) - 4} more" if len(result) > 4 else ""
-        self.report({"INFO"}, f"Made {names}{more} in '{result[0].parent}'" if result else "There was nothing to make")
+        self.report({"INFO"}, f"Made {names}{more} in '{result[0].parent}'" if result else "There is no figure to make")
 
 
 CLASSES = (PALPATE_OT_figures_make,)

@@ -77,12 +77,15 @@ class PALPATE_OT_stiffness_fit(MeasurementFit, bpy.types.Operator):
         name="Line",
         description="Which of the two lines gives the stiffness",
         items=(
-            ("ZERO", "Through Zero", "No force without depth, as the model has it"),
-            ("OFFSET", "With Offset", "The slope alone; the foam may give way before it carries"),
+            ("ZERO", "Through Zero", "Line through zero, as in the model"),
+            ("OFFSET", "With Offset", "Line with an offset, for foam with a dead zone"),
         ),
     )
     weight_area: FloatProperty(
-        name="Weight Area (m²)", description="What forces or masses rested on, m²; pressures need none", min=0.0, precision=8
+        name="Weight Area (m²)",
+        description="Contact area of the forces or masses, m²; not needed for pressures",
+        min=0.0,
+        precision=8,
     )
     with_damping: BoolProperty(name="Damping 1 % of k", description="Also set cn, numerically to 1 % of k", default=True)
 
@@ -104,7 +107,7 @@ class PALPATE_OT_stiffness_fit(MeasurementFit, bpy.types.Operator):
         self.picture(context, plot_stiffness, fit, "Palpate Stiffness Fit")
         text = f"k = {chosen.value:.4g} N/m (95 %: {chosen.low:.4g} to {chosen.high:.4g}) for {len(report.texels)} texels"
         if fit.offset_is_significant and fit.dead_zone > 0:
-            text += f"; the foam gives way by {fit.dead_zone * 1e3:.3g} mm before it carries: add the effect dead-zone for it"
+            text += f"; the foam has a dead zone of {fit.dead_zone * 1e3:.3g} mm: add the effect dead-zone for it"
         self.report({"INFO"}, text)
 
 
@@ -117,7 +120,11 @@ class PALPATE_OT_friction_fit(MeasurementFit, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     normal_force: FloatProperty(
-        name="Normal Force (N)", description="On one texel while it was measured, N", default=0.08, min=1e-9, precision=5
+        name="Normal Force (N)",
+        description="Normal force on one texel during the measurement, N",
+        default=0.08,
+        min=1e-9,
+        precision=5,
     )
     texels: IntProperty(name="Texels", description="How many texels shared the measured force", default=1, min=1)
 
@@ -135,7 +142,7 @@ class PALPATE_OT_friction_fit(MeasurementFit, bpy.types.Operator):
         self.report({"INFO"}, values)
         if fit.unidentifiable:
             names = ", ".join(fit.unidentifiable)
-            self.report({"WARNING"}, f"These measurements do not tell {names}: add some at other velocities")
+            self.report({"WARNING"}, f"These measurements do not identify {names}: add some at other velocities")
 
 
 CLASSES = (PALPATE_OT_stiffness_fit, PALPATE_OT_friction_fit)

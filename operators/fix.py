@@ -9,7 +9,7 @@ from . import support
 
 
 class PALPATE_OT_fix(support.ErrorReporting, bpy.types.Operator):
-    """Put this problem of the active sensor right"""
+    """Fix this problem of the active sensor"""
 
     bl_idname = "palpate.fix"
     bl_label = "Fix Sensor"
@@ -17,7 +17,7 @@ class PALPATE_OT_fix(support.ErrorReporting, bpy.types.Operator):
 
     kind: EnumProperty(
         name="Problem",
-        description="What is put right",
+        description="Problem to fix",
         items=[(kind, label, label) for kind, (label, _) in problems.FIXES.items()],
         options={"SKIP_SAVE"},
     )
@@ -34,7 +34,7 @@ class PALPATE_OT_fix(support.ErrorReporting, bpy.types.Operator):
         if left:
             self.report({"WARNING"}, left[0].text)
         else:
-            self.report({"INFO"}, f"'{obj.name}' is all right now")
+            self.report({"INFO"}, f"'{obj.name}' is fixed")
 
 
 CLASSES = (PALPATE_OT_fix,)

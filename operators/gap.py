@@ -13,7 +13,7 @@ from .fits import show_image
 
 
 class PALPATE_OT_measured_open(support.ErrorReporting, support.FileChooser, bpy.types.Operator):
-    """Choose measurements of the real sensor: a rig.toml with its CSV files beside it. They are read to see that they fit"""
+    """Choose measurements of the real sensor: a rig.toml with its CSV files. They are read and checked"""
 
     bl_idname = "palpate.measured_open"
     bl_label = "Open Rig…"
@@ -73,7 +73,7 @@ class PALPATE_OT_gap_find(modal_job.ModalJob, bpy.types.Operator):
     bl_idname = "palpate.gap_find"
     bl_label = "Find Gap"
     bl_options = {"REGISTER"}
-    stopped = "Stopped; what was found before is unchanged"
+    stopped = "Stopped; earlier results are unchanged"
 
     @classmethod
     def poll(cls, context):
@@ -96,17 +96,17 @@ class PALPATE_OT_gap_plan(modal_job.ModalJob, bpy.types.Operator):
     stopped = "Stopped; no probe has changed"
 
     depth: FloatProperty(
-        name="Depth (m)", description="How deep it may press, m; 0: as deep as the recordings", min=0.0, precision=5, step=0.01
+        name="Depth (m)", description="Largest depth, m; 0: that of the recordings", min=0.0, precision=5, step=0.01
     )
     speed: FloatProperty(
         name="Speed (m/s)",
-        description="How fast it may move, m/s; 0: as fast as the recordings",
+        description="Largest speed, m/s; 0: that of the recordings",
         min=0.0,
         precision=4,
         step=0.1,
     )
     duration: FloatProperty(
-        name="Duration (s)", description="How long it may last, s; 0: as long as the longest recording", min=0.0, precision=1
+        name="Duration (s)", description="Longest duration, s; 0: that of the longest recording", min=0.0, precision=1
     )
 
     @classmethod
@@ -124,16 +124,16 @@ class PALPATE_OT_gap_plan(modal_job.ModalJob, bpy.types.Operator):
     def done(self, result):
         experiment, rig = result
         if experiment is None:
-            self.report({"INFO"}, "The recordings tell all effects from each other: nothing is planned")
+            self.report({"INFO"}, "The recordings distinguish all effects: nothing is planned")
             return
         sensor = bpy.data.objects[self._sensor]
         probe = planned_probe.put_on_probe(bpy.context, sensor, experiment, rig)
-        sure = f"about {experiment.sure_after:.0%} sure with it, {experiment.sure_before:.0%} without"
-        self.report({"INFO"}, f"'{probe.name}' tells {' from '.join(experiment.kinds)}: {sure}")
+        sure = f"confidence {experiment.sure_after:.0%} with it, {experiment.sure_before:.0%} without"
+        self.report({"INFO"}, f"'{probe.name}' separates {' from '.join(experiment.kinds)}: {sure}")
 
 
 class PALPATE_OT_gap_add(support.ErrorReporting, bpy.types.Operator):
-    """Put the fitted parameters and the effects that were found on the sensor, instead of those it has"""
+    """Replace the sensor's parameters and effects by the fitted ones"""
 
     bl_idname = "palpate.gap_add"
     bl_label = "Add to Sensor"
@@ -151,7 +151,7 @@ class PALPATE_OT_gap_add(support.ErrorReporting, bpy.types.Operator):
 
 
 class PALPATE_OT_gap_curves(support.ErrorReporting, bpy.types.Operator):
-    """Show what was measured and what the model says, before and after"""
+    """Plot measurement and model, before and after"""
 
     bl_idname = "palpate.gap_curves"
     bl_label = "Before and After"
@@ -172,7 +172,7 @@ class PALPATE_OT_gap_show(support.ErrorReporting, bpy.types.Operator):
     bl_label = "Show on Sensor"
     bl_options = {"REGISTER", "UNDO"}
 
-    amended: BoolProperty(name="Amended", description="With what was found, on the same scale", options={"SKIP_SAVE"})
+    amended: BoolProperty(name="Amended", description="With the effects found, on the same scale", options={"SKIP_SAVE"})
 
     @classmethod
     def poll(cls, context):

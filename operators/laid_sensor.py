@@ -36,7 +36,7 @@ class PALPATE_OT_pad_mesh_add(support.ErrorReporting, AddObjectHelper, bpy.types
     @classmethod
     def poll(cls, context):
         if context.mode != "OBJECT":
-            cls.poll_message_set("Leave the mode you are in first (Object Mode)")
+            cls.poll_message_set("Switch to Object Mode first")
             return False
         return True
 
@@ -74,7 +74,7 @@ class PALPATE_OT_skin_add(support.ErrorReporting, bpy.types.Operator):
             ("OWN", "Sensor's Region", "The region that the object has as a sensor"),
             ("SELECTION", "Selection", "Selected faces; they are kept in a vertex group"),
             ("GROUP", "Active Vertex Group", "Vertices whose weight is a half or more"),
-            ("MATERIAL", "Active Material", "Faces that wear the active material"),
+            ("MATERIAL", "Active Material", "Faces with the active material"),
             ("FACE_SET", "Face Set", "Faces of the set that the active face is in"),
             ("MESH", "Whole Mesh", "Everywhere"),
         ),
@@ -107,7 +107,7 @@ class PALPATE_OT_skin_add(support.ErrorReporting, bpy.types.Operator):
     seed: IntProperty(name="Seed", description="Another pattern for each", min=0)
     lift: FloatProperty(
         name="Lift (m)",
-        description="How far above the surface the texels are, m: so much earlier they are touched",
+        description="Height of the texels above the surface, m",
         default=0.0,
         min=0.0,
         precision=6,
@@ -134,7 +134,7 @@ class PALPATE_OT_skin_add(support.ErrorReporting, bpy.types.Operator):
         text = f"'{obj.name}' has {len(obj.data.vertices)} texels"
         if replaces:  # its own texels would bear the same load a second time
             carrier.palpate.role = "TARGET" if carrier.palpate.body == "FREE" else "NONE"
-            text += f"; '{carrier.name}' itself is no sensor any more"
+            text += f"; '{carrier.name}' is no longer a sensor"
         self.report({"INFO"}, text)
 
     def _source(self, carrier) -> str:
@@ -160,10 +160,10 @@ class PALPATE_OT_skin_add(support.ErrorReporting, bpy.types.Operator):
 
 
 class PALPATE_OT_skin_update(support.ErrorReporting, bpy.types.Operator):
-    """Lay the texels of this sensor anew onto the surface as it is now; what was painted on it is carried over"""
+    """Lay the texels of this sensor again onto the current surface; painted groups and attributes are kept"""
 
     bl_idname = "palpate.skin_update"
-    bl_label = "Lay Anew"
+    bl_label = "Lay Again"
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod

@@ -73,7 +73,7 @@ class PALPATE_OT_preset_load(support.ErrorReporting, bpy.types.Operator):
 
 
 class PALPATE_OT_preset_add(AddPresetBase, bpy.types.Operator):
-    """Keep the parameters of the active sensor as a preset, or remove one"""
+    """Save the parameters of the active sensor as a preset, or remove one"""
 
     bl_idname = "palpate.preset_add"
     bl_label = "Add Sensor Preset"
@@ -90,7 +90,7 @@ class PALPATE_OT_preset_add(AddPresetBase, bpy.types.Operator):
         if self.remove_name or self.remove_active:
             found = bpy.utils.preset_find(self.name, self.preset_subdir, display_name=True)
             if found and sensor_presets.FOLDER in Path(found).parents:  # Blender takes an extension's files for the user's own
-                self.report({"WARNING"}, f"'{self.name}' comes with Palpate and stays")
+                self.report({"WARNING"}, f"'{self.name}' is part of Palpate and cannot be removed")
                 return {"CANCELLED"}
         return super().execute(context)
 

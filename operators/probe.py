@@ -4,12 +4,12 @@
 import bpy
 from bpy.props import EnumProperty, FloatProperty
 
-from ..addon.authoring import probes
+from ..addon.authoring import probes, sensors
 from . import support
 
 
 class PALPATE_OT_probe_add(support.ErrorReporting, bpy.types.Operator):
-    """Add something that presses on the middle of the active sensor, holds and goes, over the scene's frame range"""
+    """Add an object that presses on the middle of the active sensor, holds and retracts within the scene's frame range"""
 
     bl_idname = "palpate.probe_add"
     bl_label = "Add Probe"
@@ -33,7 +33,7 @@ class PALPATE_OT_probe_add(support.ErrorReporting, bpy.types.Operator):
     )
     depth: FloatProperty(
         name="Depth (m)",
-        description="How deep it presses, m; 0 is a quarter of the maximum penetration",
+        description="Depth of the press, m; 0 is a quarter of the maximum penetration",
         min=0.0,
         precision=5,
         step=0.01,
@@ -45,9 +45,12 @@ class PALPATE_OT_probe_add(support.ErrorReporting, bpy.types.Operator):
 
     def run(self, context):
         support.leave_edit_mode(context)
+        note = sensors.follow_size(context.scene, context.object)  # of a region that was painted
         probe = probes.add_probe(context, context.object, self.shape, self.size, self.depth)
         context.scene.frame_set(context.scene.frame_start)
-        self.report({"INFO"}, f"'{probe.name}' presses on '{context.object.name}': press Space to play")
+        self.report(
+            {"INFO"}, f"'{probe.name}' presses on '{context.object.name}': press Space to play. {note}".removesuffix(". ")
+        )
 
 
 CLASSES = (PALPATE_OT_probe_add,)

@@ -24,7 +24,7 @@ class PALPATE_OT_sensor_add(support.ErrorReporting, bpy.types.Operator):
             ("AUTO", "Automatic", "The selection in Edit Mode, the painted group in Weight Paint, else the whole mesh"),
             ("SELECTION", "Selection", "Selected faces or vertices; they are kept in a vertex group"),
             ("GROUP", "Active Vertex Group", "Vertices whose weight reaches the threshold"),
-            ("MATERIAL", "Active Material", "Faces that wear the active material"),
+            ("MATERIAL", "Active Material", "Faces with the active material"),
             ("FACE_SET", "Face Set", "Faces of the set that the active face is in"),
             ("MESH", "Whole Mesh", "Every vertex"),
         ),
@@ -33,8 +33,8 @@ class PALPATE_OT_sensor_add(support.ErrorReporting, bpy.types.Operator):
     )
     role: EnumProperty(
         name="Role",
-        description="Whether it is read out",
-        items=(("SENSOR", "Sensor", "Feels and is read out"), ("PAD", "Pad", "Gives way, but is not read out")),
+        description="With or without read-out",
+        items=(("SENSOR", "Sensor", "Measures contact forces"), ("PAD", "Pad", "Compliant, without read-out")),
         default="SENSOR",
         options={"SKIP_SAVE"},
     )
@@ -48,11 +48,13 @@ class PALPATE_OT_sensor_add(support.ErrorReporting, bpy.types.Operator):
         source = sensors.automatic_source(obj, obj.mode) if self.source == "AUTO" else self.source
         support.leave_edit_mode(context)
         count = sensors.make_sensor(obj, source, self.role)
-        self.report({"INFO"}, f"'{obj.name}' is a {self.role.lower()} of {count} texels")
+        note = sensors.follow_size(context.scene, obj)
+        said = f"'{obj.name}' is a {self.role.lower()} of {count} texels"
+        self.report({"INFO"}, f"{said}. {note}" if note else said)
 
 
 class PALPATE_OT_role_set(support.ErrorReporting, bpy.types.Operator):
-    """Say what part the selected objects have"""
+    """Set the role of the selected objects"""
 
     bl_idname = "palpate.role_set"
     bl_label = "Set Role"
@@ -60,11 +62,11 @@ class PALPATE_OT_role_set(support.ErrorReporting, bpy.types.Operator):
 
     role: EnumProperty(
         name="Role",
-        description="Part of the objects",
+        description="Role of the objects",
         items=(
-            ("TARGET", "Target", "Presses on sensors and pads"),
-            ("PAD", "Pad", "Gives way like a sensor, but is not read out"),
-            ("SENSOR", "Sensor", "Feels and is read out"),
+            ("TARGET", "Target", "Can touch sensors and pads"),
+            ("PAD", "Pad", "Compliant like a sensor, without read-out"),
+            ("SENSOR", "Sensor", "Measures contact forces"),
         ),
         default="TARGET",
         options={"SKIP_SAVE"},
@@ -73,8 +75,8 @@ class PALPATE_OT_role_set(support.ErrorReporting, bpy.types.Operator):
     @classmethod
     def description(cls, _context, properties):
         return {
-            "TARGET": "Make the active and the selected objects targets: what touches them on a sensor is felt",
-            "PAD": "Make the active object a pad: it gives way like a sensor, but is not read out",
+            "TARGET": "Make the active and the selected objects targets: sensors measure contact with them",
+            "PAD": "Make the active object a pad: compliant like a sensor, without read-out",
             "SENSOR": "Make the active object a sensor again, on the region it has",
         }[properties.role]
 
@@ -94,7 +96,7 @@ class PALPATE_OT_role_set(support.ErrorReporting, bpy.types.Operator):
 
 
 class PALPATE_OT_sensor_remove(support.ErrorReporting, bpy.types.Operator):
-    """Take the active object out of the simulation, with its heat map, arrow and baked keyframes; vertex groups stay"""
+    """Remove the active object from the simulation, with its heat map, arrow and baked keyframes; vertex groups stay"""
 
     bl_idname = "palpate.sensor_remove"
     bl_label = "Remove Role"

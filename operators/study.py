@@ -38,13 +38,13 @@ class PALPATE_OT_study_vary(support.ErrorReporting, bpy.types.Operator):
 
 
 class PALPATE_OT_study_remove(support.ErrorReporting, bpy.types.Operator):
-    """Take this out of the study; the scene stays as it is"""
+    """Remove this from the study; the scene does not change"""
 
     bl_idname = "palpate.study_remove"
     bl_label = "Remove from Study"
     bl_options = {"REGISTER", "UNDO"}
 
-    index: IntProperty(name="Number", description="Place among what varies, from zero", min=0, options={"SKIP_SAVE"})
+    index: IntProperty(name="Number", description="Index among the varied properties, from zero", min=0, options={"SKIP_SAVE"})
 
     @classmethod
     def poll(cls, context):
@@ -83,7 +83,7 @@ class PALPATE_OT_study_run(modal_job.ModalJob, bpy.types.Operator):
     bl_idname = "palpate.study_run"
     bl_label = "Run Study"
     bl_options = {"REGISTER"}
-    stopped = "Study stopped; what is done is kept, and Run Study goes on"
+    stopped = "Study stopped; finished runs are kept, and Run Study continues"
 
     @classmethod
     def poll(cls, context):
@@ -106,7 +106,7 @@ class PALPATE_OT_study_run(modal_job.ModalJob, bpy.types.Operator):
 
 
 class PALPATE_OT_study_report(support.ErrorReporting, bpy.types.Operator):
-    """Open the report of the study in a browser: metrics over what varies, the strongest dependencies, failures"""
+    """Open the report of the study in a browser: metrics over the varied parameters, the strongest dependencies, failures"""
 
     bl_idname = "palpate.study_report"
     bl_label = "Open Report"

@@ -66,7 +66,7 @@ def poll_mesh_object(cls, context) -> bool:
     if not poll_surface_object(cls, context):
         return False
     if context.object.type != "MESH":
-        cls.poll_message_set(f"'{context.object.name}' is no mesh: use Object › Convert › Mesh first")
+        cls.poll_message_set(f"'{context.object.name}' is not a mesh: use Object › Convert › Mesh first")
         return False
     if not context.object.data.is_editable:
         cls.poll_message_set(
@@ -96,7 +96,7 @@ def poll_sensor(cls, context) -> bool:
         cls.poll_message_set("Make an object active first")
         return False
     if context.object.palpate.role not in {"SENSOR", "PAD"}:
-        cls.poll_message_set(f"'{context.object.name}' is no sensor: use Make Sensor first")
+        cls.poll_message_set(f"'{context.object.name}' is not a sensor: use Make Sensor first")
         return False
     return True
 

@@ -39,6 +39,8 @@ class Bake(Subpanel):
             row.operator("palpate.reset", text="Reset")
         status = frame_status.status_of(scene)
         draw_sentences(layout, status.text, "INFO", context)
+        if status.warnings:
+            draw_sentences(layout, status.warnings, "ERROR", context)
         if status.step:
             draw_sentences(layout, status.step, "PREVIEW_RANGE", context)
 

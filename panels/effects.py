@@ -6,7 +6,7 @@ from .subpanels import Subpanel
 
 
 class Effects(Subpanel):
-    """What real sensors do and the base model does not"""
+    """Effects of real sensors that the base model lacks"""
 
     name = "effects"
     bl_label = "Effects"

@@ -67,7 +67,7 @@ def build(scene) -> None:
     scene_builder.add_stage(scene, paper, aim=(0.0, 0.0, 20.0), camera=(60.0, -300.0, 190.0))
     frame_picture(scene, (1280, 720))
     scene_builder.add_readme(TEXT)
-    scene.frame_set(scene.frame_start)
+    scene_builder.open_at(scene, pad_a, STRIP_FRAMES[3])
 
 
 def _finger(scene, name: str, pitch: float, location, turn: float, rubber, black, screw):

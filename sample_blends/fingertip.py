@@ -59,7 +59,7 @@ def build(scene) -> None:
     paper = scene_builder.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
     scene_builder.add_stage(scene, paper, aim=(0.0, -3.0, 32.0), camera=(95.0, 90.0, 85.0), size=0.3)
     scene_builder.add_readme(TEXT)
-    scene.frame_set(scene.frame_start)
+    scene_builder.open_at(scene, finger, 24)
 
 
 def capsule():

@@ -71,7 +71,7 @@ def build(scene) -> None:
     scene.frame_set(28)
     scene_builder.frame_objects(scene, (gel, nut, scene.objects["Housing"]))
     scene_builder.add_readme(TEXT)
-    scene.frame_set(scene.frame_start)
+    scene_builder.open_at(scene, gel, 28)
 
 
 def _gel(scene):

@@ -47,6 +47,7 @@ def build(scene) -> None:
     scene.frame_set(scene.frame_start)
     scene_builder.frame_objects(scene, [sensor for sensor, _ in sensors], region=(0.06, 0.06, 0.94, 0.70), size=(1100, 600))
     scene_builder.add_readme(TEXT)
+    scene_builder.open_at(scene, scene.objects[GRID], FRAME_END)
 
 
 def _grid(scene):

@@ -69,7 +69,7 @@ def build(scene) -> None:
     backdrop = scene.objects["Backdrop"]
     backdrop.location.z = -4.0
     scene_builder.add_readme(TEXT)
-    scene.frame_set(scene.frame_start)
+    scene_builder.open_at(scene, scene.objects[LEFT], 20)
 
 
 def _finger(scene, name: str, side: int, rubber, grey) -> None:

@@ -92,3 +92,4 @@ def build(scene, kind: str) -> None:
     shown = [obj, *obj.children, *fingers, *(part for pad in fingers for part in pad.children)]
     scene_builder.frame_objects(scene, shown, (0.04, 0.04, 0.96, 0.96))
     scene_builder.add_readme(TEXT.format(what=f"a {thing.name.lower()}"))
+    scene_builder.open_at(scene, fingers[0], TABLE_STARTS)

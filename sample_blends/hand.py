@@ -59,6 +59,7 @@ def build(scene) -> None:
     scene.frame_set(scene.frame_start)
     scene_builder.frame_objects(scene, (index, thumb, cylinder), (0.05, 0.05, 0.95, 0.95))
     scene_builder.add_readme(TEXT)
+    scene_builder.open_at(scene, index, TABLE_STARTS)
 
 
 def bodies(scene):

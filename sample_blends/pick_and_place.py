@@ -62,3 +62,4 @@ def build(scene) -> None:
     scene.frame_set(scene.frame_start)
     scene_builder.frame_objects(scene, [*fingers, arm, table], (0.04, 0.04, 0.96, 0.96), size=(720, 720))
     scene_builder.add_readme(TEXT)
+    scene_builder.open_at(scene, fingers[0], STAGES["grasp"])

@@ -324,6 +324,28 @@ def add_stage(scene, paper, aim, camera, size: float = 1.0) -> None:
     made.location, made.rotation_euler = camera, look_at(camera, aim)
 
 
+def open_at(scene, sensor, frame: int) -> None:
+    """Let the file open at `frame`, where there is contact, in the camera's view with materials and the sensor's panel.
+
+    A view's usual clipping ends at 1000 units, which is within the backdrop.
+    """
+    width, height = scene.render.resolution_x, scene.render.resolution_y
+    # At zoom z the longer side of the picture takes (√2 + z/50)² / 4 of the longer side of the view, which is about 3 : 2.
+    zoom = 50.0 * (2.0 * math.sqrt(0.95 * min(1.0, width / height / 1.5)) - math.sqrt(2.0))
+    scene.frame_set(frame)
+    for obj in scene.objects:
+        obj.select_set(obj == sensor)
+    bpy.context.view_layer.objects.active = sensor
+    for space in [area.spaces.active for screen in bpy.data.screens for area in screen.areas]:
+        if space.type == "VIEW_3D":
+            space.shading.type, space.clip_start, space.clip_end = "MATERIAL", 1.0, 10_000.0
+            space.region_3d.view_perspective, space.region_3d.view_camera_zoom = "CAMERA", zoom
+            space.overlay.show_cursor = space.overlay.show_floor = False
+            space.overlay.show_axis_x = space.overlay.show_axis_y = False
+        elif space.type == "PROPERTIES":
+            space.context = "PHYSICS"
+
+
 def add_readme(text: str) -> None:
     """Store a text that explains the scene in the file; the text editor lists it as "Read me"."""
     made = bpy.data.texts.new("Read me")

@@ -64,3 +64,4 @@ def weigh(scene, mass: float, tilt: float, frame_end: int = FRAME_END, fps: int 
     paper = scene_builder.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
     scene_builder.add_stage(scene, paper, aim=(0.0, 0.0, 25.0), camera=(190.0, -170.0, 110.0), size=0.5)
     scene_builder.frame_objects(scene, (pad, cube))
+    scene_builder.open_at(scene, pad, min(24, frame_end))

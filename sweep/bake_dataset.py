@@ -12,6 +12,7 @@ from ..core.io.bake_reader import Bake
 from ..core.jobs.progress import Job
 from ..core.study.run_record import RunRecord
 from .dataset import require_pyarrow
+from .encoded_run import encode_run
 from .features import bake_frames
 from .lerobot_writer import LeRobotWriter
 
@@ -23,9 +24,9 @@ def write_lerobot(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Pat
     require_pyarrow()
     first = next(iter(bake.texels))
     yield sensor_progress(bake, first)
-    frames = bake_frames(bake)
+    frames = encode_run(bake_frames(bake))
     scene = bake.manifests[first].scene_file
-    writer = LeRobotWriter(folder / FOLDER, frames, Path(scene).stem if scene else "bake")
+    writer = LeRobotWriter(folder / FOLDER, frames.layout, Path(scene).stem if scene else "bake")
     try:
         writer.add(RunRecord(folder, bake.recording.digest, 0, sensors=tuple(bake.texels)), frames)
         writer.finish()

@@ -16,19 +16,24 @@ import time
 import traceback
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TextIO
 
 from ..core.errors import FileError, PalpateError
+from ..core.model.recording import Recording
 from ..core.model.scenario import Scenario
 from ..core.model.shared_results import SharedResults
 from ..core.study.metrics import metrics_of
 from ..core.study.presses import Press
-from ..core.study.run_files import STUDY_NAME, write_failure, write_run
+from ..core.study.run_files import STUDY_NAME, write_failure, write_packed_run, write_run
 from ..core.study.run_placement import place_run
+from ..core.study.run_record import RunRecord
 from ..core.study.scene_property import is_scene_property, scene_values
 from ..core.study.study_file import SCENE, Plan, Run, Study, at_rate, read_study
 from ..core.study.variation import PRESS, varied_scenario
+from .encoded_run import encode_run, layout_name, pack_layout, pack_run
+from .features import FrameStyle, Layout, solved_frames
 from .program import Program, frozen_program, require_allowed
 from .scene_evaluation import REFUSE, SceneReader
 from .study_scenes import frozen_meshes, plan_of
@@ -57,6 +62,7 @@ class Scenes:
         require_allowed(self.study, scripts)
         self._plans: dict[str, Plan] = {}
         self._programs: dict[str, Program] = {}
+        self._layouts: dict[str, Layout] = {}
         self.shared = SharedResults()
 
     def plan(self, scene: str) -> Plan:
@@ -70,6 +76,10 @@ class Scenes:
         if name not in self._programs:
             self._programs[name] = frozen_program(self.study, self.folder, name)
         return self._programs[name]
+
+    def layout(self, found: Layout) -> Layout:
+        """Return the first layout that is equal, so that what follows from it is computed once."""
+        return self._layouts.setdefault(found.digest, found)
 
     def scenario(self, scene: str, values: Mapping[str, Any]) -> Scenario:
         """Return the scenario of a scene with the values of a run; it is read anew where they have properties of the scene."""
@@ -88,8 +98,6 @@ def compute_run(scenes: Scenes, run: Run, place: Path) -> None:
     PalpateError
         Its values make no run.
     """
-    from dataclasses import replace
-
     from ..core.solver.simulation import Simulation
 
     began = time.perf_counter()
@@ -108,7 +116,25 @@ def compute_run(scenes: Scenes, run: Run, place: Path) -> None:
         made = replace(made, **own)
     metrics = metrics_of(scenario, recording, made)
     seconds = time.perf_counter() - began
-    write_run(place, run, scenario, recording, metrics, seconds, scenes.study.images, scenes.shared)
+    if scenes.study.has_folders:
+        write_run(place, run, scenario, recording, metrics, seconds, scenes.study.images, scenes.shared)
+        return
+    numbers = RunRecord(place, run.digest, run.index, dict(run.values), metrics, seconds, tuple(recording.sensors))
+    pack_frames(scenes, place, run, scenario, recording, numbers)
+
+
+def pack_frames(scenes: Scenes, place: Path, run: Run, scenario: Scenario, recording: Recording, numbers: RunRecord) -> None:
+    """Encode the frames of a run and write them with its numbers into the folder of a batch, for a shard.
+
+    Raises
+    ------
+    FileError
+        The file cannot be written, or a number is too large for 32 bits.
+    """
+    frames = encode_run(solved_frames(scenario, recording, numbers, scenes.shared, FrameStyle.of(scenes.study)))
+    common = scenes.shared.of(pack_layout, scenes.layout(frames.layout))
+    content = pack_run(replace(numbers, frames=frames.rows), frames)
+    write_packed_run(place, run, content, layout_name(frames.layout), common)
 
 
 def answer_to(scenes: Scenes, run: Run, place: Path) -> dict[str, Any]:

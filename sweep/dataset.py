@@ -12,19 +12,19 @@ from pathlib import Path
 
 from ..core.errors import FileError, os_error_reason
 from ..core.io.temporary_folder import remove_unfinished, temporary_folder
-from ..core.model.shared_results import SharedResults
-from ..core.study.run_files import RUNS, STUDY_NAME
-from ..core.study.run_record import read_run_record
+from ..core.study.run_files import STUDY_NAME
 from ..core.study.study_file import Run, read_study
 from .exchange import exchange_folder, require_own
-from .features import read_frames
-from .finished_runs import failures, run_order, study_name
+from .finished_runs import StoredRuns, failures, run_order, study_name
 from .lerobot_writer import LeRobotWriter
 from .run_table import write_run_table
 
 DATASET_FOLDER = "dataset"
 DATASET_FILES = re.compile(r"(part-\d{3,}/)?(README\.md|data/chunk-\d{3,}/file-\d{3,}\.parquet|meta/.+\.(parquet|json))")
 """Names of the files of a dataset; no other file is removed with an earlier one."""
+
+MOST_FILES = 5000
+"""Files of frames that a dataset is to have at most; where 100 MB each were more, they are larger."""
 
 
 def publish(folder: Path, planned: Sequence[Run] = ()) -> None:
@@ -77,15 +77,15 @@ def _write_parts(folder: Path, order: list[tuple[int, str]], hidden: Path) -> Pa
     task = study_name(folder)
     parts = hidden / "parts"
     writers: dict[str, LeRobotWriter] = {}
-    shared = SharedResults()
+    runs = StoredRuns(folder)
+    file_bytes = runs.bytes_in_shards // MOST_FILES
     try:
         for _, digest in order:
-            run = read_run_record(folder / RUNS / digest)
-            frames = read_frames(run, shared)
-            writer = writers.get(frames.layout_digest)
+            run, frames = runs.run(digest)
+            writer = writers.get(frames.layout.digest)
             if writer is None:
-                writer = LeRobotWriter(parts / f"part-{len(writers):03d}", frames, task)
-                writers[frames.layout_digest] = writer
+                writer = LeRobotWriter(parts / f"part-{len(writers):03d}", frames.layout, task, file_bytes)
+                writers[frames.layout.digest] = writer
             writer.add(run, frames)
         for writer in writers.values():
             writer.finish()

@@ -23,7 +23,7 @@ def require_own(target: Path, files: re.Pattern[str]) -> None:
     if not os.path.lexists(target):
         return
     if target.is_symlink() or not target.is_dir():
-        raise FileError(f"'{target}' is no folder: move it away, `palpate sweep` writes a folder of this name.")
+        raise FileError(f"'{target}' is not a folder: move it away, `palpate sweep` writes a folder of this name.")
     for root, folders, names in os.walk(target):
         links = [name for name in folders if Path(root, name).is_symlink()]
         for name in sorted([*names, *links]):

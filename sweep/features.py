@@ -8,8 +8,8 @@ other gives lists in the order of its texels, whose places are in ``meta/texels.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -27,14 +27,17 @@ from ..core.io.regular_file import read_bytes
 from ..core.io.sensor_npz import SENSOR_NAME, load_sensor, unpack_sensor
 from ..core.model.digest import digest_of
 from ..core.model.recording import Recording, SensorRecording
+from ..core.model.scenario import Scenario
 from ..core.model.sensor_parameters import Painted, SensorParameters
 from ..core.model.shared_results import SharedResults
 from ..core.response import metrics
-from ..core.study.run_record import RunRecord
+from ..core.study.run_record import RunRecord, values_read
+from ..core.study.study_file import Study
 
 POSE_AXES = ("x", "y", "z", "qw", "qx", "qy", "qz")
 CHANNELS = ("normal_force", "shear_x", "shear_y")
 AXES = ("x", "y", "z")
+VARIED = "varied."
 
 
 @dataclass(frozen=True)
@@ -69,7 +72,37 @@ class Feature:
     @property
     def is_constant(self) -> bool:
         """True for what is the same in all frames of a run."""
-        return self.name.startswith("varied.")
+        return self.name.startswith(VARIED)
+
+
+TIMESTAMP = Feature("timestamp", "float32", (1,), (), "s", "Time since the first frame.")
+"""A column that LeRobot expects in every dataset."""
+
+
+@dataclass(frozen=True)
+class FrameStyle:
+    """How texels stand in a dataset.
+
+    Attributes
+    ----------
+    points : bool
+        As a list in any case, and not as a picture where they form a grid.
+    dtype : str
+        Of forces and readings: "float32" or "float16".
+    """
+
+    points: bool = False
+    dtype: str = "float32"
+
+    @classmethod
+    def of(cls, study: Study) -> FrameStyle:
+        """Return what a study asks for."""
+        return cls(study.points, "float16" if study.half_precision else "float32")
+
+
+PLAIN_STYLE = FrameStyle()
+HALF_ERROR = "Rounded to 16 bits: a relative error of 2^-11 at most, and 3e-8 absolute below 6.1e-5."
+"""Of IEEE 754's binary16: 11 digits of the mantissa, and steps of 2^-24 below 2^-14."""
 
 
 @dataclass(frozen=True)
@@ -85,31 +118,51 @@ class SensorRun:
 
 
 @dataclass(frozen=True)
+class Layout:
+    """What the frames of all runs in one dataset have in common.
+
+    Attributes
+    ----------
+    features : tuple of Feature
+    fps : float
+    texels : dict of str to Texels
+        By sensor.
+    digest : str
+        Equal for the same features, the same texels and the same rate.
+    """
+
+    features: tuple[Feature, ...]
+    fps: float
+    texels: dict[str, Texels]
+    digest: str
+
+    @cached_property
+    def frame_features(self) -> tuple[Feature, ...]:
+        """Time and features that change from frame to frame, in their order."""
+        return (TIMESTAMP, *(item for item in self.features if not item.is_constant))
+
+
+@dataclass(frozen=True)
 class RunFrames:
     """The frames of a run as columns.
 
     Attributes
     ----------
-    features : tuple of Feature
-    columns : dict of str to (F, …) ndarray or str
-        By name of the feature; a value that is the same in all frames may be a single text.
-    times : (F,) float, s
-    fps : float
-    texels : dict of str to Texels
-        By sensor.
-    layout_digest : str
-        Equal for runs whose frames may stand in one dataset: the same features, the same texels, the same rate.
+    layout : Layout
+    columns : dict of str to (F, …) ndarray
+        By the names of the layout's `frame_features`.
     """
 
-    features: tuple[Feature, ...]
-    columns: dict[str, Any]
-    times: np.ndarray
-    fps: float
-    texels: dict[str, Texels] = field(default_factory=dict)
-    layout_digest: str = ""
+    layout: Layout
+    columns: dict[str, np.ndarray]
+
+    @property
+    def rows(self) -> int:
+        """Number of frames."""
+        return len(self.columns[TIMESTAMP.name])
 
 
-def read_frames(run: RunRecord, shared: SharedResults | None = None) -> RunFrames:
+def read_frames(run: RunRecord, shared: SharedResults | None = None, style: FrameStyle = PLAIN_STYLE) -> RunFrames:
     """Read the recordings of a run.
 
     Parameters
@@ -117,6 +170,7 @@ def read_frames(run: RunRecord, shared: SharedResults | None = None) -> RunFrame
     run : RunRecord
     shared : SharedResults, optional
         Of the runs that are read one after the other.
+    style : FrameStyle
 
     Raises
     ------
@@ -128,7 +182,34 @@ def read_frames(run: RunRecord, shared: SharedResults | None = None) -> RunFrame
     sensors = {own: _read_sensor(run.folder / own, shared) for own in folder_names(run.sensors).values()}
     if not sensors:
         raise FileError(f"The run '{run.folder}' has no sensor: delete the folder and run the sweep again.")
-    return _frames(shared, sensors, run.values, f"the run '{run.folder}' is no 32-bit number: delete the run and sweep again.")
+    too_large = f"the run '{run.folder}' is too large: delete the run and sweep again."
+    return _frames(shared, sensors, run.values, too_large, style)
+
+
+def solved_frames(
+    scenario: Scenario,
+    recording: Recording,
+    numbers: RunRecord,
+    shared: SharedResults,
+    style: FrameStyle = PLAIN_STYLE,
+) -> RunFrames:
+    """Return the frames of a run as it was solved.
+
+    Raises
+    ------
+    PalpateError
+        A number of it is too large for the bits that it gets.
+    """
+    names = folder_names(recording.sensors)
+    sensors = {
+        names[own.name]: SensorRun(
+            own.texels, own.painted, recording, recording.sensors[own.name], own.parameters, own.parameters.unit
+        )
+        for own in scenario.sensors
+        if own.readout
+    }
+    advice = "leave half_precision out" if style.dtype == "float16" else "vary less widely"
+    return _frames(shared, sensors, values_read(numbers.values), f"run {numbers.index} is too large: {advice}.", style)
 
 
 def bake_frames(bake: Bake) -> RunFrames:
@@ -151,21 +232,24 @@ def bake_frames(bake: Bake) -> RunFrames:
         )
         for name, texels in bake.texels.items()
     }
-    return _frames(SharedResults(), sensors, {}, "the bake is no 32-bit number: export it as HDF5 or NPZ.")
+    return _frames(SharedResults(), sensors, {}, "the bake is too large: export it as HDF5 or NPZ.", PLAIN_STYLE)
 
 
-def _frames(shared: SharedResults, sensors: dict[str, SensorRun], varied: Mapping[str, Any], too_large: str) -> RunFrames:
-    """Return the frames of some sensors of one run; `too_large` ends the sentence about a number that 32 bits cannot hold."""
+def _frames(
+    shared: SharedResults, sensors: dict[str, SensorRun], varied: Mapping[str, Any], too_large: str, style: FrameStyle
+) -> RunFrames:
+    """Return the frames of some sensors of one run; `too_large` ends the sentence about a number that its bits cannot hold."""
     first = next(iter(sensors.values())).recording
     features: list[Feature] = []
-    columns: dict[str, Any] = {}
-    for feature, values in _all_features(varied, first, sensors):
+    columns = {TIMESTAMP.name: (first.times - first.times[0]).astype(TIMESTAMP.dtype)}
+    for feature, values in _all_features(first, sensors, style):
         features.append(feature)
-        columns[feature.name] = values if isinstance(values, str) else _narrowed(too_large, feature, values)
+        columns[feature.name] = _narrowed(too_large, feature, values)
+    features += [_varied_feature(name, value) for name, value in varied.items()]
     fps = _frame_rate(first.times)
     texels = {name: sensor.texels for name, sensor in sensors.items()}
     digest = _layout_digest(tuple(features), fps, tuple(texels), tuple(shared.of(digest_of, own) for own in texels.values()))
-    return RunFrames(tuple(features), columns, first.times - first.times[0], fps, texels, digest)
+    return RunFrames(Layout(tuple(features), fps, texels, digest), columns)
 
 
 @lru_cache(maxsize=64)
@@ -177,7 +261,7 @@ def _read_sensor(folder: Path, shared: SharedResults) -> SensorRun:
     recording = load_recording(folder / RECORDING_NAME)
     texels, painted = _read_texels(folder / SENSOR_NAME, shared)
     if len(recording.sensors) != 1 or len(recording.frames) == 0:
-        raise FileError(f"'{folder / RECORDING_NAME}' is no recording of one sensor: delete the run and sweep again.")
+        raise FileError(f"'{folder / RECORDING_NAME}' is not a recording of one sensor: delete the run and sweep again.")
     (arrays,) = recording.sensors.values()
     if arrays.normal_force.shape[1] != len(texels):
         raise FileError(f"'{folder}' holds a recording and a sensor of different runs: delete the run and sweep again.")
@@ -204,46 +288,70 @@ def _frame_rate(times: np.ndarray) -> float:
 
 def _narrowed(too_large: str, feature: Feature, values: np.ndarray) -> np.ndarray:
     """Return the values in the type that the dataset stores."""
-    if feature.dtype == "float32" and not (np.abs(values) <= np.finfo(np.float32).max).all():
-        raise FileError(f"'{feature.name}' of {too_large}")
+    if feature.dtype in ("float32", "float16") and not (np.abs(values) <= np.finfo(feature.dtype).max).all():
+        bits = feature.dtype.removeprefix("float")
+        raise FileError(f"A number of '{feature.name}' has no place in {bits} bits, {too_large}")
     return np.ascontiguousarray(values, dtype=feature.dtype)
 
 
 def _all_features(
-    varied: Mapping[str, Any], recording: Recording, sensors: dict[str, SensorRun]
-) -> Iterator[tuple[Feature, Any]]:
+    recording: Recording, sensors: dict[str, SensorRun], style: FrameStyle
+) -> Iterator[tuple[Feature, np.ndarray]]:
     for name, sensor in sensors.items():
-        yield from _texel_features(name, sensor)
+        yield from _texel_features(name, sensor, style)
         yield from _net_features(name, sensor.arrays)
     yield from _pose_features(recording)
-    for name, value in varied.items():
-        about = "What was varied; the same in all frames of a run."
-        plain = f"varied.{name.replace('/', '_')}"  # LeRobot allows no slash
-        if isinstance(value, str):
-            yield Feature(plain, "string", (1,), (), "", about), value
-        else:
-            yield Feature(plain, "float64", (1,), (), "", about), np.full(len(recording.frames), value)
 
 
-def _texel_features(name: str, sensor: SensorRun) -> Iterator[tuple[Feature, np.ndarray]]:
+def tactile_name(sensor: str) -> str:
+    """Return the column of the forces on the texels."""
+    return f"observation.tactile.{sensor}"
+
+
+def net_force_name(sensor: str) -> str:
+    """Return the column of the force on a sensor."""
+    return f"observation.net_force.{sensor}"
+
+
+def by_texel(values: np.ndarray, texels: Texels) -> np.ndarray:
+    """Return (F, rows, columns, 3) or (F, n, 3) forces in the order of the texels, (F, n, 3)."""
+    if values.ndim < 4:
+        return values
+    assert isinstance(texels.layout, GridLayout)  # which alone gives pictures
+    return values[:, texels.layout.row, texels.layout.column]
+
+
+def varied_name(name: str) -> str:
+    """Return the column of what was varied; LeRobot allows no slash."""
+    return f"{VARIED}{name.replace('/', '_')}"
+
+
+def _varied_feature(name: str, value: Any) -> Feature:
+    about = "What was varied; the same in all frames of a run."
+    return Feature(varied_name(name), "string" if isinstance(value, str) else "float64", (1,), (), "", about)
+
+
+def _texel_features(name: str, sensor: SensorRun, style: FrameStyle) -> Iterator[tuple[Feature, np.ndarray]]:
     """Yield what is recorded of each texel: forces, readings, and the truth about contact."""
     texels, arrays = sensor.texels, sensor.arrays
-    shape: tuple[int, ...] = texels.layout.shape if isinstance(texels.layout, GridLayout) else (len(texels),)
+    layout = None if style.points or not isinstance(texels.layout, GridLayout) else texels.layout
+    shape: tuple[int, ...] = (len(texels),) if layout is None else layout.shape
     names = ("row", "column") if len(shape) == 2 else ("texel",)
 
     def placed(values: np.ndarray) -> np.ndarray:
-        if not isinstance(texels.layout, GridLayout):
+        if layout is None:
             return values
         picture = np.zeros((len(values), *shape, *values.shape[2:]), values.dtype)
-        picture[:, texels.layout.row, texels.layout.column] = values
+        picture[:, layout.row, layout.column] = values
         return picture
 
     force = np.concatenate([arrays.normal_force[:, :, None], arrays.shear], axis=2)
-    about = "Forces on the texels: along the normal, and shear along the texel's x and y axes."
-    image = Feature(f"observation.tactile.{name}", "float32", (*shape, 3), (*names, "channel"), "N", about, CHANNELS)
+    error = f" {HALF_ERROR}" if style.dtype == "float16" else ""
+    about = f"Forces on the texels: along the normal, and shear along the texel's x and y axes.{error}"
+    image = Feature(tactile_name(name), style.dtype, (*shape, 3), (*names, "channel"), "N", about, CHANNELS)
     yield image, placed(force)
-    about = "Readings of the texels, in the sensor's unit."
-    yield Feature(f"observation.reading.{name}", "float32", shape, names, sensor.unit, about), placed(arrays.reading)
+    about = f"Readings of the texels, in the sensor's unit.{error}"
+    yield Feature(f"observation.reading.{name}", style.dtype, shape, names, sensor.unit, about), placed(arrays.reading)
     touch = placed(np.asarray(arrays.contact, bool))
     yield Feature(f"contact.touch.{name}", "bool", shape, names, "1", "Which texels touch something."), touch
     if sensor.parameters is not None:
@@ -254,10 +362,10 @@ def _texel_features(name: str, sensor: SensorRun) -> Iterator[tuple[Feature, np.
 
 def _net_features(name: str, arrays: SensorRecording) -> Iterator[tuple[Feature, np.ndarray]]:
     frame = "in the frame of the sensor's body"
-    yield _vector(f"observation.net_force.{name}", "N", f"Net force on the sensor, {frame}."), arrays.net_force
+    yield _vector(net_force_name(name), "N", f"Net force on the sensor, {frame}."), arrays.net_force
     about = f"Net torque on the sensor about the origin of its body, {frame}."
     yield _vector(f"observation.net_torque.{name}", "N m", about), arrays.net_torque
-    about = f"Force-weighted mean of the contact points, {frame}; zero while nothing touches."
+    about = f"Force-weighted mean of the contact points, {frame}; zero without contact."
     yield _vector(f"contact.centre_of_pressure.{name}", "m", about), arrays.centre_of_pressure
 
 

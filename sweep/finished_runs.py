@@ -5,13 +5,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 from ..core.errors import FileError, os_error_reason
 from ..core.io.regular_file import read_bytes
+from ..core.model.shared_results import SharedResults
 from ..core.study.run_files import FAILED, RUNS, STUDY_NAME, done_runs, failed_runs
 from ..core.study.run_record import RunRecord, Value, read_run_record, values_read
+from ..core.study.run_shards import ShardIndex, damaged
 from ..core.study.study_file import Run, read_study
+from .encoded_run import EncodedRun, encode_run, record_of, unpack_layout, unpack_run
+from .features import FrameStyle, Layout, read_frames
 
 UNNAMED_STUDY = "study of a tactile sensor"
 """Name of a study whose file gives none. The name of its folder does not serve, so that equal studies give equal files."""
@@ -25,6 +30,73 @@ class FailedRun:
     sentence: str
     index: int | None = None
     values: dict[str, Value] = field(default_factory=dict)
+
+
+class StoredRuns:
+    """Reads runs of a study by their digests, whether they stand in shards with others or in folders of their own.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the study.
+    """
+
+    def __init__(self, folder: Path):
+        self._runs = folder / RUNS
+        self._shared = SharedResults()
+        self._layouts: dict[str, Layout] = {}
+
+    @cached_property
+    def _shards(self) -> ShardIndex:
+        return ShardIndex(self._runs)
+
+    @cached_property
+    def _style(self) -> FrameStyle:
+        return FrameStyle.of(read_study(self._runs.parent / STUDY_NAME))
+
+    @property
+    def bytes_in_shards(self) -> int:
+        """Bytes of the runs in shards."""
+        return self._shards.size
+
+    def record(self, digest: str) -> RunRecord:
+        """Return the numbers of a run.
+
+        Raises
+        ------
+        FileError
+            It is missing or damaged.
+        """
+        if digest not in self._shards:
+            return read_run_record(self._runs / digest)
+        path = self._shards.path(digest)
+        try:
+            return record_of(lambda most: self._shards.start(digest, most), path)
+        except (ValueError, LookupError, TypeError) as error:
+            raise damaged(path) from error
+
+    def run(self, digest: str) -> tuple[RunRecord, EncodedRun]:
+        """Return a run with its frames; those of a run with a folder are encoded now.
+
+        Raises
+        ------
+        FileError
+            It is missing or damaged, or has no sensor.
+        """
+        if digest not in self._shards:
+            record = self.record(digest)
+            return record, encode_run(read_frames(record, self._shared, self._style))
+        path = self._shards.path(digest)
+        content = self._shards.read(digest)
+        try:
+            return unpack_run(content, path, self._layout)
+        except (ValueError, LookupError, TypeError) as error:
+            raise damaged(path) from error
+
+    def _layout(self, name: str) -> Layout:
+        if name not in self._layouts:
+            self._layouts[name] = unpack_layout(self._shards.common(name))
+        return self._layouts[name]
 
 
 def run_order(folder: Path, planned: Sequence[Run] = ()) -> list[tuple[int, str]]:
@@ -49,7 +121,8 @@ def run_order(folder: Path, planned: Sequence[Run] = ()) -> list[tuple[int, str]
     done = done_runs(folder)
     order = [(run.index, run.digest) for run in planned if run.digest in done]
     known = {digest for _, digest in order}
-    return sorted(order + [(read_run_record(folder / RUNS / digest).index, digest) for digest in done - known])
+    runs = StoredRuns(folder)
+    return sorted(order + [(runs.record(digest).index, digest) for digest in done - known])
 
 
 def finished_runs(folder: Path, order: list[tuple[int, str]] | None = None) -> Iterator[RunRecord]:
@@ -67,8 +140,9 @@ def finished_runs(folder: Path, order: list[tuple[int, str]] | None = None) -> I
     FileError
         As :func:`run_order`.
     """
+    runs = StoredRuns(folder)
     for _, digest in run_order(folder) if order is None else order:
-        yield read_run_record(folder / RUNS / digest)
+        yield runs.record(digest)
 
 
 def failures(folder: Path, planned: Sequence[Run] = ()) -> list[FailedRun]:

@@ -4,11 +4,14 @@
 The layout is that of `lerobot/datasets` in LeRobot 0.6 (codebase version "v3.0"): frames in ``data/chunk-000/file-000.parquet``
 and so on, runs ("episodes") in ``meta/episodes``, tasks, features and statistics in ``meta``. LeRobot itself is not needed.
 Beyond it, ``meta/texels.parquet`` says where the texels are.
+
+The frames of a run are taken over as they were encoded when it was computed; only what tells its place in the dataset is new.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,7 +22,10 @@ from ..core.geometry.layout.grid_layout import GridLayout
 from ..core.geometry.texels import Texels
 from ..core.io.file_writing import sync_file
 from ..core.study.run_record import RunRecord
-from .features import AXES, Feature, RunFrames
+from .encoded_run import EncodedRun
+from .features import AXES, TIMESTAMP, Feature, Layout, varied_name
+from .parquet_file import Chunk, ParquetFile, chunk_of, chunks_of
+from .parquet_pages import joined
 from .running_statistics import RunningStatistics
 
 if TYPE_CHECKING:
@@ -36,13 +42,9 @@ EPISODES_AT_ONCE = 10_000
 """Rows about runs that wait in memory."""
 COMPRESSION: dict[str, Any] = {"compression": "zstd", "compression_level": 3}
 
-INDEX_COLUMNS = {
-    "timestamp": "float32",
-    "frame_index": "int64",
-    "episode_index": "int64",
-    "index": "int64",
-    "task_index": "int64",
-}
+PLACE_COLUMNS = ("frame_index", "episode_index", "index", "task_index")
+"""Whole numbers that LeRobot expects in every dataset, and that tell the place of a frame in it."""
+INDEX_COLUMNS = {TIMESTAMP.name: TIMESTAMP.dtype, **dict.fromkeys(PLACE_COLUMNS, "int64")}
 """Columns that LeRobot expects in every dataset, with their types."""
 
 
@@ -53,39 +55,54 @@ class LeRobotWriter:
     ----------
     root : Path
         A folder that is empty or is made.
-    first : RunFrames
-        A run of it; the others have the same `layout_digest`.
+    layout : Layout
+        Of all its runs.
     task : str
         What LeRobot calls the task, the same for all runs.
+    file_bytes : int
+        Size from which on a file of frames is followed by the next, where it is above :data:`FILE_MEGABYTES`.
     """
 
-    def __init__(self, root: Path, first: RunFrames, task: str):
-        self._root, self._features, self._fps, self._task = root, first.features, first.fps, task
-        self._schema = _schema(first.features)
-        self._data = _FileSeries(root, DATA_PATH, self._schema, first.features)
+    def __init__(self, root: Path, layout: Layout, task: str, file_bytes: int = 0):
+        self._root, self._layout, self._task = root, layout, task
+        self._features = layout.features
+        self._data = _FrameFiles(root, _schema(layout.features), file_bytes)
         self._episodes: _FileSeries | None = None
         self._episode_rows: list[dict[str, Any]] = []
-        self._waiting: list[dict[str, Any]] = []
+        self._waiting: list[EncodedRun] = []
+        self._waiting_columns: dict[str, list[Any]] = {name: [] for name in (*PLACE_COLUMNS, *self._constants())}
         self._waiting_bytes = 0
-        self._statistics = {item.name: RunningStatistics() for item in first.features if item.dtype != "string"}
+        self._statistics = {item.name: RunningStatistics() for item in layout.features if item.dtype != "string"}
         self._statistics |= {name: RunningStatistics() for name in INDEX_COLUMNS}
         self._runs = self._frames = 0
         (root / "meta").mkdir(parents=True, exist_ok=True)
-        _write_texels(root / "meta" / "texels.parquet", first.texels)
+        _write_texels(root / "meta" / "texels.parquet", layout.texels)
 
-    def add(self, run: RunRecord, frames: RunFrames) -> None:
-        """Append the frames of a run."""
-        count = len(frames.times)
-        columns: dict[str, Any] = {
-            "timestamp": frames.times.astype(np.float32),
+    def _constants(self) -> dict[str, str]:
+        """Return names and types of what is the same in all frames of a run."""
+        return {item.name: item.dtype for item in self._features if item.is_constant}
+
+    def add(self, run: RunRecord, frames: EncodedRun) -> None:
+        """Append the frames of a run.
+
+        Raises
+        ------
+        ValueError
+            They are damaged.
+        """
+        count = frames.rows
+        columns = {
             "frame_index": np.arange(count),
             "episode_index": np.full(count, self._runs),
             "index": np.arange(self._frames, self._frames + count),
             "task_index": np.zeros(count, dtype=np.int64),
-            **frames.columns,
         }
-        self._waiting.append(columns)
-        self._waiting_bytes += sum(values.nbytes for values in columns.values() if isinstance(values, np.ndarray))
+        for name, own in columns.items():
+            self._waiting_columns[name].append(own)
+        for name, value in run.values.items():
+            self._waiting_columns[varied_name(name)] += [value] * count
+        self._waiting.append(frames)
+        self._waiting_bytes += sum(column.size for column in frames.columns)
         chunk, file = self._data.place
         episode = {
             "episode_index": self._runs,
@@ -132,17 +149,22 @@ class LeRobotWriter:
 
         if not self._waiting:
             return
-        columns: dict[str, Any] = {}
-        for name in [*INDEX_COLUMNS, *(item.name for item in self._features)]:
-            parts = [one[name] for one in self._waiting]
-            if isinstance(parts[0], str):
-                columns[name] = [part for one, part in zip(self._waiting, parts) for _ in range(len(one["index"]))]
-            else:
-                columns[name] = np.concatenate(parts)
+        constants = self._constants()
+        columns: dict[str, Any] = {
+            name: parts if name in constants else np.concatenate(parts) for name, parts in self._waiting_columns.items()
+        }
+        small = pyarrow.table(columns, _small_schema(self._data.schema, columns))
+        chunks = chunks_of(small, **COMPRESSION, **_encodings(list(constants)))
+        for name, values in columns.items():
+            if name in self._statistics:
+                self._statistics[name].add(np.asarray(values))
+        for number, feature in enumerate(self._layout.frame_features):
+            own = [run.columns[number] for run in self._waiting]
+            chunks[feature.name] = chunk_of(feature, joined(own))
+            self._statistics[feature.name].add(np.concatenate([run.decoded(feature) for run in self._waiting]))
+        self._data.write(chunks, sum(run.rows for run in self._waiting))
         self._waiting, self._waiting_bytes = [], 0
-        for name, statistics in self._statistics.items():
-            statistics.add(columns[name])
-        self._data.write(pyarrow.Table.from_batches([_batch(self._schema, self._features, columns)]))
+        self._waiting_columns = {name: [] for name in self._waiting_columns}
 
     def _flush_episodes(self) -> None:
         import pyarrow
@@ -153,13 +175,14 @@ class LeRobotWriter:
             numbers = [(name, pyarrow.int64()) for name in self._episode_rows[0] if name not in ("tasks", "digest")]
             places = [(f"meta/episodes/{kind}_index", pyarrow.int64()) for kind in ("chunk", "file")]
             texts = [("tasks", pyarrow.list_(pyarrow.string())), ("digest", pyarrow.string())]
-            self._episodes = _FileSeries(self._root, EPISODES_PATH, pyarrow.schema([*numbers, *texts, *places]), ())
+            self._episodes = _FileSeries(self._root, EPISODES_PATH, pyarrow.schema([*numbers, *texts, *places]))
         chunk, file = self._episodes.place
         rows = [{**row, "meta/episodes/chunk_index": chunk, "meta/episodes/file_index": file} for row in self._episode_rows]
         self._episodes.write(pyarrow.Table.from_pylist(rows, self._episodes.schema))
         self._episode_rows = []
 
     def _info(self) -> dict[str, Any]:
+        fps = self._layout.fps
         return {
             "codebase_version": VERSION,
             "robot_type": None,
@@ -169,7 +192,7 @@ class LeRobotWriter:
             "chunks_size": FILES_PER_CHUNK,
             "data_files_size_in_mb": FILE_MEGABYTES,
             "video_files_size_in_mb": 200,  # LeRobot's own; there are no videos
-            "fps": int(self._fps) if self._fps == int(self._fps) else self._fps,
+            "fps": int(fps) if fps == int(fps) else fps,
             "splits": {"train": f"0:{self._runs}"},
             "data_path": DATA_PATH,
             "video_path": None,
@@ -180,12 +203,46 @@ class LeRobotWriter:
         }
 
 
-class _FileSeries:
-    """Parquet files that follow each other, one when the one before has reached :data:`FILE_MEGABYTES`."""
+class _FrameFiles:
+    """Files of frames that follow each other, one when the one before has reached its size."""
 
-    def __init__(self, root: Path, pattern: str, schema: pyarrow.Schema, features: tuple[Feature, ...]):
+    def __init__(self, root: Path, schema: pyarrow.Schema, file_bytes: int):
+        self._root, self.schema, self._file_bytes = root, schema, file_bytes
+        self._number = 0
+        self._file: ParquetFile | None = None
+
+    @property
+    def place(self) -> tuple[int, int]:
+        """Numbers of the folder and of the file that is written next."""
+        return divmod(self._number, FILES_PER_CHUNK)
+
+    def write(self, chunks: dict[str, Chunk], rows: int) -> None:
+        """Write a group of rows."""
+        if self._file is None:
+            self._file = ParquetFile(_file_in(self._root, DATA_PATH, self.place), self.schema)
+        self._file.write(chunks, rows)
+        if self._file.size >= max(FILE_MEGABYTES << 20, self._file_bytes):
+            self.close()
+
+    def close(self) -> None:
+        """Finish the present file, if there is one."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+            self._number += 1
+
+    def abandon(self) -> None:
+        """Let go of the present file after an error."""
+        if self._file is not None:
+            self._file.abandon()
+            self._file = None
+
+
+class _FileSeries:
+    """Parquet files of rows about runs that follow each other, one when the one before has reached :data:`FILE_MEGABYTES`."""
+
+    def __init__(self, root: Path, pattern: str, schema: pyarrow.Schema):
         self._root, self._pattern, self.schema = root, pattern, schema
-        self._options = _encodings(features)
         self._number = 0
         self._writer: Any = None
         self._sink: Any = None
@@ -200,9 +257,9 @@ class _FileSeries:
         from pyarrow import parquet
 
         if self._writer is None:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
+            self._path = _file_in(self._root, self._pattern, self.place)
             self._sink = open(self._path, "wb")  # noqa: SIM115 -- it stays open until the file is full
-            self._writer = parquet.ParquetWriter(self._sink, self.schema, **COMPRESSION, **self._options)
+            self._writer = parquet.ParquetWriter(self._sink, self.schema, **COMPRESSION)
         self._writer.write_table(table, row_group_size=len(table))
         if self._sink.tell() >= FILE_MEGABYTES << 20:
             self.close()
@@ -224,25 +281,24 @@ class _FileSeries:
                 self._sink.close()
             self._writer = self._sink = None
 
-    @property
-    def _path(self) -> Path:
-        chunk, file = self.place
-        return self._root / self._pattern.format(chunk_index=chunk, file_index=file)
+
+def _file_in(root: Path, pattern: str, place: tuple[int, int]) -> Path:
+    """Return the path of a file of a series, whose folder is made."""
+    path = root / pattern.format(chunk_index=place[0], file_index=place[1])
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return path
 
 
-def _encodings(features: tuple[Feature, ...]) -> dict[str, Any]:
-    """Return how columns are encoded.
+def _encodings(constants: list[str]) -> dict[str, Any]:
+    """Return how small columns are encoded: numbers that count up by their differences, those that repeat by a dictionary."""
+    encodings = dict.fromkeys(("index", "frame_index"), "DELTA_BINARY_PACKED")
+    return {"use_dictionary": [*constants, "episode_index", "task_index"], "column_encoding": encodings}
 
-    The bytes of numbers that change from frame to frame are split by their place in the number, which makes them compress
-    better; of numbers that count up, the differences are stored; numbers that repeat become a dictionary.
-    """
-    if not features:
-        return {}
-    floats = [item for item in features if item.dtype == "float32"]
-    encodings = {item.name + ".list.element" * len(item.shape): "BYTE_STREAM_SPLIT" for item in floats}
-    encodings |= dict.fromkeys(("index", "frame_index"), "DELTA_BINARY_PACKED")
-    names = [item.name for item in features if item.is_constant] + ["episode_index", "task_index"]
-    return {"use_dictionary": names, "column_encoding": encodings}
+
+def _small_schema(schema: pyarrow.Schema, names: Iterable[str]) -> pyarrow.Schema:
+    import pyarrow
+
+    return pyarrow.schema([schema.field(name) for name in names])
 
 
 def _schema(features: tuple[Feature, ...]) -> pyarrow.Schema:
@@ -263,31 +319,6 @@ def _arrow_type(feature: Feature) -> pyarrow.DataType:
     for _ in feature.shape:
         kind = pyarrow.list_(kind)
     return kind
-
-
-def _batch(schema: pyarrow.Schema, features: tuple[Feature, ...], columns: dict[str, Any]) -> pyarrow.RecordBatch:
-    import pyarrow
-
-    arrays = [pyarrow.array(columns[name]) for name in INDEX_COLUMNS]
-    for feature in features:
-        values = columns[feature.name]
-        arrays.append(pyarrow.array(values, pyarrow.string()) if feature.dtype == "string" else _nested(values, feature))
-    return pyarrow.record_batch(arrays, schema=schema)
-
-
-def _nested(values: np.ndarray, feature: Feature) -> pyarrow.Array:
-    """Return (F, …) values as an array of lists of lists, without a Python object for each of them."""
-    import pyarrow
-
-    array = pyarrow.array(values.reshape(-1))
-    if feature.shape == (1,):
-        return array
-    if len(feature.shape) == 1:
-        return pyarrow.FixedSizeListArray.from_arrays(array, feature.shape[0])
-    for length in reversed(feature.shape):
-        starts = pyarrow.array(np.arange(0, len(array) + 1, length, dtype=np.int32))
-        array = pyarrow.ListArray.from_arrays(starts, array)
-    return array
 
 
 def _described(feature: Feature) -> dict[str, Any]:

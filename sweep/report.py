@@ -14,17 +14,13 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import counted
-from ..core.io.bake_folder import RECORDING_NAME, folder_names
 from ..core.io.file_writing import atomic_write
 from ..core.io.html_templates import render_html
-from ..core.io.recording_npz import load_recording
-from ..core.io.sensor_npz import SENSOR_NAME, load_sensor
 from ..core.io.temporary_folder import temporary_folder
-from ..core.study.run_files import RUNS
-from ..core.study.run_record import read_run_record
 from ..core.study.study_file import Run
 from .dependencies import LEAST_RUNS, RUNS_PER_NAME, Dependency, dependencies
-from .finished_runs import FailedRun, failures, finished_runs, run_order, study_name
+from .features import by_texel, net_force_name, tactile_name
+from .finished_runs import FailedRun, StoredRuns, failures, finished_runs, run_order, study_name
 from .report_figures import MOST_METRICS, MOST_NAMES, MOST_PARAMETERS, RunImage, draw_image_sheet, draw_small_multiples
 
 REPORT_NAME = "report.html"
@@ -147,14 +143,16 @@ def _images(folder: Path, order: list[tuple[int, str]]) -> list[RunImage]:
     """Return images of the first sensor of runs that are spread evenly over the design."""
     chosen = np.unique(np.linspace(0, len(order) - 1, min(len(order), MOST_IMAGES)).round().astype(int))
     images = []
+    runs = StoredRuns(folder)
     for index, digest in (order[i] for i in chosen):
-        run = read_run_record(folder / RUNS / digest)
-        if not run.sensors:
+        if not runs.record(digest).sensors:
             continue
-        sensor = run.folder / folder_names(run.sensors)[run.sensors[0]]
-        (recorded,) = load_recording(sensor / RECORDING_NAME).sensors.values()
-        frame = int(np.argmax(np.linalg.norm(recorded.net_force, axis=1)))
-        images.append(RunImage(f"run {index}", load_sensor(sensor / SENSOR_NAME)[0], recorded.at(frame)))
+        _, frames = runs.run(digest)
+        (sensor, texels), *_ = frames.layout.texels.items()
+        features = {item.name: item for item in frames.layout.features}
+        force = np.linalg.norm(frames.decoded(features[net_force_name(sensor)]), axis=1)
+        image = by_texel(frames.decoded(features[tactile_name(sensor)]), texels)[int(np.argmax(force))]
+        images.append(RunImage(f"run {index}", texels, image[:, 0], image[:, 1:]))
     return images
 
 

@@ -14,7 +14,6 @@ from ..core.figures.figure_canvas import new_figure, save_figure, tidy_axes
 from ..core.figures.figure_style import FONT, GREY, INK, NORMAL_COLOUR, SHEAR_COLOUR, SMALL, FigureStyle
 from ..core.figures.tactile_image import SensorView, draw_colour_bar
 from ..core.geometry.texels import Texels
-from ..core.model.recording import SensorFrame
 from ..core.response.metrics import scale_limit
 
 if TYPE_CHECKING:
@@ -39,7 +38,8 @@ class RunImage:
 
     label: str
     texels: Texels
-    frame: SensorFrame
+    normal_force: np.ndarray
+    shear: np.ndarray
 
 
 def draw_small_multiples(
@@ -158,9 +158,9 @@ def draw_image_sheet(path: Path, images: Sequence[RunImage]) -> None:
         One at least.
     """
     style = FigureStyle()
-    peak = max(float(image.frame.normal_force.max(initial=0.0)) for image in images)
-    shear = max(float(np.linalg.norm(image.frame.shear, axis=1).max(initial=0.0)) for image in images)
-    views = [SensorView.of(image.texels, image.frame.normal_force) for image in images]
+    peak = max(float(image.normal_force.max(initial=0.0)) for image in images)
+    shear = max(float(np.linalg.norm(image.shear, axis=1).max(initial=0.0)) for image in images)
+    views = [SensorView.of(image.texels, image.normal_force) for image in images]
     across = min(len(images), IMAGES_ACROSS)
     rows = -(-len(images) // across)
     cell = 1.35
@@ -173,7 +173,7 @@ def draw_image_sheet(path: Path, images: Sequence[RunImage]) -> None:
         place = (column * cell + 0.08) / width, (height - (row + 1) * (tall + 0.3) + 0.02) / height
         axes = figure.add_axes((*place, (cell - 0.16) / width, tall / height))
         drawn = view.at_size(tall / max(view.height, view.width)).draw(
-            axes, image.frame.normal_force, image.frame.shear, shear, scale_limit(peak) if peak > 0 else 1.0, style
+            axes, image.normal_force, image.shear, shear, scale_limit(peak) if peak > 0 else 1.0, style
         )
         axes.set_title(image.label, fontsize=SMALL, color=INK, pad=2)
     up = min(height - 0.3, 3.0)

@@ -7,6 +7,9 @@ from typing import Any
 
 import numpy as np
 
+BLOCK_NUMBERS = 1 << 15
+"""Numbers that are taken into account at once: 256 kB, as much as the cache of a core holds."""
+
 
 class RunningStatistics:
     """Statistics of (F, …) values over all F of all parts, for each number by itself.
@@ -16,6 +19,7 @@ class RunningStatistics:
 
     def __init__(self) -> None:
         self._count = 0
+        self._shape: tuple[int, ...] = (1,)
         self._least: Any = None
         self._most: Any = None
         self._mean: Any = None
@@ -23,12 +27,21 @@ class RunningStatistics:
 
     def add(self, values: np.ndarray) -> None:
         """Take the next part into account."""
-        part = np.asarray(values, dtype=float).reshape(len(values), *(values.shape[1:] or (1,)))
+        part = np.asarray(values).reshape(len(values), -1)
         if len(part) == 0:
             return
-        mean = part.mean(axis=0)
-        squares = np.square(part - mean).sum(axis=0)
+        self._shape = values.shape[1:] or (1,)
+        rows = max(1, BLOCK_NUMBERS // part.shape[1])
+        for at in range(0, len(part), rows):
+            self._add_block(part[at : at + rows])
+
+    def _add_block(self, part: np.ndarray) -> None:
+        """Take (F, n) values into account that fit into a processor's cache."""
         least, most = part.min(axis=0), part.max(axis=0)
+        wide = part.astype(float)
+        mean = wide.sum(axis=0) / len(part)
+        wide -= mean
+        squares = np.einsum("ij,ij->j", wide, wide)
         if self._count == 0:
             self._count, self._least, self._most, self._mean, self._squares = len(part), least, most, mean, squares
             return
@@ -43,4 +56,5 @@ class RunningStatistics:
         """Return the statistics as LeRobot's ``stats.json`` has them; the deviation is that of all values, not of a sample."""
         deviation = np.sqrt(self._squares / self._count)
         found = {"min": self._least, "max": self._most, "mean": self._mean, "std": deviation}
-        return {**{name: np.asarray(values).tolist() for name, values in found.items()}, "count": [self._count]}
+        shaped = {name: np.asarray(values, float).reshape(self._shape).tolist() for name, values in found.items()}
+        return {**shaped, "count": [self._count]}

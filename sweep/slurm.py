@@ -44,7 +44,7 @@ def options_of(words: list[str]) -> dict[str, Any]:
             advice = f"did you mean '{near[0]}=…'?" if near else f"write NAME=VALUE with {', '.join(OPTIONS)}."
             raise PalpateError(f"--slurm-option {word!r:.60} is not known: {advice}")
         if OPTIONS[name] is int and not (value.isdigit() and int(value) > 0):
-            raise PalpateError(f"--slurm-option {word!r:.60} is no whole number above zero: write {name}=4.")
+            raise PalpateError(f"--slurm-option {word!r:.60} is not a whole number above zero: write {name}=4.")
         found[name] = OPTIONS[name](value)
     return found
 

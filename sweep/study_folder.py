@@ -184,7 +184,7 @@ def resume_study(folder: Path) -> OpenStudy:
     plans, meshes = {}, frozen_meshes(study, folder)
     for entry in entries:
         if not _is_as_frozen(study, folder, entry):
-            raise FileError(f"The scene '{entry['name']}' in '{folder}' is not the one that the study began with: begin anew.")
+            raise FileError(f"The scene '{entry['name']}' in '{folder}' is not the one that the study began with: start again.")
         plans[entry["name"]] = plan_of(study, folder, entry["name"], meshes)
     return OpenStudy(folder, study, plans, runs_of(study, plans, _digests(plans, entries)))
 
@@ -217,7 +217,7 @@ def frozen_entries(study: Study, folder: Path) -> tuple[str, list[dict[str, Any]
     if not isinstance(version, str) or not isinstance(entries, list) or not entries:
         raise FileError(f"'{folder / STUDY_NAME}' is not the study of an output folder: its table [frozen] is missing or cut.")
     if not all(isinstance(entry, dict) and all(isinstance(entry.get(word), str) for word in words) for entry in entries):
-        raise FileError(f"'{folder / STUDY_NAME}' is damaged: a scene of its table [frozen] is cut; begin anew.")
+        raise FileError(f"'{folder / STUDY_NAME}' is damaged: a scene of its table [frozen] is cut; start again.")
     return version, entries
 
 
@@ -227,13 +227,13 @@ def _sources(study: Study, base: Path) -> dict[str, Path]:
     for pattern in study.scenes:
         found = sorted(glob.glob(str(base / pattern))) if glob.has_magic(pattern) else [str(base / pattern)]
         if not found:
-            raise FileError(f"No file fits the scene '{pattern}' beside the study: check its name and folder.")
+            raise FileError(f"No file next to the study matches the scene '{pattern}': check its name and folder.")
         files += [Path(path) for path in found if Path(path) not in files]
     for file in files:
         if not file.is_file():
             raise FileError(f"There is no scene '{file}': check its name; it is counted from the study's folder.")
         if study.is_job and file.suffix != program.SUFFIX:
-            raise FileError(f"The job '{file}' is no Python file: give one that ends with {program.SUFFIX}.")
+            raise FileError(f"The job '{file}' is not a Python file: give one that ends with {program.SUFFIX}.")
         if not study.is_job and file.suffix not in (BLEND, SCENARIO):
             raise FileError(f"The scene '{file}' is neither a .blend nor a scenario (.npz): give one of these.")
     stems: dict[str, Path] = {}

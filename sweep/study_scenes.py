@@ -46,5 +46,5 @@ def frozen_meshes(study: Study, folder: Path) -> StudyMeshes:
     if not isinstance(entries, list) or not all(
         isinstance(entry, dict) and all(isinstance(entry.get(word), str) for word in words) for entry in entries
     ):
-        raise FileError(f"'{folder / STUDY_NAME}' is damaged: a mesh of its table [frozen] is cut; begin anew.")
+        raise FileError(f"'{folder / STUDY_NAME}' is damaged: a mesh of its table [frozen] is cut; start again.")
     return StudyMeshes(folder / SCENES / MESHES, entries)

@@ -25,6 +25,7 @@ from typing import Any
 from ..core.errors import FileError, PalpateError
 from ..core.study.run_files import RUNS, run_batch, write_failure
 from ..core.study.run_record import RUN_NAME
+from ..core.study.run_shards import KnownRuns
 from ..core.study.study_file import Study
 from .child import DONE, FAILED, UNWRITABLE
 from .scene_evaluation import REFUSE
@@ -215,10 +216,13 @@ def compute_batch(
         failure. After an unwritable run the others are left out.
     """
     answers: list[dict[str, Any]] = []
+    done: set[str] | None = None
     while len(answers) < len(runs):
         left = runs[len(answers) :]
         try:
-            answers += _computed_group(folder, left, limits, scripts)
+            if done is None:
+                done = _done_before(folder, [str(words["digest"]) for words in runs])
+            answers += _computed_group(folder, left, done, limits, scripts)
         except FileError as error:
             answers.append({"digest": left[0]["digest"], "status": UNWRITABLE, "sentence": str(error), "seconds": 0.0})
         if answers[-1]["status"] == UNWRITABLE:
@@ -226,7 +230,22 @@ def compute_batch(
     return answers
 
 
-def _computed_group(folder: str, runs: Sequence[dict[str, Any]], limits: Limits, scripts: str) -> list[dict[str, Any]]:
+_known: dict[str, KnownRuns] = {}
+"""Runs in the shards of the study at which this worker is."""
+
+
+def _done_before(folder: str, digests: list[str]) -> set[str]:
+    """Return the runs of a batch that are done: by a worker that Dask had lost."""
+    runs = Path(folder) / RUNS
+    if folder not in _known:
+        _known.clear()
+        _known[folder] = KnownRuns(runs)
+    return _known[folder].among(digests) | {digest for digest in digests if (runs / digest / RUN_NAME).is_file()}
+
+
+def _computed_group(
+    folder: str, runs: Sequence[dict[str, Any]], done: set[str], limits: Limits, scripts: str
+) -> list[dict[str, Any]]:
     """Compute runs until it is time to bring them onto the disk; return what became of them when they are there.
 
     Their files are put into place by this process, so that one that dies on a run takes none of the earlier ones with it.
@@ -235,7 +254,7 @@ def _computed_group(folder: str, runs: Sequence[dict[str, Any]], limits: Limits,
     until = time.monotonic() + GROUP_SECONDS
     with run_batch(Path(folder)) as batch:
         for words in runs:
-            if (Path(folder) / RUNS / str(words["digest"]) / RUN_NAME).is_file():  # by a worker that Dask had lost
+            if words["digest"] in done:
                 answers.append({"digest": words["digest"], "status": DONE, "seconds": 0.0})
                 continue
             answers.append(_computed(folder, words, batch.place, limits, scripts))

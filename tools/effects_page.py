@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
@@ -17,11 +18,9 @@ INTRODUCTION = """\
 
 <!-- Written by tools/effects_page.py from core/effects; change it there. -->
 
-A real sensor does more than the base model of [model.md](model.md): foam settles, transducers trail behind the load, wires
-leak.
-Each of these phenomena is an *effect* that a sensor can be given. Most effects come in several formulas, called forms, since no
-two papers agree on one. In Blender: Physics › Palpate › Effects › *Add Effect*. In a script or a file, an effect is its name,
-its form and its values:
+An *effect* is a property of real sensors that the base model of [model.md](model.md) lacks. Most have several formulas,
+called *forms*. In Blender: Physics › Palpate › Effects › *Add Effect*. In a script or a file, an effect is its name, its form
+(by default the first) and its values:
 
 ```python
 from palpate.core.effects.engine.registry import effect
@@ -34,32 +33,29 @@ sensor = dataclasses.replace(sensor, effects=(effect("creep", amount=0.3), effec
 name = "creep"
 form = "exponential"
 amount = 0.3
-time = 2.0
 ```
 
-![What each effect does](images/effects.png)
+![Each effect in an experiment that shows it](images/effects.png)
 
-*What each effect does: the base model in grey, the forms in colour, with their default values or slightly larger ones.*
+*Base model in grey, forms in colour, with their default values or slightly larger ones.*
 
 ## Where effects act
 
-| site of action | what it changes |
+Effects act in the order of this page, whatever their order in the stack:
+
+| site | what changes |
 | --- | --- |
-| contact | the contact law itself, without memory: the forces, hence the bodies and the readings |
-| pad | the same, with a memory in each texel |
-| readout | only what the sensor reports |
+| contact | the contact law, without memory: forces, hence bodies and readings |
+| pad | the same, with a memory in each contact point: without contact creep recovers, hysteresis and adhesion reset |
+| readout | the reading only |
 
-The effects of a sensor act in the order of this page, from the contact to the reading, in whatever order they are stacked.
-Effects on readings act before the conversion `reading = zero + gain · force` (then their parameters are in newtons) or after
-it (then they are in the unit of the sensor; the defaults and bounds below are for a gain of one unit per newton and scale with
-the gain). The parameters have these names in files and scripts.
+Readout forms act on the force in newtons, or, marked †, on `reading = zero + gain · force` in the unit of the sensor; their
+defaults and bounds then scale with the gain. Forms marked ⚄ take a `seed`. Random numbers depend on seed, texel and time only:
+a frame reads the same played, baked or computed alone. Time counts from the first frame.
 
-In the formulas *fₑ* is the elastic force `k d` (or Hunt and Crossley's), to which damping is added after the effects of the
-pad; *f* is the force that results, *r* the reading, and *r₀* the reading before the effect. Effects of the pad have a memory in
-each contact point, whatever presses on it. While nothing touches, what was pressed recovers, and hysteresis and adhesion are
-reset. Random numbers depend only on the seed, the texel and the time: a frame reads the same whether it is played, baked or
-computed by itself. Time counts from the first frame. Effects on readings that have a memory take the force as linear between
-two frames.
+*fₑ* is the elastic force (`k d`, or Hunt and Crossley's), to which damping is added after the effects of the pad; *f* the
+resulting force, *r* the reading, *r₀* the reading before the effect. \\* marks one number per texel, or one for all.
+Tooltips state the bounds.
 """
 
 
@@ -67,23 +63,44 @@ def page() -> str:
     """Return the text of docs/effects.md."""
     from palpate.core.effects.engine.registry import library
 
-    parts = [INTRODUCTION]
-    for kind in library().values():
-        parts.append(f"\n## {kind.title}\n\n`{kind.name}` · {kind.site}. {kind.text}\n")
-        for form in kind.forms:
-            stage = kind.site_of(form)
-            where = f" ({stage})" if stage != kind.site else ""
-            side = ""
-            if stage == "readout":
-                side = " After the conversion." if form.after_conversion else " Before the conversion."
-            seed = " Takes a `seed`." if form.random else ""
-            parts.append(f"\n**{form.name}**{where}: {form.formula}.{side}{seed} *{form.reference}.*\n\n")
-            parts.append("| parameter | unit | default | from | to | |\n| --- | --- | ---: | ---: | ---: | --- |\n")
-            for p in form.parameters:
-                texels = " One number per texel, or one for all." if p.per_texel else ""
-                unit = "" if p.unit == "1" else p.unit
-                parts.append(f"| `{p.name}` | {unit} | {p.default:g} | {p.low:g} | {p.high:g} | {p.text}{texels} |\n")
-    return "".join(parts)
+    return "".join([INTRODUCTION, *(section(kind) for kind in library().values())])
+
+
+def section(kind) -> str:
+    """Return what the page says of one effect: formulas, parameters and the experiment that shows it."""
+    lines = [f"\n## {kind.title}\n", f"`{kind.name}` · {kind.site}. {kind.text}", f"*Shown by:* {kind.experiment}.\n"]
+    cited: set[str] = set()
+    for form in kind.forms:
+        source = source_of(form.reference, cited)
+        site = kind.site_of(form)
+        marks = f" ({site})" * (site != kind.site) + "†" * form.after_conversion + "⚄" * form.random
+        formula = " ".join(form.formula.replace(" · ", "·").split())
+        lines.append(f"- **{form.name}**{marks}: {formula}. *{source.removesuffix('.')}.*")
+    return "\n".join([*lines, "", *parameter_lines(kind)]) + "\n"
+
+
+def source_of(reference: str, cited: set[str]) -> str:
+    """Return the works and sections of a reference, without what they are cited for; of a cited one the first author."""
+    source = "; ".join(work.partition(": ")[0].replace(", section ", ", §") for work in reference.split("; "))
+    if source in cited:
+        return re.split(r",| (?=\(| et al)", source)[0]
+    cited.add(source)
+    return source
+
+
+def parameter_lines(kind) -> list[str]:
+    """Return one line for each parameter, and the forms that have it if another form gives the name another meaning."""
+    forms: dict[tuple, list[str]] = {}
+    for form in kind.forms:
+        for p in form.parameters:
+            unit = "" if p.unit == "1" else f" {p.unit}"
+            forms.setdefault((p.name, f"{p.default:g}", unit, p.text, p.per_texel), []).append(form.name)
+    names = [name for name, *_ in forms]
+    lines = []
+    for (name, default, unit, text, per_texel), having in forms.items():
+        only = f" ({', '.join(having)})" if names.count(name) > 1 else ""
+        lines.append(f"- `{name}={default}`{'*' * per_texel}{unit}{only}: {text}")
+    return lines
 
 
 # --- the picture

@@ -65,7 +65,7 @@ def _draw(press: np.ndarray, planned: np.ndarray, before: dict[str, Any], after:
         for axes in (depth, reading):
             tidy_axes(axes)
     sure = f"{plan['sure_before']:.0%} sure without it, about {plan['sure_after']:.0%} with it"
-    figure.suptitle(f"To tell {', '.join(plan['between'])} apart: {sure}", fontsize=11, x=0.07, ha="left")
+    figure.suptitle(f"To distinguish {', '.join(plan['between'])}: {sure}", fontsize=11, x=0.07, ha="left")
     figure.subplots_adjust(left=0.07, right=0.98, top=0.86, bottom=0.1, hspace=0.5, wspace=0.22)
     save_figure(figure, PICTURE, 110)
 

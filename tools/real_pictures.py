@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draw the pictures of docs/gap-real.md: python tools/real_pictures.py, after python -m benchmarks real further.
+"""Draw the pictures of benchmarks/RESULTS.md: python tools/real_pictures.py, after python -m benchmarks real further.
 
 The curves are those of the reports in build/real and build/further; the counts of the insole are read from the recordings
 (``PALPATE_REAL_DATA``).

@@ -4,7 +4,7 @@
     python tools/upload_zips.py --website https://… dist/*.zip      # into dist/upload/
 
 The platform wants a website in the manifest, source that can be reviewed and, for each platform, one zip per version. Machine
-code is therefore left out, and the version names the Python, as in 0.1.0+cp313. The zips are checked by
+code is therefore left out, and the version names the Python, as in 0.2.0+cp313. The zips are checked by
 tools/extension_rules.py. Those for a distribution's Blender (``-local``) are not for the platform.
 """
 

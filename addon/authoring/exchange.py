@@ -32,7 +32,7 @@ def put_parameters(obj, values: SensorParameters) -> None:
     if obj.library is not None:
         raise SceneError(f"'{obj.name}' is linked from '{obj.library.filepath}': change it there, or make it local first.")
     if obj.palpate.role not in {"SENSOR", "PAD"}:
-        raise SceneError(f"'{obj.name}' is no sensor: make it one with Physics › Palpate › Make Sensor first.")
+        raise SceneError(f"'{obj.name}' is not a sensor: make it one with Physics › Palpate › Make Sensor first.")
     values.check(obj.name)
     parameter_properties.put_sensor_parameters(obj.palpate, values)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Probes: keyframed balls, boxes or rods that approach a sensor, press on it, hold and leave, to try it out."""
+"""Probes: keyframed balls, boxes or rods that press on a sensor, hold and leave, to try it out."""
 
 from __future__ import annotations
 
@@ -12,11 +12,13 @@ from mathutils import Matrix, Vector
 from mathutils.bvhtree import BVHTree
 
 from ...core.errors import SensorError
-from ..session import transforms
+from ..session import fcurves, transforms
 from . import sensor_report
 
-APPROACH, PRESS, HOLD = 0.04, 0.2, 0.75
-"""Shares of the frame range at which the probe arrives, is deepest, and begins to leave."""
+PRESS, HOLD = 0.2, 0.75
+"""Shares of the frame range at which the probe is deepest, and begins to leave."""
+START = 0.02
+"""Height at the first frame, as a share of the depth: the probe touches at the second frame, or the third of a long range."""
 SIDES = 64
 MATERIAL_KEY = "palpate_probe"
 """Custom property of the material of all probes."""
@@ -123,12 +125,16 @@ def _first_contact(mesh, points: np.ndarray, size: float) -> float:
 
 
 def _animate(scene, probe, ground: np.ndarray, normal: np.ndarray, size: float, depth: float) -> None:
-    """Keyframe the probe: it approaches the ground point along the normal, presses, holds and leaves; Blender units."""
+    """Keyframe the probe: it starts just above the ground point, presses along the normal, holds and leaves; Blender units.
+
+    It moves at constant speeds, so that the start is not drawn out by an easing.
+    """
     first, length = scene.frame_start, scene.frame_end - scene.frame_start
     clear = max(2.0 * depth, 0.2 * size)
-    for share, height in ((0.0, clear), (APPROACH, 0.1 * depth), (PRESS, -depth), (HOLD, -depth), (1.0, clear)):
-        probe.location = ground + (size + height) * normal
-        probe.keyframe_insert("location", frame=round(first + share * length))
+    shares, heights = np.array([(0.0, START * depth), (PRESS, -depth), (HOLD, -depth), (1.0, clear)]).T
+    places = ground + (size + heights)[:, None] * normal
+    curves, _ = fcurves.ensure(probe, "Probe")
+    fcurves.write(curves, "location", np.round(first + shares * length).astype(int), places)
 
 
 def _mesh(shape: str, size: float):

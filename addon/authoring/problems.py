@@ -68,21 +68,25 @@ def texel_problems(obj, mesh: TriangleMesh, texels: Texels, reach: float, around
     if is_closed(body.triangles) and not mixed:
         inside = _inside(body, texels, TEST_DISTANCE * spacing)
     if inside.sum() > 0.5 * len(texels):
-        text = f"The texels of '{obj.name}' face inwards: its normals are flipped, nothing from outside is felt."
+        text = f"The texels of '{obj.name}' face inwards: its normals are flipped, so contact from outside is not measured."
         found.append(Problem("FLIPPED", text, np.flatnonzero(inside)))
     elif inside.any():
-        text = f"{inside.sum()} texels of '{obj.name}' lie inside the object and never touch anything."
+        text = f"{inside.sum()} texels of '{obj.name}' lie inside the object and cannot be in contact."
         found.append(Problem("INSIDE", text, np.flatnonzero(inside)))
     near = _overlapping(texels, spacing)
     if len(near):
-        found.append(Problem("OVERLAP", f"{len(near)} texels of '{obj.name}' lie upon another and feel the same twice.", near))
+        found.append(
+            Problem(
+                "OVERLAP", f"{len(near)} texels of '{obj.name}' coincide with another and measure the same force twice.", near
+            )
+        )
     if not inside.any() and not mixed:
         thickness = _thickness(body, texels, TEST_DISTANCE * spacing)
         thin = np.flatnonzero(thickness < reach)
         if len(thin):
             text = (
                 f"{len(thin)} texels of '{obj.name}' reach through it: the maximum penetration ({reach * 1e3:.3g} mm) is more "
-                f"than its thickness there ({thickness.min() * 1e3:.3g} mm), what touches its back would be felt in front."
+                f"than its thickness there ({thickness.min() * 1e3:.3g} mm), so contact at its back would be measured in front."
             )
             found.append(Problem("THROUGH", text, thin))
     return found
@@ -93,7 +97,7 @@ def object_problems(obj, notes: list[str]) -> list[Problem]:
     found = [Problem("MODIFIER", note) for note in notes]
     if laid_sensors.is_laid(obj):
         if obj.parent is None:
-            found.append(Problem("ORPHAN", f"'{obj.name}' has lost its parent: it stays where it is and moves with nothing."))
+            found.append(Problem("ORPHAN", f"'{obj.name}' has lost its parent: it no longer moves with an object."))
         elif laid_sensors.is_outdated(obj):
             found.append(
                 Problem("OUTDATED", f"The surface of '{obj.parent.name}' has changed since '{obj.name}' was laid on it.")
@@ -287,7 +291,7 @@ FIXES: dict[str, tuple[str, Callable]] = {
     "OVERLAP": ("Merge Them", _merge),
     "THROUGH": ("Shorten Max Penetration", _shorten),
     "MODIFIER": ("Apply Modifiers", _apply_modifiers),
-    "OUTDATED": ("Lay Anew", _lay_anew),
+    "OUTDATED": ("Lay Again", _lay_anew),
     "STILL": ("Bind to Surface", _cling),
     "ORPHAN": ("Keyframed Body", _on_its_own),
     "GROWN": ("That Is Meant", _accept),
@@ -305,11 +309,11 @@ def fix(obj, kind: str, report) -> None:
     Raises
     ------
     SensorError
-        The sensor has no such problem any more.
+        The sensor no longer has this problem.
     """
     problem = next((found for found in report.problems if found.kind == kind), None)
     if problem is None:
-        raise SensorError(f"'{obj.name}' has no such problem any more.")
+        raise SensorError(f"'{obj.name}' no longer has this problem.")
     FIXES[kind][1](obj, problem, report)
 
 

@@ -36,7 +36,7 @@ def import_file(context, path, names=()) -> tuple[list, list[str]]:
     objects : list of Object
         Those that are new, and those that got parameters.
     notes : list of str
-        What was not taken over, one sentence each.
+        What was not imported, one sentence each.
 
     Raises
     ------
@@ -167,7 +167,7 @@ def _flagged_points(mesh, name: str):
     flag.data.foreach_get("value", values)
     position = _vectors(mesh, POSITION)
     normal = _vectors(mesh, NORMAL)
-    notes = [f"'{name}': the kind and the radius of GenTact's sensors were not taken over; parameters have their defaults."]
+    notes = [f"'{name}': the kind and the radius of GenTact's sensors were not imported; parameters have their defaults."]
     if position is None:
         position = mesh_arrays.vertices(mesh)
     if normal is None:

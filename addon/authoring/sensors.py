@@ -8,8 +8,12 @@ import numpy as np
 from ...core.errors import SensorError
 from ..display import baked_scene
 from ..scene import sensor_regions
+from ..session import units
 
 GROUP_NAME = "Palpate Sensor"
+PENETRATION_SHARE, USUAL_SIZES = 0.25, (0.02, 0.1)
+"""Maximum penetration as a share of the longest side of a sensor whose side is not within `USUAL_SIZES` (m): 12 mm, the foam of
+the paper's 44 mm pad, suits those between them."""
 
 
 def automatic_source(obj, mode: str) -> str:
@@ -49,7 +53,7 @@ def make_sensor(obj, source: str, role: str = "SENSOR") -> int:
         The region has no vertices or no face. Nothing was changed then.
     """
     if obj.type != "MESH":
-        raise SensorError(f"'{obj.name}' is no mesh: convert it with Object › Convert › Mesh before it becomes a sensor.")
+        raise SensorError(f"'{obj.name}' is not a mesh: convert it with Object › Convert › Mesh before it becomes a sensor.")
     settings = obj.palpate
     if source == "SELECTION":
         chosen = selected_vertices(obj)
@@ -80,6 +84,31 @@ def make_sensor(obj, source: str, role: str = "SENSOR") -> int:
         settings.region, settings.vertex_group = "GROUP", group.name
     settings.role = role
     return int(chosen.sum())
+
+
+def follow_size(scene, obj) -> str:
+    """Set a maximum penetration that nobody has set yet after the size of the region, where the default does not suit it.
+
+    Returns
+    -------
+    str
+        What was set, as a sentence; empty where nothing was.
+    """
+    settings = obj.palpate
+    if settings.is_property_set("max_penetration") or not obj.is_editable:
+        return ""
+    places = np.empty(3 * len(obj.data.vertices), dtype=np.float32)
+    obj.data.vertices.foreach_get("co", places)
+    try:
+        chosen = places.reshape(-1, 3)[sensor_regions.region_vertices(obj, len(obj.data.vertices))]
+    except SensorError:
+        return ""  # nothing is painted yet
+    scale = np.abs(obj.matrix_world.to_scale()) * units.metres_per_unit(scene)
+    size = float((np.ptp(chosen, axis=0) * scale).max()) if len(chosen) else 0.0
+    if not size or USUAL_SIZES[0] <= size <= USUAL_SIZES[1]:
+        return ""
+    settings.max_penetration = float(f"{PENETRATION_SHARE * size:.1g}")
+    return f"The maximum penetration is {1e3 * settings.max_penetration:g} mm, a quarter of the region's {1e3 * size:.3g} mm."
 
 
 def describe_region(obj, source: str) -> dict:
@@ -145,7 +174,7 @@ def _check(obj, chosen: np.ndarray, source: str) -> None:
     reason = {
         "SELECTION": "Nothing is selected",
         "GROUP": f"No vertex has a weight of {obj.palpate.threshold:g} or more in the active vertex group",
-        "MATERIAL": "No face wears the active material",
+        "MATERIAL": "No face has the active material",
         "FACE_SET": "No face is in that face set",
         "MESH": "There are no vertices",
     }[source]

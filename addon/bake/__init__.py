@@ -2,7 +2,7 @@
 """A bake: the scene is read, its forces are computed for all frames, and the result goes into files and into the scene.
 
 :func:`.bake.bake` is the whole of it, step by step. Until its last step an earlier bake stays as it is, and a bake that was
-killed goes on where it was.
+killed continues.
 """
 
 __all__ = ["bake", "bake_checkpoint", "bake_files", "scene_writer"]

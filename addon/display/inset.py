@@ -10,6 +10,9 @@ import numpy as np
 
 from ...core.figures import color_maps
 from ...core.geometry.layout.grid_layout import GridLayout
+from ...core.geometry.layout.texture_maps import UVLayout
+from ...core.geometry.projection import Projection, projection_of
+from ...core.geometry.texels import Texels
 from ..session import redraw
 from . import bake_display
 
@@ -22,8 +25,11 @@ NO_LOAD = 1e-9
 """End of the colours (N or Pa) as long as nothing has been touched, so that no load has the colour of zero."""
 MAX_IMAGE_SIDE = 256
 """Pixels along a side of an image: larger images are subsampled, images of few texels are enlarged."""
+VIEW_SIDE = 120
+"""Pixels along the longer side of a view of a surface whose image is an atlas of single triangles."""
 COLORS = ((0.34, 0.7, 0.91), (1.0, 0.62, 0.25), (0.4, 0.85, 0.6), (0.9, 0.6, 0.8))
 BACKGROUND_COLOR, AXIS_COLOR = (0.05, 0.05, 0.06, 0.72), (1.0, 1.0, 1.0, 0.35)
+VIEW_COLOR = (1.0, 1.0, 1.0, 0.7)
 NOTE_COLOR = (1.0, 0.62, 0.1, 1.0)
 
 
@@ -40,6 +46,8 @@ class SensorInset:
         Frames so far, and the sum of the normal forces at each of them, N.
     now : float, N
         The sum of the normal forces at the present frame.
+    views : tuple of str
+        Names of the views of which the image consists, side by side; of one view that needs no name an empty string.
     """
 
     name: str
@@ -47,6 +55,7 @@ class SensorInset:
     frames: np.ndarray
     force: np.ndarray
     now: float
+    views: tuple[str, ...] = ("",)
     texture: object = None
 
 
@@ -78,7 +87,21 @@ class InsetContent:
 
 
 _contents: dict[int, InsetContent] = {}
+_projections: dict[int, tuple[Texels, Projection]] = {}
+"""By identity of the texels, which are kept with it: views of the sensors that were shown last."""
 _handle = None
+
+
+def picture_layout(texels: Texels) -> GridLayout | UVLayout | Projection:
+    """Return how the texels are laid out here: as in their tactile image, or, where that is an atlas, as seen from outside."""
+    if not getattr(texels.layout, "cell", 0):
+        return texels.layout
+    known = _projections.get(id(texels))
+    if known is None:
+        if len(_projections) >= 2 * MAX_SENSORS:
+            _projections.clear()
+        known = _projections[id(texels)] = texels, projection_of(texels, VIEW_SIDE)
+    return known[1]
 
 
 def tactile_pixels(layout, values: np.ndarray, maximum: float, color_map: str) -> np.ndarray:
@@ -114,8 +137,10 @@ def inset_content(scene, frame, texels: dict, frames: np.ndarray, loads: dict, m
     settings, insets = scene.palpate, []
     for name, own in list(texels.items())[:MAX_SENSORS]:
         forces = frame.sensors[name].normal_force
-        pixels = tactile_pixels(own.layout, bake_display.displayed_values(settings, forces, own), maximum, settings.color_map)
-        insets.append(SensorInset(name, pixels, frames, loads[name], float(forces.sum())))
+        layout = picture_layout(own)
+        pixels = tactile_pixels(layout, bake_display.displayed_values(settings, forces, own), maximum, settings.color_map)
+        views = layout.names if isinstance(layout, Projection) else ("",)
+        insets.append(SensorInset(name, pixels, frames, loads[name], float(forces.sum()), views))
     span = float(scene.frame_start), float(scene.frame_end)
     return InsetContent(insets, settings.color_map, range_label(settings, maximum), span, float(frame.frame), note)
 
@@ -159,7 +184,7 @@ def _draw() -> None:
 
 def _sizes(inset: SensorInset, scale: float) -> tuple[float, float]:
     height, width = inset.pixels.shape[:2]
-    zoom = IMAGE * scale / max(height, width)
+    zoom = IMAGE * scale / max(height, width / len(inset.views))
     return width * zoom, height * zoom
 
 
@@ -181,6 +206,8 @@ def _draw_content(content: InsetContent, canvas, x: float, top: float) -> None:
             inset.texture = _texture(inset.pixels)
         size = _sizes(inset, scale)
         canvas.image(inset.texture, at, upper - 3.0 * scale - size[1], *size)
+        for number, view in enumerate(inset.views):
+            canvas.text(at + size[0] * number / len(inset.views), upper - 1.0 * scale - size[1], view, VIEW_COLOR)
         at += width + gap
     if content.bar is None:
         colors = color_maps.colors(content.color_map, np.linspace(0.0, 1.0, 64))
@@ -207,9 +234,12 @@ def _draw_curves(content: InsetContent, canvas, x: float, y: float, width: float
             )  # the first curves are wider, so that equal curves do not hide each other
     now = x + (content.frame - first) / span * width
     canvas.line([(now, y), (now, y + height)], AXIS_COLOR, 1.0)
-    text = content.note or "normal force  " + ",  ".join(f"{inset.now:.3g} N" for inset in content.insets)
-    color = NOTE_COLOR if content.note else (1.0, 1.0, 1.0, 1.0)
-    canvas.text(x + 4.0 * scale, y + height + 3.0 * scale, text, color, width)
+    parts = [(content.note, NOTE_COLOR)] if content.note else [("sum of normals", (1.0, 1.0, 1.0, 1.0))]
+    if not content.note:
+        parts += [(f"{inset.now:.3g} N", (*color, 1.0)) for inset, color in zip(content.insets, COLORS)]
+    at = x + 4.0 * scale
+    for text, color in parts:
+        at += canvas.text(at, y + height + 3.0 * scale, text, color, x + width - at) + 8.0 * scale
 
 
 class _PixelPainter:
@@ -239,7 +269,8 @@ class _PixelPainter:
             uniforms = {"color": color, "lineWidth": width * self.scale, "viewportSize": self._viewport}
             self._batch(self._lines, "LINE_STRIP", pos=points, uniforms=uniforms)
 
-    def text(self, x, y, words: str, color, room: float | None = None) -> None:
+    def text(self, x, y, words: str, color, room: float | None = None) -> float:
+        """Draw words, cut off where there is no more `room`, and return their width."""
         import blf
 
         blf.size(0, 11.0 * self.scale)
@@ -248,6 +279,7 @@ class _PixelPainter:
         blf.color(0, *color)
         blf.position(0, x, y, 0.0)
         blf.draw(0, words)
+        return blf.dimensions(0, words)[0]
 
     @staticmethod
     def _batch(shader, kind: str, uniforms=None, **content) -> None:

@@ -62,6 +62,7 @@ def palpate_load_post(_path):
     playback.forget()
     sensor_report.forget()
     _examine_file()
+    playback.file_is_open()
     second_look.soon()
 
 

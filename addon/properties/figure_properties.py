@@ -20,12 +20,12 @@ from . import path_options
 from .scene_units import in_units
 
 KINDS = (
-    ("SCENE", "Scene", "The scene with its overlays, alone and with the tactile images beside it"),
+    ("SCENE", "Scene", "The scene with its overlays, alone and with the tactile images"),
     ("STRIP", "Strip", "Tactile images over time"),
     ("CURVES", "Curves", "Forces, slip and centre of pressure over time"),
     ("NUMBERS", "Numbers", "The number of every texel"),
     ("VIDEO", "Video", "Scene and tactile images side by side, MP4"),
-    ("GEL", "Gel", "What a camera behind the gel would see: an image for each frame, of sensors with rows and columns"),
+    ("GEL", "Gel", "Image of a camera behind the gel: one for each frame, of sensors with rows and columns"),
 )
 FORMATS = (
     ("PNG", "PNG", "Pixels"),
@@ -55,7 +55,7 @@ class PALPATE_PG_figures(bpy.types.PropertyGroup):
     )
     exports: EnumProperty(
         name="Data",
-        description="Data to write beside the figures; Shift-click adds one to those chosen",
+        description="Data to write with the figures; Shift-click adds one to those chosen",
         items=EXPORTS,
         options={"ENUM_FLAG"},
     )
@@ -103,7 +103,7 @@ class PALPATE_PG_figures(bpy.types.PropertyGroup):
     )
     camera: EnumProperty(
         name="Camera",
-        description="Where the camera stands",
+        description="Position of the camera",
         items=(
             ("FRAMED", "Framed", "Turned to the texels that carry force, as near as everything fits"),
             ("VIEW", "Direction", "In the direction given below, as near as everything fits"),

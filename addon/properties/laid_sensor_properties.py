@@ -30,7 +30,7 @@ class LengthsInUnits:
             "shift_x": ("Shift Across", "Displacement of the middle of the array along its rows"),
             "shift_y": ("Shift Along", "Displacement of the middle of the array across its rows"),
             "spacing": ("Spacing", "Distance between texels"),
-            "lift": ("Lift", "Height of the texels above the surface; they are touched so much earlier"),
+            "lift": ("Lift", "Height of the texels above the surface"),
         }
     )
 
@@ -56,7 +56,7 @@ class PALPATE_PG_skin(LengthsInUnits, bpy.types.PropertyGroup):
     )
     spacing: _length("Spacing (m)", "Distance between texels, m", default=0.002, min=1e-6)
     seed: IntProperty(name="Seed", description="Seed of the random pattern", min=0, options=set())
-    lift: _length("Lift (m)", "Height of the texels above the surface, m; they are touched so much earlier", min=0.0)
+    lift: _length("Lift (m)", "Height of the texels above the surface, m", min=0.0)
     region: StringProperty(options={"HIDDEN"})
     region_name: StringProperty(options={"HIDDEN"})
     region_number: IntProperty(options={"HIDDEN"})

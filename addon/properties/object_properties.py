@@ -23,8 +23,8 @@ from .scene_units import in_units
 ROLES = (
     ("NONE", "None", "Not part of the simulation"),
     ("SENSOR", "Sensor", "Reports the forces on its texels"),
-    ("TARGET", "Target", "Presses on sensors and pads"),
-    ("PAD", "Pad", "Soft like a sensor, but not read out: a table, the back of a finger"),
+    ("TARGET", "Target", "Can touch sensors and pads"),
+    ("PAD", "Pad", "Compliant like a sensor, without read-out: a table, the back of a finger"),
 )
 
 
@@ -49,7 +49,7 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
     schema_version: IntProperty(options={"HIDDEN"})
     uid: StringProperty(options={"HIDDEN"})
     role: EnumProperty(
-        name="Role", description="What this object does in the simulation", items=ROLES, **(FIXED | {"update": _role_changed})
+        name="Role", description="Role of the object in the simulation", items=ROLES, **(FIXED | {"update": _role_changed})
     )
 
     region: EnumProperty(
@@ -102,14 +102,14 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
     )
 
     presses: BoolProperty(
-        name="Felt by Other Sensors",
+        name="Contact with Other Sensors",
         description="Other sensors and pads also touch the surface of this one; "
         "the two soft layers share the overlap as springs in series",
         **FIXED,
     )
     contact_normals: EnumProperty(
         name="Contact Normals",
-        description="In which direction this object presses",
+        description="Direction of the contact normals",
         items=(
             ("FLAT", "Flat", "Along the normals of its triangles"),
             (
@@ -122,12 +122,12 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
     )
     body: EnumProperty(
         name="Body",
-        description="What moves this object",
+        description="Cause of the motion of this object",
         items=(
             ("KEYFRAMED", "Keyframed", "Animation, parents and constraints move it; forces do not"),
             ("FREE", "Free", "Gravity and contact forces move it, from where it is at the first frame"),
             ("DRIVEN", "Driven", "An actuator of limited force along one axis; its parent carries it. A finger of a gripper"),
-            ("PARENT", "Part of Parent", "It is fixed to its parent: what presses on it moves the parent's body"),
+            ("PARENT", "Part of Parent", "It is fixed to its parent: contact forces on it act on the parent's body"),
         ),
         **(FIXED | {"update": _body_changed}),
     )
@@ -165,13 +165,11 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
     effects: CollectionProperty(
         type=effect_stack.PALPATE_PG_effect,
         name="Effects",
-        description="What real sensors do and the base model does not",
+        description="Effects of real sensors that the base model lacks",
         override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"},
     )
 
-    measured: StringProperty(
-        name="Rig", description="Measurements of the real sensor: a rig.toml, with its CSV files beside it", **FIXED
-    )
+    measured: StringProperty(name="Rig", description="Measurements of the real sensor: a rig.toml, with its CSV files", **FIXED)
 
     made_vertices: IntProperty(options={"HIDDEN"})
     skin: PointerProperty(

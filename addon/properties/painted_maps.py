@@ -27,7 +27,7 @@ def _map(what: str, effect: str):
     """Return the property that holds the name of a map."""
     return StringProperty(
         name=what,
-        description=f"Vertex group or attribute that says, texel by texel, how much {effect}. "
+        description=f"Vertex group or attribute that gives each texel a factor of {effect}. "
         "A weight of 1 means the factor below, 0 leaves the texel as it is; an attribute holds the factors themselves",
         search=_names_of_maps,
         **FIXED,
@@ -38,7 +38,7 @@ def _factor(what: str):
     """Return the property that says what a weight of 1 means."""
     return FloatProperty(
         name="At Full Weight (×)",
-        description=f"What {what} is multiplied by where the weight is 1, no unit; 1 changes nothing",
+        description=f"Factor of {what} where the weight is 1, no unit; 1 changes nothing",
         default=0.5,
         min=0.0,
         soft_max=4.0,
@@ -50,9 +50,9 @@ def _factor(what: str):
 class PaintedProperties:
     """The painted maps of a sensor, one for each field of :class:`.Painted`."""
 
-    k_map: _map("Painted Stiffness", "stiffer or softer it is (stiffness and damping)")
+    k_map: _map("Painted Stiffness", "stiffness and damping")
     k_factor: _factor("stiffness and damping")
-    friction_map: _map("Painted Friction", "rougher or smoother it is (static and dynamic friction)")
+    friction_map: _map("Painted Friction", "static and dynamic friction")
     friction_factor: _factor("friction")
-    gain_map: _map("Painted Gain", "more or less it reports for the same force")
+    gain_map: _map("Painted Gain", "the gain")
     gain_factor: _factor("the gain")

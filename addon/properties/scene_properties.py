@@ -138,8 +138,8 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
     )
     show_indentation: BoolProperty(
         name="Indentation",
-        description="The surface of a sensor gives way by its penetration, while playing and after a bake, "
-        "so that what presses does not cut into it",
+        description="The surface of a sensor is displaced by its penetration, while playing and after a bake, "
+        "so that objects do not intersect it",
         default=True,
         **SETTING,
     )
@@ -185,10 +185,10 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
         precision=5,
         **SETTING,
     )
-    figures: PointerProperty(
-        type=figure_properties.PALPATE_PG_figures, description="What figures are made of the bake, and how"
+    figures: PointerProperty(type=figure_properties.PALPATE_PG_figures, description="Figures of the bake and their settings")
+    study: PointerProperty(
+        type=study_properties.PALPATE_PG_study, description="Varied parameters of the study and their distributions"
     )
-    study: PointerProperty(type=study_properties.PALPATE_PG_study, description="What varies in the study of the scene, and how")
     # Tells this scene from others that bake into the same folder; made at the first bake.
     scene_id: StringProperty(options={"HIDDEN"})
     # What the latest bake has left: the digest of its scenario (empty without a bake) and its id, by which the bake in the

@@ -36,14 +36,14 @@ class PALPATE_PG_study_variable(bpy.types.PropertyGroup):
     unit: StringProperty(options={"HIDDEN"})
     use: BoolProperty(name="Vary", description="Vary it in the study", default=True, options=set())
     distribution: EnumProperty(name="Distribution", description="Which values it has", items=DISTRIBUTIONS, options=set())
-    low: FloatProperty(name="Lowest", description="Lowest value, in the unit beside the name", precision=5, options=set())
+    low: FloatProperty(name="Lowest", description="Lowest value, in the unit next to the name", precision=5, options=set())
     high: FloatProperty(
-        name="Highest", description="Highest value, in the unit beside the name", default=1.0, precision=5, options=set()
+        name="Highest", description="Highest value, in the unit next to the name", default=1.0, precision=5, options=set()
     )
-    mean: FloatProperty(name="Mean", description="Mean, in the unit beside the name", precision=5, options=set())
+    mean: FloatProperty(name="Mean", description="Mean, in the unit next to the name", precision=5, options=set())
     deviation: FloatProperty(
         name="Deviation",
-        description="Standard deviation, in the unit beside the name",
+        description="Standard deviation, in the unit next to the name",
         default=1.0,
         min=0.0,
         precision=5,
@@ -105,8 +105,8 @@ class PALPATE_PG_study(bpy.types.PropertyGroup):
     )
     press_by: EnumProperty(
         name="Press by",
-        description="What is held at each press",
-        items=(("DEPTH", "Depth", "How far the target goes past the place"), ("FORCE", "Force", "Sum of normal forces")),
+        description="Controlled quantity of each press",
+        items=(("DEPTH", "Depth", "Depth of the target below the surface"), ("FORCE", "Force", "Sum of normal forces")),
         options=set(),
     )
     depth_low: _press_number("m", "Least Depth", 0.5e-3, "Least depth of a press", precision=5, step=0.01)
@@ -119,7 +119,7 @@ class PALPATE_PG_study(bpy.types.PropertyGroup):
     variables: CollectionProperty(
         type=PALPATE_PG_study_variable,
         name="What Varies",
-        description="What varies from run to run: right-click on a number and choose Vary in Study",
+        description="Parameters that vary from run to run: right-click on a number and choose Vary in Study",
     )
 
 

@@ -130,7 +130,7 @@ def draw_figures(bake: Bake, folder: Path, request: FigureRequest, frames: Seque
 
 
 def _render_pictures(scene, folder, request, bake, frames, steps) -> Job[list[Path]]:
-    """Render the frames, each alone and with the tactile images beside it; return the files."""
+    """Render the frames, each alone and with the tactile images; return the files."""
     written = []
     with _prepared_scene(scene, request, bake, frames, request.size) as show_frame:
         for number in frames:

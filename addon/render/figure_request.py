@@ -112,7 +112,7 @@ def requested_figures(scene, active=None) -> FigureRequest:
     sensors: tuple[str, ...] = ()
     if own.sensors == "ACTIVE":
         if active is None or active.palpate.role != "SENSOR":
-            raise ParameterError("The active object is no sensor: choose another, or set Figures › Sensors to All Sensors.")
+            raise ParameterError("The active object is not a sensor: choose another, or set Figures › Sensors to All Sensors.")
         sensors = (active.name,)
     if not (own.kinds or own.exports):
         raise ParameterError("Nothing is chosen: choose at least one figure in Palpate › Figures.")
@@ -159,7 +159,7 @@ def frames_of(text: str) -> tuple[int, ...]:
     for part in filter(None, re.split(r"[,;\s]+", text.strip())):
         match = re.fullmatch(r"(-?\d{1,7})(?:-(-?\d{1,7}))?", part)
         if match is None:
-            raise ParameterError(f"'{part}' in Figures › Frames is no frame: write numbers as in 12, 40-44, or peak.")
+            raise ParameterError(f"'{part}' in Figures › Frames is not a frame: write numbers as in 12, 40-44, or peak.")
         first = int(match[1])
         found += range(first, (int(match[2]) if match[2] else first) + 1)
     return tuple(dict.fromkeys(found))

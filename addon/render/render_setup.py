@@ -24,11 +24,11 @@ DEFAULT_VIEW = (-55.0, 30.0)
 MARGIN = 0.06
 """Free margin around the subjects, as a share of the picture's width and height."""
 _BACKDROP_SIZE_RATIO = 3.0
-"""An object that takes no part is a backdrop if it is larger than the subjects by this factor."""
+"""An object outside the simulation is a backdrop if it is larger than the subjects by this factor."""
 _MAX_FRAMED_FRAMES = 60
 """Number of frames, at most, at which the subjects are measured for the camera."""
 NEARBY_RATIO = 2.0
-"""An object that takes no part but touches the subjects, as a gripper's housing, is framed up to this ratio of sizes."""
+"""An object outside the simulation that touches the subjects, as a gripper's housing, is framed up to this ratio of sizes."""
 NEARBY = 0.05
 """Distance at which an object counts as touching, as a share of the subjects' size."""
 MOST_ROOM = 1.25
@@ -276,7 +276,7 @@ def _box(obj) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _backdrops(scene) -> list:
-    """Return floors and backdrops: objects that take no part, carry no subject, and are far larger than the subjects."""
+    """Return floors and backdrops: objects outside the simulation, without subjects on them and far larger than these."""
     seen = subjects(scene)
     carriers = {ancestor for obj in seen for ancestor in _ancestors(obj)}
     size = float(np.linalg.norm(np.ptp(render.bounding_box_corners(seen), axis=0))) if seen else 0.0

@@ -97,7 +97,9 @@ def controlled_sensor(obj, sensor_objects: list) -> int:
     chosen = obj.palpate.drive_sensor or obj
     if chosen in sensor_objects and chosen.palpate.role == "SENSOR":
         return sensor_objects.index(chosen)
-    raise SceneError(f"Driven body '{obj.name}' controls the force on '{chosen.name}', which is no sensor: choose its Sensor.")
+    raise SceneError(
+        f"Driven body '{obj.name}' controls the force on '{chosen.name}', which is not a sensor: choose its Sensor."
+    )
 
 
 def matrix_without_drive(matrix: np.ndarray, parent: np.ndarray, parent_now: np.ndarray) -> np.ndarray:

@@ -119,7 +119,7 @@ def sensor_arrays(obj, depsgraph) -> tuple[MeshArrays, list[str]]:
     modifiers is returned, with a warning.
     """
     if obj.type != "MESH":
-        raise SensorError(f"'{obj.name}' is no mesh: convert it with Object › Convert › Mesh before it becomes a sensor.")
+        raise SensorError(f"'{obj.name}' is not a mesh: convert it with Object › Convert › Mesh before it becomes a sensor.")
     if obj.mode == "EDIT":
         obj.update_from_editmode()
     base = read_arrays(obj.data)

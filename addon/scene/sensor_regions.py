@@ -60,7 +60,7 @@ def _faces_of_material(obj, name: str) -> np.ndarray:
     """Return which faces have a material, or had it before a heat map replaced it, (nf,) bool."""
     slots = [index for index, slot in enumerate(obj.material_slots) if slot.material is not None and slot.material.name == name]
     if not slots:
-        raise RegionError(f"Sensor '{obj.name}' wears no material '{name}': choose one in its Region panel (was it renamed?).")
+        raise RegionError(f"Sensor '{obj.name}' has no material '{name}': choose one in its Region panel (was it renamed?).")
     index = np.empty(len(obj.data.polygons), dtype=np.int32)
     obj.data.polygons.foreach_get("material_index", index)
     covered = obj.data.attributes.get(display_names.OLD_MATERIAL)

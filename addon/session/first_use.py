@@ -167,7 +167,7 @@ def _give_up(why: str) -> None:
     """Compile the solver where it is first used: the window is blocked meanwhile, but the result is the same."""
     global _gave_up
     _gave_up = True
-    print(f"Palpate could not prepare its solver beside the window; it does so at first use. {why}", file=sys.stderr)
+    print(f"Palpate could not compile its solver in the background; it compiles at first use. {why}", file=sys.stderr)
 
 
 def _poll() -> float | None:
@@ -199,7 +199,8 @@ def _change_over() -> None:
 def _show(text: str | None) -> None:
     for manager in bpy.data.window_managers:
         for window in manager.windows:
-            window.workspace.status_text_set(text)
+            with bpy.context.temp_override(window=window):  # Blender crashes without one, as just after a timer opened a file
+                window.workspace.status_text_set(text)
 
 
 def stop() -> None:

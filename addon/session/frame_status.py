@@ -20,11 +20,14 @@ class FrameStatus:
         The numbers of this frame, where there are any.
     step : str
         Why the solver chose its substep.
+    warnings : str
+        Sentences about what is wrong with the numbers; empty where nothing is.
     """
 
     text: str
     frame: Frame | None = None
     step: str = ""
+    warnings: str = ""
 
 
 _statuses: dict[int, FrameStatus] = {}
@@ -35,9 +38,9 @@ def status_of(scene) -> FrameStatus:
     return _statuses.get(scene.session_uid, FrameStatus("Not computed: go to the first frame and play."))
 
 
-def set_status(scene, text: str, frame: Frame | None = None, step: str = "") -> None:
+def set_status(scene, text: str, frame: Frame | None = None, step: str = "", warnings: str = "") -> None:
     """Replace what is known about a scene's present frame; see :class:`FrameStatus`."""
-    _statuses[scene.session_uid] = FrameStatus(text, frame, step)
+    _statuses[scene.session_uid] = FrameStatus(text, frame, step, warnings)
 
 
 def forget(scene) -> None:

@@ -108,7 +108,7 @@ def find_property(path: str) -> Found:
             found = None if found is None or hasattr(value, "bl_rna") else replace(found, index=step.index)
         before += step.text
     if found is None or value is None or hasattr(value, "bl_rna") or isinstance(value, bpy.types.bpy_prop_collection):
-        raise ParameterError(f"'{path}' is no number, switch or choice: add the name of one of its properties.")
+        raise ParameterError(f"'{path}' is not a number, switch or choice: add the name of one of its properties.")
     return found
 
 
@@ -128,7 +128,9 @@ class _Step:
 def _steps(path: str) -> Iterator[_Step]:
     """Yield the steps of a path after ``bpy.data``."""
     if not path.startswith(PREFIX):
-        raise ParameterError(f"'{path:.80}' is no path of a property: begin it with {PREFIX}, as Copy Full Data Path does.")
+        raise ParameterError(
+            f"'{path:.80}' is not the path of a property: begin it with {PREFIX}, as Copy Full Data Path does."
+        )
     at = len(PREFIX) - 1
     while at < len(path):
         step = _STEP.match(path, at)
@@ -180,7 +182,7 @@ def _described(found: Found) -> SceneProperty:
     if rna.type == "ENUM" and not rna.is_enum_flag:
         return SceneProperty(found.path, CHOICE, choices=tuple(item.identifier for item in rna.enum_items))
     if rna.type not in ("FLOAT", "INT"):
-        raise ParameterError(f"'{found.path}' is no number, switch or choice, so a study cannot vary it.")
+        raise ParameterError(f"'{found.path}' is not a number, switch or choice, so a study cannot vary it.")
     low, high = _bounds(rna.hard_min, rna.hard_max)
     kind = NUMBER if rna.type == "FLOAT" else WHOLE_NUMBER
     return SceneProperty(found.path, kind, _UNITS.get(rna.unit, ""), low, high)
@@ -190,7 +192,7 @@ def _described_custom(found: Found, value: Any) -> SceneProperty:
     if isinstance(value, bool):
         return SceneProperty(found.path, SWITCH)
     if not isinstance(value, int | float):
-        raise ParameterError(f"'{found.path}' is no number or switch, so a study cannot vary it.")
+        raise ParameterError(f"'{found.path}' is not a number or switch, so a study cannot vary it.")
     limits = found.owner.id_properties_ui(found.key).as_dict()
     low, high = _bounds(limits.get("min", -inf), limits.get("max", inf))
     return SceneProperty(found.path, NUMBER if isinstance(value, float) else WHOLE_NUMBER, "", low, high)

@@ -42,7 +42,7 @@ def sweep_command() -> list[str]:
     chosen = bpy.path.abspath(command_in_preferences())
     if chosen:
         if not (os.path.isfile(chosen) and os.access(chosen, os.X_OK)):
-            raise FileError(f"'{chosen}' is no command: choose the file palpate under Preferences › Add-ons › Palpate.")
+            raise FileError(f"'{chosen}' is not a command: choose the file palpate under Preferences › Add-ons › Palpate.")
         return [chosen, "sweep"]
     root = __package__.removesuffix(".addon.study")
     has_sweep = importlib.util.find_spec(f"{root}.sweep") and importlib.util.find_spec("distributed")

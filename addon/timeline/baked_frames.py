@@ -53,7 +53,7 @@ def show(scene, depsgraph) -> None:
         text, note = "The scene has changed since this bake. Bake again.", "out of date: bake again"
     sensors = recording.at(number).sensors
     frame = Frame(number, 0.0, sensors, poses=np.zeros((0, 7)), velocities=np.zeros((0, 6)))
-    frame_status.set_status(scene, text, frame, recording.step_reason)
+    frame_status.set_status(scene, text, frame, recording.step_reason, " ".join(recording.warnings))
     if not bpy.app.background:
         _show_in_views(scene, frame, note)
 

@@ -163,6 +163,19 @@ def compute_to_present_frame(scene) -> Generator[Progress, None, None]:
             session_state.session.catching_up = False
 
 
+def file_is_open() -> None:
+    """Compute up to the present frame of a file that was saved at a later one than its first."""
+    if not bpy.app.background:
+        bpy.app.timers.register(_compute_opened_file, first_interval=0.1)
+
+
+def _compute_opened_file() -> None:
+    """Timer after a file was opened."""
+    scene = bpy.context.scene
+    if scene is not None and scene.frame_current > scene.frame_start:
+        _offer_to_compute()
+
+
 def _offer_to_compute() -> None:
     """Timer after a jump on the timeline: compute the missing frames with progress. The handler itself must return at once."""
     scene = bpy.context.scene
@@ -225,7 +238,7 @@ def show(scene, run) -> None:
             _write_force(obj, sensor.texels.vertex, frame.sensors[sensor.name].normal_force)
     overlays.show(scene, run, frame)
     warnings = run.reading.warnings + tuple(run.simulation.warnings)
-    frame_status.set_status(scene, " ".join(warnings) or f"Frame {number} computed.", frame, run.simulation.step_reason)
+    frame_status.set_status(scene, f"Frame {number} computed.", frame, run.simulation.step_reason, " ".join(warnings))
 
 
 def _place(run, obj, placement, index: int, number: int, part: float) -> None:

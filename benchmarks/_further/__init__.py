@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Further public recordings of real sensors, a model made by hand for each, and a learned one (docs/gap-real.md)."""
+"""Further public recordings of real sensors, a model made by hand for each, and a learned one (benchmarks/RESULTS.md)."""

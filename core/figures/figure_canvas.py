@@ -62,7 +62,7 @@ def file_type(path: str | Path) -> str:
     path = Path(path)
     kind = path.suffix.lstrip(".").lower()
     if kind not in FILE_TYPES:
-        raise ParameterError(f"'{path.name}' is no figure that can be written: end its name with .png, .pdf or .svg.")
+        raise ParameterError(f"'{path.name}' is not a figure that can be written: end its name with .png, .pdf or .svg.")
     return kind
 
 

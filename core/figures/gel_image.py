@@ -138,7 +138,7 @@ def gel_pixels(sensor: SensorFrame, texels: Texels, name: str, sigma0: float, st
     style = style or GelStyle()
     require_grid(texels, name)
     if not (np.isfinite(sensor.depth).all() and np.isfinite(sensor.shear).all()):
-        raise SensorError(f"The bake of sensor '{name}' has depths or shear that are no numbers: bake again.")
+        raise SensorError(f"The bake of sensor '{name}' has depths or shear that are not numbers: bake again.")
     light = _shaded(sensor, texels, style)
     if style.markers:
         light *= _marker_albedo(sensor, texels, name, sigma0, style)[:, :, None]

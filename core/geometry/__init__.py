@@ -2,9 +2,10 @@
 """Geometry: triangle meshes, texels on them, contact points of texels, and the images that texels become.
 
 :mod:`.mesh` checks meshes and computes their normals, areas and mass properties; :mod:`.bvh` finds where segments meet them.
-:mod:`.texels` makes texels of a region's vertices. :mod:`.layout` arranges texels as images, and :mod:`.sampling` places texels
-on a surface that has none. :mod:`.point_surface` joins points of a surface by triangles. :mod:`.smooth_grid` is the smooth
-surface of penetration between texels in rows and columns, :mod:`.smooth_mesh` that between texels on any faces.
+:mod:`.texels` makes texels of a region's vertices, and :mod:`.projection` shows them from outside. :mod:`.layout` arranges
+texels as images, and :mod:`.sampling` places texels on a surface that has none. :mod:`.point_surface` joins points of a
+surface by triangles. :mod:`.smooth_grid` is the smooth surface of penetration between texels in rows and columns,
+:mod:`.smooth_mesh` that between texels on any faces.
 """
 
 __all__ = [
@@ -13,8 +14,10 @@ __all__ = [
     "layout",
     "mesh",
     "point_surface",
+    "projection",
     "rotations",
     "sampling",
+    "shapes",
     "smooth_grid",
     "smooth_mesh",
     "texels",

@@ -35,7 +35,7 @@ def read_checksums(path: Path) -> Iterator[tuple[str, str]]:
             while line := file.readline(_LONGEST_LINE):
                 found = _LINE.fullmatch(line)
                 if found is None:
-                    raise FileError(f"'{path}' is damaged (a line is no SHA-256 with a name): bake again.")
+                    raise FileError(f"'{path}' is damaged (a line is not a SHA-256 with a name): bake again.")
                 yield found[2].decode("ascii"), found[1].decode("ascii")
     except FileNotFoundError:
         raise FileError(f"'{path}' is missing from the bake: bake again.") from None

@@ -292,7 +292,7 @@ def require_name(path: str | os.PathLike) -> None:
     """Raise FileError if no file can have this name: an empty one would be the present folder."""
     name = os.fspath(path)
     if not name.strip() or "\0" in name:
-        raise FileError(f"{name!r} is no name of a file or a folder: give another.")
+        raise FileError(f"{name!r} is not the name of a file or a folder: give another.")
 
 
 def _require_folder(folder: Path) -> None:

@@ -30,7 +30,7 @@ def load_mesh(path: str | os.PathLike) -> TriangleMesh:
 
     name, suffix = Path(path).name, Path(path).suffix.lower()
     if suffix not in SUFFIXES:
-        raise FileError(f"'{path}' is no mesh file: give one that ends with {', '.join(SUFFIXES)}.")
+        raise FileError(f"'{path}' is not a mesh file: give one that ends with {', '.join(SUFFIXES)}.")
     try:
         with open_regular(path) as file:
             loaded = trimesh.load_mesh(file, file_type=suffix[1:], process=False)

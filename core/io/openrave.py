@@ -87,7 +87,7 @@ def _sensor(path: str | os.PathLike, attached: ElementTree.Element) -> OpenRaveS
             values[key] = float((child.text or "").strip())
         except ValueError as error:
             raise FileError(
-                f"<{key}> of sensor '{name}' in '{path}' is '{child.text or '':.60}', which is no number: correct it."
+                f"<{key}> of sensor '{name}' in '{path}' is '{child.text or '':.60}', which is not a number: correct it."
             ) from error
     missing = tuple(key for key in (THICKNESS, *NUMBERS) if key not in values)
     if THICKNESS in values:

@@ -47,7 +47,7 @@ def read_xml(path: str | os.PathLike, what: str) -> ElementTree.Element:
     except (ElementTree.ParseError, ValueError) as error:
         line = getattr(error, "position", (1, 0))[0]
         raise FileError(
-            f"Line {line} of '{path}' is no XML ({error}): a tag may have no space behind its '<' and must be closed."
+            f"Line {line} of '{path}' is not XML ({error}): a tag may have no space behind its '<' and must be closed."
         ) from error
 
 

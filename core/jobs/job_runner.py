@@ -10,7 +10,9 @@ from typing import Generic
 from .progress import Job, Progress, Result
 
 SLICE = 0.1
-"""Seconds of work between two looks at the keyboard."""
+"""Seconds of work between two looks at the keyboard, where the window draws quickly."""
+LONGEST_SLICE = 1.0
+"""Seconds of work at most, where the window draws slowly: as long as it draws, so that drawing takes half of the time."""
 
 
 def run_job(job: Job[Result], on_progress: Callable[[Progress], None] | None = None) -> Result:
@@ -72,17 +74,24 @@ class SlicedJob(Generic[Result]):
         self.is_done = False
         self.result: Result | None = None
         self.progress: Progress | None = None
+        self._rested_since = time.monotonic()
 
-    def work(self, seconds: float = SLICE) -> None:
-        """Run at least one step, and more until this time has passed."""
-        end = time.monotonic() + seconds
+    def work(self, seconds: float | None = None) -> None:
+        """Run at least one step, and more until this time has passed; by default as long as the pause since the last slice.
+
+        That time is at least :data:`SLICE` and at most :data:`LONGEST_SLICE`.
+        """
+        begin = time.monotonic()
+        if seconds is None:
+            seconds = min(max(begin - self._rested_since, SLICE), LONGEST_SLICE)
         while not self.is_done:
             try:
                 self.progress = next(self._job)
             except StopIteration as stop:
                 self.is_done, self.result = True, stop.value
-            if time.monotonic() >= end:
-                return
+            if time.monotonic() >= begin + seconds:
+                break
+        self._rested_since = time.monotonic()
 
     def cancel(self) -> None:
         """Stop the job, which removes what it has begun."""

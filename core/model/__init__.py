@@ -13,6 +13,7 @@ __all__ = [
     "digest",
     "drive",
     "effect",
+    "mode",
     "motion",
     "parameter",
     "pose_interpolation",

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .drive import Drive
+from .mode import Mode
 from .motion import Motion
 
 
@@ -42,6 +43,11 @@ class Body:
     drive: Drive | None = None
 
     @property
+    def mode(self) -> Mode:
+        """What moves the body."""
+        return Mode.FREE if self.free else Mode.DRIVEN if self.drive is not None else Mode.KEYFRAMED
+
+    @property
     def moved_by_forces(self) -> bool:
         """True when forces change the path of the body: it is free or driven."""
-        return self.free or self.drive is not None
+        return self.mode != Mode.KEYFRAMED

@@ -49,20 +49,20 @@ class Drive:
     axis_in_world: bool = False
     # fmt: off
     stiffness: float = specified(Parameter(
-        "stiffness", "N/m", 1e5, 0.0, inf, "Position control: force per metre that is lacking", label="Stiffness"))
+        "stiffness", "N/m", 1e5, 0.0, inf, "Position control: force per metre of error", label="Stiffness"))
     damping: float = specified(Parameter(
-        "damping", "N·s/m", 1e3, 0.0, inf, "Force for each m/s that is lacking", above_low=True, label="Damping"))
+        "damping", "N·s/m", 1e3, 0.0, inf, "Force per m/s of error", above_low=True, label="Damping"))
     max_force: float = specified(Parameter(
         "max_force", "N", 40.0, 0.0, inf, "Largest force of the drive", label="Max Force"))
     max_speed: float = specified(Parameter(
-        "max_speed", "m/s", 0.05, 0.0, inf, "Largest speed that the drive asks for", above_low=True, label="Max Speed",
+        "max_speed", "m/s", 0.05, 0.0, inf, "Largest speed that the drive commands", above_low=True, label="Max Speed",
         note="Force control approaches with it"))
     sensor: int = -1
     settling: float = specified(Parameter(
-        "settling", "s", 0.1, 0.0, inf, "Force control: time in which the rest is made up", above_low=True, label="Settling",
-        note="Longer than the foam swings"))
+        "settling", "s", 0.1, 0.0, inf, "Force control: time constant of the error", above_low=True, label="Settling",
+        note="Longer than the foam's oscillation"))
     period: float = specified(Parameter(
-        "period", "s", 1e-3, 0.0, inf, "Force control: time between two looks at the sensor", above_low=True))
+        "period", "s", 1e-3, 0.0, inf, "Force control: sampling period of the sensor", above_low=True))
     # fmt: on
     leader: int | None = None
 

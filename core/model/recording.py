@@ -46,7 +46,7 @@ class SensorArrays:
     net_torque : (3,) float, N·m
         About the origin of the sensor's body.
     centre_of_pressure : (3,) float, m
-        Force-weighted mean of the contact points; zero while nothing touches.
+        Force-weighted mean of the contact points; zero without contact.
     """
 
     normal_force: np.ndarray

@@ -63,7 +63,7 @@ class SensorParameters:
         "sigma1", "N·s/m", 0.1, 0.0, inf, "Bristle damping",
         label="Bristles", symbol="σ1", source="Eq. 13", group=FRICTION, xml_place=4, note="Table 2: 0.1"))
     x0: float = specified(Parameter(
-        "x0", "m/s", 0.3, 0.0, inf, "Stribeck velocity: speed at which static friction gives way to dynamic",
+        "x0", "m/s", 0.3, 0.0, inf, "Stribeck velocity: speed at which static friction changes to dynamic",
         above_low=True, label="Stribeck", symbol="x0", source="Eq. 10", group=FRICTION, xml_place=5, fit_place=4,
         note="Table 2: 0.3"))
     mus: float = specified(Parameter(
@@ -75,19 +75,19 @@ class SensorParameters:
         label="Dynamic Friction", symbol="μd", source="Eq. 12", group=FRICTION, xml_place=8, fit_place=2,
         note="Foam on metal: 0.23"))
     max_penetration: float = specified(Parameter(
-        "max_penetration", "m", 0.012, 0.0, inf, "Depth past which a texel no longer acts",
+        "max_penetration", "m", 0.012, 0.0, inf, "Depth beyond which a texel exerts no force",
         above_low=True, label="Max Penetration", group=CONTACT,
         note="About twice the thickness of the foam (section 3.3.3): 0.012 for 6 mm"))
     normal_law: str = specified(ChoiceParameter(
-        "normal_law", LINEAR, NORMAL_LAWS, "How the normal force follows from depth and its rate",
+        "normal_law", LINEAR, NORMAL_LAWS, "Normal force as a function of depth and its rate",
         label="Normal Law", group=CONTACT))
     exponent: float = specified(Parameter(
         "exponent", "1", 1.5, 1.0, 4.0, "Power of the depth",
         label="Exponent", symbol="p", source="Hunt–Crossley", group=CONTACT, note="k then is in N/mᵖ. Hertz: 1.5"))
     dissipation: float = specified(Parameter(
-        "dissipation", "s/m", 0.2, 0.0, inf, "What an impact loses",
+        "dissipation", "s/m", 0.2, 0.0, inf, "Energy loss of an impact",
         label="Dissipation", symbol="α", source="Hunt–Crossley", group=CONTACT,
-        note="A slow impact at v m/s leaves with the share 1 - α v"))
+        note="Restitution of a slow impact at v m/s: 1 - α v"))
     points_per_texel: int = specified(ChoiceParameter(
         "points_per_texel", 1, CONTACT_POINTS,
         "Points per texel, spread over its cell; they share its stiffness. More points are slower, and make the force and "
@@ -174,7 +174,7 @@ class Painted:
                 continue
             if values.shape != (count,):
                 raise ParameterError(
-                    f"The painted {item.name} of sensor '{name}' has {len(values)} values for {count} texels: paint it anew."
+                    f"The painted {item.name} of sensor '{name}' has {len(values)} values for {count} texels: paint it again."
                 )
             lowest = 0.0 if item.name == "friction" else np.nextafter(0.0, 1.0)
             if not (np.isfinite(values).all() and values.min(initial=1.0) >= lowest):

@@ -11,7 +11,7 @@ from .deformation import Deformation
 
 @dataclass(frozen=True)
 class Target:
-    """A surface that presses on sensors.
+    """A surface that sensors can be in contact with.
 
     Attributes
     ----------

@@ -131,7 +131,7 @@ class MagneticSkin:
                 f"give (T, {texels}, 3)."
             )
         if not np.isfinite(displacement).all():
-            raise ParameterError("The displacements hold values that are no numbers: give metres for each texel and frame.")
+            raise ParameterError("The displacements have values that are not numbers: give metres for each texel and frame.")
         numbers = len(self.magnets.place) * len(self.magnetometers.place)
         step = max(1, BLOCK_NUMBERS // max(numbers, 1))
         parts = [self._seen(self.places(displacement[i : i + step])) for i in range(0, len(displacement), step)]

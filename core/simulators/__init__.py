@@ -3,7 +3,8 @@
 
 A new format is one new module in :mod:`.formats` that defines a ``FORMAT``; the command line, the menus and the checks take it
 from there. :mod:`.pressed_sensor` computes Palpate's forces inside the loop of another simulator, and :mod:`.pressed_sensors`
-those of many environments. :mod:`.probe_list` has all that they need of a sensor.
+those of many environments. :mod:`.warp` does the same as :mod:`.pressed_sensors` on Warp, also on a GPU.
+:mod:`.probe_list` has all that they need of a sensor.
 """
 
-__all__ = ["pressed_sensor", "pressed_sensors", "probe_list", "registry", "sensor_format", "sensor_on_mesh"]
+__all__ = ["pressed_sensor", "pressed_sensors", "probe_list", "registry", "sensor_format", "sensor_on_mesh", "warp"]

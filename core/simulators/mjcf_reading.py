@@ -100,7 +100,7 @@ def _pose(model: _Model, element: ElementTree.Element) -> np.ndarray:
             turn = Rotation.from_rotvec((np.radians(angle) if model.degrees else angle) * np.array(axis) / np.linalg.norm(axis))
         elif element.get("xyaxes") is not None or element.get("zaxis") is not None:
             model.notes.append(
-                f"The rotation of <{element.tag} name='{element.get('name', '')}'> by its axes was not taken over."
+                f"The rotation of <{element.tag} name='{element.get('name', '')}'> by its axes was not imported."
             )
     except ValueError as error:  # a quaternion of length zero
         raise FileError(f"The rotation of <{element.tag}> in '{model.path}' is none ({error}): correct it.") from error
@@ -118,7 +118,7 @@ def _tactile(model: _Model, sensor: ElementTree.Element, number: int) -> FoundSe
     if place is None:
         raise FileError(f"Sensor '{name}' in '{model.path}' names the geom '{sensor.get('geom', '')}', which is not there.")
     position, normal, faces = _mesh_arrays(model, mesh, name)
-    notes = [*model.notes, f"'{name}': MuJoCo's geoms, contact and joints were not taken over; parameters have their defaults."]
+    notes = [*model.notes, f"'{name}': MuJoCo's geoms, contact and joints were not imported; parameters have their defaults."]
     frame = place[1]
     return FoundSensor(
         name, position, normal, faces, frame_position=frame[:3, 3], frame_quaternion=quaternion_of(frame[:3, :3]), notes=notes
@@ -142,7 +142,7 @@ def _mesh_arrays(model: _Model, mesh: ElementTree.Element, name: str) -> tuple[n
     position = values.reshape(-1, 3) * vector_in(path, mesh, "scale", "1 1 1") - vector_in(path, mesh, "refpos", "0 0 0")
     corners, normals = numbers_in(path, mesh, "face", ""), numbers_in(path, mesh, "normal", "")
     if len(corners) % 3 or (corners % 1).any():
-        raise FileError(f"The faces of '{name}' in '{path}' are no triples of whole numbers: correct them.")
+        raise FileError(f"The faces of '{name}' in '{path}' are not triples of whole numbers: correct them.")
     per_vertex = len(normals) // len(values) if len(normals) % len(values) == 0 else 0
     if len(normals) and per_vertex not in (1, 3):
         raise FileError(f"The mesh of '{name}' in '{path}' has {len(normals) // 3} normals for {len(position)} vertices.")
@@ -186,7 +186,7 @@ def _touch_grid(model: _Model, sensor: ElementTree.Element, number: int) -> Foun
     notes = [
         *model.notes,
         f"'{name}': a touch_grid has directions and no surface; its texels are on a sphere of the site's size, {radius:g} m.",
-        f"'{name}': MuJoCo's geoms, contact and joints were not taken over; parameters have their defaults.",
+        f"'{name}': MuJoCo's geoms, contact and joints were not imported; parameters have their defaults.",
     ]
     grid = np.arange(len(row)).reshape(int(rows), int(columns))
     corners = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=-1).reshape(-1, 4)

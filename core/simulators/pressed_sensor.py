@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import ParameterError
 from ..geometry.mesh import TriangleMesh
+from ..geometry.shapes import Shape
 from ..model.recording import SENSOR_FIELDS, SensorFrame
 from ..solver.pressed_model import PressedModel
 from ..solver.pressing import PressedTexels, StepMemory, begin_at
@@ -47,8 +48,8 @@ class PressedSensor:
     ----------
     item : SensorOnMesh
         As :func:`.read_probe_list` or :func:`.sensors_on_meshes` returns it.
-    target : TriangleMesh or sequence of TriangleMesh
-        Each in the frame of what presses, metres.
+    target : TriangleMesh or Shape, or a sequence of them
+        Each in the frame of what presses, metres. Contacts with a shape (sphere, box, capsule, plane) are in closed form.
     dt : float, seconds
         Step of the other program.
     sensor_pose : Pose
@@ -81,14 +82,14 @@ class PressedSensor:
     def __init__(
         self,
         item: SensorOnMesh,
-        target: TriangleMesh | Sequence[TriangleMesh],
+        target: TriangleMesh | Shape | Sequence[TriangleMesh | Shape],
         dt: float,
         sensor_pose: Pose,
         target_pose: Pose | Sequence[Pose],
         threads: int | None = None,
     ):
-        self._one_target = isinstance(target, TriangleMesh)
-        targets = [target] if isinstance(target, TriangleMesh) else list(target)
+        self._one_target = isinstance(target, TriangleMesh | Shape)
+        targets = [target] if isinstance(target, TriangleMesh | Shape) else list(target)
         model = self._model = PressedModel(item.sensor, targets, dt, threads)
         out = self._out = PressedTexels.zero(1, model.texels, len(targets))
         memory = self._memory = StepMemory.zero(model.texels, len(targets))
@@ -200,7 +201,7 @@ class PressedSensor:
             load = np.zeros(0)
         if load.shape not in ((1,), (3,), (6,)) or not np.isfinite(load).all():
             raise ParameterError(
-                "The wrench is no 1, 3 or 6 finite numbers: give a normal force, a force, or force and torque."
+                "The wrench is not 1, 3 or 6 finite numbers: give a normal force, a force, or force and torque."
             )
         if self._balance is None:
             self._balance = LoadBalance(self._model, self._out, self._environments, self._press)
@@ -238,4 +239,6 @@ class PressedSensor:
     def _no_pose(self, number: int) -> ParameterError:
         """Return the error for a body whose pose is none."""
         whose = "sensor" if number == 0 else "target" if self._one_target else f"target {number}"
-        return ParameterError(f"The pose of the {whose} is no position and quaternion of finite numbers: check its simulation.")
+        return ParameterError(
+            f"The pose of the {whose} is not a position and quaternion of finite numbers: check its simulation."
+        )

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import ParameterError
 from ..geometry.mesh import TriangleMesh
+from ..geometry.shapes import Shape
 from ..solver.pressed_model import PressedModel
 from ..solver.pressing import PressedTexels, Presser, StepMemory
 from .load_balance import LoadBalance
@@ -57,7 +58,7 @@ class Contacts:
             return ""
         which = ", ".join(map(str, bad[:8])) + (" …" if len(bad) > 8 else "")
         return (
-            f"{len(bad)} of {len(self.valid)} environments have a pose that is no position and quaternion of finite numbers "
+            f"{len(bad)} of {len(self.valid)} environments have a pose that is not a position and quaternion of finite numbers "
             f"({which}): reset them in the simulation."
         )
 
@@ -72,8 +73,8 @@ class PressedSensors:
     ----------
     item : SensorOnMesh
         As :func:`.read_probe_list` or :func:`.sensors_on_meshes` returns it.
-    target : TriangleMesh or sequence of TriangleMesh
-        Each in the frame of what presses, metres.
+    target : TriangleMesh or Shape, or a sequence of them
+        Each in the frame of what presses, metres. Contacts with a shape (sphere, box, capsule, plane) are in closed form.
     dt : float, seconds
         Step of the other program.
     environments : int
@@ -100,15 +101,15 @@ class PressedSensors:
     def __init__(
         self,
         item: SensorOnMesh,
-        target: TriangleMesh | Sequence[TriangleMesh],
+        target: TriangleMesh | Shape | Sequence[TriangleMesh | Shape],
         dt: float,
         environments: int,
         threads: int | None = None,
     ):
         if environments < 1:
             raise ParameterError(f"There are {environments} environments: ask for one at least.")
-        self._one_target = isinstance(target, TriangleMesh)
-        targets = [target] if isinstance(target, TriangleMesh) else list(target)
+        self._one_target = isinstance(target, TriangleMesh | Shape)
+        targets = [target] if isinstance(target, TriangleMesh | Shape) else list(target)
         model = self._model = PressedModel(item.sensor, targets, dt, 1)
         n = model.texels
         _check_memory(environments, model.bytes_of_environment() + n * BYTES_OF_TEXEL)

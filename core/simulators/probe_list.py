@@ -89,9 +89,9 @@ def _read_json(path: str | os.PathLike) -> dict[str, Any]:
     try:
         content = json.loads(text.decode("utf-8"))
     except (ValueError, RecursionError) as error:
-        raise FileError(f"'{path}' is no JSON ({str(error)[:80]}): export it again.") from error
+        raise FileError(f"'{path}' is not JSON ({str(error)[:80]}): export it again.") from error
     if not isinstance(content, dict):
-        raise FileError(f"'{path}' is no probe list: give a file that 'palpate sensor export --to probes' wrote.")
+        raise FileError(f"'{path}' is not a probe list: give a file that 'palpate sensor export --to probes' wrote.")
     return content
 
 
@@ -101,13 +101,13 @@ def _sensor_of(content: Mapping[str, Any]) -> SensorOnMesh:
     name = checked_name(content.get("sensor"), "the file")
     words = content.get("parameters", {})
     if not isinstance(words, Mapping):
-        raise FileError("Its parameters are no table: export it again.")
+        raise FileError("Its parameters are not a table: export it again.")
     known_words(words, SENSOR_PARAMETERS, "parameters")
     parameters = SensorParameters(**stated_parameters(words, "parameters"))
     parameters.check(name)
     entries = content.get("effects", [])
     if not isinstance(entries, list) or not all(isinstance(entry, Mapping) for entry in entries):
-        raise FileError("Its effects are no list of tables: export it again.")
+        raise FileError("Its effects are not a list of tables: export it again.")
     effects = tuple(from_dict(entry, parameters.gain) for entry in entries)
     position = _array(content, "position", (-1, 3))
     count = len(position)
@@ -134,7 +134,7 @@ def _texels(content: Mapping[str, Any], mesh: TriangleMesh) -> Texels:
     wrong = np.abs(np.einsum("ij,ij->i", normal, normal) - 1.0) + np.abs(np.einsum("ij,ij->i", tangent, tangent) - 1.0)
     wrong += np.abs(np.einsum("ij,ij->i", normal, tangent))
     if wrong.max() > 4 * UNIT_LENGTH:
-        raise FileError(f"Normal and tangent of texel {wrong.argmax()} are no unit vectors at right angles: export it again.")
+        raise FileError(f"Normal and tangent of texel {wrong.argmax()} are not orthogonal unit vectors: export it again.")
     if area.min() < 0:
         raise FileError(f"The area of texel {area.argmin()} is below zero: export it again.")
     layout: Any
@@ -154,7 +154,7 @@ def _array(content: Mapping[str, Any], name: str, shape: tuple[int, ...]) -> np.
     try:
         values = np.asarray(content.get(name), float)
     except (ValueError, TypeError, OverflowError) as error:
-        raise FileError(f"'{name}' is no list of numbers: export it again.") from error
+        raise FileError(f"'{name}' is not a list of numbers: export it again.") from error
     if values.ndim != len(shape) or any(n not in (-1, m) for n, m in zip(shape, values.shape)):
         wanted = " × ".join("n" if n < 0 else str(n) for n in shape)
         raise FileError(f"'{name}' is missing or has another size than {wanted}: export it again.")

@@ -28,7 +28,7 @@ def is_urdf(path: str | os.PathLike) -> bool:
         return False
     root = read_xml(path, "a robot")
     if any("xacro" in element.tag for element in root.iter()):
-        raise FileError(f"'{path}' has macros: run xacro on it, and give the URDF that this makes.")
+        raise FileError(f"'{path}' has macros: run xacro on it, and give the resulting URDF.")
     return root.find("robot/link") is not None
 
 
@@ -81,7 +81,7 @@ def _sensor(
         normal = normal / length
     notes = [
         f"'{link}': normals are {'the axes of the joints' if has_axes else 'the z axes of the frames'}; "
-        "mass, inertia and joints were not taken over, and parameters have their defaults."
+        "mass, inertia and joints were not imported, and parameters have their defaults."
     ]
     surface = _surface(path, root, link, notes)
     return FoundSensor(link, position, normal, triangles_between(position, normal), surface=surface, notes=notes)
@@ -97,6 +97,6 @@ def _surface(path: str | os.PathLike, root: ElementTree.Element, link: str, note
     try:
         mesh = mesh_beside(path, meshes[0].get("filename", ""))
     except PalpateError as error:
-        notes.append(f"The mesh of '{link}' was not taken over: {error}")
+        notes.append(f"The mesh of '{link}' was not imported: {error}")
         return None
     return TriangleMesh(mesh.vertices * vector_in(path, meshes[0], "scale", "1 1 1"), mesh.triangles)

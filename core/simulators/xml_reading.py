@@ -29,7 +29,7 @@ def numbers_in(path: str | os.PathLike, element: ElementTree.Element, key: str, 
     try:
         values = np.array([float(word) for word in text.split()])
     except ValueError as error:
-        raise FileError(f"'{key}' of {label} in '{path}' is '{text[:60]}', which are no numbers: correct it.") from error
+        raise FileError(f"'{key}' of {label} in '{path}' is '{text[:60]}', which are not numbers: correct it.") from error
     if not np.isfinite(values).all():
         raise FileError(f"'{key}' of {label} in '{path}' has a number that is NaN or infinite: correct it.")
     return values

@@ -4,11 +4,14 @@
 :mod:`.simulation` is the loop over frames and :mod:`.substep` that over the steps of a frame. :mod:`.detection` finds the
 contacts. :mod:`.implicit_velocities` solves for the velocities with the parts in :mod:`.dynamics`, which also advances
 friction. The formulas of contact themselves stand in laws/. :mod:`.pressing` runs single steps for the loops of other programs,
-of any number of environments that share what :mod:`.pressed_model` builds.
+of any number of environments that share what :mod:`.pressed_model` builds. Warp's kernels of the same step use
+parts of :mod:`.detection` and :mod:`.dynamics`.
 """
 
 __all__ = [
     "checkpoint",
+    "detection",
+    "dynamics",
     "precompile",
     "precompile_process",
     "pressed_model",

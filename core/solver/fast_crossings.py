@@ -137,7 +137,8 @@ class FastCrossings:
                 advised = dt * GOOD_SHARE * sensor.parameters.max_penetration / deepest
                 found.append(
                     f"Frame {frame}: '{target.name}' goes {deepest * 1e3:.3g} mm into '{sensor.name}' within one time step of "
-                    f"{dt * 1e3:.3g} ms and may pass through its {sensor.parameters.max_penetration * 1e3:.3g} mm unfelt: "
+                    f"{dt * 1e3:.3g} ms and may pass through its {sensor.parameters.max_penetration * 1e3:.3g} mm "
+                    "without contact: "
                     f"set a time step of {advised * 1e3:.2g} ms or less, or move slower."
                 )
         return found

@@ -12,14 +12,14 @@ import math
 import numpy as np
 
 from ..compiled.kernels import inlined, kernel
-from ..geometry.rotations import solve_positive_definite, write_step_motion
+from ..geometry.rotations import solve_positive_definite
 from .detection.detection_data import DetectionData
 from .dynamics.actuators import SPEED, add_actuators
-from .dynamics.free_rotation import matrix_times_vector, mean_angular_velocity
 from .dynamics.linear_system import add_pair_to_system, write_pair_forces
+from .dynamics.modes import add_mass, write_guess, write_motion
 from .dynamics.passivity import MAX_BISECTIONS, check_energy, reset_force_scales
 from .parallel_loops import SUM_CONTACTS, run_parallel_loop
-from .solver_model import DRIVEN, FREE, KEYFRAMED, SolverModel, State
+from .solver_model import SolverModel, State
 from .workspace import Workspace
 
 MAX_ITERATIONS = 40
@@ -71,7 +71,8 @@ def _iterate(
                 add_pair_to_system(pair, dt, model, state, workspace)
         if n == 0:
             return
-        _add_masses(model, workspace)
+        for body in range(len(bodies.mode)):
+            add_mass(body, model, workspace)
         if len(model.drives.gains) > 0:
             add_actuators(dt, iteration > 0, commands, model, state, workspace)
         solve_positive_definite(system.matrix, vector, n)
@@ -91,19 +92,6 @@ def _iterate(
             break
         last_change = change
     _write_step_motions(dt, model, state, workspace)
-
-
-@kernel
-def _add_masses(model: SolverModel, workspace: Workspace) -> None:
-    """Add the masses and inertias of free bodies to the matrix."""
-    bodies, matrix = model.bodies, workspace.system.matrix
-    for body in range(len(bodies.kind)):
-        if bodies.kind[body] == FREE:
-            at = bodies.first_unknown[body]
-            for i in range(3):
-                matrix[at + i, at + i] += bodies.mass[body]
-                for j in range(i + 1):
-                    matrix[at + 3 + i, at + 3 + j] += workspace.bodies.inertia[body, i, j]
 
 
 @kernel
@@ -136,60 +124,17 @@ def _update_guess(share: float, accelerate: bool, n: int, workspace: Workspace) 
 @inlined
 def _write_initial_guess(dt: float, model: SolverModel, state: State, workspace: Workspace) -> None:
     """Write the present velocities as the first guess, and the bodies' momentum without contacts and drives."""
-    bodies, work, system, velocity = model.bodies, workspace.bodies, workspace.system, state.velocity
-    momentum, guess, free = system.momentum, system.guess, system.free_solution
-    for body in range(len(bodies.kind)):
-        at = bodies.first_unknown[body]
-        if bodies.kind[body] == FREE:
-            inertia, spin = work.inertia[body], velocity[body, 3:]
-            lx, ly, lz = matrix_times_vector(inertia, spin[0], spin[1], spin[2])
-            mean = mean_angular_velocity(work.rotation[body], bodies.inverse_inertia[body], lx, ly, lz, dt)
-            # The spin that is solved for is the mean over the step, which makes a body tumble as it should.
-            for i in range(3):
-                guess[at + i] = velocity[body, i]
-                free[at + i] = velocity[body, i] + dt * bodies.gravity[i]
-                momentum[at + i] = bodies.mass[body] * free[at + i]
-                guess[at + 3 + i] = free[at + 3 + i] = work.velocity_before[body, 3 + i] = mean[i]
-                work.spin_correction[body, i] = mean[i] - spin[i]
-            momentum[at + 3], momentum[at + 4], momentum[at + 5] = matrix_times_vector(inertia, mean[0], mean[1], mean[2])
-        elif bodies.kind[body] == KEYFRAMED:
-            write_step_motion(velocity[body], dt, work.step_motion[body])
-            for i in range(12):
-                work.known_step_motion[body, i] = work.step_motion[body, i]
+    for body in range(len(model.bodies.mode)):
+        write_guess(body, dt, model, state, workspace)
+    system = workspace.system
     for drive in range(len(model.drives.gains)):
         at = model.drives.unknown[drive]
-        guess[at] = free[at] = state.drives[drive, SPEED]
-        momentum[at] = workspace.drives.mass[drive] * guess[at] - workspace.drives.load[drive]
+        system.guess[at] = system.free_solution[at] = state.drives[drive, SPEED]
+        system.momentum[at] = workspace.drives.mass[drive] * system.guess[at] - workspace.drives.load[drive]
 
 
 @kernel
 def _write_step_motions(dt: float, model: SolverModel, state: State, workspace: Workspace) -> None:
-    """Write the velocities and step motions that follow from the guess, and the part of the motions that is not solved for.
-
-    Of a free body that part is by how much a finite rotation exceeds ``ω × r``; of a driven one it is its carrier's motion.
-    """
-    bodies, work = model.bodies, workspace.bodies
-    guess, velocity, motion, known = workspace.system.guess, state.velocity, work.step_motion, work.known_step_motion
-    for body in range(len(bodies.kind)):
-        at = bodies.first_unknown[body]
-        if bodies.kind[body] == FREE:
-            for i in range(6):
-                velocity[body, i] = guess[at + i]
-            write_step_motion(velocity[body], dt, motion[body])
-            for i in range(3):
-                known[body, i] = 0.0
-            for i in range(3, 12):
-                known[body, i] = motion[body, i]
-            known[body, 4] += velocity[body, 5]
-            known[body, 5] -= velocity[body, 4]
-            known[body, 6] -= velocity[body, 5]
-            known[body, 8] += velocity[body, 3]
-            known[body, 9] += velocity[body, 4]
-            known[body, 10] -= velocity[body, 3]
-        elif bodies.kind[body] == DRIVEN:
-            for i in range(6):
-                velocity[body, i] = work.carrier_velocity[body, i]
-            write_step_motion(velocity[body], dt, known[body])
-            for i in range(3):
-                velocity[body, i] += guess[at] * workspace.drives.axis[body, i]
-            write_step_motion(velocity[body], dt, motion[body])
+    """Write the velocities and step motions that follow from the guess."""
+    for body in range(len(model.bodies.mode)):
+        write_motion(body, dt, model, state, workspace)

@@ -18,7 +18,8 @@ from ..model.shared_results import SharedResults
 from .detection.deforming_surfaces import bounding_sphere, point_rows
 from .detection.neighbour_lists import MAX_RADIUS_SHARE
 from .dynamics.actuators import drive_table
-from .solver_model import DRIVEN, FREE, KEYFRAMED, NO_TRIANGLE, Bodies, Drives, Pairs, Points, Sensors, SolverModel, State
+from .dynamics.modes import number_unknowns
+from .solver_model import NO_TRIANGLE, Bodies, Drives, Pairs, Points, Sensors, SolverModel, State
 
 MAX_PAIR_POINTS = 512
 """Most contact points of a pair, which is what a thread takes at a time."""
@@ -43,10 +44,10 @@ def build_model(
     rows = [point_rows(mounted_texels(s), p, center[s.body]) for s, p in zip(scenario.sensors, points, strict=True)]
     first_point = np.cumsum([0] + [len(block) for block in rows])
     drive_of, gains = drive_table(scenario)
-    kind = np.array([FREE if body.free else DRIVEN if body.drive is not None else KEYFRAMED for body in scenario.bodies])
-    first_unknown, drive_unknown, unknowns = _number_unknowns(kind, drive_of)
+    mode = np.array([int(body.mode) for body in scenario.bodies])
+    first_unknown, drive_unknown, unknowns = number_unknowns(mode, drive_of)
     return SolverModel(
-        bodies=_bodies(scenario, kind, first_unknown, unknowns),
+        bodies=_bodies(scenario, mode, first_unknown, unknowns),
         sensors=_sensors(scenario, rows, first_point),
         points=_points(scenario, rows, points),
         pairs=_pairs(scenario, first_point, shared),
@@ -81,10 +82,10 @@ def initial_state(scenario: Scenario, model: SolverModel, center: np.ndarray) ->
     )
 
 
-def _bodies(scenario: Scenario, kind: np.ndarray, first_unknown: np.ndarray, unknowns: int) -> Bodies:
+def _bodies(scenario: Scenario, mode: np.ndarray, first_unknown: np.ndarray, unknowns: int) -> Bodies:
     bodies = scenario.bodies
     return Bodies(
-        kind=kind,
+        mode=mode,
         first_unknown=first_unknown,
         unknowns=unknowns,
         mass=np.array([body.mass for body in bodies], dtype=float),
@@ -177,21 +178,3 @@ def _drives(scenario: Scenario, drive_of: np.ndarray, unknown: np.ndarray, gains
         unknown=unknown,
         gains=gains,
     )
-
-
-def _number_unknowns(kind: np.ndarray, drive_of: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """Number the unknowns of a step: six for each free body, then one for each drive.
-
-    Returns
-    -------
-    first_unknown : (b,) int
-        Index of the first unknown of each body, -1 for keyframed bodies.
-    drive_unknown : (d,) int
-    unknowns : int
-    """
-    free = kind == FREE
-    drives = int(drive_of.max(initial=-1)) + 1
-    drive_unknown = 6 * np.count_nonzero(free) + np.arange(drives)
-    first_unknown = np.where(free, 6 * (np.cumsum(free) - 1), -1)
-    first_unknown[kind == DRIVEN] = drive_unknown[drive_of[kind == DRIVEN]]
-    return first_unknown, drive_unknown, int(6 * np.count_nonzero(free) + drives)

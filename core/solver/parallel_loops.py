@@ -26,13 +26,14 @@ from ..effects.engine.compiled_program import prepare_laws
 from ..geometry.rotations import write_rotation
 from .detection.detection_data import DetectionData
 from .detection.narrow_phase import find_contacts
+from .detection.shape_contacts import write_last_contacts
 from .detection.surface_kinematics import finish_contacts
 from .dynamics.contact_assembly import sum_pair_contacts
 from .dynamics.friction_state import update_pair_friction
 from .solver_model import SolverModel, State
 from .workspace import Workspace
 
-FIND_CONTACTS, SUM_CONTACTS, UPDATE_FRICTION = 2, 3, 4
+FIND_CONTACTS, SUM_CONTACTS, UPDATE_FRICTION, WRITE_CONTACTS = 2, 3, 4, 5
 """Numbers of the loops in the queue. :mod:`.thread_team` has the numbers 0 (idle) and 1 (stop)."""
 
 
@@ -42,6 +43,16 @@ def find_pair_contacts(
 ) -> None:
     """Find the contacts of one pair."""
     find_contacts(pair, model, detection, state, workspace)
+    if workspace.contacts.number[pair] > 0:
+        finish_contacts(pair, dt, model, detection, state, workspace)
+
+
+@addressed_kernel
+def write_pair_contacts(
+    pair: int, dt: float, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace
+) -> None:
+    """Write the contacts of one pair that were found last, when the bodies have not moved since."""
+    write_last_contacts(pair, model, detection, state, workspace)
     if workspace.contacts.number[pair] > 0:
         finish_contacts(pair, dt, model, detection, state, workspace)
 
@@ -64,7 +75,12 @@ def update_friction(
         update_pair_friction(pair, dt, model, detection.surfaces, state, workspace)
 
 
-PAIR_LOOPS = {FIND_CONTACTS: find_pair_contacts, SUM_CONTACTS: sum_contacts, UPDATE_FRICTION: update_friction}
+PAIR_LOOPS = {
+    FIND_CONTACTS: find_pair_contacts,
+    SUM_CONTACTS: sum_contacts,
+    UPDATE_FRICTION: update_friction,
+    WRITE_CONTACTS: write_pair_contacts,
+}
 """What each loop does with a pair. What it writes belongs to this pair alone."""
 
 
@@ -101,14 +117,28 @@ def find_all_contacts(dt: float, model: SolverModel, detection: DetectionData, s
 
     `dt` is the length of the step that begins, or minus the length of the step that has ended (see :func:`.finish_contacts`).
     """
-    for body in range(len(state.position)):
-        write_rotation(state.quaternion[body], workspace.bodies.rotation[body])
-    workspace.step[0] = dt
-    run_parallel_loop(FIND_CONTACTS, model, detection, state, workspace)
+    _run_at_bodies(FIND_CONTACTS, dt, model, detection, state, workspace)
     too_deep = 0
     for pair in range(len(model.pairs.sensor)):
         too_deep += workspace.contacts.too_deep[pair]
     return too_deep
+
+
+@inlined
+def write_all_contacts(dt: float, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace) -> None:
+    """Do as :func:`find_all_contacts` where contacts were found last at the poses where the bodies are now."""
+    _run_at_bodies(WRITE_CONTACTS, dt, model, detection, state, workspace)
+
+
+@inlined
+def _run_at_bodies(
+    loop: int, dt: float, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace
+) -> None:
+    """Run a loop that looks where the bodies are."""
+    for body in range(len(state.position)):
+        write_rotation(state.quaternion[body], workspace.bodies.rotation[body])
+    workspace.step[0] = dt
+    run_parallel_loop(loop, model, detection, state, workspace)
 
 
 @inlined

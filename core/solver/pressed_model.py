@@ -13,12 +13,14 @@ from ..effects.engine.readout_chain import transducers_of
 from ..effects.engine.registry import in_signal_order
 from ..errors import ParameterError
 from ..geometry.mesh import TriangleMesh
+from ..geometry.shapes import Shape
 from ..model.body import Body
 from ..model.motion import Motion
 from ..model.scenario import Scenario
 from ..model.sensor import Sensor
 from ..model.target import Target
 from ..response.readings import ReadoutChain
+from .detection.detection_data import TargetShapes
 from .parallel_loops import help_with_loops, prepare_pair_loops
 from .pressing import (
     Environment,
@@ -40,7 +42,7 @@ class PressedModel:
     Parameters
     ----------
     sensor : Sensor
-    targets : sequence of TriangleMesh
+    targets : sequence of TriangleMesh or Shape
         Each in the frame of what presses, metres.
     dt : float, seconds
         Of a step.
@@ -65,19 +67,20 @@ class PressedModel:
         Effects act on readings; otherwise these are a scale and a zero.
     """
 
-    def __init__(self, sensor: Sensor, targets: Sequence[TriangleMesh], dt: float, threads: int | None = None):
+    def __init__(self, sensor: Sensor, targets: Sequence[TriangleMesh | Shape], dt: float, threads: int | None = None):
         if not (np.isfinite(dt) and dt > 0):
             raise ParameterError(f"The step is {dt:g} s: give a number above zero.")
         if not targets:
-            raise ParameterError(f"Nothing presses on '{sensor.name}': give a target's mesh, or several.")
+            raise ParameterError(f"There is no target for '{sensor.name}': give a mesh, or several.")
         if sensor.deformation is not None:
             raise ParameterError(f"'{sensor.name}' deforms by prescription: take a sensor that keeps its shape in this loop.")
+        meshes = [target.stand_in if isinstance(target, Shape) else target for target in targets]
         names = [f"target {number}" for number in range(1, len(targets) + 1)]
         simulation = Simulation(
             Scenario(
                 bodies=(Body("sensor", Motion.at_rest()), *(Body(name, Motion.at_rest()) for name in names)),
                 sensors=(sensor,),
-                targets=tuple(Target(name, 1 + i, mesh) for i, (name, mesh) in enumerate(zip(names, targets, strict=True))),
+                targets=tuple(Target(name, 1 + i, mesh) for i, (name, mesh) in enumerate(zip(names, meshes, strict=True))),
                 frame_start=0,
                 frame_end=1,
                 fps=1.0 / dt,
@@ -89,7 +92,9 @@ class PressedModel:
         self.rate = simulation.scenario.fps
         self.texels = len(sensor.texels)
         self._dt = simulation.dt
-        self._model, self._detection, self._state, workspace = simulation.arrays
+        self._model, detection, self._state, workspace = simulation.arrays
+        shapes = TargetShapes.of([target if isinstance(target, Shape) else None for target in targets])
+        self._detection = detection._replace(shapes=shapes)
         self._queue = workspace.queue
         self.helpers = simulation.helpers
         transducers = transducers_of(sensor)

@@ -33,10 +33,13 @@ class Environment(NamedTuple):
     ----------
     detection : DetectionData
     state : State
+    found : (1,) bool
+        The state has the contacts at the poses where the bodies are.
     """
 
     detection: DetectionData
     state: State
+    found: np.ndarray
 
 
 @by_reference
@@ -149,20 +152,22 @@ class Pressing(NamedTuple):
 
 def make_environments(count: int, detection: DetectionData, state: State) -> list[Environment]:
     """Return environments that begin as this one; the arrays of all of them lie behind one another."""
+    found = np.zeros((count, 1), np.bool_)
     lists, states = ([np.repeat(field[None], count, axis=0) for field in part] for part in (detection.neighbours, state))
     return [
         Environment(
-            DetectionData(detection.tree, NeighbourLists(*(rows[i] for rows in lists)), detection.surfaces),
+            DetectionData(detection.tree, NeighbourLists(*(rows[i] for rows in lists)), detection.surfaces, detection.shapes),
             State(*(rows[i] for rows in states)),
+            found[i],
         )
         for i in range(count)
     ]
 
 
-def stacked_states(environments: list[Environment]) -> State:
-    """Return the state of all environments of :func:`make_environments` at once: each array with a leading axis of length E."""
-    stacks = [field.base for field in environments[0].state]
-    return State(*(stack for stack in stacks if stack is not None))
+def stacked_states(environments: list[Environment]) -> list[np.ndarray]:
+    """Return what environments of :func:`make_environments` carry on, each array of all of them, with a leading axis of E."""
+    stacks = [field.base for field in (*environments[0].state, environments[0].found)]
+    return [stack for stack in stacks if stack is not None]
 
 
 def addresses_of(environments: list[Environment]) -> np.ndarray:
@@ -173,6 +178,7 @@ def addresses_of(environments: list[Environment]) -> np.ndarray:
 def begin_at(poses: np.ndarray, environment: Environment) -> None:
     """Put an environment back to its beginning, at rest at these poses (b, 7); its next step goes on from there."""
     forget(environment.state)
+    environment.found[0] = False
     environment.state.position[...] = poses[:, :3]
     environment.state.quaternion[...] = poses[:, 3:] / np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
 
@@ -224,12 +230,14 @@ def press_environment(number: int, pressing: Pressing, environment: Environment)
     _write_path(dt, poses, out.begins[number], state, memory)
     if out.begins[number]:
         forget(state)
+        environment.found[0] = False
     out.begins[number] = False
     for body in range(len(state.velocity)):  # the working memory is that of another environment
         write_backward_step_motion(state.velocity[body], dt, workspace.bodies.step_motion[body])
     path = FramePath(memory.position, memory.quaternion, memory.velocity, memory.commands)
-    advance_steps(dt, 0, 1, path, model, environment.detection, state, workspace)
+    advance_steps(dt, 0, 1, path, model, environment.detection, state, workspace, environment.found[0])
     out.too_deep[number] = find_all_contacts(-dt, model, environment.detection, state, workspace)
+    environment.found[0] = True
     _read(number, pressing, state)
 
 

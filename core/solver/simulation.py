@@ -28,16 +28,17 @@ from ..model.shared_results import SharedResults
 from ..response.readings import ReadoutChain
 from .detection.deformation import refit_boxes, set_moment
 from .detection.deforming_surfaces import DeformingSurfaces
-from .detection.detection_data import DetectionData
+from .detection.detection_data import DetectionData, TargetShapes
 from .detection.narrow_phase import count_too_deep
 from .detection.neighbour_lists import neighbour_lists_for
 from .dynamics.drive_commands import DriveCommands
+from .dynamics.modes import driven_bodies
 from .dynamics.passivity import credit_initial_contacts
 from .fast_crossings import FastCrossings, path_of_moved_bodies
 from .found_contacts import contacts_of
 from .model_builder import build_model, initial_state, texel_starts
 from .parallel_loops import find_all_contacts, help_with_loops, prepare_pair_loops
-from .solver_model import DRIVEN, SolverModel, State
+from .solver_model import SolverModel, State
 from .substep import FRAME, NOTHING, TEXELS, FramePath, ObservedFrames, Surroundings, advance_frames
 from .time_step_adviser import plan
 from .workspace import Workspace
@@ -108,6 +109,7 @@ class Simulation:
         self._readers = [ReadoutChain.of(sensor) for sensor in scenario.sensors]
         self._drive_commands = DriveCommands(scenario)
         self._texel_start = texel_starts(scenario)
+        self._shapes = TargetShapes.of([None] * len(scenario.targets))
         self._detection: DetectionData | None = None
         self._fast_crossings = FastCrossings(scenario, self._center)
         self._surroundings = Surroundings(np.array(self._closed, np.bool_), self._fast_crossings.limits)
@@ -115,7 +117,7 @@ class Simulation:
     @property
     def arrays(self) -> tuple[SolverModel, DetectionData, State, Workspace]:
         """The structures that the kernels work on."""
-        parts = (self._tree, self._neighbour_lists, self._surface_motion)
+        parts = (self._tree, self._neighbour_lists, self._surface_motion, self._shapes)
         if self._detection is None or any(now is not then for now, then in zip(parts, self._detection, strict=True)):
             self._detection = DetectionData(*parts)
         arrays = self._model, self._detection, self._state, self._workspace
@@ -357,7 +359,7 @@ class Simulation:
         path = [poses_at(motion, times.ravel(), self.scenario.interpolation) for motion in self._motions]
         quaternions = np.stack([quaternion for _, quaternion in path], axis=1).reshape(*times.shape, -1, 4)
         positions = np.stack([position for position, _ in path], axis=1).reshape(*times.shape, -1, 3)
-        for body in np.flatnonzero(self._model.bodies.kind == DRIVEN):
+        for body in driven_bodies(self._model.bodies.mode):
             positions[:, :, body] += rotation_matrices(quaternions[:, :, body]) @ self._center[body]
         before, after = quaternions[:, :-1], quaternions[:, 1:]
         turns = rotation_vectors(quaternion_product(after, before * np.array([1.0, -1.0, -1.0, -1.0])))
@@ -433,7 +435,8 @@ class Simulation:
             what = "texels" if all(sensor.parameters.points_per_texel == 1 for sensor in sensors) else "contact points"
             self.warnings.append(
                 f"Frame {self.frame}: {total} {what} are pressed past their maximum penetration by "
-                f"{', '.join(dict.fromkeys(pressed))} and do not act; press less deep, or raise k or the maximum penetration."
+                f"{', '.join(dict.fromkeys(pressed))} and exert no force; "
+                "reduce the depth, or raise k or the maximum penetration."
             )
 
     def _count_too_deep(self, pair: int) -> int:

@@ -10,9 +10,6 @@ import numpy as np
 from ..compiled.struct_reference import by_reference
 from ..effects.engine.compiled_program import EffectProgram
 
-KEYFRAMED, FREE, DRIVEN = 0, 1, 2
-"""What moves a body: its animation; forces; or its animation together with an actuator along an axis."""
-
 NO_TRIANGLE, TOO_DEEP = -1, -2
 """Instead of a triangle in :attr:`State.triangle`: nothing is touched; the point was pressed past its maximum penetration."""
 
@@ -23,8 +20,8 @@ class Bodies(NamedTuple):
 
     Attributes
     ----------
-    kind : (b,) int
-        KEYFRAMED, FREE or DRIVEN.
+    mode : (b,) int
+        :class:`.Mode` of each.
     first_unknown : (b,) int
         Index of each body's first unknown in the linear system: a free body has six, a driven one has one, which coupled bodies
         share; -1 for keyframed bodies.
@@ -39,7 +36,7 @@ class Bodies(NamedTuple):
         Of each free body at the start of the run; zero for the others.
     """
 
-    kind: np.ndarray
+    mode: np.ndarray
     first_unknown: np.ndarray
     unknowns: int
     mass: np.ndarray

@@ -13,16 +13,17 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiled.kernels import inlined, kernel
-from ..geometry.rotations import write_backward_step_motion, write_world_inertia
+from ..geometry.rotations import write_backward_step_motion
 from .detection.deformation import refit_boxes, set_moment
 from .detection.detection_data import DetectionData
 from .detection.narrow_phase import count_too_deep
-from .dynamics.actuators import move_drives, place_driven, prepare_driven
+from .dynamics.actuators import move_drives
 from .dynamics.effect_memory import commit_effect_memory
+from .dynamics.modes import move, place, prescribe_velocity, write_inertia
 from .fast_crossings import BodiesInFrame, CrossingLimits, may_cross
 from .implicit_velocities import solve_velocities
-from .parallel_loops import UPDATE_FRICTION, find_all_contacts, run_parallel_loop
-from .solver_model import DRIVEN, FREE, KEYFRAMED, SolverModel, State
+from .parallel_loops import UPDATE_FRICTION, find_all_contacts, run_parallel_loop, write_all_contacts
+from .solver_model import SolverModel, State
 from .texel_readout import TexelReadout, read_texels
 from .workspace import Workspace
 
@@ -116,6 +117,7 @@ def advance_steps(
     detection: DetectionData,
     state: State,
     workspace: Workspace,
+    known: bool,
 ) -> int:
     """Run some of the substeps of one frame; the state is brought forward in place.
 
@@ -129,6 +131,8 @@ def advance_steps(
     detection : DetectionData
     state : State
     workspace : Workspace
+    known : bool
+        The state has the contacts at the beginning of the first step, which need not be found then.
 
     Returns
     -------
@@ -146,25 +150,29 @@ def advance_steps(
         _set_prescribed_velocities(step, dt, path, model, state, workspace)
         if deforms:
             set_moment(step, step + 1, dt, model, surfaces)
-        too_deep = find_all_contacts(dt, model, detection, state, workspace)
+        too_deep = 0
+        if known and step == first:
+            write_all_contacts(dt, model, detection, state, workspace)
+        else:
+            too_deep = find_all_contacts(dt, model, detection, state, workspace)
         if too_deep > worst:
             worst = too_deep
             for pair in range(len(model.pairs.sensor)):
                 workspace.contacts.most_too_deep[pair] = workspace.contacts.too_deep[pair]
-        _write_world_inertias(model, workspace)
+        for body in range(len(model.bodies.mode)):
+            write_inertia(body, model, workspace)
         solve_velocities(dt, path.commands[step], model, detection, state, workspace)
         if len(workspace.effects.contacts.force) > 0:
             commit_effect_memory(dt, model, state, workspace)
         run_parallel_loop(UPDATE_FRICTION, model, detection, state, workspace)
         if len(model.drives.gains) > 0:
             move_drives(dt, path.commands[step], model, state, workspace)
-        for body in range(len(model.bodies.kind)):
-            if model.bodies.kind[body] == FREE:
-                _move_free(body, dt, state, workspace)
+        for body in range(len(model.bodies.mode)):
+            move(body, dt, model, state, workspace)
     if deforms:
         set_moment(last, last - 1, dt, model, surfaces)
     _place(path.position[last], path.quaternion[last], model, state, workspace)
-    for body in range(len(model.bodies.kind)):
+    for body in range(len(model.bodies.mode)):
         write_backward_step_motion(state.velocity[body], dt, workspace.bodies.step_motion[body])
     return worst
 
@@ -206,7 +214,7 @@ def advance_frames(
     for frame in range(len(seen.may_cross)):
         own = FramePath(path.position[frame], path.quaternion[frame], path.velocity[frame], path.commands[frame])
         if last > first:
-            worst = advance_steps(dt, first, last, own, model, detection, state, workspace)
+            worst = advance_steps(dt, first, last, own, model, detection, state, workspace, False)
             before = 0
             for pair in range(len(model.pairs.sensor)):
                 before += seen.too_deep_between[frame, pair]
@@ -253,50 +261,16 @@ def _set_prescribed_velocities(
     step: int, dt: float, path: FramePath, model: SolverModel, state: State, workspace: Workspace
 ) -> None:
     """Remember the velocities at a step's beginning, and give keyframed and driven bodies those of the path."""
-    bodies = model.bodies
     for drive in range(len(model.drives.gains)):
         workspace.drives.mass[drive] = workspace.drives.load[drive] = 0.0
-    for body in range(len(bodies.kind)):
+    for body in range(len(model.bodies.mode)):
         for i in range(6):
             workspace.bodies.velocity_before[body, i] = state.velocity[body, i]
-        if bodies.kind[body] == KEYFRAMED:
-            for i in range(6):
-                state.velocity[body, i] = path.velocity[step, body, i]
-        elif bodies.kind[body] == DRIVEN:
-            after = path.quaternion[step + 1, body]
-            prepare_driven(body, dt, after, path.velocity[step, body], model, state, workspace)
-
-
-@inlined
-def _write_world_inertias(model: SolverModel, workspace: Workspace) -> None:
-    """Turn the inertia of free bodies into the world's frame."""
-    for body in range(len(model.bodies.kind)):
-        if model.bodies.kind[body] == FREE:
-            write_world_inertia(workspace.bodies.rotation[body], model.bodies.inertia[body], workspace.bodies.inertia[body])
+        prescribe_velocity(body, dt, path.velocity[step, body], path.quaternion[step + 1, body], model, state, workspace)
 
 
 @inlined
 def _place(position: np.ndarray, quaternion: np.ndarray, model: SolverModel, state: State, workspace: Workspace) -> None:
-    """Put keyframed and driven bodies where they are at the beginning of a step."""
-    kind = model.bodies.kind
-    for body in range(len(kind)):
-        if kind[body] != FREE:
-            for i in range(4):
-                state.quaternion[body, i] = quaternion[body, i]
-            for i in range(3):
-                state.position[body, i] = position[body, i]
-            if kind[body] == DRIVEN:
-                place_driven(body, position[body], model, state, workspace.drives.axis[body])
-
-
-@inlined
-def _move_free(body: int, dt: float, state: State, workspace: Workspace) -> None:
-    """Move a free body with its new velocity, and give it the orientation and spin that :mod:`.passivity` found for the end."""
-    velocity, work = state.velocity[body], workspace.bodies
-    for i in range(3):
-        state.position[body, i] += dt * velocity[i]
-        velocity[3 + i] = work.end_spin[body, i]
-        for j in range(3):
-            work.rotation[body, i, j] = work.end_rotation[body, i, j]
-    for i in range(4):
-        state.quaternion[body, i] = work.end_quaternion[body, i]
+    """Put the bodies where their paths have them at the beginning of a step."""
+    for body in range(len(model.bodies.mode)):
+        place(body, position, quaternion, model, state, workspace)

@@ -18,9 +18,9 @@ SHARE_OF_LIMIT = 0.2
 A contact that vibrates against all stiff texels at once takes 5π ≈ 16 such steps per period without damping, and more with it.
 """
 LONGEST = 1e-3
-"""Longest step that is advised (s), so that fast motions are followed where nothing is stiff."""
+"""Longest recommended step (s), so that fast motions are followed where nothing is stiff."""
 SHORTEST = 1e-6
-"""Shortest step that is advised (s); the solver stays bounded at any step, shorter ones only cost time."""
+"""Shortest recommended step (s); the solver stays bounded at any step, shorter ones only cost time."""
 FAR_ABOVE_LIMIT = 10.0
 """Stability limits from which a step is warned of. Of the 1,000 random sets of tests/oracles/sweep.py, 327 take longer steps:
 in 193 of them texels report depths that stand for more energy than was put into them, by four times that of the throw in the
@@ -91,7 +91,7 @@ def advise(scenario: Scenario) -> Advice:
         reason = f"{wanted * 1e3:.3g} ms: {SHARE_OF_LIMIT:.0%} of {of_limit} ({limit * 1e3:.3g} ms)."
         return Advice(wanted, limit, reason, contact)
     dt, which = (SHORTEST, "shortest") if wanted < SHORTEST else (LONGEST, "longest")
-    return Advice(dt, limit, f"{dt * 1e3:.3g} ms: the {which} that is advised; {of_limit} is {limit * 1e3:.3g} ms.", contact)
+    return Advice(dt, limit, f"{dt * 1e3:.3g} ms: the {which} recommended step; {of_limit} is {limit * 1e3:.3g} ms.", contact)
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ def plan(scenario: Scenario) -> Plan:
         )
     else:
         warning = ""
-    beyond = " Longer ones stay bounded, but follow the motion less exactly." if dt > 1.001 * advice.dt else ""
+    beyond = " Longer steps are stable but less accurate." if dt > 1.001 * advice.dt else ""
     return Plan(dt, substeps, f"Time step {dt * 1e3:.3g} ms ({number}, as set). Recommended: {advice.reason}{beyond}", warning)
 
 

@@ -227,7 +227,7 @@ class Workspace(NamedTuple):
         The time step that helper threads reckon with.
     queue : (QUEUE_SIZE,) or (0,) int
         Where helper threads find work (see :mod:`.thread_team`).
-    pair_loops : (5,) int
+    pair_loops : (6,) int
         Address of what each loop over pairs does with a pair (see :mod:`.parallel_loops`).
     """
 

@@ -9,7 +9,8 @@ from ..effects.engine.compiled_program import TexelContacts
 from ..geometry.rotations import write_backward_step_motion
 from .contact_rows import LANES, ROW
 from .detection.detection_data import SurfaceMotion
-from .solver_model import DRIVEN, FREE, SolverModel, State
+from .dynamics.modes import pairs_with_account
+from .solver_model import SolverModel, State
 from .workspace import SUMS, BodyWork, ContactWork, DriveWork, EffectWork, EnergyWork, LinearSystem, PairWork, Workspace
 
 
@@ -49,7 +50,7 @@ def workspace_for(model: SolverModel, state: State, surfaces: SurfaceMotion, que
         energy=_energy_work(model, deforming),
         step=np.zeros(1),
         queue=queue,
-        pair_loops=np.zeros(5, np.int64),
+        pair_loops=np.zeros(6, np.int64),
     )
 
 
@@ -91,12 +92,10 @@ def _linear_system(n: int) -> LinearSystem:
 
 def _energy_work(model: SolverModel, deforming: np.ndarray) -> EnergyWork:
     pairs, q = model.pairs, len(model.pairs.sensor)
-    kinds = model.bodies.kind[np.stack([pairs.sensor_body, pairs.target_body])]
-    moved = (kinds == FREE).any(axis=0) & (kinds != DRIVEN).all(axis=0)
     effects = model.effects
     pulls = effects.first_unclipped[pairs.sensor] < effects.first_law[pairs.sensor + 1]  # as compiled_program.may_pull
     return EnergyWork(
-        tracked=moved & ~deforming & ~pulls,
+        tracked=pairs_with_account(model.bodies.mode, pairs) & ~deforming & ~pulls,
         force=np.zeros((q, 6)),
         new_force=np.zeros((q, 6)),
         previous_force=np.zeros((q, 6)),

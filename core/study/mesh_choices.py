@@ -100,7 +100,7 @@ def find_meshes(vary: Mapping[str, Any], base: Path) -> dict[str, Path]:
             continue
         found = sorted(glob.glob(word, root_dir=base))
         if not found:
-            raise FileError(f"No file fits the meshes '{word}' beside the study: check its name and folder.")
+            raise FileError(f"No file next to the study matches the meshes '{word}': check its name and folder.")
         files |= {Path(name).as_posix(): base / name for name in found}
     for file in files.values():
         load_mesh(file)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Numbers that sum a run of a study up.
+"""Metrics of a run of a study.
 
 ======================  ============================================================================================
 ``max_normal_force``    N, largest sum of the texels' normal forces
@@ -90,7 +90,7 @@ def _centers(index: int, scenario: Scenario, recording: Recording) -> np.ndarray
 
 
 def _is_held(index: int, scenario: Scenario, recording: Recording) -> bool:
-    """Return whether a free body is near a sensor that feels something at the last frame."""
+    """Return whether a free body is near a sensor in contact at the last frame."""
     center = _centers(index, scenario, recording)[1]
     own = [target for target in scenario.targets if target.body == index]
     middle = scenario.bodies[index].center_of_mass

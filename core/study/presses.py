@@ -57,19 +57,19 @@ class Press:
     place: float = specified(Parameter("place", "1", 0.5, 0.0, 1.0, "Share of the surface before the texel that is pressed"))
     across: float = specified(Parameter("across", "1", 0.5, 0.0, 1.0, "Where in the cell of the texel, along its x axis"))
     along: float = specified(Parameter("along", "1", 0.5, 0.0, 1.0, "Where in the cell of the texel, along its y axis"))
-    depth: float = specified(Parameter("depth", "m", 1e-3, 0.0, inf, "How far the object's lowest point goes past the place"))
+    depth: float = specified(Parameter("depth", "m", 1e-3, 0.0, inf, "Depth of the object's lowest point below the surface"))
     force: float = specified(Parameter(
         "force", "N", 0.0, 0.0, inf, "Sum of normal forces that is held instead of a depth; zero: the depth counts"))
     speed: float = specified(Parameter("speed", "m/s", 0.02, 0.0, inf, "Speed of approach and return", above_low=True))
     clearance: float = specified(Parameter("clearance", "m", 5e-4, 0.0, inf, "Distance from the place at the start"))
     tilt: float = specified(Parameter("tilt", "rad", 0.0, 0.0, 1.4, "Angle between the approach and the normal"))
     tilt_direction: float = specified(Parameter(
-        "tilt_direction", "rad", 0.0, -inf, inf, "Where the tilt leans to, from the texel's x axis to its y axis"))
+        "tilt_direction", "rad", 0.0, -inf, inf, "Direction of the tilt, from the texel's x axis to its y axis"))
     spin: float = specified(Parameter("spin", "rad", 0.0, -inf, inf, "Turn of the object about its z axis"))
     hold: float = specified(Parameter("hold", "s", 0.05, 0.0, inf, "Rest after the press, and after the slide"))
     slide: float = specified(Parameter("slide", "m", 0.0, 0.0, inf, "Length of the slide"))
     slide_direction: float = specified(Parameter(
-        "slide_direction", "rad", 0.0, -inf, inf, "Where it slides to, from the texel's x axis to its y axis"))
+        "slide_direction", "rad", 0.0, -inf, inf, "Direction of the slide, from the texel's x axis to its y axis"))
     slide_speed: float = specified(Parameter("slide_speed", "m/s", 0.02, 0.0, inf, "Speed of the slide", above_low=True))
     twist: float = specified(Parameter("twist", "rad", 0.0, -4 * pi, 4 * pi, "Turn about the approach during the slide"))
     twist_speed: float = specified(Parameter("twist_speed", "rad/s", 2.0, 0.0, inf, "Speed of the twist", above_low=True))

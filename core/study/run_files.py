@@ -5,12 +5,16 @@
 
     study.toml                              the study, with the version and the digests of its scenes
     scenes/<scene>.npz                      the scenes as the solver sees them (scenario_npz)
-    runs/<digest>/run.json                  values and metrics of a run
-    runs/<digest>/<sensor>/recording.npz    with sensor.npz and manifest.json, as in a bake without images
+    runs/<16 digits>.shard                  values, metrics and frames of many runs (run_shards)
     failed/<digest>.txt                     why a run could not be computed: a sentence, and the traceback of a fault
 
-Runs are written in a hidden folder. Those of a batch are brought onto the disk together, and then each is renamed, so that it
-is there as a whole or not at all.
+Where a study asks for images or recordings, and where a program computes its runs, each has a folder instead::
+
+    runs/<digest>/run.json                  values and metrics of a run
+    runs/<digest>/<sensor>/recording.npz    with sensor.npz and manifest.json, as in a bake without images
+
+Runs are written in a hidden folder. Those of a batch are brought onto the disk together, in a shard or under the names of their
+folders, so that each is there as a whole or not at all.
 """
 
 from __future__ import annotations
@@ -39,12 +43,15 @@ from ..model.recording import Recording
 from ..model.scenario import Scenario
 from ..model.sensor_parameters import Painted
 from ..model.shared_results import SharedResults
+from . import run_shards
 from .run_images import write_run_images
 from .run_record import RUN_NAME, RunRecord, write_run_record
 from .study_file import Run
 
 STUDY_NAME = "study.toml"
 RUNS, FAILED, SCENES = "runs", "failed", "scenes"
+PACKED, COMMON = ".run", ".common"
+"""Endings in the folder of a batch: of what a run becomes in a shard, and of what runs have in common there."""
 
 _REMEDY = "free some space or check the permissions, and give the same command again"
 _DIGEST = re.compile(r"[0-9a-f]{24}")
@@ -64,7 +71,7 @@ def make_folders(folder: Path) -> None:
 
 def done_runs(folder: Path) -> set[str]:
     """Return the digests of the runs that are done."""
-    return _digests(folder / RUNS, "")
+    return _digests(folder / RUNS, "") | run_shards.digests_in(folder / RUNS)
 
 
 def failed_runs(folder: Path) -> set[str]:
@@ -130,10 +137,31 @@ def run_folder(place: Path, run: Run) -> Iterator[Path]:
         A file cannot be written, which the body may also tell by OSError.
     """
     own = place / run.digest
-    try:
+    with _told(run, place):
         remove_tree(own)
         own.mkdir()
         yield own
+
+
+def write_packed_run(place: Path, run: Run, content: bytes, common_name: str, common: bytes) -> None:
+    """Write what a run becomes in a shard into the folder of a batch, and what it has in common with others if it is not there.
+
+    Raises
+    ------
+    FileError
+        A file cannot be written.
+    """
+    with _told(run, place):
+        (place / f"{run.digest}{PACKED}").write_bytes(content)
+        if not (place / f"{common_name}{COMMON}").exists():
+            (place / f"{common_name}{COMMON}").write_bytes(common)
+
+
+@contextmanager
+def _told(run: Run, place: Path) -> Iterator[None]:
+    """Turn an OSError into a sentence about a run."""
+    try:
+        yield
     except OSError as error:
         raise FileError(
             f"Run {run.index} could not be written to '{place.parent}' ({os_error_reason(error)}): {_REMEDY}."
@@ -146,7 +174,7 @@ class RunBatch:
     Attributes
     ----------
     place : Path
-        Hidden folder in which runs are written; that of a run has the name of its digest.
+        Hidden folder in which runs are written; that of a run, or its file, has the name of its digest.
     """
 
     def __init__(self, folder: Path, place: Path):
@@ -169,16 +197,26 @@ class RunBatch:
         if not self._digests:
             return
         runs = self._folder / RUNS
+        packed = [digest for digest in self._digests if (self.place / f"{digest}{PACKED}").is_file()]
+        folders = [digest for digest in self._digests if digest not in set(packed)]
         try:
-            group.sync([self.place / digest for digest in self._digests])
-            for digest in self._digests:
-                self._put_into_place(digest)
+            if packed:
+                self._append(packed)
+            if folders:
+                group.sync([self.place / digest for digest in folders])
+                for digest in folders:
+                    self._put_into_place(digest)
+                sync_folder(runs)
         except OSError as error:
             raise FileError(f"Runs could not be written to '{runs}' ({os_error_reason(error)}): {_REMEDY}.") from error
-        sync_folder(runs)
         for digest in self._digests:
             with suppress(OSError):
                 (self._folder / FAILED / f"{digest}.txt").unlink(missing_ok=True)
+
+    def _append(self, digests: list[str]) -> None:
+        found = {digest: (self.place / f"{digest}{PACKED}").read_bytes() for digest in digests}
+        common = {path.stem: path.read_bytes() for path in sorted(self.place.glob(f"*{COMMON}"))}
+        run_shards.append(self._folder / RUNS, self.place, found, common)
 
     def _put_into_place(self, digest: str) -> None:
         target = self._folder / RUNS / digest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``run.json``: what a run was, and the numbers that sum it up; written with its recordings, read for tables and datasets."""
+"""``run.json``: values and metrics of a run; written with its recordings, read for tables and datasets."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ RUN_FORMAT = "palpate-run/1"
 RUN_NAME = "run.json"
 
 Value = float | str
-"""What a run may vary, as it is read: a number, or a name from a choice. Whole numbers and switches count as numbers."""
+"""A varied value, as it is read: a number, or a name from a choice. Whole numbers and switches count as numbers."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,11 @@ def write_run_record(record: RunRecord) -> None:
     OSError
         It cannot be written.
     """
+    write_hashed(record.folder / RUN_NAME, record_bytes(record))
+
+
+def record_bytes(record: RunRecord, **more: Any) -> bytes:
+    """Return what ``run.json`` says of a run, with more words where it stands in a shard."""
     content = {
         "format": RUN_FORMAT,
         "digest": record.digest,
@@ -68,9 +73,17 @@ def write_run_record(record: RunRecord) -> None:
         "seconds": round(record.seconds, 6),
         "frames": record.frames,
         "sensors": list(record.sensors),
+        **more,
     }
     text = json.dumps(content, ensure_ascii=False, allow_nan=False) + "\n"
-    write_hashed(record.folder / RUN_NAME, text.encode("utf-8", "surrogatepass"))
+    return text.encode("utf-8", "surrogatepass")
+
+
+def record_in(words: dict[str, Any], folder: Path) -> RunRecord:
+    """Return the run that :func:`record_bytes` describes, in words that were found whole."""
+    values, metrics = values_read(words["values"]), words["metrics"]
+    numbers = words["seconds"], tuple(words["sensors"]), words["frames"]
+    return RunRecord(folder, words["digest"], words["index"], values, metrics, *numbers)
 
 
 def read_run_record(folder: Path) -> RunRecord:

@@ -111,7 +111,7 @@ def read_overrides(path: str | os.PathLike) -> dict[str, Any]:
     for key in table[OVERRIDES]:
         if not is_scene_property(key):
             raise ParameterError(
-                f"'{key:.80}' in '{name}' is no path of a property: write it as bpy.data.objects[\"Name\"].property."
+                f"'{key:.80}' in '{name}' is not the path of a property: write it as bpy.data.objects[\"Name\"].property."
             )
     return dict(table[OVERRIDES])
 
@@ -133,7 +133,7 @@ def read_properties(path: str | os.PathLike) -> dict[str, SceneProperty]:
         It cannot be read, or is damaged.
     """
     try:
-        found, _ = read_json(path, _PropertiesFile, PROPERTIES_FORMAT, "begin the study anew")
+        found, _ = read_json(path, _PropertiesFile, PROPERTIES_FORMAT, "start the study again")
     except FileNotFoundError:
         return {}
     return {row.name: row for row in found.properties}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The file of a study: which scene, which design, and what varies over what.
+"""The file of a study: scene, design, and the distributions of the varied parameters.
 
 ::
 
@@ -66,8 +66,8 @@ FROZEN, JOB = "frozen", "job"
 A_STUDY = "a study"
 SCENE = "scene"
 """Name of the column that tells the scene of a run, where a study has several."""
-_OF_SCENES = ("fps", "images", "press")
-"""Words that mean nothing beside a job."""
+_OF_SCENES = ("fps", "images", "recordings", "points", "half_precision", "press")
+"""Words that have no meaning for a job."""
 _DIRECTIONS = {"tilt_direction": "tilt", "slide_direction": "slide"}
 """Directions of a press, which are any as long as the study says nothing else, and what they direct."""
 LARGEST_LEVELS = 10_000
@@ -98,6 +98,12 @@ class Study:
         For the report and the dataset; empty if the file gives none.
     images : bool
         Whether runs have tactile images.
+    recordings : bool
+        Whether runs have files of their own, as a bake has; with images they do in any case.
+    points : bool
+        Whether the dataset has the texels of a grid as a list, too, and not as a picture.
+    half_precision : bool
+        Whether the dataset has forces and readings of texels in 16 bits.
     is_job : bool
         Whether a Python file computes the runs, and no solver a scene.
     frozen : mapping
@@ -113,8 +119,16 @@ class Study:
     run_memory: Positive | None = None
     name: Name = ""
     images: Switch = False
+    recordings: Switch = False
+    points: Switch = False
+    half_precision: Switch = False
     is_job: bool = False
     frozen: Annotated[Mapping[str, Any], wanted("write it as a table, [frozen]")] = field(default_factory=dict)
+
+    @property
+    def has_folders(self) -> bool:
+        """Whether each run has a folder of its own, and not a place in a shard with others."""
+        return self.images or self.recordings or self.is_job
 
 
 @dataclass(frozen=True)
@@ -199,7 +213,7 @@ def study_of(table: Mapping[str, Any], name: str) -> Study:
     study = read_words(words, Study, f"'{name}'", A_STUDY, others, design=design, is_job=JOB in table)
     for word in _OF_SCENES if study.is_job else ():
         if word in table:
-            raise FileError(f"{word} of '{name}' means nothing beside a job: leave it out.")
+            raise FileError(f"{word} of '{name}' has no meaning for a job: leave it out.")
     if design.kind == GRID and "samples" in table:
         raise FileError(f"'{name}' has a grid and samples: a grid takes all combinations, so leave samples out, or use random.")
     if design.kind != GRID and not design.samples:
@@ -225,7 +239,7 @@ def plan_for(
     properties: Mapping[str, SceneProperty] | None = None,
     meshes: Mapping[str, TriangleMesh] | None = None,
 ) -> Plan:
-    """Return what a study means on a scene.
+    """Return the plan of a study on a scene.
 
     Parameters
     ----------
@@ -414,7 +428,7 @@ def _distribution(found: Variable, entry: Mapping[str, Any]) -> Distribution:
     if kind == CHOICE:
         return Distribution(CHOICE, tuple(found.read(word) for word in numbers))
     if not isinstance(found.specification, Parameter):
-        raise ParameterError(f"{found.name} is no number that can be {kind}: use choice.")
+        raise ParameterError(f"{found.name} is not a number that can be {kind}: use choice.")
     if isinstance(found.specification, WholeNumber):
         raise ParameterError(f"{found.name} is a whole number, which cannot be {kind}: use choice.")
     first, second = numbers
@@ -480,9 +494,10 @@ def frozen_text(text: str, frozen: Mapping[str, Any]) -> str:
 
 
 def differences(before: Study, now: Study) -> list[str]:
-    """Return what two studies say differently, one phrase each."""
+    """Return the differences of two studies, one phrase each."""
     found = []
-    pairs = [(word, getattr(before, word), getattr(now, word)) for word in ("name", "scenes", "fps", "images")]
+    words = ("name", "scenes", "fps", "images", "recordings", "points", "half_precision")
+    pairs = [(word, getattr(before, word), getattr(now, word)) for word in words]
     pairs += [(word, getattr(before.design, word), getattr(now.design, word)) for word in ("kind", "samples", "seed")]
     for name in dict.fromkeys([*before.vary, *now.vary]):
         pairs.append((name, before.vary.get(name), now.vary.get(name)))

@@ -100,7 +100,7 @@ class Variable:
 
 
 def variables_of(scenario: Scenario, has_press: bool = False) -> dict[str, Variable]:
-    """Return what may vary in a scenario by name, effects apart: :func:`variable` knows these too."""
+    """Return the parameters of a scenario that can vary, by name, without effects: :func:`variable` knows these too."""
     found: dict[str, Variable] = {}
 
     def add(owner: str, words: tuple[str, ...], specification: Specification | None) -> None:

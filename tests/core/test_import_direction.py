@@ -29,7 +29,7 @@ BLENDER = {
     "idprop",
     "aud",
 }
-HEAVY = {"numba", "llvmlite", "scipy", "matplotlib", "trimesh", "OpenEXR", "tqdm", "tomli_w", "jinja2"}
+HEAVY = {"numba", "llvmlite", "scipy", "matplotlib", "trimesh", "OpenEXR", "tqdm", "tomli_w", "jinja2", "warp"}
 # Loaded when the add-on is enabled; core is measured by the subprocess test below.
 LIGHT_PACKAGES = {"", "addon", "operators", "panels"}
 

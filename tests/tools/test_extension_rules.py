@@ -11,6 +11,8 @@ import tomli_w
 import upload_zips
 from build_zip import MACHINE_CODE, package_files
 
+from palpate.core.version import VERSION
+
 WHEELS = ["jinja2-3.1.6-py3-none-any.whl", "numba-0.68.1-cp311-cp311-manylinux2014_x86_64.manylinux_2_17_x86_64.whl"]
 
 
@@ -37,7 +39,7 @@ def zip_content(repository, files):
     return content | {"blender_manifest.toml": tomli_w.dumps(manifest | tables).encode()}
 
 
-def zipped(content, folder, name="palpate-0.1.0-linux-x64-cp311.zip"):
+def zipped(content, folder, name=f"palpate-{VERSION}-linux-x64-cp311.zip"):
     with zipfile.ZipFile(folder / name, "w") as archive:
         for file, data in content.items():
             archive.writestr(file, data)
@@ -132,14 +134,14 @@ def test_every_excuse_is_on_the_page(repository):
 
 def test_a_zip_becomes_one_to_upload(good, tmp_path, capsys):
     content = {name: data for name, data in changed(good, website="").items()} | {MACHINE_CODE: b"\0"}
-    sources = [zipped(content, tmp_path, f"palpate-0.1.0-linux-x64-{python}.zip") for python in ("cp311", "cp313")]
+    sources = [zipped(content, tmp_path, f"palpate-{VERSION}-linux-x64-{python}.zip") for python in ("cp311", "cp313")]
     assert extension_rules.main([str(path) for path in sources]) == 0
     assert extension_rules.main(["--upload", *map(str, sources)]) == 1
     said = capsys.readouterr().out
     assert "give each a version of its own" in said and "machine_code.bin" in said and "website is missing" in said
     arguments = ["--website", "https://palpate.invalid", "--out", str(tmp_path / "up"), *map(str, sources)]
     assert upload_zips.main(arguments) == 0
-    for path, version in zip(sources, ("0.1.0+cp311", "0.1.0+cp313"), strict=True):
+    for path, version in zip(sources, (f"{VERSION}+cp311", f"{VERSION}+cp313"), strict=True):
         with zipfile.ZipFile(tmp_path / "up" / path.name) as archive:
             manifest = tomllib.loads(archive.read("blender_manifest.toml").decode())
             assert (manifest["version"], manifest["website"]) == (version, "https://palpate.invalid")

@@ -7,12 +7,14 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-READ_BY_USERS = ("addon", "commands", "core/effects", "core/model", "core/solver", "operators", "panels", "docs")
+READ_BY_USERS = (
+    *("addon", "api", "commands", "core/effects", "core/export", "core/model", "core/simulators", "core/solver", "core/study"),
+    *("operators", "panels", "docs", "sweep"),
+)
 """Folders whose strings and pages a user reads."""
 
 INSTEAD = {
     r"\bAdvised (step|are)\b": "Recommended",
-    r"' (is hidden and )?takes no part\b": "is not part of the simulation",
     r"\bTexels that touch\b": "Texels in contact",
     r"\breading trembles\b": "reading is noisy",
     r"\bbrightest texel errs\b": "Largest texel error",
@@ -22,6 +24,22 @@ INSTEAD = {
     r"\ball that varies is known\b": "all varied parameters are handled",
     r"\bnothing that forces move\b": "free body",
     r"\bk in number\b": "Numerically ... of k",
+    r"\btakes? no part\b": "is not part of the simulation",
+    r"\b(was|were) not taken over\b": "not imported",
+    r"\bunfelt\b": "without contact",
+    r"\bnothing from outside is felt\b": "contact from outside is not measured",
+    r"\bFeels and is read out\b": "Measures contact forces",
+    r"\bbut (is )?not read out\b": "Compliant, without read-out",
+    r"\bwears? (the|no) (active )?material\b": "has the material",
+    r"\bwhat was (there|found|computed) before\b": "the earlier bake, earlier results",
+    r"\bthat is lacking\b": "error",
+    r"\bsinks in as far\b": "has the same penetration",
+    r"\bmeans nothing beside\b": "has no meaning for",
+    r"\bbefore it carries\b": "dead zone",
+    r"\bthat is advised\b": "recommended",
+    r"\bgoes on where it was\b": "continues",
+    r"\bWhat an impact loses\b": "Energy loss of an impact",
+    r"\bshare 1 - α v\b": "Restitution",
 }
 """Each expression, and the words to use in its place."""
 

@@ -48,9 +48,9 @@ SIGNATURES = {
 NEEDS = {
     "temperature": "temperatures that were recorded and vary",
     "clock": "recordings of which a session says how the time went on between them",
-    "no clock": "recordings of which each begins anew",
+    "no clock": "recordings of which each begins with an untouched sensor",
     "signed channels": "channels of which some rise and others fall under the same load",
-    "axes": "the same, with a number of channels that threes divide",
+    "axes": "the same, with a number of channels that is a multiple of three",
 }
 """What recordings must hold for an effect, or a form of it, to be a candidate."""
 GAIN_FALLS_WITH = {"use": "what the sensor was pressed", "clock": "the time"}
@@ -143,8 +143,6 @@ class Variant:
         Whether it acts after damping was added and the force was clipped at zero, so that a texel can pull.
     texel_columns : tuple of str
         Of which parameters of single texels it consists besides: "gain", "offset", "rate", "fading".
-    is_static : bool
-        Whether it only bends the curve of reading over load.
     needs_neighbours : bool
         Whether it passes something from texel to texel.
     displaces : bool
@@ -162,7 +160,6 @@ class Variant:
     in_contact: bool = False
     after_clip: bool = False
     texel_columns: tuple[str, ...] = ()
-    is_static: bool = False
     needs_neighbours: bool = False
     displaces: bool = False
     kind: str = ""

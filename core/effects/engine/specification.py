@@ -49,7 +49,7 @@ class TexelInput(NamedTuple):
     slope : float, N/m
         Derivative of `force` with respect to the depth at the end of the step.
     depth : float, m
-        Penetration at the end of the step, zero while nothing touches. Zero for a readout law.
+        Penetration at the end of the step, zero without contact. Zero for a readout law.
     slide : float, m
         Distance slid during the step. Zero for a readout law.
     """
@@ -224,10 +224,7 @@ class Kind:
     families : tuple of str
         Which effects resemble it, of :data:`.declarations.FAMILIES`.
     variants : tuple of Variant
-        What it can add to a signal whatever its formula. Without one, the search for kinds and the plans of experiments leave
-        it out.
-    cost : float, optional
-        Its price in that search, if it differs from the usual one: higher for what absorbs what others leave.
+        What it can add to a signal whatever its formula. Without one, the plans of experiments leave it out.
     found_by : str
         How it is found in recordings, one of :data:`.declarations.FOUND_BY`.
     signature : str
@@ -252,7 +249,6 @@ class Kind:
     known_from: tuple[str, ...] = ()
     families: tuple[str, ...] = ()
     variants: tuple[Variant, ...] = ()
-    cost: float | None = None
     found_by: str = FIT
     signature: str = ""
     needs: str = ""

@@ -92,8 +92,8 @@ def _relaxing(values: Values, dt: np.ndarray) -> np.ndarray:
 
 
 _PULL = Parameter("pull", "N", 0.02, 0.0, 100.0, "Largest pull F of one texel.")
-_ZONE = Parameter("depth", "m", 2e-4, 1e-6, 0.02, "Depth D, before contact ends, at which the pull is largest.", log=True)
-_WAY = Parameter("depth", "m", 2e-4, 1e-6, 0.02, "Distance D on the way out after which the pull has reached 63 %.", log=True)
+_ZONE = Parameter("depth", "m", 2e-4, 1e-6, 0.02, "Depth D of the largest pull, before contact ends.", log=True)
+_WAY = Parameter("depth", "m", 2e-4, 1e-6, 0.02, "Retraction D after which the pull has reached 63 %.", log=True)
 
 
 def unloading_pull(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
@@ -122,13 +122,13 @@ def steady_pull(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarra
 KIND = Kind(
     name="adhesion",
     title="Adhesion",
-    text="Sticks: the force goes below that of the spring when the object comes off, and may pull.",
+    text="The surfaces stick: the force falls below the spring's, and may pull.",
     site="pad",
     order=50,
     forms=(
         Form(
             "unloading",
-            "f = f₀ − F u,  u → 1 on the way back, → 0 on the way in, within D",
+            "f = f₀ − F u,  u → 1 during unloading, → 0 during loading, within D",
             "Johnson, Kendall and Roberts, Proc. R. Soc. A 324 (1971): contact is held longer than it was made",
             (_PULL, _WAY),
             neutral={"pull": 0.0},
@@ -154,7 +154,7 @@ KIND = Kind(
             (
                 _PULL,
                 _WAY,
-                Parameter("time", "s", 2.0, 0.01, 1000.0, "Time of contact τ after which the pull has reached 63 %.", log=True),
+                Parameter("time", "s", 2.0, 0.01, 1000.0, "Contact time τ after which the pull has reached 63 %.", log=True),
             ),
             neutral={"pull": 0.0},
             law=unloading,
@@ -164,7 +164,7 @@ KIND = Kind(
         ),
         Form(
             "cohesive",
-            "f = f₀ − F u x exp(1 − x),  x = d/D;  u → 1 on the way back, → 0 on the way in, within D",
+            "f = f₀ − F u x exp(1 − x),  x = d/D,  u as in unloading",
             "Rose, Ferrante and Smith, Phys. Rev. Lett. 47 (1981); Xu and Needleman, Model. Simul. Mater. Sci. Eng. 1 (1993): "
             "traction over separation",
             (_PULL, _ZONE),
@@ -176,12 +176,12 @@ KIND = Kind(
         ),
         Form(
             "relaxing",
-            "f = f₀ − F u x exp(1 − x) as cohesive, but u fades within the time τ when it rests",
+            "as cohesive, but u fades within τ at rest",
             "Maugis and Barquins, J. Phys. D 11 (1978): the faster surfaces part, the more adhesion takes",
             (
                 _PULL,
                 _ZONE,
-                Parameter("time", "s", 0.1, 1e-3, 1000.0, "Time τ after which 37 % of the pull is left at rest.", log=True),
+                Parameter("time", "s", 0.1, 1e-3, 1000.0, "Time constant τ of the decay at rest.", log=True),
             ),
             neutral={"pull": 0.0},
             law=cohesive,
@@ -190,7 +190,7 @@ KIND = Kind(
             after_clip=True,
         ),
     ),
-    experiment="retract slowly after contacts of one second and of one minute, and record until well after release",
+    experiment="retract slowly after contacts of one second and one minute, and record beyond the release",
     drawing=Drawing(
         "depth",
         depth=0.0002 * np.interp(np.linspace(0, 20, 2001), [0, 10, 20], [0.0, 1.0, 0.0]),
@@ -205,7 +205,7 @@ KIND = Kind(
     known_from=("unloading",),
     variants=(
         Variant(70, unloading_pull, name="unloading", in_contact=True, after_clip=True),
-        Variant(80, steady_pull, name="steady", in_contact=True, after_clip=True, is_static=True),
+        Variant(80, steady_pull, name="steady", in_contact=True, after_clip=True),
     ),
     signature="pull",
 )

@@ -94,16 +94,16 @@ def power(values: Values) -> tuple[np.ndarray, np.ndarray]:
     return scalar(values, "amount") * weights, scalar(values, "time") / rates
 
 
-_TIME = Parameter("time", "s", 2.0, 0.02, 1000.0, "Time after which 63 % of the settling is over.", log=True)
-_ONSET = Parameter("time", "s", 0.5, 0.01, 100.0, "Time after which the settling follows the logarithm of time.", log=True)
-_AMOUNT = Parameter("amount", "1", 0.2, 0.0, 0.95, "Share of the force that is lost in the end.")
-_RISE = Parameter("amount", "1", 0.2, -0.9, 5.0, "Share by which the reading has risen in the end; negative: fallen.")
+_TIME = Parameter("time", "s", 2.0, 0.02, 1000.0, "Time constant τ of the settling.", log=True)
+_ONSET = Parameter("time", "s", 0.5, 0.01, 100.0, "Time τ of the onset.", log=True)
+_AMOUNT = Parameter("amount", "1", 0.2, 0.0, 0.95, "Final loss a, as a share of the force.")
+_RISE = Parameter("amount", "1", 0.2, -0.9, 5.0, "Final rise a, as a share; negative: fall.")
 _SECOND = (
-    Parameter("amount_2", "1", 0.1, 0.0, 0.95, "Amount of a second, slower settling."),
-    Parameter("time_2", "s", 20.0, 0.02, 1000.0, "Time of the second settling.", log=True),
+    Parameter("amount_2", "1", 0.1, 0.0, 0.95, "Loss a₂ of a second, slower settling."),
+    Parameter("time_2", "s", 20.0, 0.02, 1000.0, "Time constant τ₂ of the second settling.", log=True),
 )
-_DECADE = Parameter("amount", "1", 0.05, 0.0, 0.15, "Share of the force that is lost per decade of time.")
-_RISE_DECADE = Parameter("amount", "1", 0.05, 0.0, 1.0, "Share by which the reading rises per decade of time.")
+_DECADE = Parameter("amount", "1", 0.05, 0.0, 0.15, "Loss a per decade of time, as a share.")
+_RISE_DECADE = Parameter("amount", "1", 0.05, 0.0, 1.0, "Rise a per decade of time, as a share.")
 _EXPONENT = Parameter("exponent", "1", 0.3, 0.05, 1.5, "Exponent p of the power law.")
 
 _VISCOELASTIC = "Fung, Biomechanics (1993), section 7.6: quasi-linear viscoelasticity"
@@ -134,7 +134,7 @@ def _relaxation_times(recorded: Recordings) -> list[float]:
 KIND = Kind(
     name="creep",
     title="Creep",
-    text="Settles slowly: held at one depth the force relaxes, or under one load the reading goes on rising.",
+    text="At constant depth the force relaxes, or under constant load the reading rises.",
     site="pad",
     order=30,
     forms=(

@@ -43,6 +43,13 @@ def common(signal: np.ndarray, time: np.ndarray, values: Values, transducers: Tr
     return signal + scalar(values, "share") * signal.mean(axis=1, keepdims=True)
 
 
+def previous(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Add a share of the texel before, in the order of the texels; the first has none before it."""
+    result = signal.copy()
+    result[:, 1:] += scalar(values, "share") * signal[:, :-1]
+    return result
+
+
 def couplings(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
     """Readings that couple into neighbours and into texels of the same row or column, on top of their own."""
     columns = []
@@ -60,13 +67,14 @@ def couplings(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]
         columns.append(x @ ((apart > 1e-9) & (apart < 1.3)))
     order = np.arange(x.shape[1])
     columns.append(x @ (np.abs(order[:, None] - order[None]) == 1))
+    columns.append(x @ (order[None] - order[:, None] == 1))  # the one before alone
     return columns
 
 
 KIND = Kind(
     name="crosstalk",
     title="Crosstalk",
-    text="Texels leak into the readings of others that share their wires or lie beside them.",
+    text="The signal of a texel leaks into those of neighbours, of its lines, or of the texel that is scanned next.",
     site="readout",
     order=50,
     forms=(
@@ -94,9 +102,21 @@ KIND = Kind(
             neutral={"share": 0.0},
             memoryless=common,
         ),
+        Form(
+            "previous",
+            "rᵢ = fᵢ + c · fᵢ₋₁",
+            "Kester (ed.), The Data Conversion Handbook (2005), section 7.3: a multiplexer that has not settled keeps "
+            "a part of the channel before",
+            (Parameter("share", "1", 0.05, 0.0, 1.0, "Share c that the texel scanned before leaves."),),
+            neutral={"share": 0.0},
+            memoryless=previous,
+        ),
     ),
     experiment="press single texels with a pin, along one row and along one column, at two loads",
-    drawing=Drawing("row", values={"neighbours": {"share": 0.2}, "lines": {"share": 1.0}, "common": {"share": 4.0}}),
+    drawing=Drawing(
+        "row",
+        values={"neighbours": {"share": 0.2}, "lines": {"share": 1.0}, "common": {"share": 4.0}, "previous": {"share": 0.3}},
+    ),
     known_from=("places",),
     families=("spreading",),
     variants=(Variant(20, couplings, needs_neighbours=True),),

@@ -39,7 +39,7 @@ def missing_below(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndar
 KIND = Kind(
     name="dead-zone",
     title="Dead Zone",
-    text="Does not feel loads below a threshold.",
+    text="Loads below a threshold are not measured.",
     site="readout",
     order=35,
     forms=(
@@ -71,5 +71,5 @@ KIND = Kind(
     experiment="approach slowly, with many samples at the first touch, with a flat and with a round indenter",
     drawing=Drawing("force", values={form: {"threshold": 0.4} for form in ("hard", "soft", "step")}),
     families=("nonlinear",),
-    variants=(Variant(40, missing_below, is_static=True),),
+    variants=(Variant(40, missing_below),),
 )

@@ -47,7 +47,7 @@ def functions_of_time(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.
 KIND = Kind(
     name="drift",
     title="Drift",
-    text="The reading moves slowly by itself, with or without load.",
+    text="The reading changes slowly by itself.",
     site="readout",
     order=64,
     forms=(
@@ -66,7 +66,7 @@ KIND = Kind(
             "Doebelin, Measurement Systems (2003): warm-up of an instrument",
             (
                 Parameter("amount", "unit", 0.05, -1e4, 1e4, "Change a of the reading when warm."),
-                Parameter("time", "s", 30.0, 0.1, 1e5, "Time τ after which 63 % of the change is over.", log=True),
+                Parameter("time", "s", 30.0, 0.1, 1e5, "Time constant τ of the change.", log=True),
             ),
             neutral={"amount": 0.0},
             memoryless=warm_up,
@@ -77,8 +77,8 @@ KIND = Kind(
             "r = f · (1 + a · (1 − exp(−t/τ)))",
             "Doebelin, Measurement Systems (2003), section 3.2: sensitivity drift",
             (
-                Parameter("amount", "1", 0.2, -0.9, 5.0, "Share a by which the reading of a load has changed when warm."),
-                Parameter("time", "s", 30.0, 0.1, 1e5, "Time τ after which 63 % of the change is over.", log=True),
+                Parameter("amount", "1", 0.2, -0.9, 5.0, "Final change a of the sensitivity, as a share."),
+                Parameter("time", "s", 30.0, 0.1, 1e5, "Time constant τ of the change.", log=True),
             ),
             neutral={"amount": 0.0},
             memoryless=sensitivity,
@@ -104,6 +104,5 @@ KIND = Kind(
     known_from=("timing", "rest"),
     families=("moving",),
     variants=(Variant(90, functions_of_time, -1.0, 1.0, texel_columns=("rate",)),),
-    cost=0.3,
     gain_falls_with="clock",
 )

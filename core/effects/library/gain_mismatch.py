@@ -45,7 +45,7 @@ def gradient(signal: np.ndarray, time: np.ndarray, values: Values, transducers: 
 KIND = Kind(
     name="gain-mismatch",
     title="Gain Mismatch",
-    text="Some texels read more, others less, under the same load.",
+    text="Texels read differently under the same load.",
     site="readout",
     order=40,
     forms=(
@@ -71,8 +71,8 @@ KIND = Kind(
             "r = (1 + gₓ x + g_y y) · f,  x and y from −1 to 1 across the sensor",
             "ISO/IEC Guide 99 (2007), 2.39: calibration, to first order in the place",
             (
-                Parameter("along_x", "1", 0.2, -0.5, 0.5, "Change g of the factor from the centre to the end in +x."),
-                Parameter("along_y", "1", 0.0, -0.5, 0.5, "Change g of the factor from the centre to the end in +y."),
+                Parameter("along_x", "1", 0.2, -0.5, 0.5, "Change g of the factor from the centre to the +x end."),
+                Parameter("along_y", "1", 0.0, -0.5, 0.5, "Change g of the factor from the centre to the +y end."),
             ),
             neutral={"along_x": 0.0, "along_y": 0.0},
             memoryless=gradient,
@@ -82,7 +82,7 @@ KIND = Kind(
             "rᵢ = gᵢ · fᵢ · (1 + cᵢ fᵢ)",
             "ISO/IEC Guide 99 (2007), 4.31: calibration curve, here to second order for each texel",
             (
-                Parameter("factor", "1", 1.0, 0.0, 100.0, "Factor g of each texel at small forces.", per_texel=True),
+                Parameter("factor", "1", 1.0, 0.0, 100.0, "Factor g of each texel.", per_texel=True),
                 Parameter("curvature", "1/N", 0.0, -1e4, 1e4, "Share c by which the factor grows per newton.", per_texel=True),
             ),
             neutral={"factor": 1.0, "curvature": 0.0},
@@ -106,5 +106,4 @@ KIND = Kind(
     drawing=Drawing("texel"),
     known_from=("places",),
     variants=(Variant(30, texel_columns=("gain",)),),
-    cost=0.5,
 )

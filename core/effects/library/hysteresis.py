@@ -161,9 +161,9 @@ def _relays(values: Values, dt: np.ndarray) -> np.ndarray:
     return np.tile(row, (len(dt), 1))
 
 
-_SHARE = Parameter("share", "1", 0.4, 0.0, 0.95, "Share a of the force that goes through the elements that slip.")
+_SHARE = Parameter("share", "1", 0.4, 0.0, 0.95, "Share a of the force in the slip elements.")
 _FORCE = Parameter("force", "N", 0.05, 1e-6, 1e3, "Force Y at which they slip.", log=True)
-_WIDTH = Parameter("width", "1", 0.15, 0.0, 0.9, "Half the width h of the loop, as a share of the force.")
+_WIDTH = Parameter("width", "1", 0.15, 0.0, 0.9, "Half width h of the loop, as a share of the force.")
 
 
 def loops_below(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
@@ -185,7 +185,7 @@ def loops_above(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarra
 KIND = Kind(
     name="hysteresis",
     title="Hysteresis",
-    text="Reads differently at the same depth on the way in and on the way back, however slowly it is done.",
+    text="Loading and unloading differ at the same depth, at any speed.",
     site="pad",
     order=20,
     forms=(
@@ -201,7 +201,7 @@ KIND = Kind(
                     3e-4,
                     1e-6,
                     0.05,
-                    "Depth D that leads 63 % of the way to the other branch.",
+                    "Depth D over which 63 % of the transition happens.",
                     log=True,
                 ),
             ),
@@ -218,7 +218,7 @@ KIND = Kind(
             (
                 _SHARE,
                 _FORCE,
-                Parameter("beta", "1", 0.75, 0.5, 1.0, "Shape β of the loop: how much of the yielding happens on unloading."),
+                Parameter("beta", "1", 0.75, 0.5, 1.0, "Shape β of the loop: share of the yielding on unloading."),
             ),
             neutral={"share": 0.0},
             law=bouc_wen,
@@ -240,8 +240,8 @@ KIND = Kind(
             "r = (1 − a) f + a · mean of pⱼ,  pⱼ is dragged along rⱼ behind f",
             "Krasnosel'skii and Pokrovskii, Systems with Hysteresis (1989); Kuhnen, Eur. J. Control 9 (2003): play operators",
             (
-                Parameter("share", "1", 0.4, 0.0, 1.0, "Share a of the reading that goes through the elements with play."),
-                Parameter("force", "N", 0.05, 1e-6, 1e3, "Mean force Y by which they trail behind.", log=True),
+                Parameter("share", "1", 0.4, 0.0, 1.0, "Share a of the reading in the play elements."),
+                Parameter("force", "N", 0.05, 1e-6, 1e3, "Mean force Y by which they trail.", log=True),
             ),
             neutral={"share": 0.0},
             law=play,
@@ -254,7 +254,7 @@ KIND = Kind(
             "r = (1 − a) f + a · mean of pⱼ,  pⱼ between f − wⱼ and f, and never below zero",
             "Preisach, Z. Phys. 94 (1935); Mayergoyz, Mathematical Models of Hysteresis (1991): relays of exponential widths",
             (
-                Parameter("share", "1", 0.4, 0.0, 1.0, "Share a of the reading that goes through the relays."),
+                Parameter("share", "1", 0.4, 0.0, 1.0, "Share a of the reading in the relays."),
                 Parameter("force", "N", 0.1, 1e-6, 1e3, "Mean width w between switching on and off.", log=True),
             ),
             neutral={"share": 0.0},
@@ -275,7 +275,7 @@ KIND = Kind(
                     0.02,
                     1e-6,
                     1e3,
-                    "Force F that leads 63 % of the way to the other branch.",
+                    "Force F over which 63 % of the transition happens.",
                     log=True,
                 ),
             ),
@@ -287,7 +287,7 @@ KIND = Kind(
             fitted_up_to={"width": 0.5},
         ),
     ),
-    experiment="load and unload to the same depth at speeds a hundredfold apart, with partial unloadings",
+    experiment="load and unload to the same depth at very different speeds (1:100), with partial unloadings",
     drawing=Drawing(
         "depth",
         depth=cycles(1, np.linspace(0, 20, 2001)),

@@ -76,7 +76,7 @@ _SECOND = np.linspace(0, 1, 501)
 KIND = Kind(
     name="lag",
     title="Lag",
-    text="Answers late to a change.",
+    text="The reading follows a change late.",
     site="readout",
     order=60,
     forms=(
@@ -112,7 +112,7 @@ KIND = Kind(
             after_conversion=True,
         ),
     ),
-    experiment="press and release as fast as the rig can, and record at a high rate",
+    experiment="press and release as fast as possible, and record at a high rate",
     drawing=Drawing(time=_SECOND, depth=0.002 * np.interp(_SECOND, [0.1, 0.12, 0.6, 0.62], [0, 1, 1, 0]), headroom=1.6),
     known_from=("timing",),
     families=("late",),

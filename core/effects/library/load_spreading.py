@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A cover spreads the load: the force on each texel is distributed among its neighbours, and the sum is preserved."""
+"""A cover spreads the load of each texel among its neighbours. The sum is preserved unless the cover goes on beyond the rim."""
 
 from __future__ import annotations
 
@@ -32,6 +32,22 @@ def half_space(values: Values, transducers: TransducerArray) -> CouplingMatrix:
     return _spread(transducers, lambda r: (1.0 + (r / thickness) ** 2) ** -2.5, 12.0 * thickness)
 
 
+def open_rim(values: Values, transducers: TransducerArray) -> CouplingMatrix:
+    """Weights ``exp(−r²/2s²)`` over their sum on a square lattice that goes on beyond the texels, as their cover does.
+
+    What would fall on texels outside is lost. The pitch of the lattice is the root of a texel's median area.
+    """
+    width = max(scalar(values, "width"), 1e-9)
+    whole = _lattice_sum(width / float(np.sqrt(np.median(transducers.area))))
+    return coupling_matrix(transducers.position, lambda r: np.exp(-0.5 * (r / width) ** 2) / whole, 5.0 * width, None)
+
+
+def _lattice_sum(width: float) -> float:
+    """Sum of ``exp(−r²/2s²)`` over a square lattice of pitch 1."""
+    reach = np.arange(1.0, 10.0 * width + 2.0)
+    return float(1.0 + 2.0 * np.exp(-0.5 * (reach / width) ** 2).sum()) ** 2
+
+
 def _spread(transducers: TransducerArray, weight: Callable[[np.ndarray], np.ndarray], reach: float) -> CouplingMatrix:
     """Weights that preserve the sum, with which all texels count alike.
 
@@ -41,23 +57,29 @@ def _spread(transducers: TransducerArray, weight: Callable[[np.ndarray], np.ndar
     return coupling_matrix(transducers.position, weight, reach, np.full_like(transducers.area, np.median(transducers.area)))
 
 
-_WIDTH = Parameter("width", "m", 0.003, 0.0, 0.1, "How far a point load spreads, s.")
+_WIDTH = Parameter("width", "m", 0.003, 0.0, 0.1, "Spread s of a point load.")
+
+
+_WIDTHS, _OPEN_WIDTHS = (0.4, 0.55, 0.75, 1.0, 1.4, 2.2), (0.55, 1.0, 2.2)
+"""Widths of kernels, in pitches, and those of kernels under a cover that goes on beyond the rim."""
 
 
 def kernels(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
-    """Isotropic kernels that pass load on and keep its sum."""
+    """Isotropic kernels that pass load on; most keep its sum, and some lose what goes beyond the rim."""
     apart = np.linalg.norm(recorded.place[:, None] - recorded.place[None], axis=2)
     columns = []
-    for width in (0.4, 0.55, 0.75, 1.0, 1.4, 2.2):
+    for width in _WIDTHS:
         kernel = np.exp(-0.5 * (apart / width) ** 2)
         columns.append(x @ (kernel / kernel.sum(axis=0)).T - x)
+        if width in _OPEN_WIDTHS:
+            columns.append(x @ kernel.T / _lattice_sum(width) - x)
     return columns
 
 
 KIND = Kind(
     name="load-spreading",
     title="Load Spreading",
-    text="A cover shares the load of a texel with its neighbours, so that small things look wider.",
+    text="A cover shares the load of a texel with its neighbours.",
     site="readout",
     order=10,
     forms=(
@@ -85,8 +107,16 @@ KIND = Kind(
             neutral={"thickness": 0.0},
             coupling=half_space,
         ),
+        Form(
+            "open",
+            "rᵢ = Σⱼ wᵢⱼ fⱼ,  wᵢⱼ = exp(−r²/2s²) / Σ exp(−r²/2s²) over all lattice points",
+            "Shimojo, IEEE Trans. Robot. Autom. 13 (1997), under a cover that is wider than the array: loads leave at the rim",
+            (_WIDTH,),
+            neutral={"width": 0.0},
+            coupling=open_rim,
+        ),
     ),
-    experiment="press single texels with a pin that is narrower than a texel",
+    experiment="press single texels with a pin narrower than a texel",
     drawing=Drawing("row"),
     known_from=("places",),
     families=("spreading",),

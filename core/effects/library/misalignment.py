@@ -48,14 +48,14 @@ def _rotation(x: float, y: float, z: float) -> np.ndarray:
 _X = Parameter("x", "m", 0.001, -0.05, 0.05, "Shift along the columns.")
 _Y = Parameter("y", "m", 0.0, -0.05, 0.05, "Shift along the rows.")
 _TURN = Parameter("about_z", "rad", 0.05, -0.8, 0.8, "Turn about the normal.")
-_HEIGHT = Parameter("z", "m", 0.0, -0.02, 0.02, "Shift outwards, along the normal.")
+_HEIGHT = Parameter("z", "m", 0.0, -0.02, 0.02, "Shift along the normal.")
 _TILT_X = Parameter("about_x", "rad", 0.03, -0.5, 0.5, "Turn about the texels' x axis.")
 _TILT_Y = Parameter("about_y", "rad", 0.0, -0.5, 0.5, "Turn about the texels' y axis.")
 
 KIND = Kind(
     name="misalignment",
     title="Misalignment",
-    text="The texels sit beside or askew of where the model has them.",
+    text="The texels are shifted or turned against the model's.",
     site="contact",
     order=0,
     forms=(
@@ -92,12 +92,11 @@ KIND = Kind(
             placement=displaced,
         ),
     ),
-    experiment="press at many known places, beyond the sensor's edges as well",
+    experiment="press at many known places, also beyond the edges",
     drawing=Drawing(
         "ball",
         values={"shift": {"x": 0.0, "y": 0.005}, "turn": {"x": 0.003, "y": 0.0, "about_z": 0.4}, "tilt": {"about_x": 0.08}},
     ),
     known_from=("places",),
     variants=(Variant(0, low=-1.0, high=1.0, in_contact=True, displaces=True),),
-    cost=0.4,
 )

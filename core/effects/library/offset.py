@@ -33,7 +33,7 @@ _SECOND = np.linspace(0, 1, 501)
 KIND = Kind(
     name="offset",
     title="Offset",
-    text="Reads something without load.",
+    text="The reading without load is not zero.",
     site="readout",
     order=62,
     forms=(
@@ -70,6 +70,5 @@ KIND = Kind(
     experiment="record a minute without touching the sensor, before and after a trial",
     drawing=Drawing(time=_SECOND, depth=0.0002 * np.sin(np.pi * _SECOND) ** 2, values={"common": {"offset": 0.05}}),
     variants=(Variant(100, texel_columns=("offset",)), Variant(110, name="fading", texel_columns=("fading",))),
-    cost=0.4,
     signature="unloaded",
 )

@@ -54,14 +54,12 @@ def _stepped(signal: np.ndarray, step: float, rounding: Callable[[np.ndarray], n
 
 
 _STEP = Parameter("step", "unit", 0.01, 0.0, 1e4, "Width Δ of a step.")
-_ROUNDING = Parameter(
-    "rounding", "1", 0.0, 0.0, 0.5, "Share h of a step that is rounded up: 0 cuts off, 0.5 rounds to the nearest."
-)
+_ROUNDING = Parameter("rounding", "1", 0.0, 0.0, 0.5, "Share h of a step that is rounded up: 0 truncates, 0.5 rounds.")
 
 KIND = Kind(
     name="quantization",
     title="Quantization",
-    text="The reading comes in steps.",
+    text="The reading is discrete.",
     site="readout",
     order=90,
     forms=(
@@ -102,7 +100,7 @@ KIND = Kind(
             "ITU-T Recommendation G.711 (1988): companding by a logarithm",
             (
                 Parameter("scale", "unit", 0.1, 1e-6, 1e5, "Reading A above which the steps grow with the reading.", log=True),
-                Parameter("growth", "1", 0.05, 0.0, 3.0, "Width b of a step, as a share of the sum of A and the reading."),
+                Parameter("growth", "1", 0.05, 0.0, 3.0, "Width b of a step, as a share of A plus the reading."),
                 _ROUNDING,
             ),
             neutral={"growth": 0.0},
@@ -115,7 +113,7 @@ KIND = Kind(
             "Max, IRE Trans. Inf. Theory 6 (1960): uneven steps as even steps behind a compressor, here a power",
             (
                 Parameter("first", "unit", 0.02, 0.0, 1e4, "Reading s at the end of the first step."),
-                Parameter("exponent", "1", 0.5, 0.1, 3.0, "Power p of the reading that the converter divides evenly."),
+                Parameter("exponent", "1", 0.5, 0.1, 3.0, "Power p of the reading that is divided evenly."),
                 _ROUNDING,
             ),
             neutral={"first": 0.0},

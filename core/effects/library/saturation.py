@@ -12,7 +12,7 @@ from ...model.parameter import Parameter
 from ..engine.declarations import Drawing, Recordings, Run, Variant
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
-_LEVEL = Parameter("level", "unit", 1.0, 1e-4, 1e5, "Largest change of the reading from the one without load.", log=True)
+_LEVEL = Parameter("level", "unit", 1.0, 1e-4, 1e5, "Largest reading L, counted from the reading without load.", log=True)
 
 
 def clip(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
@@ -43,7 +43,7 @@ def missing_above(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndar
 KIND = Kind(
     name="saturation",
     title="Saturation",
-    text="The reading stops growing at a highest level.",
+    text="The reading stops growing at a maximum.",
     site="readout",
     order=70,
     forms=(
@@ -75,8 +75,8 @@ KIND = Kind(
             after_conversion=True,
         ),
     ),
-    experiment="go on to the highest load that the sensor may bear",
+    experiment="press to the highest permitted load",
     drawing=Drawing("force"),
     families=("nonlinear",),
-    variants=(Variant(50, missing_above, is_static=True),),
+    variants=(Variant(50, missing_above),),
 )

@@ -55,7 +55,7 @@ def path(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bo
     return texel.force * factor, texel.slope * factor + texel.force * factor_slope
 
 
-_SHARE = Parameter("share", "1", 0.25, 0.0, 0.9, "Share s of the force that is lost at most.")
+_SHARE = Parameter("share", "1", 0.25, 0.0, 0.9, "Largest share s of the force that is lost.")
 
 
 def losses(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
@@ -77,7 +77,7 @@ is over. What still goes on is wear."""
 KIND = Kind(
     name="softening",
     title="Softening",
-    text="Is stiff when pressed for the first time and softer in the cycles after it.",
+    text="The first press is stiffer than later ones.",
     site="pad",
     order=10,
     forms=(
@@ -95,7 +95,7 @@ KIND = Kind(
             "peak",
             "f = fₑ · (1 − s · (1 − exp(−dₘ/D))),  dₘ the largest depth so far",
             "Simo, Comput. Methods Appl. Mech. Eng. 60 (1987): damage by the largest strain",
-            (_SHARE, Parameter("depth", "m", 0.002, 1e-5, 0.1, "Largest depth D that causes 63 % of the loss.", log=True)),
+            (_SHARE, Parameter("depth", "m", 0.002, 1e-5, 0.1, "Depth D that causes 63 % of the loss.", log=True)),
             neutral={"share": 0.0},
             law=peak,
             constants=constants_from("share", "depth"),
@@ -108,7 +108,7 @@ KIND = Kind(
             "Miehe, Eur. J. Mech. A 14 (1995): continuous damage by the arc length of the strain",
             (
                 _SHARE,
-                Parameter("path", "m", 0.01, 1e-5, 10.0, "Path P, over all cycles, that does 63 % of the loss.", log=True),
+                Parameter("path", "m", 0.01, 1e-5, 10.0, "Path P, over all cycles, that causes 63 % of the loss.", log=True),
             ),
             neutral={"share": 0.0},
             law=path,

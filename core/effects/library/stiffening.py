@@ -52,8 +52,8 @@ def foam(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bo
     return texel.force * factor, texel.slope * factor + texel.force * factor_slope / length
 
 
-_DOUBLE = Parameter("depth", "m", 0.004, 1e-4, 0.1, "Depth D at which the force is twice that of the linear spring.", log=True)
-_POWER = Parameter("exponent", "1", 1.0, 0.5, 4.0, "How suddenly it sets in: 1 adds a quadratic force, 2 a cubic one.")
+_DOUBLE = Parameter("depth", "m", 0.004, 1e-4, 0.1, "Depth D at which the force is twice the linear one.", log=True)
+_POWER = Parameter("exponent", "1", 1.0, 0.5, 4.0, "Exponent p: 1 adds a quadratic force, 2 a cubic one.")
 
 
 def powers_of_load(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
@@ -65,7 +65,7 @@ def powers_of_load(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.nda
 KIND = Kind(
     name="stiffening",
     title="Stiffening",
-    text="Gets stiffer the deeper it is pressed.",
+    text="The stiffness grows with the depth.",
     site="contact",
     order=10,
     forms=(
@@ -92,16 +92,16 @@ KIND = Kind(
             "f = k d / (1 − (d/L)ᵖ)",
             "Gibson and Ashby, Cellular Solids (1997), chapter 5: densification",
             (
-                Parameter("depth", "m", 0.01, 2e-4, 0.1, "Depth L at which the foam's cells are closed.", log=True),
-                Parameter("exponent", "1", 2.0, 0.5, 8.0, "How suddenly it densifies."),
+                Parameter("depth", "m", 0.01, 2e-4, 0.1, "Depth L at which the cells are closed.", log=True),
+                Parameter("exponent", "1", 2.0, 0.5, 8.0, "Exponent p of the densification."),
             ),
             neutral={"depth": math.inf},
             law=foam,
             constants=constants_from("depth", "exponent"),
         ),
     ),
-    experiment="go on to the largest depth that the sensor may bear, slowly",
+    experiment="press slowly to the largest permitted depth",
     drawing=Drawing("depth", depth=np.linspace(0, 0.004, 400)),
     families=("nonlinear",),
-    variants=(Variant(10, powers_of_load, 0.0, 3.0, in_contact=True, is_static=True),),
+    variants=(Variant(10, powers_of_load, 0.0, 3.0, in_contact=True),),
 )

@@ -30,15 +30,15 @@ def rational(speed: float, force: float, constants: np.ndarray) -> tuple[float, 
 
 
 _PARAMETERS = (
-    Parameter("rise", "1", 0.5, 0.0, 4.0, "Share a by which friction is larger at rest than in fast sliding."),
-    Parameter("speed", "m/s", 0.01, 1e-5, 2.0, "Sliding speed V at which most of the rise is gone.", log=True),
+    Parameter("rise", "1", 0.5, 0.0, 4.0, "Excess a of friction at rest over fast sliding, as a share."),
+    Parameter("speed", "m/s", 0.01, 1e-5, 2.0, "Stribeck velocity V, at which most of the excess is gone.", log=True),
 )
 _CONSTANTS = constants_from("rise", "speed")
 
 KIND = Kind(
     name="stribeck",
     title="Stribeck Friction",
-    text="Grips harder when it slides slowly than when it slides fast.",
+    text="Friction is larger in slow sliding than in fast sliding.",
     site="contact",
     order=20,
     forms=(
@@ -70,6 +70,6 @@ KIND = Kind(
             constants=_CONSTANTS,
         ),
     ),
-    experiment="slide at constant speeds from a tenth of a millimetre to a hundred millimetres per second",
+    experiment="slide at constant speeds from 0.1 to 100 mm/s",
     drawing=Drawing("speed"),
 )

@@ -41,14 +41,14 @@ def _warmth(time: np.ndarray, values: Values, transducers: TransducerArray) -> n
 _GAIN = Parameter("gain_change", "1/K", 0.005, -0.5, 0.5, "Share a by which the gain changes per kelvin.")
 _ZERO = Parameter("zero_change", "unit/K", 0.005, -1e3, 1e3, "Change b of the reading per kelvin.")
 _TEMPERATURES = (
-    Parameter("temperature", "°C", 35.0, -273.0, 2000.0, "Temperature T of the sensor, where no recording holds it."),
-    Parameter("reference", "°C", REFERENCE, -273.0, 2000.0, "Temperature T₀ at which gain and zero are those of the sensor."),
+    Parameter("temperature", "°C", 35.0, -273.0, 2000.0, "Temperature T of the sensor, unless recorded."),
+    Parameter("reference", "°C", REFERENCE, -273.0, 2000.0, "Reference temperature T₀ of gain and zero."),
 )
 
 KIND = Kind(
     name="temperature",
     title="Temperature",
-    text="The gain and the reading without load follow the temperature.",
+    text="Gain and zero follow the temperature.",
     site="readout",
     order=63,
     forms=(
@@ -79,7 +79,7 @@ KIND = Kind(
             after_conversion=True,
         ),
     ),
-    experiment="record an unloaded hour and repeated presses while the sensor warms by ten kelvin, with its temperature",
+    experiment="record its temperature, an unloaded hour and repeated presses while the sensor warms by 10 K",
     drawing=Drawing("force", values={"gain": {"gain_change": 0.02}, "zero": {"zero_change": 0.02}}),
     needs="temperature",
     known_parameters=("temperature", "reference"),  # recordings hold the temperature; the reference is that of gain and zero

@@ -28,7 +28,7 @@ def load(speed: float, force: float, constants: np.ndarray) -> tuple[float, floa
 KIND = Kind(
     name="viscous-friction",
     title="Viscous Friction",
-    text="Drags the harder the faster it slides.",
+    text="Friction grows with the sliding speed.",
     site="contact",
     order=30,
     forms=(
@@ -63,6 +63,6 @@ KIND = Kind(
             constants=constants_from("drag", "exponent"),
         ),
     ),
-    experiment="slide at constant speeds, up to the fastest that the rig can",
+    experiment="slide at constant speeds, up to the fastest possible",
     drawing=Drawing("speed", values={"linear": {"viscosity": 2.0}, "load": {"viscosity": 4.0}, "power": {"drag": 0.3}}),
 )

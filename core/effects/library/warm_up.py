@@ -27,13 +27,13 @@ def _since(time: np.ndarray, values: Values) -> np.ndarray:
     return np.asarray(np.maximum(time + scalar(values, "since"), 0.0)[:, None])
 
 
-_AMOUNT = Parameter("amount", "1", 0.2, -0.9, 5.0, "Share a by which the reading of a load has changed when warm.")
-_SINCE = Parameter("since", "s", 0.0, 0.0, 1e6, "Time t₀ from power-on to time zero: the first frame, or the first recording.")
+_AMOUNT = Parameter("amount", "1", 0.2, -0.9, 5.0, "Final change a of the sensitivity, as a share.")
+_SINCE = Parameter("since", "s", 0.0, 0.0, 1e6, "Time t₀ from power-on to the first frame or recording.")
 
 KIND = Kind(
     name="warm-up",
     title="Warm-Up",
-    text="The same load reads more, or less, the longer the sensor is switched on, until it is warm.",
+    text="The sensitivity changes after power-on until the sensor is warm.",
     site="readout",
     order=48,
     forms=(
@@ -43,7 +43,7 @@ KIND = Kind(
             "Doebelin, Measurement Systems (2003), section 3.2: sensitivity drift",
             (
                 _AMOUNT,
-                Parameter("time", "s", 300.0, 0.1, 1e5, "Time τ after which 63 % of the change is over.", log=True),
+                Parameter("time", "s", 300.0, 0.1, 1e5, "Time constant τ of the change.", log=True),
                 _SINCE,
             ),
             neutral={"amount": 0.0, "since": 0.0},
@@ -55,14 +55,14 @@ KIND = Kind(
             "Doebelin, Measurement Systems (2003), section 3.2: sensitivity drift, here with a slow end",
             (
                 _AMOUNT,
-                Parameter("time", "s", 300.0, 0.1, 1e5, "Time τ after which half of the change is over.", log=True),
+                Parameter("time", "s", 300.0, 0.1, 1e5, "Time τ of half the change.", log=True),
                 _SINCE,
             ),
             neutral={"amount": 0.0, "since": 0.0},
             memoryless=rational,
         ),
     ),
-    experiment="switch the sensor off for an hour, on again, and repeat one press every minute until it reads the same",
+    experiment="after an hour switched off, repeat one press every minute until it reads the same",
     drawing=Drawing(time=np.linspace(0, 900, 601), depth=np.full(601, 1e-3)),
     needs="clock",
     known_parameters=("since",),  # the clock of a session begins with its first recording

@@ -85,7 +85,7 @@ def losses(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
 KIND = Kind(
     name="wear",
     title="Wear",
-    text="Loses force for good, the more it has been pressed or rubbed.",
+    text="Pressing or rubbing reduces the force permanently.",
     site="pad",
     order=40,
     forms=(

@@ -67,7 +67,7 @@ def refined_shifts(rig: Rig, trials: Sequence[Trial], shifts: Sequence[float]) -
     """Return constant shifts (s) of some trials to a fraction of a sample.
 
     A viscous response comes earlier than its load. It is told from a shift by the beginnings and ends of contact, so contacts
-    are computed anew for each shift, and changes of the response are compared with those of load and rate together. All
+    are computed again for each shift, and changes of the response are compared with those of load and rate together. All
     trials have the same ratio of both, because the sensor is the same. A part of this lead may be left in the shifts, the
     same in all trials, where the recordings do not tell: then the viscosity is fitted too small, and nothing else changes.
     """

@@ -48,7 +48,7 @@ def _responses_change(s: Stimulus) -> bool:
 def put_right(rig: Rig, stimuli: Sequence[Stimulus]) -> tuple[Rig, list[DataFault]]:
     """Return a rig without the faults that it wants to be put right, and all faults that it had.
 
-    One fault is put right after the other, and what is left is looked for again, because a fault may hide another one.
+    Faults are corrected one by one, and the search is repeated after each, because a fault may hide another one.
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ MOST_POINTS, USUAL_POINTS = 8000, 4000
 """Most points of a surface, and most of them if the rig gives no pitch: contact is computed at each of them in each sample."""
 MOST_SENSORS = 4096
 POINTS_PER_DEPTH, POINTS_PER_STRIP = 4.0, 4.0
-"""Points per depth of the transducers, and across the narrowest strip, if the rig gives no pitch (see docs/rig-format.md)."""
+"""Points per depth, and across the narrowest strip, if the rig gives no pitch; benchmarks/RESULTS.md has the errors."""
 NEGLIGIBLE = 1e-4
 """Share of a transducer's largest weight up to which a weight is zero: what is far away does not load it."""
 SUBDIVISIONS = 4

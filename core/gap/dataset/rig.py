@@ -431,7 +431,7 @@ class _TrialReader:
         if own["contact_height"] is None:
             own["contact_height"] = self.height
         if trial.stimulus == "force":
-            own["contact_height"] = 0.0  # what presses is known, wherever contact begins
+            own["contact_height"] = 0.0  # the force is known, wherever contact begins
         return replace(trial, probe=words.probe or "", repeats=words.repeats, tared=words.tared, **own), history, said
 
     def _columns(self, file: Path, second: SecondLogger | None, where: str) -> dict[str, np.ndarray]:

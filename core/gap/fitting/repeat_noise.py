@@ -17,7 +17,7 @@ MOST_DIFFERENT = 0.1
 """Root mean square difference of the loads of two repeats, as a share of the largest load, above which they are none."""
 
 MOST_SQUARE = 2.0
-"""Mean square of a fit's residual, in units of the variance of repeats, up to which what is left is their scatter. In simulated
+"""Mean square of a fit's residual, in units of the variance of repeats, up to which the residual is their scatter. In simulated
 sets of four repeats that differed in gain, zero, delay or by a slow wander, the base model left 0.3 to 1.6 where nothing was
 hidden (6 sets), 1.3 where the effect was smaller than the scatter, and 7.7 to 12.9 with larger effects (5 sets). It was judged
 on sets of other stimuli, scatter and effects: 0.5 to 1.2 with nothing hidden (6 sets), 2.9 and more with effects (7 sets)."""

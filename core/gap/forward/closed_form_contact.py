@@ -10,6 +10,7 @@ import numpy as np
 
 from ...compiled.kernels import kernel
 from ...geometry.rotations import rotation_matrices
+from ...geometry.shapes import box_entry, is_in_box, is_in_sphere, sphere_entry
 
 Contact = tuple[np.ndarray, np.ndarray, np.ndarray, int]
 
@@ -98,18 +99,12 @@ def meet_sphere(center, radius, position, outward, reach, depth, normal, point):
         deep = 0
         for j in range(position.shape[0]):
             nx, ny, nz = outward[j, 0], outward[j, 1], outward[j, 2]
-            # From the segment's base, along the texel's normal: |base + s·n - c| = radius, the smaller root.
             ox = position[j, 0] - reach * nx - center[i, 0]
             oy = position[j, 1] - reach * ny - center[i, 1]
             oz = position[j, 2] - reach * nz - center[i, 2]
-            along = ox * nx + oy * ny + oz * nz
-            inside = ox * ox + oy * oy + oz * oz - radius * radius
-            if inside < 0.0:
+            if is_in_sphere((ox, oy, oz), radius):
                 deep += 1
-            root = along * along - inside
-            if root <= 0.0:
-                continue
-            s = -along - np.sqrt(root)
+            s = sphere_entry((ox, oy, oz), (nx, ny, nz), radius)
             if s < 0.0 or s >= reach:
                 continue
             ax, ay, az = (ox + s * nx) / radius, (oy + s * ny) / radius, (oz + s * nz) / radius
@@ -129,25 +124,23 @@ def meet_box(center, frame, half, position, outward, reach, depth, normal, point
             ox = position[j, 0] - reach * nx - center[i, 0]
             oy = position[j, 1] - reach * ny - center[i, 1]
             oz = position[j, 2] - reach * nz - center[i, 2]
-            enters, leaves, face, sign, within = -np.inf, np.inf, 0, 0.0, 0
-            for axis in range(3):  # into the box's frame, whose axes are columns
-                fx, fy, fz = frame[i, 0, axis], frame[i, 1, axis], frame[i, 2, axis]
-                base, way = ox * fx + oy * fy + oz * fz, nx * fx + ny * fy + nz * fz
-                between = abs(base) < half[axis]
-                if between:
-                    within += 1
-                if way == 0.0:  # along a pair of planes: always between them, or never
-                    first, last = (-np.inf, np.inf) if between else (np.inf, -np.inf)
-                else:
-                    side = half[axis] if way > 0.0 else -half[axis]
-                    first, last = (-side - base) / way, (side - base) / way
-                if first > enters:
-                    enters, face, sign = first, axis, -1.0 if way > 0.0 else 1.0
-                leaves = min(leaves, last)
-            if within == 3:
+            # Into the box's frame, whose axes are columns.
+            base = (
+                ox * frame[i, 0, 0] + oy * frame[i, 1, 0] + oz * frame[i, 2, 0],
+                ox * frame[i, 0, 1] + oy * frame[i, 1, 1] + oz * frame[i, 2, 1],
+                ox * frame[i, 0, 2] + oy * frame[i, 1, 2] + oz * frame[i, 2, 2],
+            )
+            way = (
+                nx * frame[i, 0, 0] + ny * frame[i, 1, 0] + nz * frame[i, 2, 0],
+                nx * frame[i, 0, 1] + ny * frame[i, 1, 1] + nz * frame[i, 2, 1],
+                nx * frame[i, 0, 2] + ny * frame[i, 1, 2] + nz * frame[i, 2, 2],
+            )
+            if is_in_box(base, (half[0], half[1], half[2])):
                 deep += 1
-            if not (0.0 <= enters < reach and enters <= leaves):
+            enters, face = box_entry(base, way, (half[0], half[1], half[2]))
+            if not 0.0 <= enters < reach:
                 continue
+            sign = -1.0 if way[face] > 0.0 else 1.0
             ax, ay, az = sign * frame[i, 0, face], sign * frame[i, 1, face], sign * frame[i, 2, face]
             write_contact(i, j, reach - enters, (ax, ay, az), position, outward, (depth, normal, point))
         most = max(most, deep)

@@ -73,17 +73,17 @@ LEAST_OTHERS = 0.05
 
 
 FEATURES: dict[str, str] = {
-    "depth": "how deep the texel is pressed",
-    "rate and direction": "how fast it is pressed, and whether it is loaded or unloaded",
-    "time since contact": "how long it has been touched",
-    "history": "how far and how often it was loaded before",
-    "neighbours": "what its neighbours carry",
-    "texel": "which texel it is",
-    "sliding": "which way and how fast the surface slides",
-    "turning": "how far the surface has slid since it last turned back",
-    "clock": "clock time, whatever is done",
-    "common mode": "what all texels do at the same moment, loaded or not",
-    "shared by loaded texels": "something that all loaded texels share at the same moment",
+    "depth": "the depth",
+    "rate and direction": "the rate and direction of loading",
+    "time since contact": "the time since contact began",
+    "history": "the previous loads",
+    "neighbours": "the load on neighbouring texels",
+    "texel": "the texel",
+    "sliding": "the direction and speed of sliding",
+    "turning": "the distance slid since the last reversal",
+    "clock": "the clock time",
+    "common mode": "a signal that all texels share, loaded or not",
+    "shared by loaded texels": "a signal that all loaded texels share",
 }
 
 

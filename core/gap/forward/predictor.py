@@ -54,7 +54,7 @@ class Model:
 
     @cached_property
     def fitted_effects(self) -> tuple[Effect, ...]:
-        """Effects without noise, which is found in what is left."""
+        """Effects without noise, which is found in the residual."""
         return tuple(e for e in self.effects if kind_of(e.name).found_by != SCATTER)
 
     @cached_property

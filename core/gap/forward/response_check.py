@@ -73,7 +73,7 @@ def _check_reading_sign(rig: Rig, touching: Sequence[Stimulus]) -> None:
 
 
 def _check_force_sign(rig: Rig, touching: Sequence[Stimulus]) -> None:
-    """Refuse net forces that point away from what presses on the sensor."""
+    """Refuse net forces that point away from the indenter."""
     pairs = []
     for stimulus in touching:
         force = stimulus.trial.force

@@ -17,11 +17,10 @@ import numpy as np
 from ..dataset.trial import Trial
 from .bounded_least_squares import bounded_minimum
 from .cascade import TEXEL, Cascade, Point
-from .decision_numbers import DEFAULT_COST, LEAST_SHARE_TOLD, PRIORS, TOLD_APART, TYPICAL_SIZE
+from .decision_numbers import FLOOR, FLOOR_DEVIATIONS, LEAST_EXCESS, LEAST_SHARE_TOLD, PRIORS, TOLD_APART, TYPICAL_SIZE
 from .dictionaries import MISALIGNMENT, VARIANTS, Variant
 from .normal_equations import BOUNDS, CascadeEquations, joined, normal_equations
 from .recorded import Recorded, planned
-from .search import floor_for, possible_variants
 
 
 @dataclass(frozen=True)
@@ -86,6 +85,28 @@ COMPARED_KINDS = frozenset(variant.kind for variant in (*VARIANTS, MISALIGNMENT)
 """Names of all kinds that can be compared. Friction, noise, steps and dead texels are none of these."""
 
 
+def possible_variants(recorded: Recorded, possible: Set[str]) -> list[Variant]:
+    """Return the variants of the kinds that recordings could show."""
+    several = recorded.texel_count > 1
+    found = [
+        v
+        for v in VARIANTS
+        if v.kind in possible and (several or not v.needs_neighbours) and (recorded.has_readings or v.in_contact)
+    ]
+    if recorded.source.can_move and MISALIGNMENT.kind in possible:
+        found.append(MISALIGNMENT)
+    return found
+
+
+def floor_for(count: float, correlation: float) -> float:
+    """Return what no fit resolves of so many measured values whose noise has a memory of `correlation` samples.
+
+    It is a share of the noise, and the scatter of its mean square.
+    """
+    independent = count / correlation
+    return FLOOR + FLOOR_DEVIATIONS * float(np.sqrt(2.0 / max(independent, 1.0)))
+
+
 class Comparison:
     """Kinds that are compared on recordings, and on recordings with one more that was not made yet.
 
@@ -144,7 +165,7 @@ def left_by_kinds(recorded: Recorded, possible: Set[str]) -> dict[str, float]:
     equations = normal_equations(Cascade(recorded), Point(), variants)
     left: dict[str, float] = {}
     for variant in variants:
-        solution = equations.solve([variant], with_left_out=False)
+        solution = equations.solve([variant])
         left[variant.kind] = min(max(solution.fitted, 0.0), left.get(variant.kind, np.inf))
     return left
 
@@ -176,7 +197,7 @@ def _both_signs(signal: KindSignal, variants: Sequence[Variant]) -> list[KindSig
 
 def _smallest(noise: float, floor: float, share: float) -> float:
     """Root mean square, as a share of full load, from which on the excess that is left decides; the rest is imitated."""
-    least = floor * float(np.expm1(DEFAULT_COST))
+    least = floor * LEAST_EXCESS
     return float(noise * np.sqrt(least / share)) if share > 1e-9 else np.inf
 
 

@@ -2,7 +2,7 @@
 """Least squares of the cascade about a point: Gram blocks of half-recordings, parameters of single texels eliminated.
 
 At a point the cascade is linear in its coefficients. Sums of products of its columns are kept for each half of each recording,
-so that any set of kinds is solved for without going back to the samples, and with any half left out. Parameters of single
+so that any set of kinds is solved for without going back to the samples. Parameters of single
 texels have Gaussian priors and are eliminated by a Schur complement, one texel at a time.
 """
 
@@ -31,18 +31,10 @@ class Solution:
     point : Point
     fitted : float
         Mean square of the residual, in units of the noise's variance.
-    left_out : float
-        The same of halves of recordings that were left out of the fit; parameters of single texels are those of the whole fit.
     """
 
     point: Point
     fitted: float
-    left_out: float
-
-    @property
-    def excess(self) -> float:
-        """The larger of both, less the noise."""
-        return max(self.fitted, self.left_out, 1.0) - 1.0
 
 
 @dataclass
@@ -73,15 +65,13 @@ class CascadeEquations:
     texel_right: np.ndarray
     _eliminated: dict[tuple[int, ...], tuple[np.ndarray, np.ndarray, float]] = field(default_factory=dict)
 
-    def solve(self, members: Sequence[Variant], with_left_out: bool = True) -> Solution:
+    def solve(self, members: Sequence[Variant]) -> Solution:
         """Return the best coefficients of some variants.
 
         Parameters
         ----------
         members : sequence of Variant
             With columns at this point.
-        with_left_out : bool
-            Whether the error of halves that are left out is wanted; else it is that of the fit.
         """
         names = [*(name for name in BASE if name in self.at), *(m.label for m in members if self.at[m.label].start is not None)]
         picked = np.concatenate([np.arange(self.at[n].start, self.at[n].stop) for n in names]).astype(int)
@@ -93,8 +83,7 @@ class CascadeEquations:
         fitted = square - 2.0 * x @ right + x @ gram @ x
         texel = self._texel_values(own, picked, x)
         count = max(float(self.count.sum()), 1.0)
-        left_out = self._left_out(own, picked, x, texel, low, high) if with_left_out else fitted
-        return Solution(self._point(members, names, x, own, texel), float(fitted) / count, float(left_out) / count)
+        return Solution(self._point(members, names, x, own, texel), float(fitted) / count)
 
     def _bounds(self, names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
         low, high = [], []
@@ -137,23 +126,6 @@ class CascadeEquations:
         coupling = self.coupling.sum(axis=0)[list(own)][:, picked]
         values: np.ndarray = np.einsum("qrn,rn->qn", inverse, texel_right - np.einsum("qpn,p->qn", coupling, x))
         return values
-
-    def _left_out(
-        self, own: tuple[int, ...], picked: np.ndarray, x: np.ndarray, texel: np.ndarray, low: np.ndarray, high: np.ndarray
-    ) -> float:
-        """Sum of squares of all blocks under fits without them, with these parameters of single texels."""
-        gram = self.gram[:, picked[:, None], picked[None]]
-        right, square = self.right[:, picked], self.square.copy()
-        if own:
-            rows = list(own)
-            right = right - np.einsum("bqpn,qn->bp", self.coupling[:, rows][:, :, picked], texel)
-            square = square - 2.0 * np.einsum("bqn,qn->b", self.texel_right[:, rows], texel)
-            square = square + np.einsum("bqrn,qn,rn->b", self.texel_gram[:, rows][:, :, rows], texel, texel)
-        whole, whole_right, total = gram.sum(axis=0), right.sum(axis=0), 0.0
-        for own_gram, own_right, own_square in zip(gram, right, square, strict=True):
-            y = bounded_minimum(whole - own_gram, whole_right - own_right, low, high, x)
-            total += float(own_square - 2.0 * y @ own_right + y @ own_gram @ y)
-        return total
 
     def _point(
         self, members: Sequence[Variant], names: Sequence[str], x: np.ndarray, own: tuple[int, ...], texel: np.ndarray

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Recordings as the search by kinds sees them: the base model's forces, what was measured, and the noise, without units.
+"""Recordings as the comparison of kinds sees them: the base model's forces, what was measured, and the noise, without units.
 
 Forces and readings are in units of the base model's largest force, so that 1 is full load. A recording that begins with an
 untouched sensor is one :class:`RecordedRun`; the recordings of a session are one together, with samples in the pauses that

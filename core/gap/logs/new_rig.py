@@ -391,7 +391,7 @@ def _lateness(
         seen = f"changes agree best with {found.late:.2g} ± {found.uncertainty:.2g} s" if found else "nothing changes"
         if found and abs(found.late) > TOLD_APART * found.uncertainty:
             seen += ", but the readings together do not"
-        return apart, 0.0, f"the two clocks show the time of day, and no shift is told apart from zero ({seen})"
+        return apart, 0.0, f"the two clocks show the time of day, and the shift is not distinguishable from zero ({seen})"
     if found is None or not found.is_sure:
         seen = (
             "do not change"
@@ -417,7 +417,7 @@ def _lateness(
 
 
 def _is_told_apart(found: ClockShift, driven: Mapping[str, np.ndarray], answered: Mapping[str, np.ndarray]) -> bool:
-    """Whether a shift of clocks that show the time of day is told apart from none.
+    """True if a shift of clocks that show the time of day is distinguishable from zero.
 
     Changes of a sensor that answers in a curve, and takes another way back, agree best with a shift even where there is none.
     So the readings together must also explain what drove the sensor better with the shift.

@@ -52,7 +52,7 @@ class Design:
 
 
 class DesignSpace:
-    """Recordings, limits and the kinds that are to be told apart.
+    """Recordings, limits and the kinds to distinguish.
 
     Parameters
     ----------

@@ -145,7 +145,7 @@ def plan_experiment(rig: Rig, wishes: Wishes | None = None) -> Job[ExperimentPla
     seen = recorded(known.fitted, known.start, known.free, known.channels)
     ground = Ground(known.predictors, wishes.limits(known.predictors))
     space = DesignSpace(seen, known.fitted, ground, sorted(compared))
-    yield Progress("pairs that an experiment can tell", 300, TOTAL)
+    yield Progress("pairs that an experiment can separate", 300, TOTAL)
     question = _question_of(space, wishes.between) if wishes.between else _open_question(space)
     experiment = None
     if question:
@@ -203,18 +203,18 @@ def _planned(space: DesignSpace, question: Question, begins: int) -> Generator[P
             share = next(steps)
         except StopIteration as stop:
             return PlannedExperiment(kinds, stop.value, space.ground.limits)
-        yield Progress(f"a trajectory that tells {' from '.join(kinds)}", begins + int((TOTAL - begins) * share), TOTAL)
+        yield Progress(f"a trajectory that separates {' from '.join(kinds)}", begins + int((TOTAL - begins) * share), TOTAL)
 
 
 def _check_kinds(names: Sequence[str], compared: frozenset[str]) -> None:
-    """Raise if some kinds cannot be told apart by any planned trajectory."""
+    """Raise if no planned trajectory can distinguish some of the kinds."""
     for name in names:
         if name not in library():
             raise ParameterError(f"There is no effect '{name}': choose from {', '.join(sorted(compared))}.")
         if name not in compared:
             raise ParameterError(f"No trajectory is planned for '{name}': choose from {', '.join(sorted(compared))}.")
     if len(set(names)) == 1:
-        raise ParameterError(f"'{names[0]}' stands alone: name another effect that it is to be told from.")
+        raise ParameterError(f"'{names[0]}' stands alone: name another effect to separate it from.")
 
 
 def _question_of(space: DesignSpace, kinds: Sequence[str]) -> Question:

@@ -26,8 +26,8 @@ HINTS = {
 """What to record for an unexplained gap, by the feature that its residual depends on most."""
 SLIDING_HINTS = {
     "turning": (
-        "turn back after slides of several lengths, some very slowly, to see whether what is left goes with the way "
-        "or with the time since the turn"
+        "turn back after slides of several lengths, some very slowly, to see whether the residual follows the "
+        "distance or the time since the reversal"
     ),
     "sliding": "slide both ways at several constant speeds",
 }
@@ -42,8 +42,8 @@ def next_experiment(result: Diagnosis) -> str:
         return _sliding_experiment(result)
     lacking = _lacking(result)
     if result.verdict == "unexplained":
-        return f"To find out what it is: {'; '.join([_hint(result), *lacking])}."
-    return f"To cover what these recordings do not: {'; '.join(lacking)}." if lacking else ""
+        return f"To find the cause: {'; '.join([_hint(result), *lacking])}."
+    return f"To complete the recordings: {'; '.join(lacking)}." if lacking else ""
 
 
 def _experiment_between_rivals(result: Diagnosis) -> str:
@@ -51,7 +51,7 @@ def _experiment_between_rivals(result: Diagnosis) -> str:
     pairs = [f"{names[0]} from {' and '.join(names[1:])}" for names in result.ambiguous]
     involved = list(dict.fromkeys(name for names in result.ambiguous for name in names))
     parts = [kind_of(name).experiment for name in involved]
-    return f"To tell {', and '.join(pairs)}: {'; and '.join(dict.fromkeys(parts))}."
+    return f"To distinguish {', and '.join(pairs)}: {'; and '.join(dict.fromkeys(parts))}."
 
 
 def _sliding_experiment(result: Diagnosis) -> str:
@@ -59,7 +59,7 @@ def _sliding_experiment(result: Diagnosis) -> str:
     if result.verdict != "unexplained":
         return ""
     hint = SLIDING_HINTS.get(result.structure.strongest, REPEAT)
-    return f"To find out what it is: {hint}; slide under two other loads, and record the normal force."
+    return f"To find the cause: {hint}; slide under two other loads, and record the normal force."
 
 
 def _hint(result: Diagnosis) -> str:

@@ -122,7 +122,7 @@ def _evidence_table(found: dict[str, Any]) -> Table:
     rows = []
     for one in found["found"]:
         rival = one["next_best"]
-        near = "none came near"
+        near = "no close alternative"
         if rival:
             much = "as much" if rival["leaves"] < AS_MUCH else f"{rival['leaves']:.2g} times as much"
             near = f"{rival['effect']}, which leaves {much}"
@@ -152,7 +152,7 @@ def _parameter_table(result: Diagnosis, found: dict[str, Any]) -> Table:
 
 def _open_questions(found: dict[str, Any]) -> list[str]:
     """Rivals, the next experiment with its file, and warnings."""
-    lines = [f"These recordings do not tell {' from '.join(names)}." for names in found["ambiguous"]]
+    lines = [f"These recordings do not distinguish {' from '.join(names)}." for names in found["ambiguous"]]
     if found["next_experiment"]:
         lines.append(found["next_experiment"])
     planned = found["planned_experiment"]
@@ -188,13 +188,13 @@ def _recordings_table(result: Diagnosis) -> Table:
     memory = "none" if noise.correlation_time < WHITE_MEMORY else f"{noise.correlation_time:.3g} samples"
     rows = [
         [f"noise of a {'reading' if has_readings else 'net force'}", f"{noise.deviation:.3g} {unit}, from {noise.source}"],
-        ["memory of the noise", memory],
+        ["noise correlation", memory],
         ["texels touched", f"{c.touched_share:.0%}"],
         ["fast to slow loading", f"{c.speed_ratio:.3g} to 1"],
         ["longest hold", f"{c.longest_hold:.3g} s"],
         ["cycles in one trial", f"{c.cycles}"],
         ["unloading recorded", "yes" if c.unloading else "no"],
-        ["something without load", f"over {c.unloaded_share:.0%} of a trial"],
+        ["span of unloaded samples", f"{c.unloaded_share:.0%} of a trial"],
         ["sliding", "yes" if c.slides else "no"],
     ]
     return Table(["", ""], rows)

@@ -31,7 +31,7 @@ def table_rows(plan: ExperimentPlan) -> list[tuple[str, str]]:
     for signal in plan.signals:
         if signal.split("/")[0] not in plan.cannot_show:
             words = ", ".join(f"{one.other} ({_left(one)})" for one in plan.taken_for(signal))
-            rows.append((signal.replace("/", ", "), words or "told from all others"))
+            rows.append((signal.replace("/", ", "), words or "distinguishable from all others"))
     return rows + [(kind, why) for kind, why in plan.cannot_show.items()]
 
 
@@ -47,12 +47,12 @@ def planned_sentence(words: Mapping[str, Any]) -> str:
     what = " from ".join(words["between"])
     if words["sure_after"] - words["sure_before"] < LEAST_GAIN:
         return (
-            f"No trajectory within these limits tells {what} better than the recordings do, about {words['sure_before']:.0%} "
-            f"sure: allow more depth, speed, duration or places. The best one found is {words['file']}."
+            f"No trajectory within these limits separates {what} better than your recordings (confidence "
+            f"{words['sure_before']:.0%}): allow more depth, speed, duration or places. The best one found is {words['file']}."
         )
     return (
-        f"{words['file']} is a trajectory of {words['limits']['duration']:.3g} s that tells {what}: "
-        f"about {words['sure_after']:.0%} sure with it, {words['sure_before']:.0%} without."
+        f"{words['file']} is a trajectory of {words['limits']['duration']:.3g} s that separates {what}: "
+        f"confidence {words['sure_after']:.0%} with it, {words['sure_before']:.0%} without."
     )
 
 

@@ -224,10 +224,10 @@ def _base_squared_error(predictor: Predictor, result: Diagnosis) -> np.ndarray:
 
 
 CAPTIONS = {
-    "gap": "The gap before and after. Check trials were never fitted. A further effect that makes them worse was dropped, and "
-    "they decide whether the rest is borne out.",
-    "curves": "What was measured and what the models say, where the base model errs most in each trial.",
-    "loops": "The same over what was done to the sensor: the shape by which an effect is known.",
+    "gap": "The gap before and after. Check trials were never fitted: an effect that makes them worse is dropped, and they "
+    "decide the verdict.",
+    "curves": "Measured and simulated curves where the error of the base model is largest in each trial.",
+    "loops": "The same, plotted against the stimulus: the characteristic shape of an effect.",
     "map": "Root mean square error of each texel on the fitted trials.",
     "phases": "Squared error by phase of contact, as a share of that of the base model.",
 }

@@ -96,7 +96,7 @@ def recording_differences(result: Diagnosis, name: str) -> list[str]:
     fitted = [recording_summary(p, model, result.full) for p in result.of("fit")]
     other = next(recording_summary(p, model, result.full) for p in result.of("check") if p.trial.name == name)
     said = [*_response_differences(fitted, other), *_loading_differences(fitted, other)]
-    return said or ["it differs from the fitted ones in nothing that was looked at (level, gain, depth, speed, length, place)"]
+    return said or ["it does not differ from the fitted ones in level, gain, depth, speed, length or place"]
 
 
 def _response_differences(fitted: list[RecordingSummary], other: RecordingSummary) -> list[str]:

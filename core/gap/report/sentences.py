@@ -20,24 +20,24 @@ from .experiments import LOUD_NOISE
 from .recording_differences import LEAST_GAIN, LEAST_LEVEL, recording_differences
 
 MOST_SAID = 0.99
-"""Largest confidence that is said as a number: a few hundred cases do not tell one wrong name in a thousand from none."""
+"""Largest confidence stated as a number: a few hundred cases cannot show one wrong name in a thousand."""
 WIDE_INTERVAL = 20.0
 """If an interval reaches this many times below and above its value, the recordings do not identify the value."""
 MANY_FLOORS = 3.0
-"""The headline says how much stays in the check recordings from this many times the noise floor on."""
+"""Multiple of the noise floor from which the headline states the remaining error of the check recordings."""
 LEAST_SHARE = 0.01
-"""A quantity that predicts a smaller share of what is left is not said to predict it."""
+"""Smallest share of the residual that a quantity must predict to be named."""
 ASSUMED_SESSION = "If they were recorded in another order or with pauses that matter, name their session and its times."
 TOLD_BY = {
-    USE: " The gains fall with what was loaded rather than with the time.",
-    CLOCK: " The gains fall with the time or the number of recordings rather than with what was loaded.",
-    TEXELS: " All texels change alike, whatever each of them carried: it is no wear of texels.",
+    USE: " The gains fall with the accumulated load, not with time.",
+    CLOCK: " The gains fall with time or the number of recordings, not with the accumulated load.",
+    TEXELS: " All texels change alike, whatever their load: this is not wear of single texels.",
     NOTHING: "",
 }
-"""What tells wear from drift between recordings."""
+"""Evidence that distinguishes wear from drift between recordings."""
 NOT_TOLD = (
-    "The gains fall, and the recordings do not say whether with what was loaded or with the time: name their session and when "
-    "they started, and load the sensor far more in some recordings than in others."
+    "The gains fall, and the recordings do not show whether with the accumulated load or with time: name their session and "
+    "when they started, and load the sensor far more in some recordings than in others."
 )
 FRICTION_MATTERS = 1.5
 """The headline mentions the base model's friction if without it the error would be at least this many times as large."""
@@ -63,12 +63,12 @@ def _outcome(result: Diagnosis, errors: GapErrors) -> str:
     own, after = result.between, errors.amended["fit"] or 0.0
     shrinks = f"the error shrinks from {own.before:.2%} to {after:.2%} of the range"
     if own.rival:
-        said = f"Not told apart between recordings, of which each has a level and a gain of its own: {own.name} or {own.rival}"
+        said = f"Indistinguishable between recordings (each with its own level and gain): {own.name} or {own.rival}"
         said += f" ({shrinks}). {NOT_TOLD}"
     else:
-        said = f"Missing: {own.name} between recordings, of which each has a level and a gain of its own; {shrinks}."
+        said = f"Missing: {own.name} between recordings (each with its own level and gain); {shrinks}."
         said += f"{TOLD_BY[own.told_by]}{_odd_one(result)} Name their session to learn more."
-    return f"{said} Beside that: {_effects(result, errors)}" if result.findings else said
+    return f"{said} Also: {_effects(result, errors)}" if result.findings else said
 
 
 def _odd_one(result: Diagnosis) -> str:
@@ -98,9 +98,9 @@ def _effects(result: Diagnosis, errors: GapErrors) -> str:
     with_rivals = {names[0]: " or ".join(names) for names in result.ambiguous}
     if not sure and findings and all(one.name in with_rivals for one in findings):
         choices = "; ".join(with_rivals[one.name] for one in findings)
-        return f"Not told apart by these recordings: {choices} ({shrink}).{stays}"
+        return f"Indistinguishable in these recordings: {choices} ({shrink}).{stays}"
     unsure = _listed([with_rivals.get(one.name, one.name) for one in findings if one not in sure])
-    open_names = " (not told apart)" if with_rivals else ""
+    open_names = " (indistinguishable)" if with_rivals else ""
     if not sure:
         return f"Perhaps missing: {unsure}{open_names}; {shrink}.{stays}"
     besides = f", and perhaps {unsure}{open_names}" if len(sure) < len(findings) else ""
@@ -122,7 +122,7 @@ def _what_stays(result: Diagnosis, errors: GapErrors) -> str:
     left = errors.amended["check"]
     if left is None or left < MANY_FLOORS * errors.noise_floor or any(map(_is_noise, result.findings)):
         return ""
-    return f" In the check recordings {left:.2%} of the range stays, {left / errors.noise_floor:.0f} times the noise."
+    return f" In the check recordings {left:.2%} of the range remains, {left / errors.noise_floor:.0f} times the noise."
 
 
 def check_failure(result: Diagnosis) -> str:
@@ -138,8 +138,8 @@ def check_failure(result: Diagnosis) -> str:
     else:
         share = max(result.check.closed[quantity] or 0.0, 0.0)
         said = (
-            f"in the check recordings only {share:.0%} of the squared gap{what} closes (at least {CHECK_CLOSED:.0%} is asked), "
-            f"in '{worst.name}' from {before:.2%} to {after:.2%} of the range"
+            f"in the check recordings only {share:.0%} of the squared gap{what} closes (at least {CHECK_CLOSED:.0%} is "
+            f"required), in '{worst.name}' from {before:.2%} to {after:.2%} of the range"
         )
     return f"{said}; {'; '.join(recording_differences(result, worst.name))}"
 
@@ -178,13 +178,13 @@ def _unexplained(result: Diagnosis, errors: GapErrors, sure: list[Finding]) -> s
         )
     if result.line is not None:
         line, unit = result.line, result.rig.parameters.unit
-        said = f"a line at {line.frequency:.3g} Hz of {line.amplitude:.3g} {unit}, there without load too"
+        said = f"a line at {line.frequency:.3g} Hz of {line.amplitude:.3g} {unit}, also present without load"
         return f"Unexplained: {said}, is {line.share:.0%} of the noise without load.{part}"
     after, structure = errors.amended["fit"] or 0.0, result.structure
     if structure.total < LEAST_STRUCTURE or structure.shares.get(structure.strongest, 0.0) < LEAST_SHARE:
-        said = f"nothing that was looked at predicts what is left ({after:.2%} of the range)"
+        said = f"the residual ({after:.2%} of the range) does not correlate with any measured quantity"
     else:
-        said = f"what is left ({after:.2%} of the range) varies most with {FEATURES[structure.strongest]}"
+        said = f"the residual ({after:.2%} of the range) varies most with {FEATURES[structure.strongest]}"
     return f"Unexplained: {said}.{part}{_friction(result, errors)}"
 
 
@@ -211,18 +211,18 @@ def evidence(result: Diagnosis, errors: GapErrors) -> list[str]:
     left = [error or 0.0 for error in errors.stages]
     said = []
     for one in by_share_closed(result):
-        rivals = f"; it could as well be {' or '.join(one.rivals)}" if one.rivals else ""
+        rivals = f"; it could also be {' or '.join(one.rivals)}" if one.rivals else ""
         before, after = left[one.effect], left[min(one.effect + 1, len(left) - 1)]
         confidence = said_confidence(one.confidence)
         said.append(f"{one.name} ({one.form}): {before:.2%} → {after:.2%}, confidence {confidence}{rivals}")
-        said += [f"{one.name}: {why}, so its name is not sure" for why in (*one.unsettled, *one.doubts)]
+        said += [f"{one.name}: {why}, so its name is in doubt" for why in (*one.unsettled, *one.doubts)]
     if result.of("check") and result.findings:
         before, after = errors.base["check"] or 0.0, errors.amended["check"] or 0.0
-        said.append(f"never fitted: {before:.2%} → {after:.2%}; noise alone is {errors.noise_floor:.2%}")
+        said.append(f"check recordings, never fitted: {before:.2%} → {after:.2%}; noise alone is {errors.noise_floor:.2%}")
     least = [share for share in map(result.closed.least, (READINGS, FORCES)) if share is not None]
     if least and result.findings:
         said.append(
-            f"of the squared gap {max(min(least), 0.0):.0%} closes (the least of fitted, left-out and check recordings)"
+            f"{max(min(least), 0.0):.0%} of the squared gap is closed (the least of fitted, left-out and check recordings)"
         )
     return said
 
@@ -240,11 +240,11 @@ def noise_sentence(share: float, left: float | None) -> str:
     """
     if left is not None and left < 0.5 * share:
         return (
-            f"Readings change by {share:.0%} of the range where poses and shapes say that nothing touches the sensor, and the "
+            f"Readings change by {share:.0%} of the range although poses and shapes show no contact, and the "
             f"amended sensor leaves {left:.2%}: contact begins elsewhere. "
             'Try contact_height = "free" in [sensor], and check the shapes.'
         )
-    return f"Noise is {share:.0%} of the range: an effect that is not much larger cannot be seen in these recordings."
+    return f"Noise is {share:.0%} of the range: effects that are not much larger cannot be detected in these recordings."
 
 
 def warnings(result: Diagnosis) -> list[str]:
@@ -253,26 +253,26 @@ def warnings(result: Diagnosis) -> list[str]:
     for one in result.outlying:
         said.append(
             f"Texel {one.texel} of the check recording '{one.recording}' has {one.times:.0f} times the squared error of any "
-            "texel in the fitted recordings, and keeps it: it is in the errors, and is not held against the amended sensor."
+            "texel in the fitted recordings, and the amended sensor leaves most of it: it counts in the errors only."
         )
     for silenced in silenced_texels(result.predictors, result.base.model, result.noise[READINGS].deviation):
         said.append(
-            f"Texel {silenced.texel} answers no more from {silenced.seconds:.3g} s of '{silenced.recording}' on, whatever "
-            f"presses on it: repair it, or leave its readings empty from there on."
+            f"Texel {silenced.texel} does not respond to load from {silenced.seconds:.3g} s of '{silenced.recording}' on: "
+            f"repair it, or leave its readings empty from there on."
         )
     overpressed = max((p.stimulus.overpressed for p in result.predictors), default=0)
     if overpressed:
         said.append(
             f"Up to {overpressed} texels were pressed past the maximum penetration of "
-            f"{result.rig.parameters.max_penetration * 1e3:.3g} mm; here they go on acting, in a simulation they would not."
+            f"{result.rig.parameters.max_penetration * 1e3:.3g} mm: here they still exert force, in a simulation not."
         )
     share = result.noise[0].deviation / result.full[0]
     if share > LOUD_NOISE:
         said.append(noise_sentence(share, nrmse(result.of("fit"), result.best.model, result.full)))
     if not result.of("check"):
-        said.append('No trial is for checking only: give one use = "check", so that the result can be judged on it.')
+        said.append('No trial is kept for checking: give one use = "check", so that the result is tested on it.')
     if len(result.of("fit")) == 1:
-        said.append("Only one trial was fitted: its halves were judged against each other.")
+        said.append("Only one trial was fitted: effects were compared on its halves.")
     return said
 
 
@@ -285,7 +285,7 @@ def interval_ends(one: ParameterInterval) -> str:
     """Return an interval, or a remark if it fills the bounds of its parameter or leaves the order of magnitude open."""
     on_both_sides = one.low >= 0.0 and one.high > WIDE_INTERVAL * one.value and one.low * WIDE_INTERVAL <= one.value
     if one.fills_bounds or on_both_sides or one.high - one.low > WIDE_INTERVAL**2 * abs(one.value) > 0.0:
-        return "not told by these recordings"
+        return "not identifiable from these recordings"
     return f"{one.low:.4g} … {one.high:.4g}"
 
 

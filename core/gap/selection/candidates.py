@@ -299,7 +299,7 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
     """Return the candidates that could show in these recordings at all.
 
     A gain that changes by itself is a warm-up where a session says how the time went on from recording to recording. Elsewhere
-    each recording begins anew, and such a gain is a form of drift.
+    each recording begins with an untouched sensor, and such a gain is a form of drift.
     """
     posed = any(p.trial.stimulus == "pose" for p in predictors)
     dragged = any(p.trial.force is not None and p.stimulus.slide.any() for p in predictors)

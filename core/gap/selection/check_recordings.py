@@ -19,7 +19,7 @@ from .gap_sizes import FORCES, READINGS, GapSizes
 
 LEAST_CHECK_GAP, LEAST_CHECK_SHARE = 0.1, 0.02
 """Least gap of the check recordings that can be judged: in units of the noise's variance, and as a share of the gap of the
-fitted recordings. A smaller one does not show the effects: what is left of it is the difference of the noise from recording to
+fitted recordings. A smaller one does not show the effects: the rest of it is the difference of the noise from recording to
 recording."""
 CHECK_CLOSED = 0.5
 """Least share of the gap of the check recordings that the amended model must close."""

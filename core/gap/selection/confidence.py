@@ -16,7 +16,6 @@ from ...effects.engine.declarations import STEPS
 from ...effects.engine.registry import form_of, kind_of, names_found_by
 from ...model.effect import Effect
 from ..fitting.least_squares import Fit
-from ..kinds.search import KNOWN_KINDS
 from .candidates import DIRECTLY_ESTIMATED, is_spatial, parameters_at_bounds
 from .direct_estimates import coarsest_step
 from .findings import Diagnosis
@@ -48,7 +47,7 @@ the others leave: the misfit of a formula seldom looks just like another effect.
 UNSURE_CONFIDENCE = 0.45
 """Highest confidence of an effect that is not sure."""
 UNLIKELY_CONFIDENCE = 0.33
-"""The same without a rival: then the effect only makes up for what another formula lacks, or is not borne out. Of such names
+"""The same without a rival: then the effect only compensates for another formula, or fails a test. Of such names
 7 of 32 were right in the cases of benchmarks/_hidden numbered from 23000 on, and 16 of 45 in those from 31000 on without the
 third family; of names that have rivals 11 of 16, and 11 of 19."""
 SURE = 0.5
@@ -107,9 +106,9 @@ def misfit_of_another(effect: Effect, state: SelectionState, fitted: Sequence[Ef
     if _describes_dead_texels(effect, fitted):
         return "it varies mostly over texels that are dead"
     if _larger_effect_of_same_kind(effect, state, fitted, gap_sizes):
-        return "it may make up for the formula of a similar effect that closes more"
+        return "it may only compensate for the formula of a similar effect that closes more"
     if step is not None and step.times_worse(step.remaining_repeated, effect.name) < REPEATED_RATIO:
-        return "a second effect of a kind that is in the model does nearly as well in its place"
+        return "a second effect of a kind already in the model fits nearly as well"
     if improvement is None or improvement.of_gap >= SMALL_SHARE:
         return ""
     little = f"it closes {max(improvement.of_gap, 0.0):.1%} of the gap, and the misfit of another formula may close as much"
@@ -124,22 +123,13 @@ def misfit_of_another(effect: Effect, state: SelectionState, fitted: Sequence[Ef
 
 
 def may_absorb_misfit(effect: Effect, state: SelectionState) -> bool:
-    """Return whether parameters of single texels may have absorbed what is left unexplained.
+    """Return whether parameters of single texels may have absorbed the unexplained part.
 
     They may if a larger effect was found beside them and much of the gap is left.
     """
     mine = state.improvements[effect.name].of_gap if effect.name in state.improvements else 0.0
     larger = any(improvement.of_gap > mine for name, improvement in state.improvements.items() if name != effect.name)
     return larger and effect.name not in DIRECTLY_ESTIMATED and _has_texel_numbers(effect)
-
-
-def kinds_can_settle(effect: Effect) -> bool:
-    """Return whether the search by kinds tells anything about an effect.
-
-    It has no dictionary of friction, for example. Numbers of single texels absorb what another kind leaves, whether that is a
-    formula or not.
-    """
-    return effect.name in KNOWN_KINDS and not _has_texel_numbers(effect)
 
 
 def _has_texel_numbers(effect: Effect) -> bool:
@@ -171,7 +161,7 @@ def unsettled_parameters(effect: Effect, index: int, result: Diagnosis, lead: fl
     own = [one for one in result.intervals if one.effect == index and one.name in fitted]
     open_names = [one.name for one in own if one.fills_bounds]
     if own and len(open_names) == len(own) and lead < CLEAR_LEAD:
-        said.append(f"these recordings leave {' and '.join(open_names)} open")
+        said.append(f"these recordings do not identify {' and '.join(open_names)}")
     return tuple(said)
 
 
@@ -213,19 +203,19 @@ def unsure_names(result: Diagnosis, view_set: ViewSet, state: SelectionState, ga
     - Effects on friction, if the normal force is off by more than they close: friction is proportional to it.
     """
     small = {name for name, improvement in state.improvements.items() if improvement.of_gap < SMALL_SHARE}
-    unsure = dict.fromkeys(small, "it closes little of the gap, and these recordings do not tell a larger effect from others")
+    unsure = dict.fromkeys(small, "it closes little of the gap, and a larger effect is ambiguous in these recordings")
     unsure = unsure if result.ambiguous else {}
     names = {one.name for one in result.findings}
     curvature = curvature_ratio(result.of("fit"), result.best.model)
     ambiguous = {name for name in names if indistinguishable(result.coverage, name, curvature)}
     if ambiguous:
         main = {name for name in names - ambiguous if _closes_most(name, ambiguous, state, gap_sizes)}
-        why = f"these recordings do not tell {' and '.join(sorted(ambiguous))} from other effects, of which this may be a part"
+        why = f"{' and '.join(sorted(ambiguous))} may be confused with other effects here, and this may be part of one"
         unsure |= dict.fromkeys(names - set(DIRECTLY_ESTIMATED) - main, why)
     if result.coverage.unloaded_share < LEAST_UNLOADED_SHARE and {name for pair in result.ambiguous for name in pair} & set(
         MOVING_BY_THEMSELVES
     ):
-        unsure |= dict.fromkeys(MOVING_BY_THEMSELVES, "nothing is at rest in these recordings for long")
+        unsure |= dict.fromkeys(MOVING_BY_THEMSELVES, "no texel rests for long in these recordings")
     step = coarsest_step(view_set.whole, result.base.model)
     size = {
         name: abs(improvement.of_gap) * gap_sizes.gap(gap_sizes.main_quantity)
@@ -237,7 +227,9 @@ def unsure_names(result: Diagnosis, view_set: ViewSet, state: SelectionState, ga
     for name in names & set(friction_kinds()) if gap_sizes.both else ():
         closed = state.improvements[name].of_gap * gap_sizes.gap(FORCES) * gap_sizes.count[FORCES]
         if closed < _normal_squares(view_set, state.fit, float(gap_sizes.noise[FORCES])):
-            unsure[name] = "the normal force is off by more than it closes, and friction is proportional to it"
+            unsure[name] = (
+                "the error of the normal force is larger than what it closes, and friction is proportional to that force"
+            )
     return unsure
 
 

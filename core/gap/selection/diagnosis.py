@@ -13,7 +13,6 @@ from typing import TypeVar
 
 import numpy as np
 
-from ...effects.engine.registry import library
 from ...jobs.progress import Job, Progress
 from ..data_faults.data_fault import DataFault
 from ..data_faults.search import find_faults, put_right
@@ -26,7 +25,6 @@ from ..fitting.repeat_noise import is_scatter_of_repeats
 from ..fitting.residual_tests import LEAST_STRUCTURE, ResidualStructure, residual_structure
 from ..fitting.spectral_lines import strongest_line
 from ..forward.predictor import Model, Predictor, number_name, predictors_of
-from ..kinds.search import KNOWN_KINDS
 from .base_model import base_fit, identified_base_parameters, prepared
 from .between_recordings import (
     DRIFT,
@@ -43,15 +41,13 @@ from .between_recordings import (
 )
 from .candidates import FittedCandidate, candidates, scales_of
 from .check_recordings import check_views, checked
-from .confidence import CLEAR_LEAD, EXPLAINED, UNSURE_CONFIDENCE, kinds_can_settle
+from .confidence import EXPLAINED, UNSURE_CONFIDENCE
 from .contact_heights import with_starting_heights
 from .findings import Diagnosis, Finding
 from .forms_at_bounds import without_bounds_of_forms
 from .forward_selection import ForwardSelection, SelectionState
 from .gap_sizes import FORCES, READINGS, UNRESOLVED_SQUARE, GapSizes, friction_kinds
 from .harmful_effects import without_harmful_effects
-from .identifiability import curvature_ratio, indistinguishable
-from .kind_choice import choose_kinds
 from .outlying_channels import outlying_channels, without_channels
 from .screening import screen
 from .verdict import conclude
@@ -63,13 +59,10 @@ BASE_MODEL_BEGINS, SELECTION_BEGINS = 40, 60
 """Share of the whole work, in thousandths, at which the fit of the base model and the selection of effects begin."""
 OTHER_SEARCHES_BEGIN = 500
 """The same for searches that ask how recordings differ."""
-SECOND_OPINION_BEGINS, FORMS_OF_KINDS_BEGIN = 800, 900
-"""The same for the search by kinds, where the first one leaves doubts, and for the forms of what it names."""
 SETTLED_SHARE = 0.05
 """Share of the base model's gap. If a search explains more than the rest of it, no search asks how recordings differ."""
 LEAST_NOISE = 0.8
 """Least mean square of the noise in units of its estimate: the estimate is not trusted to be too large by more than this."""
-NOT_NEEDED = "the kinds that were found explain the recordings without it"
 
 Outcome = TypeVar("Outcome")
 
@@ -87,12 +80,10 @@ def diagnose(rig: Rig) -> Job[Diagnosis]:
     Diagnosis
     """
     plain = yield from _begun(rig)
-    yield from _selected(plain, SELECTION_BEGINS, OTHER_SEARCHES_BEGIN if may_differ(rig) else SECOND_OPINION_BEGINS)
+    yield from _selected(plain, SELECTION_BEGINS, OTHER_SEARCHES_BEGIN if may_differ(rig) else TOTAL_WORK)
     best = plain
     if may_differ(rig) and not _is_settled(plain):
         best = yield from _best_of_other_searches(plain)
-    if best is plain and _is_doubtful(plain.result):
-        best = yield from _second_opinion(plain)
     best.result.stages = _stages(best.result, best.views)
     return best.result
 
@@ -145,7 +136,7 @@ def _best_of_other_searches(plain: _Search) -> Generator[Progress, None, _Search
         The best of them, or the plain one.
     """
     own, session, best = _search_with_own_numbers(plain), _search_of_one_session(plain), plain
-    middle = (OTHER_SEARCHES_BEGIN + SECOND_OPINION_BEGINS) // 2
+    middle = (OTHER_SEARCHES_BEGIN + TOTAL_WORK) // 2
     if session is not None and session.is_wanted:
         yield from _selected(session, OTHER_SEARCHES_BEGIN, middle)
         if _is_one_session(session, plain):
@@ -154,57 +145,11 @@ def _best_of_other_searches(plain: _Search) -> Generator[Progress, None, _Search
             if session.left <= own.left_of_base:
                 return session
     if own.is_wanted:
-        yield from _selected(own, middle, SECOND_OPINION_BEGINS)
+        yield from _selected(own, middle, TOTAL_WORK)
         if own.left < MOST_LEFT * plain.left and (best is plain or own.left < best.left):
             _name_differences(own, plain, session)
             best = own
     return best
-
-
-def _is_doubtful(result: Diagnosis) -> bool:
-    """Whether some effects are not sure, of which the search by kinds can tell more with these recordings."""
-    effects = result.best.model.effects
-    doubts = [one for one in result.findings if one.confidence <= UNSURE_CONFIDENCE and kinds_can_settle(effects[one.effect])]
-    if not doubts or result.misleading_faults:
-        return False
-    curvature = curvature_ratio(result.of("fit"), result.best.model)
-    return not any(indistinguishable(result.coverage, one.name, curvature) for one in result.findings)
-
-
-def _sure_names(result: Diagnosis) -> set[str]:
-    """Names of the effects that are sure."""
-    return {one.name for one in result.findings if one.confidence > UNSURE_CONFIDENCE}
-
-
-def _second_opinion(plain: _Search) -> Generator[Progress, None, _Search]:
-    """Search with nothing but the kinds that the recordings show whatever their formulas.
-
-    Returns
-    -------
-    _Search
-        It, if the library's forms bear all of these kinds out and no sure name is lost of which it knows nothing, or if it is
-        sure of all that was sure and of more; else the plain search. Not if it leaves far more without an effect that the plain
-        search and the best set of kinds both have.
-    """
-    before, choice = plain.result, choose_kinds(plain.views, plain.result.base, plain.result.noise)
-    decision = yield from _progress_of(choice, SECOND_OPINION_BEGINS, FORMS_OF_KINDS_BEGIN)
-    if _sure_names(before).issuperset(decision.clear):
-        return plain
-    result = replace(before, best=before.base, structure=before.base_structure, chosen_kinds=decision.clear)
-    result.findings, result.ambiguous, result.ruled_out, result.intervals, result.outlying = [], [], [], [], []
-    second = _Search(result, plain.views)
-    yield from _selected(second, FORMS_OF_KINDS_BEGIN, TOTAL_WORK)
-    sure, sure_before = _sure_names(result), _sure_names(before)
-    bears_out = sure.issuperset(decision.clear) and sure.issuperset(sure_before - KNOWN_KINDS)
-    if result.verdict != "explained" or not (sure > sure_before or bears_out):
-        return plain
-    named = {one.name for one in result.findings}
-    lost = {one.name for one in before.findings} & decision.kinds - named
-    if lost and second.left > CLEAR_LEAD * plain.left:
-        return plain
-    reasons = {one.name: NOT_NEEDED for one in before.findings} | dict(before.ruled_out)
-    result.ruled_out = [(name, why) for name, why in reasons.items() if name not in named]
-    return second
 
 
 @dataclass
@@ -335,7 +280,7 @@ def _name_differences(own: _Search, plain: _Search, session: _Search | None) -> 
 
 def _in_doubt(one: Finding) -> Finding:
     """A finding that is not sure: what falls within recordings as from one to the next is wear or drift as that is."""
-    why = "gains fall from recording to recording, and nothing tells whether with use or with time"
+    why = "gains fall from recording to recording, and the recordings do not show whether with use or time"
     return replace(one, confidence=min(one.confidence, UNSURE_CONFIDENCE), doubts=(*one.doubts, why))
 
 
@@ -379,8 +324,7 @@ def _select_effects(result: Diagnosis, view_set: ViewSet) -> Generator[tuple[str
     start = base.means
     noise = np.array([min(1.0, start[READINGS]), min(_unloaded_force_noise(view_set, result.base), start[FORCES])])
     gap_sizes = GapSizes(start, noise, result.base.count.sum(axis=0).astype(float))
-    kinds = result.chosen_kinds.keys() | (library().keys() - KNOWN_KINDS) if result.chosen_kinds else None
-    selection = ForwardSelection(view_set, result.scales, result.coverage, gap_sizes, kinds)
+    selection = ForwardSelection(view_set, result.scales, result.coverage, gap_sizes)
     if is_scatter_of_repeats(result.noise, result.base.sse, result.base.count):
         state = base
     else:

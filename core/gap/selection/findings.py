@@ -15,7 +15,6 @@ from ..fitting.noise_floor import ChannelNoise, Coverage
 from ..fitting.residual_tests import ResidualStructure
 from ..fitting.spectral_lines import SpectralLine
 from ..forward.predictor import Model, Predictor
-from ..kinds.decision import NamedKind
 from .between_recordings import LOAD_HISTORY, RecordingDifferences
 from .candidates import Scales
 from .check_recordings import CheckedRecording, CheckOutcome
@@ -128,13 +127,11 @@ class Diagnosis:
     check : CheckOutcome
         What the check recordings say of the amended model, or of the base model if there are no effects.
     outlying : list of OutlyingChannel
-        Channels of check recordings that jump: they are not held against the amended model.
+        Channels of check recordings that jump: they do not count against the amended model.
     closed : ClosedShares
         How much of the gaps the amended model closes.
     unlike_fitted : list of CheckedRecording
         Check recordings that the base model fits far worse than the fitted ones.
-    chosen_kinds : dict of str to NamedKind
-        Kinds that the search by kinds named, if the effects are those among them that the forms bear out; else empty.
     """
 
     rig: Rig
@@ -162,7 +159,6 @@ class Diagnosis:
     outlying: list[OutlyingChannel] = field(default_factory=list)
     closed: ClosedShares = field(default_factory=ClosedShares)
     unlike_fitted: list[CheckedRecording] = field(default_factory=list)
-    chosen_kinds: dict[str, NamedKind] = field(default_factory=dict)
 
     @property
     def carried_over(self) -> Finding | None:

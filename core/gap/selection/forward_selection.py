@@ -10,7 +10,7 @@ The thresholds below were set on simulated sensors whose hidden effects follow o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence, Set
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -67,7 +67,7 @@ UNNEEDED_SHARE = 0.02
 REPLACED_SHARE = 0.98
 """Another first effect must leave less than this share of what the present one leaves."""
 
-NO_SIGNATURE = "fitted to these recordings, its characteristic signature is not in them"
+NO_SIGNATURE = "its characteristic signature is not in these recordings"
 
 StepSearch = Generator[tuple[str, float], None, "SelectionStep"]
 StructureOfFit = Callable[[Fit], ResidualStructure]
@@ -165,15 +165,12 @@ class ForwardSelection:
     scales : Scales
     coverage : Coverage
     gap_sizes : GapSizes
-    kinds : set of str or None
-        The kinds that may join; None for all.
     """
 
     view_set: ViewSet
     scales: Scales
     coverage: Coverage
     gap_sizes: GapSizes
-    kinds: Set[str] | None = None
 
     def __post_init__(self) -> None:
         self.confounded_kinds = confounded(self.coverage)
@@ -235,8 +232,6 @@ class ForwardSelection:
         forms = candidates([s.predictor for s in self.view_set.whole], state.fit.model)
         forms = [c for c in forms if c.name not in taken or may_repeat(c)]
         forms = [c for c in forms if not is_free_already(c, state.fit.free) and (first or c.name not in self.confounded_kinds)]
-        if self.kinds is not None:
-            forms = [c for c in forms if c.name in self.kinds and c.name not in taken]
         if self.gap_sizes.both:
             forms = [c for c in forms if (c.form.friction_law is not None) == friction]
         ranked: list[FittedCandidate] = []
@@ -416,13 +411,15 @@ class ForwardSelection:
         said = state.first.passed_over
         for _ in friction_kinds():
             if state.means[FORCES] < (1.0 + LEAST_FORCE_IMPROVEMENT) * self.gap_sizes.noise[FORCES]:
-                said |= {name: "the net forces leave nothing for it to explain" for name in friction_kinds()}
+                said |= {name: "the net forces leave no gap for it to explain" for name in friction_kinds()}
                 break
             step = yield from self._best_next(state, 0.9, 0.05, first=True, friction=True)
             said |= step.passed_over
             for one in reversed(step.ranked):
                 share = self.gap_sizes.improvement(state.means, means_of(one.held_out, one.fit), FORCES).of_remaining
-                said[one.candidate.name] = f"it closes {max(share, 0.0):.0%} of what is left of the net forces on unseen trials"
+                said[one.candidate.name] = (
+                    f"it closes {max(share, 0.0):.0%} of the remaining gap of the net forces on unseen trials"
+                )
             longer = self._extended(state, step)
             if longer is state:
                 break

@@ -20,7 +20,7 @@ def without_harmful_effects(
 ) -> SelectionState:
     """Drop further effects that make the check recordings worse.
 
-    The effect that closes most stays: the verdict says whether the check recordings bear it out.
+    The effect that closes most stays: the verdict says whether it passes the check recordings.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ from ...effects.engine.registry import names_in_family, names_known_from
 from ..fitting.noise_floor import Coverage
 from ..forward.predictor import Model, Predictor
 
-NEVER_UNLOADED = "no load was ever taken back, and this effect shows after unloading"
+NEVER_UNLOADED = "the sensor was never unloaded, and this effect shows after unloading"
 KNOWN_FROM_UNLOADING, KNOWN_FROM_TIMING = names_known_from("unloading"), names_known_from("timing")
 KNOWN_FROM_REST, KNOWN_FROM_PLACES = names_known_from("rest"), names_known_from("places")
 KNOWN_FROM_CYCLES = names_known_from("cycles")
@@ -36,7 +36,7 @@ MOVING_BY_THEMSELVES, LATE, LOOPS = names_in_family("moving"), names_in_family("
 """Effects that resemble each other (see :data:`...effects.engine.declarations.FAMILIES`)."""
 SINGLE_SPEED_RATIO = 1.5
 """Ratio of fast to slow loading below which all loading was at one speed."""
-NEVER_AT_REST = "no texel was long without load, and no two different loads were held, so that drift and creep look the same"
+NEVER_AT_REST = "no texel rested for long, and no two loads were held: drift and creep are indistinguishable"
 LEAST_UNLOADED_SHARE = 0.1
 """Share of a trial, from the first to the last time that a texel is unloaded, from which on a drift would show there."""
 DISTINCT_LOAD_RATIO = 1.5

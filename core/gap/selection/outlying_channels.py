@@ -3,7 +3,7 @@
 
 A texel whose converter jumps to another level in one recording may have a hundred times the error of all others, whatever the
 model. Then the sum of squares of the check recordings is this texel's, and no effect closes half of it. Such a channel of such
-a recording is set aside where the check recordings are held against an amended model, and the report says which. This never
+a recording is set aside where the check recordings judge an amended model, and the report says which. This never
 hides an error that rises: then nothing of the recording is set aside.
 """
 
@@ -19,7 +19,7 @@ from ..forward.predictor import Model
 
 TIMES_THE_WORST = 10.0
 """Least mean square of a channel under the base model, in units of that of the worst channel of any fitted recording. The
-texel of the insole that jumps (docs/gap-real.md) has 13.6 to 123 times as much; the number was chosen after these had been
+texel of the insole that jumps (benchmarks/RESULTS.md) has 13.6 to 123 times as much; the number was chosen after these had been
 seen."""
 LEAST_STAYS = 0.5
 """Least share of its squares that stays with the amended model. What an effect explains is no jump."""

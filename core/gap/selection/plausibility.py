@@ -33,11 +33,11 @@ LEAST_SIDEWAYS_SHARE = 0.25
 """Least share of what a displacement of the texels lowers the squares by that must be lost without its shift and turns. It was
 0.58 to 1.00 of ten displacements that were hidden (benchmarks/_hidden and its mounted sensors, cases below 1000), and 0.0006
 where relays of a hysteresis were taken for one (case 26002 of other formulas, which is no proof since)."""
-HEIGHT_ALONE = "it is hardly more than a height: contact begins elsewhere than the rig says, as with a gap or with adhesion"
+HEIGHT_ALONE = "it is mostly a height: contact begins elsewhere than the rig says, as with a gap or adhesion"
 
 
 def is_plausible(found: FittedCandidate, view_set: ViewSet) -> bool:
-    """Return whether the recordings bear out a fitted effect; True if they do not contain its signature."""
+    """Return True if the recordings support a fitted effect, or do not contain its signature."""
     signature = found.candidate.kind.signature
     if signature == "pull":
         return _adhesion_pulls(found, view_set)
@@ -111,14 +111,14 @@ def _offset_is_present_unloaded(found: FittedCandidate, view_set: ViewSet) -> bo
         begins = trial.time <= trial.time[0] + BEGINNING_SHARE * np.ptp(trial.time)
         early = rest & (np.cumsum(rest, axis=0) <= ENOUGH_SAMPLES) & begins[:, None]
         total, count = miss.sum(axis=0), rest.sum(axis=0)
-        if not is_common and not _is_borne_out(claimed, total, count, is_common):
+        if not is_common and not _is_supported(claimed, total, count, is_common):
             return False
         always += [total, count]
         first += [np.where(early, miss, 0.0).sum(axis=0), early.sum(axis=0)]
-    return all(_is_borne_out(claimed, total, count, is_common) for total, count in (always, first))
+    return all(_is_supported(claimed, total, count, is_common) for total, count in (always, first))
 
 
-def _is_borne_out(claimed: np.ndarray, total: np.ndarray, count: np.ndarray, is_common: bool) -> bool:
+def _is_supported(claimed: np.ndarray, total: np.ndarray, count: np.ndarray, is_common: bool) -> bool:
     """Whether the mean of each texel's samples agrees with the claimed offsets; True if there are too few samples."""
     resting = count >= ENOUGH_SAMPLES
     if resting.sum() < 2:

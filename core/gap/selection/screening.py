@@ -142,20 +142,20 @@ def screen(
         if starts and starts[0][0] > 0:
             share = starts[0][0] / max(score_test.total, 1e-300)
             promises.append(Promise(share, candidate, [effect for _, effect in starts]))
-        yield "looking at every effect", 0.35 * (number + 1) / len(forms), []
+        yield "screening every effect", 0.35 * (number + 1) / len(forms), []
     small = sum(int(view.counts.sum()) for view in view_set.whole) < SMALL_RECORDING
     effort = THOROUGH if small else QUICK
     kept = _worth_a_fit(promises, effort)
     if reasons is not None:
         reasons |= _reasons_without_fit(forms, promises, kept)
     if not kept:
-        yield "nothing promises anything", 1.0, []
+        yield "no effect passes the screening", 1.0, []
         return
     screened: list[ScreenedCandidate] = []
     for number, one in enumerate(kept):
         score_test = score_tests[id(view_set.quick(one.candidate, found.model))]
         screened.append(_best_first_fit(one, score_test, scales, effort))
-        yield "fitting those that promise most", 0.35 + 0.35 * (number + 1) / len(kept), []
+        yield "fitting the best candidates", 0.35 + 0.35 * (number + 1) / len(kept), []
     last, whole = _finalists(screened, effort), ScoreTest(view_set.whole, found)
     if reasons is not None:
         reasons |= _reasons_after_first_fits(screened, last)
@@ -163,7 +163,7 @@ def screen(
     for number, finalist in enumerate(last):
         results.append(_final_fit(finalist, view_set.whole, found, whole, scales, effort))
         results.sort(key=lambda result: result.mean)
-        yield "judging the best on trials they have not seen", 0.7 + 0.3 * (number + 1) / len(last), results
+        yield "testing the best on unseen trials", 0.7 + 0.3 * (number + 1) / len(last), results
 
 
 def _worth_a_fit(promises: list[Promise], effort: Effort) -> list[Promise]:
@@ -188,9 +188,9 @@ def _reasons_without_fit(forms: Sequence[Candidate], promises: list[Promise], ke
     first = max(best, key=lambda name: best[name], default="")
     fitted = {one.candidate.name for one in kept}
     return {
-        name: f"a first look promised that it would close {best[name]:.1%} of the squares, and {best[first]:.1%} for {first}"
+        name: f"screening estimate: removes {best[name]:.1%} of the squared error, {first} {best[first]:.1%}"
         if name in best
-        else "a first look found nothing that it would close"
+        else "screening estimate: removes nothing of the squared error"
         for name in dict.fromkeys(form.name for form in forms)
         if name not in fitted
     }

@@ -19,7 +19,6 @@ from .confidence import (
     SURE,
     UNLIKELY_CONFIDENCE,
     UNSURE_CONFIDENCE,
-    kinds_can_settle,
     least_share,
     may_absorb_misfit,
     misfit_of_another,
@@ -45,7 +44,7 @@ UNRESOLVED_TIMES = 2.0
 """A spreading effect that leaves less than this many times what no fit can resolve has the sensor's own formula."""
 FAULTY = "the data have faults that were not put right"
 REFUTED = "the amended model fails on the check recordings"
-ABSORBS = "much of the gap is left, and numbers of single texels may have absorbed a part of it"
+ABSORBS = "much of the gap remains, and parameters of single texels may have absorbed part of it"
 """Why a name is not sure, in words."""
 MOST_MEAN_SQUARE = 2.0
 """Mean square of the base model's residual, in units of the noise, up to which a residual without structure is no gap. In a
@@ -108,10 +107,7 @@ def _judge_effects(result: Diagnosis, view_set: ViewSet, state: SelectionState, 
     )
     result.verdict = _verdict(result, gap_sizes, is_open or (bool(fitted) and result.check.is_refuted))
     for index, effect in enumerate(effects):
-        chosen = result.chosen_kinds.get(effect.name) if kinds_can_settle(effect) else None
         times_worse, leaves = _alternatives(effect, state, {e.name for e in effects})
-        if chosen is not None:  # no formula has taken part in this comparison
-            times_worse = leaves = chosen.leaves
         rivals = _rivals(effect, state, result, times_worse, gap_sizes)
         weight = 1.0 / (1.0 + sum(ratio**RIVAL_EXPONENT for ratio in times_worse.values()))
         quantity = gap_sizes.quantity_for(effect.name)
@@ -120,11 +116,11 @@ def _judge_effects(result: Diagnosis, view_set: ViewSet, state: SelectionState, 
         only_height = is_height_alone(result.best.model, index, view_set)
         unsettled += (HEIGHT_ALONE,) if only_height else ()
         support = weight * (0.5 + 0.5 * share if share >= least_share(effect.name, leaves) else 0.5 * share)
-        doubts = _doubts(effect, result, state, gap_sizes, is_open) if chosen is None else ()
+        doubts = _doubts(effect, result, state, gap_sizes, is_open)
         doubts += (REFUTED,) if fitted and result.check.is_refuted else ()
-        lowered = rivals or doubts or only_height or (unsettled and chosen is None)
+        lowered = rivals or doubts or only_height or unsettled
         confidence = min(support, UNSURE_CONFIDENCE) if lowered else probability(support)
-        if confidence < SURE and not (lowered or unsettled):
+        if confidence < SURE and not lowered:
             doubts = (_low_support(share, least_share(effect.name, leaves)),)
         if rivals:
             result.ambiguous.append((effect.name, *rivals))
@@ -137,7 +133,7 @@ def _judge_effects(result: Diagnosis, view_set: ViewSet, state: SelectionState, 
 
 
 def _doubts(effect: Effect, result: Diagnosis, state: SelectionState, gap_sizes: GapSizes, is_open: bool) -> tuple[str, ...]:
-    """Why an effect may only make up for another one's formula, in words; empty if it is alone, or if nothing says so."""
+    """Why an effect may only compensate for the formula of another one; empty if there is no reason."""
     fitted = result.best.model.fitted_effects
     if len(fitted) < 2:
         return ()
@@ -149,8 +145,8 @@ def _doubts(effect: Effect, result: Diagnosis, state: SelectionState, gap_sizes:
 def _low_support(share: float, least: float) -> str:
     """Why the support of an effect is low, in words."""
     if share < least:
-        return f"the amended model closes {max(share, 0.0):.0%} of the squared gap, and a sure name needs {least:.0%}"
-    return "other kinds together do nearly as well in its place"
+        return f"the amended model closes {max(share, 0.0):.0%} of the squared gap, and a confident name needs {least:.0%}"
+    return "other effects together fit nearly as well"
 
 
 def _least_share_closed(result: Diagnosis, left_out: list[float], quantity: int) -> float:
@@ -162,7 +158,7 @@ def _least_share_closed(result: Diagnosis, left_out: list[float], quantity: int)
 def _is_out_of_reach(result: Diagnosis, gap_sizes: GapSizes, quantity: int) -> bool:
     """Whether effects on friction are all there is, and what readings leave would be no gap by itself.
 
-    Friction cannot change readings, so it is not held against it that little of them closes.
+    Friction cannot change readings, so the share of their gap that it closes does not count.
     """
     fitted = result.best.model.fitted_effects
     only_friction = bool(fitted) and all(effect.name in friction_kinds() for effect in fitted)
@@ -170,7 +166,7 @@ def _is_out_of_reach(result: Diagnosis, gap_sizes: GapSizes, quantity: int) -> b
 
 
 def _is_quiet(result: Diagnosis, structure: ResidualStructure, gap_sizes: GapSizes) -> bool:
-    """Whether the base model's residual is small, or little more than noise, and what is left of it has no structure."""
+    """True if the base model's residual is small, or little more than noise, and has no structure."""
     mean, gap = float(gap_sizes.base[gap_sizes.main_quantity]), gap_sizes.gap(gap_sizes.main_quantity)
     small = (mean < MOST_MEAN_SQUARE or gap < LEAST_IMPROVEMENT) and not result.unlike_fitted
     return structure.total < LEAST_STRUCTURE and small and result.line is None
@@ -248,13 +244,13 @@ def _rule_out(result: Diagnosis, state: SelectionState, gap_sizes: GapSizes) -> 
         if kind.name in state.dropped:
             why = "it makes the check recordings worse"
         elif kind.name in NOT_FITTED:
-            why = "what is left does not tremble the more, the larger the reading"
+            why = "the residual noise does not grow with the reading"
         elif kind.name not in possible:
             why = unidentifiable(result.coverage).get(kind.name, "these recordings cannot show it")
         elif kind.name in tried and result.verdict != "no gap":
             why = f"alone it closes {tried[kind.name]:.0%} of the squared gap on unseen trials"
         elif result.verdict == "no gap":
-            why = "nothing is left for it to explain"
+            why = "no gap remains for it to explain"
         else:
             why = state.first.passed_over.get(kind.name, "the model has it already, as a parameter of the base model")
         result.ruled_out.append((kind.name, why))

@@ -104,6 +104,42 @@ def rasterise_cells(corners: np.ndarray, side: int, width: int) -> tuple[np.ndar
     return pixel, triangle, weights, inside
 
 
+def front_triangles(corners: np.ndarray, height: int, width: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find which triangle is in front at each pixel; triangles that are wound clockwise are not seen.
+
+    Parameters
+    ----------
+    corners : (m, 3, 3) float
+        Pixel coordinates x, y as in :func:`rasterise`, and z, which is larger for what is nearer.
+    height, width : int, pixels
+
+    Returns
+    -------
+    pixel : (p,) int
+        ``row · width + column``, each once.
+    triangle : (p,) int
+    weights : (p, 3) float
+        Sum 1.
+    """
+    plane, nobody = corners[..., :2], len(corners)
+    slopes = _barycentric(plane)
+    chosen = np.flatnonzero(np.isfinite(slopes[0, 0]))
+    nearest, owner = np.full(height * width, -np.inf), np.full(height * width, nobody)
+    for index, pixel, point in _pairs(plane, chosen, 1e-6, height, width):
+        weights = _weights(slopes, index, point)
+        covered = weights.min(axis=0) >= -1e-9
+        index, pixel = index[covered], pixel[covered]
+        depth = (weights.T[covered] * corners[index, :, 2]).sum(axis=1)
+        np.maximum.at(nearest, pixel, depth)
+        in_front = depth == nearest[pixel]
+        owner[pixel[in_front]] = index[in_front]
+    pixel = np.flatnonzero(owner < nobody)
+    triangle = owner[pixel]
+    point = np.column_stack([pixel % width, pixel // width]).astype(float)
+    weights = np.maximum(_weights(slopes, triangle, point), 0.0).T
+    return pixel, triangle, weights / weights.sum(axis=1, keepdims=True)
+
+
 def _pairs(
     corners: np.ndarray, chosen: np.ndarray, reach: float, height: int, width: int
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:

@@ -89,8 +89,8 @@ def _notes(item: SensorOnMesh) -> list[str]:
     solid, layered = item.solid
     found = [
         f"'{name}': MuJoCo has depth and sliding of each texel; Palpate alone computes {', '.join(unmodelled(item))}.",
-        f"'{name}': MuJoCo's stiffness is per mass: a box of {REFERENCE_MASS:g} kg sinks in as far as in Palpate, and a box of "
-        "another mass as far as this one; scale solref by 1 / mass for a load of another mass.",
+        f"'{name}': MuJoCo's stiffness is per mass: the penetration of a box of {REFERENCE_MASS:g} kg is that of Palpate, "
+        "and a box of another mass has the same; scale solref by 1 / mass for a load of another mass.",
     ]
     if layered:
         found.append(f"'{name}' is an open sheet: it was made a layer as thick as its foam, half its maximum penetration.")

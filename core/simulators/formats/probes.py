@@ -36,7 +36,7 @@ def read_probes(path: str | os.PathLike) -> list[FoundSensor]:
     sensor, notes = item.sensor, []
     painted = [entry.name for entry in fields(sensor.painted) if getattr(sensor.painted, entry.name) is not None]
     if painted:
-        notes.append(f"'{item.name}': painted factors ({', '.join(painted)}) were not taken over.")
+        notes.append(f"'{item.name}': painted factors ({', '.join(painted)}) were not imported.")
     layout = sensor.texels.layout
     row, column = (layout.row, layout.column) if isinstance(layout, GridLayout) else (None, None)
     found = FoundSensor(item.name, sensor.texels.position, sensor.texels.normal, item.faces, row, column)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contact detection: narrow phase, neighbour lists, and surfaces that deform."""
+"""Contact detection: narrow phase, neighbour lists, shapes in closed form, and surfaces that deform."""
 
 __all__ = [
     "deformation",
@@ -7,5 +7,6 @@ __all__ = [
     "detection_data",
     "narrow_phase",
     "neighbour_lists",
+    "shape_contacts",
     "surface_kinematics",
 ]

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The arrays of contact detection: the targets' surfaces, and what is known to be near each contact point."""
+"""The arrays of contact detection: the targets' surfaces or shapes, and what is known to be near each contact point."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from ...compiled.struct_reference import by_reference
 from ...geometry.bvh import Tree
+from ...geometry.shapes import MESH, Shape
 
 MOMENTS, PRESENT, OTHER = range(3)
 """Places in :attr:`SurfaceMotion.clock`."""
@@ -119,6 +121,28 @@ class NeighbourLists(NamedTuple):
 
 
 @by_reference
+class TargetShapes(NamedTuple):
+    """What T targets are.
+
+    Attributes
+    ----------
+    kind : (T,) int
+        MESH, or a kind of :mod:`.geometry.shapes`, whose contacts are computed in closed form.
+    size : (T, 3) float, metres
+        See :attr:`.Shape.size`.
+    """
+
+    kind: np.ndarray
+    size: np.ndarray
+
+    @classmethod
+    def of(cls, shapes: Sequence[Shape | None]) -> TargetShapes:
+        """Return the shapes of targets; None stands for a mesh."""
+        kind = np.array([MESH if shape is None else shape.kind for shape in shapes], np.int64)
+        return cls(kind, np.array([(0.0, 0.0, 0.0) if shape is None else shape.size for shape in shapes]).reshape(-1, 3))
+
+
+@by_reference
 class DetectionData(NamedTuple):
     """The arrays of contact detection.
 
@@ -129,8 +153,10 @@ class DetectionData(NamedTuple):
     neighbours : NeighbourLists
     surfaces : SurfaceMotion
         How targets and sensors deform in the present frame.
+    shapes : TargetShapes
     """
 
     tree: Tree
     neighbours: NeighbourLists
     surfaces: SurfaceMotion
+    shapes: TargetShapes

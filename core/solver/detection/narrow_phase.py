@@ -9,34 +9,19 @@ import numpy as np
 
 from ...compiled.kernels import inlined, kernel
 from ...geometry.bvh import Segment, Tree, segment_entry
-from ..contact_rows import BRISTLE, DEPTH, LANES, NORMAL, POINT, ROW, write_vector
+from ...geometry.shapes import MESH
+from ..contact_rows import LANES
 from ..solver_model import NO_TRIANGLE, TOO_DEEP, SolverModel, State
 from ..workspace import Workspace
 from .deformation import place_all_triangles, place_listed_triangles
 from .detection_data import DetectionData
 from .neighbour_lists import find_entry, rebuild_list
+from .segments import clear_slot, finish_block, segment_of, write_relative_pose, write_row
+from .shape_contacts import find_shape_contacts
 
 NEARLY_TOO_DEEP = 0.9
 """Share of the maximum penetration. If a point was deeper than this a step ago and its segment meets nothing now, it may be
 pressed past the maximum penetration now."""
-
-
-@kernel
-def _write_relative_pose(pair: int, model: SolverModel, state: State, workspace: Workspace) -> None:
-    """Write the sensor's rotation (row by row) and position in the target's frame into the pair's pose."""
-    a, b = model.pairs.sensor_body[pair], model.pairs.target_body[pair]
-    position, rotation, pose = state.position, workspace.bodies.rotation, workspace.pairs.pose[pair]
-    for i in range(3):
-        total = 0.0
-        for k in range(3):
-            total += rotation[b, k, i] * (position[a, k] - position[b, k])
-        pose[9 + i] = total
-        for j in range(3):
-            pose[3 * i + j] = (
-                rotation[b, 0, i] * rotation[a, 0, j]
-                + rotation[b, 1, i] * rotation[a, 1, j]
-                + rotation[b, 2, i] * rotation[a, 2, j]
-            )
 
 
 @kernel
@@ -66,22 +51,10 @@ def _travel_bound(pose: np.ndarray, old: np.ndarray, center: np.ndarray, radius:
 
 
 @inlined
-def _segment(point: int, reach: float, pose: np.ndarray, frame: np.ndarray) -> tuple[Segment, tuple[float, float, float]]:
-    """Segment of a contact point in the target's frame, from `reach` (m) deep in the sensor to the point, and its tip."""
-    tx = pose[9] + pose[0] * frame[point, 0] + pose[1] * frame[point, 1] + pose[2] * frame[point, 2]
-    ty = pose[10] + pose[3] * frame[point, 0] + pose[4] * frame[point, 1] + pose[5] * frame[point, 2]
-    tz = pose[11] + pose[6] * frame[point, 0] + pose[7] * frame[point, 1] + pose[8] * frame[point, 2]
-    dx = reach * (pose[0] * frame[point, 3] + pose[1] * frame[point, 4] + pose[2] * frame[point, 5])
-    dy = reach * (pose[3] * frame[point, 3] + pose[4] * frame[point, 4] + pose[5] * frame[point, 5])
-    dz = reach * (pose[6] * frame[point, 3] + pose[7] * frame[point, 4] + pose[8] * frame[point, 5])
-    return Segment(tx - dx, ty - dy, tz - dz, dx, dy, dz), (tx, ty, tz)
-
-
-@inlined
 def _segment_travel(point: int, reach: float, pose: np.ndarray, old: np.ndarray, frame: np.ndarray) -> float:
     """How far any point of a segment has moved between two poses at the most, metres: one of its ends."""
-    now, (tx, ty, tz) = _segment(point, reach, pose, frame)
-    then, (qx, qy, qz) = _segment(point, reach, old, frame)
+    now, (tx, ty, tz) = segment_of(point, reach, pose, frame)
+    then, (qx, qy, qz) = segment_of(point, reach, old, frame)
     base = (now.ox - then.ox) ** 2 + (now.oy - then.oy) ** 2 + (now.oz - then.oz) ** 2
     return math.sqrt(max(base, (tx - qx) ** 2 + (ty - qy) ** 2 + (tz - qz) ** 2))
 
@@ -145,7 +118,7 @@ def _rebuild_lists(
         near = 0.0 <= valid[slot] < 16.0 * travel
         valid[slot] -= min(_segment_travel(point, reach, pose, old, frame) + deformed, travel) if near else travel
         if valid[slot] < 0.0 or deforms or first or (narrow and lists.length[slot] != 0):
-            segment, _ = _segment(point, reach, pose, frame)
+            segment, _ = segment_of(point, reach, pose, frame)
             empty = lists.length[slot] == 0 and state.triangle[slot] < 0
             rebuild_list(slot, segment, target, (radius, max_list, travel_per_step), (empty, not deforms), lists, tree)
         shortest = min(shortest, valid[slot])
@@ -162,36 +135,7 @@ def _clear_contacts(pair: int, model: SolverModel, state: State) -> None:
     start = model.pairs.first_slot[pair]
     for slot in range(start, start + model.pairs.stop_point[pair] - model.pairs.first_point[pair]):
         if state.triangle[slot] != NO_TRIANGLE:
-            _clear_slot(slot, NO_TRIANGLE, state)
-
-
-@inlined
-def _clear_slot(slot: int, triangle: int, state: State) -> None:
-    """Write that the point of a slot does not act: `triangle` is NO_TRIANGLE or TOO_DEEP."""
-    state.triangle[slot] = triangle
-    for i in range(3):
-        state.bristle[slot, i] = 0.0
-    state.pressed_share[slot] = 0.0
-
-
-@inlined
-def _in_sensor_axes(x: float, y: float, z: float, pose: np.ndarray) -> tuple[float, float, float]:
-    """Return a vector of the target in the sensor's axes; `pose` is the sensor's in the target's frame."""
-    return (
-        pose[0] * x + pose[3] * y + pose[6] * z,
-        pose[1] * x + pose[4] * y + pose[7] * z,
-        pose[2] * x + pose[5] * y + pose[8] * z,
-    )
-
-
-@inlined
-def _place_behind(point: int, distance: float, frame: np.ndarray) -> tuple[float, float, float]:
-    """Return the place at a distance (m) behind a contact point, back along its normal."""
-    return (
-        frame[point, 0] - distance * frame[point, 3],
-        frame[point, 1] - distance * frame[point, 4],
-        frame[point, 2] - distance * frame[point, 5],
-    )
+            clear_slot(slot, NO_TRIANGLE, state)
 
 
 @kernel
@@ -216,7 +160,10 @@ def find_contacts(pair: int, model: SolverModel, detection: DetectionData, state
     rows, slots, pose, first = contacts.rows, contacts.slots, workspace.pairs.pose[pair], contacts.first_block[pair]
     frame, reach, root = model.points.frame, model.sensors.max_penetration[sensor], tree.roots[target]
     triangles, bristle, pressed_share = state.triangle, state.bristle, state.pressed_share
-    _write_relative_pose(pair, model, state, workspace)
+    write_relative_pose(pair, model, state, workspace)
+    if detection.shapes.kind[target] != MESH:
+        find_shape_contacts(pair, model, detection, state, workspace)
+        return
     if _distance_to_box(pose, model.sensors.center[sensor], tree.bounds, root) > model.sensors.radius[sensor]:
         _clear_contacts(pair, model, state)
         contacts.number[pair], contacts.too_deep[pair] = 0, 0
@@ -231,28 +178,23 @@ def find_contacts(pair: int, model: SolverModel, detection: DetectionData, state
         before = triangles[slot]
         if before == NO_TRIANGLE and lists.length[slot] == 0:
             continue
-        segment, tip = _segment(point, reach, pose, frame)
+        segment, tip = segment_of(point, reach, pose, frame)
         met, triangle, leaving = find_entry(segment, slot, target, before, lists, tree)
         if triangle < 0:
             if _is_too_deep(segment, tip, slot, target, leaving, detection, state):
                 too_deep += 1
-                _clear_slot(slot, TOO_DEEP, state)
+                clear_slot(slot, TOO_DEEP, state)
             else:
-                _clear_slot(slot, NO_TRIANGLE, state)
+                clear_slot(slot, NO_TRIANGLE, state)
             continue
-        fx, fy, fz = tree.faces[triangle, 9], tree.faces[triangle, 10], tree.faces[triangle, 11]
-        inside = 1.0 - met
-        write_vector(rows, block, NORMAL, lane, *_in_sensor_axes(fx, fy, fz, pose))
-        write_vector(rows, block, POINT, lane, *_place_behind(point, inside * reach, frame))
-        write_vector(rows, block, BRISTLE, lane, bristle[slot, 0], bristle[slot, 1], bristle[slot, 2])
-        rows[block, DEPTH + lane] = inside * abs(segment.dx * fx + segment.dy * fy + segment.dz * fz)
+        normal, inside = (tree.faces[triangle, 9], tree.faces[triangle, 10], tree.faces[triangle, 11]), 1.0 - met
+        held = bristle[slot, 0], bristle[slot, 1], bristle[slot, 2]
+        write_row((block, lane), point, (normal, inside, held), segment, pose, (reach, frame), rows)
         triangles[slot], pressed_share[slot], slots[block, lane] = triangle, inside, slot
         lane += 1
         if lane == LANES:
             block, lane = block + 1, 0
-    for unused in range(lane if lane > 0 else LANES, LANES):  # in a function of its own this costs 6 % of a step of 84 texels
-        for column in range(0, ROW, LANES):
-            rows[block, column + unused] = 0.0
+    finish_block(block, lane, rows)
     contacts.number[pair], contacts.too_deep[pair] = (block - first) * LANES + lane, too_deep
 
 
@@ -309,7 +251,7 @@ def count_too_deep(
     """
     sensor, target = model.pairs.sensor[pair], model.pairs.target[pair]
     pose, tree, triangles = workspace.pairs.pose[pair], detection.tree, state.triangle
-    _write_relative_pose(pair, model, state, workspace)
+    write_relative_pose(pair, model, state, workspace)
     place_all_triangles(target, detection.surfaces, tree)
     frame, reach, root, bounds = model.points.frame, model.sensors.max_penetration[sensor], tree.roots[target], tree.bounds
     too_deep, slot = 0, model.pairs.first_slot[pair] - 1
@@ -317,7 +259,7 @@ def count_too_deep(
         slot += 1
         if triangles[slot] >= 0 or (triangles[slot] == NO_TRIANGLE and not closed):
             continue
-        segment, _ = _segment(point, reach, pose, frame)
+        segment, _ = segment_of(point, reach, pose, frame)
         within = (
             bounds[root, 0] <= segment.ox <= bounds[root, 3]
             and bounds[root, 1] <= segment.oy <= bounds[root, 4]

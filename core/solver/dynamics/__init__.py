@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Dynamics of a step: contacts linearised and summed, friction states and effects, and the linear system of velocities.
 
-Passivity, actuators with their commands and grip control, relative motion of bodies, and free rotation stand here as well.
+Passivity, the modes of bodies, actuators with their commands and grip control, relative motion of bodies, and free rotation
+stand here as well.
 """
 
 __all__ = [
@@ -14,6 +15,7 @@ __all__ = [
     "friction_state",
     "grip_controller",
     "linear_system",
+    "modes",
     "passivity",
     "relative_kinematics",
 ]

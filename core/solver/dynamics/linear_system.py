@@ -6,10 +6,11 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled.kernels import inlined, kernel
-from ...geometry.rotations import add_triple_product, project_on_axis, write_twist_map
+from ...geometry.rotations import add_triple_product
 from ..contact_rows import LANES
-from ..solver_model import FREE, KEYFRAMED, Pairs, SolverModel, State
+from ..solver_model import Pairs, SolverModel, State
 from ..workspace import LinearSystem, Workspace
+from .modes import write_map
 
 
 @inlined
@@ -60,8 +61,8 @@ def add_pair_to_system(pair: int, dt: float, model: SolverModel, state: State, w
         return
     a, b, system = model.pairs.sensor_body[pair], model.pairs.target_body[pair], workspace.system
     map_a, map_b, wrench, vector = system.map_a, system.map_b, system.wrench, system.vector
-    at_a, width_a = _write_map(a, a, -1.0, model, state, workspace, map_a)
-    at_b, width_b = _write_map(b, a, 1.0, model, state, workspace, map_b)
+    at_a, width_a = write_map(a, a, -1.0, model, state, workspace, map_a)
+    at_b, width_b = write_map(b, a, 1.0, model, state, workspace, map_b)
     for j in range(6):
         for i in range(width_a):
             vector[at_a + i] += dt * map_a[j, i] * wrench[j]
@@ -92,23 +93,6 @@ def _add_block(
 
 
 @kernel
-def _write_map(
-    body: int, sensor_body: int, sign: float, model: SolverModel, state: State, workspace: Workspace, out: np.ndarray
-) -> tuple[int, int]:
-    """Write the map from a body's unknowns to relative motion in the sensor body's axes; return their index and number."""
-    gx = state.position[sensor_body, 0] - state.position[body, 0]
-    gy = state.position[sensor_body, 1] - state.position[body, 1]
-    gz = state.position[sensor_body, 2] - state.position[body, 2]
-    if model.bodies.kind[body] == KEYFRAMED:
-        return -1, 0
-    write_twist_map(workspace.bodies.rotation[sensor_body], gx, gy, gz, sign, out)
-    if model.bodies.kind[body] == FREE:
-        return model.bodies.first_unknown[body], 6
-    project_on_axis(workspace.drives.axis[body], out)
-    return model.bodies.first_unknown[body], 1
-
-
-@kernel
 def write_pair_forces(model: SolverModel, state: State, workspace: Workspace) -> None:
     """Write the force and torque of each pair on its target that belong to the system's solution, all parts with the last."""
     system, energy = workspace.system, workspace.energy
@@ -130,7 +114,7 @@ def _subtract_resistance(
 ) -> None:
     """Subtract from a pair's wrench the force with which its contacts resist a body's motion."""
     system = workspace.system
-    at, width = _write_map(body, sensor_body, sign, model, state, workspace, system.map_a)
+    at, width = write_map(body, sensor_body, sign, model, state, workspace, system.map_a)
     for j in range(6):
         along = 0.0
         for i in range(width):

@@ -19,10 +19,10 @@ from ...compiled.kernels import inlined, kernel
 from ...laws.contact_law import ContactLaw
 from ...laws.normal_force import elastic_energy
 from ..found_contacts import contacts_of
-from ..solver_model import FREE, KEYFRAMED, SolverModel, State
+from ..solver_model import SolverModel, State
 from ..workspace import Workspace
-from .free_rotation import write_rotation_at_end
 from .linear_system import is_last_part
+from .modes import add_integration_loss, is_moved_by_path, write_end
 
 MAX_BISECTIONS = 24
 """Bisections for the factor on its forces that a pair can pay for."""
@@ -48,10 +48,8 @@ def reset_force_scales(model: SolverModel, state: State, workspace: Workspace) -
         energy.scale[pair] = energy.scale_high[pair] = 1.0
         energy.scale_low[pair] = 0.0
         for body in (model.pairs.sensor_body[pair], model.pairs.target_body[pair]):
-            if model.bodies.kind[body] == KEYFRAMED:
-                for i in range(6):
-                    if state.velocity[body, i] != 0.0:
-                        state.stored_energy[pair] = math.inf
+            if is_moved_by_path(body, model, state):
+                state.stored_energy[pair] = math.inf
 
 
 @kernel
@@ -62,13 +60,15 @@ def check_energy(bisection: int, dt: float, model: SolverModel, state: State, wo
     """
     energy, within_account = workspace.energy, True
     scale = energy.scale
-    for body in range(len(model.bodies.kind)):
-        if model.bodies.kind[body] == FREE:
-            write_rotation_at_end(body, dt, model, state, workspace)
+    for body in range(len(model.bodies.mode)):
+        write_end(body, dt, model, state, workspace)
     _sum_contact_forces(model, workspace)
     for pair in range(len(model.pairs.sensor)):
         energy.work[pair] = _contact_work(pair, dt, model, state, workspace)
-        energy.available[pair] = max(state.stored_energy[pair] + _integration_energy(pair, dt, model, state), 0.0)
+        lost = 0.0
+        for body in (model.pairs.sensor_body[pair], model.pairs.target_body[pair]):
+            lost = add_integration_loss(lost, body, dt, model, state)
+        energy.available[pair] = max(state.stored_energy[pair] + lost, 0.0)
         if energy.work[pair] > energy.available[pair]:
             energy.scale_high[pair], within_account = scale[pair], False
         elif scale[pair] < 1.0:
@@ -125,26 +125,10 @@ def _contact_work(pair: int, dt: float, model: SolverModel, state: State, worksp
         end += dt * force[i] * after[i]
     size, besides = _force_size(pair, workspace), 0.0
     for body in (a, b):
-        if model.bodies.kind[body] == FREE and size > 0.0:
+        if size > 0.0:
             besides += workspace.bodies.unbooked_energy[body] * (size / workspace.bodies.contact_force[body])
     mean, end = mean + besides, end + besides
     return mean if mean < 0.0 else max(mean, end)
-
-
-@kernel
-def _integration_energy(pair: int, dt: float, model: SolverModel, state: State) -> float:
-    """Energy that a pair's free bodies have lost since the start by being moved with the velocity of each step's end, joules.
-
-    Gravity accelerates a body by the mean velocity and lowers it by the last: a falling body loses in each step what a rising
-    one gains.
-    """
-    lost, bodies = 0.0, model.bodies
-    for body in (model.pairs.sensor_body[pair], model.pairs.target_body[pair]):
-        if bodies.kind[body] == FREE:
-            for i in range(3):
-                gained = state.velocity[body, i] - bodies.initial_velocity[body, i]
-                lost += 0.5 * dt * bodies.mass[body] * bodies.gravity[i] * gained
-    return lost
 
 
 @inlined

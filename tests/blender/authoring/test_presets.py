@@ -131,7 +131,7 @@ def test_a_material_or_face_set_becomes_the_region(source):
             sensor_regions.region_vertices(pad, len(right))
     else:
         pad.palpate.material = "Gone"
-        with pytest.raises(SensorError, match="wears no material 'Gone'"):
+        with pytest.raises(SensorError, match="has no material 'Gone'"):
             sensor_regions.region_vertices(pad, len(right))
 
 

@@ -31,6 +31,18 @@ def test_it_presses_as_deep_as_it_says_and_goes(shape):
     assert np.linalg.norm(side) < 0.003
 
 
+def test_it_touches_within_two_frames_of_the_usual_range():
+    """So that the first image does not wait for an approach."""
+    scene = bpy.context.scene
+    assert (scene.frame_start, scene.frame_end) == (1, 250)
+    grid(columns=5, rows=5)
+    bpy.ops.palpate.sensor_add()
+    bpy.ops.palpate.probe_add()
+    scene.frame_end = 4
+    felt = run(run_job(scene_reader.read_scene(scene)).scenario).sensors["Pad"]
+    assert not felt.contact[0].any() and felt.contact[2].any()
+
+
 @pytest.mark.slow("lays a skin on a ball and presses on it")
 def test_a_probe_for_a_curved_sensor_of_any_size():
     ball(radius=0.05)

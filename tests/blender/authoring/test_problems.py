@@ -225,7 +225,7 @@ def test_an_outdated_skin_is_laid_anew_and_an_orphan_stands_alone():
 def test_every_problem_has_a_button_with_a_name():
     assert all(label and call for label, call in problems.FIXES.values())
     pad = sensor(grid())
-    with pytest.raises(RuntimeError, match="no such problem any more"):
+    with pytest.raises(RuntimeError, match="no longer has this problem"):
         bpy.context.view_layer.objects.active = pad
         bpy.ops.palpate.fix(kind="FLIPPED")
 

@@ -283,7 +283,7 @@ def test_a_curve_as_sensor(pressed):
     bpy.ops.curve.primitive_bezier_circle_add()
     bpy.context.object.name = "Circle"
     bpy.context.object.palpate.role = "SENSOR"
-    assert refusal().startswith("'Circle' is no mesh")
+    assert refusal().startswith("'Circle' is not a mesh")
 
 
 def test_a_curve_without_surface_as_target(pressed):

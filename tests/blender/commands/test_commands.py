@@ -323,7 +323,7 @@ def test_ctrl_c_keeps_the_earlier_bake(delay, tmp_path, demo_blend):
     words, err = process.communicate(timeout=120)
     assert process.returncode == 130
     assert words == ""
-    assert err == "palpate bake: stopped; an earlier bake is still as it was.\n"
+    assert err == "palpate bake: stopped; an earlier bake is unchanged.\n"
     assert contents(out) == before
 
 
@@ -419,7 +419,7 @@ def test_a_scenario_is_what_a_bake_computes(tmp_path, scene, capfd):
     assert baked.sensors["Pad"].normal_force.max() > 0
 
 
-@pytest.mark.parametrize(("name", "reason"), [("folder", "is a folder"), ("", "no name of a file")])
+@pytest.mark.parametrize(("name", "reason"), [("folder", "is a folder"), ("", "not the name of a file")])
 def test_a_scenario_that_cannot_be_written_is_one_sentence(tmp_path, scene, capfd, name, reason):
     press()
     blend = save(tmp_path)

@@ -20,7 +20,7 @@ def test_stiffness_from_foam(tmp_path, capfd):
     assert main([*words, "--weight-area", "804.25e-6", "--plot", str(tmp_path / "foam.png")]) == 0
     out = capfd.readouterr().out
     assert "58.39 N/m" in out  # the slope 3.924 MPa/m is that of 9810 Pa at 2.5 mm
-    assert "gives way by 0.3 mm" in out
+    assert "dead zone of 0.3 mm" in out
     assert (tmp_path / "foam.png").read_bytes().startswith(b"\x89PNG")
     assert main(words) == 1
     assert "on which area" in capfd.readouterr().err

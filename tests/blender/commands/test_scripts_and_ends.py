@@ -134,7 +134,7 @@ def test_ctrl_c_ends_work_that_looks_at_no_keyboard(command, tmp_path):
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=20)
     assert process.returncode == 130
-    assert err == f"palpate {command}: stopped; an earlier bake is still as it was.\n"
+    assert err == f"palpate {command}: stopped; an earlier bake is unchanged.\n"
 
 
 # --- special files

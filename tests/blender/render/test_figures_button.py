@@ -65,14 +65,14 @@ def test_what_cannot_be_made_is_one_sentence(baked):
     scene, pad, _ = baked
     own = scene.palpate.figures
     own.frames = "12, x"
-    with pytest.raises(RuntimeError, match="'x' in Figures › Frames is no frame"):
+    with pytest.raises(RuntimeError, match="'x' in Figures › Frames is not a frame"):
         bpy.ops.palpate.figures_make()
     own.frames = "99"
     with pytest.raises(RuntimeError, match="Frame 99 is not in the bake"):
         bpy.ops.palpate.figures_make()
     own.frames, own.sensors = "", "ACTIVE"
     bpy.context.view_layer.objects.active = bpy.data.objects["Ball"]
-    with pytest.raises(RuntimeError, match="The active object is no sensor"):
+    with pytest.raises(RuntimeError, match="The active object is not a sensor"):
         bpy.ops.palpate.figures_make()
     own.sensors, own.kinds = "ALL", set()
     with pytest.raises(RuntimeError, match="Nothing is chosen"):

@@ -227,6 +227,24 @@ def test_samples_are_what_their_scripts_build(name, repository, tmp_path):
     assert described(bpy.context.scene) == committed
 
 
+@pytest.mark.parametrize("name", build_samples.SAMPLES)
+def test_samples_open_to_a_picture(name, repository):
+    """In the camera's view with materials, at a frame past the first, with a sensor active and its tab shown."""
+    bpy.ops.wm.open_mainfile(filepath=str(repository / "sample_blends" / f"{name}.blend"))
+    scene, active = bpy.context.scene, bpy.context.view_layer.objects.active
+    assert active.palpate.role == "SENSOR" and active.select_get()
+    assert scene.frame_start < scene.frame_current <= scene.frame_end
+    spaces = [area.spaces.active for screen in bpy.data.screens for area in screen.areas]
+    views = [space for space in spaces if space.type == "VIEW_3D"]
+    assert {view.region_3d.view_perspective for view in views} == {"CAMERA"}
+    assert {view.shading.type for view in views} == {"MATERIAL"}
+    backdrop = max(scene.objects["Backdrop"].dimensions)
+    assert min(view.clip_end for view in views) > 2 * backdrop  # so that Home shows it all
+    assert {space.context for space in spaces if space.type == "PROPERTIES"} == {"PHYSICS"}
+    seen = scene.camera.matrix_world.inverted() @ active.matrix_world.translation
+    assert seen.z < 0
+
+
 @pytest.mark.slow("bakes each sample scene")
 @pytest.mark.parametrize("name", build_samples.SAMPLES)
 def test_samples_open_and_bake(name, repository, tmp_path):

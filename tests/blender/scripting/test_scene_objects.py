@@ -24,7 +24,7 @@ def test_a_scene_is_simulated_and_read_back(tmp_path):
     baked = pp.read_bake(tmp_path / "palpate-bake" / "Pad")
     assert (baked.normal_force == found.normal_force).all() and baked.unit == "N"
     assert (pp.read_recording(tmp_path / "palpate-bake" / "Pad" / "recording.npz").shear == found.shear).all()
-    with pytest.raises(pp.PalpateError, match="duration is given beside a scenario"):
+    with pytest.raises(pp.PalpateError, match="duration is part of the scenario"):
         pp.simulate(pp.scenario_of(scene), duration=1.0)
     with pytest.raises(pp.PalpateError, match="does not say where its texels are"):
         pp.read_recording(tmp_path / "palpate-bake" / "Pad" / "recording.npz").show(t=0.0)

@@ -22,6 +22,7 @@ from palpate.sweep.worker import compute_batch, end_children
 
 SCALE = 'bpy.data.objects["Ball"].scale[2]'
 STUDY = f"""format = "palpate-sweep/1"
+recordings = true
 scene = "scene.blend"
 design = "grid"
 [vary]

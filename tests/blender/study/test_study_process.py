@@ -56,7 +56,7 @@ def test_a_study_is_stopped_and_goes_on(study):
 
 def test_a_missing_command_is_one_sentence(study, monkeypatch):
     monkeypatch.setattr(study_process, "command_in_preferences", lambda: "/nowhere/palpate")
-    with pytest.raises(PalpateError, match="'/nowhere/palpate' is no command"):
+    with pytest.raises(PalpateError, match="'/nowhere/palpate' is not a command"):
         run_job(study_process.run_study(study))
     monkeypatch.setattr(study_process, "command_in_preferences", lambda: "")
     monkeypatch.setattr(study_process.importlib.util, "find_spec", lambda _name: None)

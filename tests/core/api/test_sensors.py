@@ -80,3 +80,19 @@ def test_a_pressed_sensor_takes_a_sensor_and_a_body():
     for _ in range(2):
         contacts = many.step([0, 0, 0, *level], poses)
     assert (contacts.wrench[:, :3] == contact.force_on_target).all()
+
+
+@pytest.mark.parametrize("body", [
+    pp.Body.box(0.02), pp.Body.sphere(0.01), pp.Body.capsule(0.005, 0.01), pp.Body.plane(0.1),
+], ids=lambda body: body.name)  # fmt: skip
+def test_bodies_know_their_shape_and_press_with_it(body):
+    """The mesh stands for it elsewhere; a moved body keeps its shape, and one of a mesh has none."""
+    assert body.shape is not None
+    assert body.moved([[0.0, 0.0, 0.0]]).shape == body.shape
+    assert pp.Body.from_mesh((body.mesh.vertices, body.mesh.triangles)).shape is None
+    half = {"box": 0.01, "sphere": 0.01, "capsule": 0.01, "plane": 0.0}[body.name]
+    assert body.mesh.vertices[:, 2].max() == pytest.approx(half, abs=1e-9)
+    level = np.array([1.0, 0.0, 0.0, 0.0]) if half else np.array([0.0, 1.0, 0.0, 0.0])
+    pressed = pp.PressedSensor(pp.Sensor.grid(3, 3, pitch=1e-3), body, dt=1e-3)
+    contact = pressed.step(([0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]), ([0.0, 0.0, half - 1e-4], level))
+    assert contact.texels.depth.max() == pytest.approx(1e-4, abs=1e-12)

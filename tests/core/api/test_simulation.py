@@ -142,7 +142,8 @@ REFUSED = [
     (lambda: pp.Body.from_mesh((np.eye(3), [[0, 1, 7]])), "refers to a vertex that does not exist"),
     (lambda: pp.Body.from_mesh(np.eye(3)), "mesh is array.*: give a file"),
     (lambda: pp.Body.from_mesh("none.stl"), "There is no mesh file 'none.stl'"),
-    (lambda: pp.Sensor.from_mesh((np.eye(3), [[0, 1, 2]]), region=[4]), "region has the shape"),
+    (lambda: pp.Sensor.from_mesh((np.eye(3), [[0, 1, 2]]), region=[4]), "region has vertex 4: the mesh has 3, from 0 to 2"),
+    (lambda: pp.Sensor.from_mesh((np.eye(3), [[0, 1, 2]]), region=[0.5]), "region has the shape"),
     (lambda: pp.simulate(pad(), cube(), duration=0), "duration is 0: give a finite number above zero"),
     (lambda: pp.simulate(pad(), cube(), duration=float("nan")), "duration is nan"),
     (lambda: pp.simulate(pad(), cube()), "duration is missing"),
@@ -155,7 +156,7 @@ REFUSED = [
     (lambda: pp.simulate(cube(), pad(), duration=1), "sensors has <Body 'box'.*: give a Sensor"),
     (
         lambda: pp.simulate(pad(), cube(), motion=np.zeros((3, 2))),
-        r"motion of 'box' has the shape \(3, 2\): give n × 3 numbers",
+        r"motion of 'box' has the shape \(3, 2\): give m × 3 positions",
     ),
     (lambda: pp.simulate(pad(), cube(), motion={"bex": [[0, 0, 0]]}), r"called 'bex' \(did you mean 'box'\?\)"),
     (lambda: pp.simulate(pad(), cube(), motion=([0, 0], [[0, 0, 0]] * 2)), "give each pose a time, in increasing order"),

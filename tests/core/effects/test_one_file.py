@@ -115,7 +115,7 @@ KIND = Kind(
     experiment="press slowly, from the first touch to the highest load",
     drawing=Drawing("force", values={"power": {"exponent": 0.5}}),
     families=("nonlinear",),
-    variants=(Variant(45, concave_powers, is_static=True),),
+    variants=(Variant(45, concave_powers),),
 )
 '''
 COPIED = ("__init__.py", "benchmarks", "commands", "core", "pyproject.toml", "tests", "tools", "docs/effects.md")
@@ -123,7 +123,7 @@ TESTS = {
     "tests/core/effects/engine/test_registry.py": "",
     "tests/core/effects/library/test_library.py": "power-law",
     "tests/core/gap/kinds/test_cascade.py": "power-law",
-    "tests/core/gap/kinds/test_search.py": "every_kind",
+    "tests/core/gap/kinds/test_distinguishability.py": "every_kind",
     "tests/core/gap/selection/test_identifiability.py": "pace or nonlinear or unloading",
     "tests/core/gap/test_hidden_cases.py": "every_effect or own_forms",
     "tests/tools/test_effects_page.py": "this_library or every_experiment",

@@ -125,7 +125,7 @@ def test_no_picture_is_made_of_what_is_no_number(texels):
         ("depth", replace(frame_of(texels), depth=np.where(np.arange(len(texels)) == 7, np.nan, 0.0))),
         ("shear", replace(frame_of(texels), shear=np.full((len(texels), 2), np.inf))),
     ):
-        with pytest.raises(SensorError, match="'gel' has depths or shear that are no numbers"):
+        with pytest.raises(SensorError, match="'gel' has depths or shear that are not numbers"):
             gel_pixels(frame, texels, name and "gel", SIGMA0)
 
 

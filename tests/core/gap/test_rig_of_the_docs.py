@@ -1,20 +1,37 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The rig of docs/rig-format.md for two specimens and two loggers finds what is known of its recordings."""
+"""docs/rig-format.md names every key, and its rig for two specimens and two loggers finds what is known of its recordings."""
 
 import re
+from dataclasses import fields
 from pathlib import Path
 
 import gap_cases as cases
 import numpy as np
 import pytest
 
-from palpate.core.gap.dataset.rig import read_rig
+from palpate.core.gap.dataset.column_names import QUANTITIES
+from palpate.core.gap.dataset.fault_kinds import FAULT_KINDS
+from palpate.core.gap.dataset.rig import RIG_SENSOR_WORDS, RigWords, read_rig
+from palpate.core.gap.dataset.trial_words import TrialWords
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.jobs.job_runner import run_job
 
 PAGE = Path(__file__).parents[3] / "docs" / "rig-format.md"
 LATE, FACTORS = 40, (1.0, 1.0, 1.5, 1.5)
 """Samples by which the responses' logger was started later, and what the readings of each recording are multiplied by."""
+
+
+def test_every_key_column_and_fault_is_on_the_page():
+    """Parameters of the sensor are those of sensor.toml, of which the page names some."""
+    rig_words = {one.name for one in fields(RigWords)} - {"sensor", "trial", "columns", "data", "indenter", "probe"}
+    words = {*rig_words, *(one.name for one in fields(TrialWords)), *RIG_SENSOR_WORDS, *FAULT_KINDS}
+    named = {
+        word for code in re.findall(r"`([^`\n]+)`", PAGE.read_text(encoding="utf-8")) for word in re.split(r"[\s=]+", code)
+    }
+    assert words | (set(QUANTITIES) - {"texel"}) <= named
+    assert {f"[[{one}]]" for one in ("trial", "probe")} | {
+        f"[{one}]" for one in ("sensor", "columns", "data", "indenter")
+    } <= named
 
 
 def test_two_specimens_and_two_loggers(tmp_path):

@@ -16,7 +16,9 @@ from palpate.core.gap.report.sentences import interval_text, said_confidence
 ])  # fmt: skip
 def test_an_interval_that_fills_its_bounds_is_not_told(value, low, high, bounds, is_told):
     text = interval_text(ParameterInterval(0, "amount", value, low, high, bounds))
-    assert text == (f"{value:.4g} ({low:.4g} … {high:.4g})" if is_told else f"{value:.4g} (not told by these recordings)")
+    assert text == (
+        f"{value:.4g} ({low:.4g} … {high:.4g})" if is_told else f"{value:.4g} (not identifiable from these recordings)"
+    )
 
 
 @pytest.mark.parametrize(("confidence", "said"), [(0.25, "25%"), (0.985, "98%"), (0.99, "99%"), (0.9996, "over 99%")])

@@ -50,7 +50,7 @@ def test_the_report_says_what_friction_does_and_what_is_left(tmp_path):
     *_, _ = summary.write_report(result, tmp_path)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "1 texel, 1 trial fitted" in page and "base without its friction" in page and "base model, refitted" in page
-    assert "not told by these recordings" in page  # friction and stiffness are known as a product alone
+    assert "not identifiable from these recordings" in page  # friction and stiffness are known as a product alone
 
 
 def test_the_way_since_the_last_turn():

@@ -78,7 +78,7 @@ def test_a_list_of_something_else_is_refused(folder, line):
     with open(folder / IMAGE_LIST_NAME, "ab") as file:
         file.write(line)
     vouch_for_list(folder)
-    assert "images.sha256' is damaged (a line is no SHA-256 with a name): bake again." in fault(folder)
+    assert "images.sha256' is damaged (a line is not a SHA-256 with a name): bake again." in fault(folder)
 
 
 @pytest.mark.parametrize("change", ["one more", "one less", "order", "a path", "twice"])

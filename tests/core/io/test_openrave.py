@@ -75,9 +75,9 @@ def test_sensors_inside_a_robot_are_found_and_gaps_are_named(tmp_path):
     [
         ("", "has no <AttachedSensor>"),
         ("<Robot></Robot>", "has no <AttachedSensor>"),
-        ("< AttachedSensor >\n</AttachedSensor>", "Line 1 of .* is no XML"),
-        (TABLE_2.replace("</sensor>", ""), "is no XML"),
-        (TABLE_2.replace("58.5", "stiff"), "<k> of sensor 'T1' .* is 'stiff', which is no number"),
+        ("< AttachedSensor >\n</AttachedSensor>", "Line 1 of .* is not XML"),
+        (TABLE_2.replace("</sensor>", ""), "is not XML"),
+        (TABLE_2.replace("58.5", "stiff"), "<k> of sensor 'T1' .* is 'stiff', which is not a number"),
         (TABLE_2.replace("58.5", "-1"), "k of sensor 'T1' is -1"),
         (TABLE_2.replace("58.5", "nan"), "k of sensor 'T1' is nan"),
         (TABLE_2.replace("<ct>0.01</ct>", "<k>3</k>"), "two <k>"),

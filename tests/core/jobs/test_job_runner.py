@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from palpate.core.jobs import job_runner
 from palpate.core.jobs.job_runner import SlicedJob, part_of_job, run_job
 from palpate.core.jobs.progress import Progress
 
@@ -58,6 +59,25 @@ def test_a_sliced_job_goes_on_where_it_was():
     assert (sliced.progress.done, sliced.is_done, sliced.result) == (5, True, "counted")
     sliced.work(60.0)
     assert sliced.result == "counted"
+
+
+@pytest.mark.parametrize(("pause", "steps"), [(0.0, 2), (0.55, 9), (20.0, 16)])
+def test_a_slice_is_as_long_as_the_pause_before_it(pause, steps, monkeypatch):
+    """Within 0.1 and 1 s, in steps of 1/16 s, so that a window that draws slowly does not draw most of the time."""
+    now = 0.0
+
+    def job():
+        nonlocal now
+        for i in range(1000):
+            now += 1 / 16
+            yield Progress("Counting", i + 1, 1000)
+
+    monkeypatch.setattr(job_runner.time, "monotonic", lambda: now)
+    sliced = SlicedJob(job())
+    sliced.work(0.0)
+    now += pause
+    sliced.work()
+    assert sliced.progress.done == 1 + steps
 
 
 def test_a_sliced_job_is_cancelled_once_and_for_all():

@@ -149,8 +149,8 @@ def test_the_step_of_a_run_is_explained():
     assert f"{chosen.substeps} per frame" in chosen.reason and advised.reason in chosen.reason and "as set" not in chosen.reason
     assert advised.reason.endswith(f"ms: 20% of the explicit stability limit of 'cube' ({advised.limit * 1e3:.3g} ms).")
     long = plan(replace(scenario, dt=0.01))
-    assert "as set" in long.reason and advised.reason in long.reason and "less exactly" in long.reason
-    assert "less exactly" not in plan(replace(scenario, dt=1e-5)).reason
+    assert "as set" in long.reason and advised.reason in long.reason and "less accurate" in long.reason
+    assert "less accurate" not in plan(replace(scenario, dt=1e-5)).reason
     assert run(replace(scenario, frame_end=2)).step_reason == chosen.reason
 
 
@@ -159,7 +159,7 @@ def test_advice_at_its_bounds_names_no_share_of_the_limit(mass, dt, which):
     advised = advise(cube_on_pad(mass, dt=None))
     assert advised.dt == dt and "%" not in advised.reason
     assert (
-        f": the {which} that is advised; the explicit stability limit of 'cube' is {advised.limit * 1e3:.3g} ms."
+        f": the {which} recommended step; the explicit stability limit of 'cube' is {advised.limit * 1e3:.3g} ms."
         in advised.reason
     )
 

@@ -212,7 +212,7 @@ def test_displacements_that_cannot_be():
     _, own = skin()
     with pytest.raises(ParameterError, match=r"the skin has 16 texels: give \(T, 16, 3\)"):
         own.readings(np.zeros((2, 15, 3)))
-    with pytest.raises(ParameterError, match="no numbers"):
+    with pytest.raises(ParameterError, match="not numbers"):
         own.readings(np.full((2, 16, 3), np.nan))
     deep = np.zeros((1, 16, 3))
     deep[0, :, 2] = -8e-3

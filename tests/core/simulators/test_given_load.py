@@ -228,7 +228,7 @@ def test_a_ball_on_a_fingertip_carries_three_forces():
 def test_what_is_no_load_is_one_sentence():
     pressed = pressed_by_box()
     for bad in ([1.0, 2.0], [np.nan], "much", np.zeros((1, 6))):
-        with pytest.raises(ParameterError, match="The wrench is no 1, 3 or 6 finite numbers"):
+        with pytest.raises(ParameterError, match="The wrench is not 1, 3 or 6 finite numbers"):
             pressed.step(pose(LEVEL), pose(at()), wrench=bad)
     many = PressedSensors(pad(4, 4), box(SIZE, SIZE, SIZE), 0.01, 2)
     with pytest.raises(ParameterError, match=r"The loads are float64 of shape \(6,\): give numbers of shape \(2, 6\)"):

@@ -59,7 +59,7 @@ def test_a_tactile_is_placed_through_its_bodies(tmp_path):
     assert found.name == "skin" and len(found.position) == 4
     assert found.frame_position == pytest.approx([1.0, 2.5, 3.0])
     assert Rotation.from_quat(np.roll(found.frame_quaternion, -1)).as_rotvec() == pytest.approx([0, 0, np.pi / 2])
-    assert any("contact and joints were not taken over" in note for note in found.notes)
+    assert any("contact and joints were not imported" in note for note in found.notes)
 
 
 def test_a_touch_grid_has_its_bins_where_mujoco_puts_a_contact(tmp_path):
@@ -98,16 +98,16 @@ JOINTS = "".join(JOINT.format(n=n, xyz=f"{n} {n * n} 0", axis="") for n in range
 BROKEN = {
     "an entity": ('<!DOCTYPE r [<!ENTITY a "b">]><mujoco>&a;</mujoco>', "declares XML entities"),
     "UTF-16": ("<mujoco/>".encode("utf-16").decode("latin-1"), "not in UTF-8"),
-    "no XML": ("<mujoco><sensor>", "is no XML"),
+    "no XML": ("<mujoco><sensor>", "is not XML"),
     "nothing": ("<mujoco/>", "has no <tactile>"),
     "another root": ("<sdf/>", "holds no sensor that can be read"),
     "no mesh": (TACTILE.format(mesh=""), "names the mesh 'm', which is not there"),
     "no geom": (TACTILE.format(mesh=MESH).replace('geom="g"', 'geom="h"'), "names the geom 'h'"),
-    "words": (TACTILE.format(mesh=MESH.replace("1 1 0", "1 one 0")), "are no numbers"),
+    "words": (TACTILE.format(mesh=MESH.replace("1 1 0", "1 one 0")), "are not numbers"),
     "NaN": (TACTILE.format(mesh=MESH.replace("1 1 0", "1 nan 0")), "NaN or infinite"),
     "odd": (TACTILE.format(mesh=MESH.replace(" 1 1 0", " 1 1")), "11 coordinates"),
     "a wrong face": (TACTILE.format(mesh=MESH.replace("0 3 2", "0 3 9")), "does not exist"),
-    "half a face": (TACTILE.format(mesh=MESH.replace("0 3 2", "0 3")), "no triples"),
+    "half a face": (TACTILE.format(mesh=MESH.replace("0 3 2", "0 3")), "not triples"),
     "built in": (TACTILE.format(mesh='<mesh name="m" builtin="plate" params="3 3"/>'), "made by MuJoCo"),
     "no file": (TACTILE.format(mesh='<mesh name="m" file="gone.stl"/>'), "no mesh file"),
     "no quaternion": (TACTILE.format(mesh=MESH).replace("1 0 0 0", "0 0 0 0"), "rotation of <geom>"),

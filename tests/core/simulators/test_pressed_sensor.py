@@ -59,7 +59,7 @@ def test_poses_that_are_none_are_refused():
         PressedSensor(item, box(), 0.0, rest, rest)
     pressed = PressedSensor(item, box(), 0.01, rest, (OFFSET, rest[1]))
     for bad in (([np.nan, 0, 0], rest[1]), (rest[0], np.zeros(4)), (np.zeros(2), rest[1])):
-        with pytest.raises(ParameterError, match="The pose of the target is no position"):
+        with pytest.raises(ParameterError, match="The pose of the target is not a position"):
             pressed.step(rest, bad)
 
 
@@ -82,9 +82,9 @@ def test_a_probe_list_is_the_sensor(item, tmp_path):
         ({"format": "palpate-probes/9"}, "Its format is 'palpate-probes/9'"),
         ({"sensor": 3}, "The name in the file is 3"),
         ({"position": [[0, 0, 0], [1, 0, 0]]}, "It has 2 texels"),
-        ({"position": "far"}, "'position' is no list of numbers"),
+        ({"position": "far"}, "'position' is not a list of numbers"),
         ({"normal": [[0, 0, 1]]}, "'normal' is missing or has another size"),
-        ({"tangent": [[0.0, 0.0, 1.0]] * 16}, "no unit vectors at right angles"),
+        ({"tangent": [[0.0, 0.0, 1.0]] * 16}, "not orthogonal unit vectors"),
         ({"area": [1e400] * 16}, "NaN or infinite"),
         ({"area": [-1.0] * 16}, "below zero"),
         ({"row": [0] * 16}, "make no grid"),

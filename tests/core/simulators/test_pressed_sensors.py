@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from exported_sensors import ball, pad
-from scipy.spatial.transform import Rotation
+from pressed_poses import DT, LEVEL, SIZE, assert_equal_bits, pose, random_poses
 from solver_scenes import box
 
 from palpate.core.compiled.kernels import COMPILED
@@ -23,39 +23,6 @@ from palpate.core.simulators import pressed_sensors
 from palpate.core.simulators.pressed_sensor import PressedSensor
 from palpate.core.simulators.pressed_sensors import Contacts, PressedSensors
 from palpate.core.solver.simulation import Simulation
-
-DT = 0.002
-LEVEL = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-SIZE = 0.02
-
-
-def pose(row):
-    return row[:3], row[3:]
-
-
-def random_poses(seed, steps, environments, targets=1):
-    """(steps, E, 1 + T, 7): boxes that slide, sink in and turn on a pad that moves along."""
-    draw = np.random.default_rng(seed)
-    shape = (steps, environments, 1 + targets)
-    poses = np.zeros((*shape, 7))
-    depth = -1e-3 * draw.random(shape[1:]) - 1e-4 * draw.standard_normal(shape)
-    poses[..., 0] = 2e-4 * draw.standard_normal(shape) + 0.01 * draw.standard_normal(shape[1:])
-    poses[..., 1] = 2e-4 * draw.standard_normal(shape)
-    poses[..., 2] = SIZE / 2 + depth
-    turns = Rotation.from_rotvec(0.01 * draw.standard_normal((np.prod(shape), 3))).as_quat()
-    poses[..., 3:] = np.roll(turns, 1, axis=1).reshape(*shape, 4)
-    poses[:, :, 0, :3] = 1e-4 * draw.standard_normal((steps, environments, 3))
-    return poses * np.array([1.0] * 3 + [1.5] * 4)  # quaternions of any length are taken
-
-
-def assert_equal_bits(contacts, number, single):
-    texels = single.texels
-    assert np.array_equal(contacts.texels[number], np.column_stack([texels.normal_force, texels.shear]))
-    assert np.array_equal(contacts.readings[number], texels.reading)
-    assert np.array_equal(contacts.contact[number], texels.contact)
-    wrench = np.concatenate([single.force_on_target, single.torque_on_target], axis=-1)
-    assert np.array_equal(contacts.wrench[number], wrench)
-
 
 KINDS = {
     "plain": (),
@@ -182,7 +149,7 @@ def test_environments_without_poses_are_flagged_and_the_others_go_on():
         if step == 1:
             assert not found.texels[1].any() and not found.wrench[1].any() and not found.contact[1].any()
             assert found.fault() == (
-                "1 of 3 environments have a pose that is no position and quaternion of finite numbers (1): "
+                "1 of 3 environments have a pose that is not a position and quaternion of finite numbers (1): "
                 "reset them in the simulation."
             )
         else:
@@ -216,7 +183,7 @@ def test_what_makes_no_environments_is_one_sentence(monkeypatch):
     item, mesh = pad(4, 4), box(SIZE, SIZE, SIZE)
     with pytest.raises(ParameterError, match="There are 0 environments"):
         PressedSensors(item, mesh, DT, 0)
-    with pytest.raises(ParameterError, match="Nothing presses on 'Pad'"):
+    with pytest.raises(ParameterError, match="There is no target for 'Pad'"):
         PressedSensors(item, [], DT, 2)
     many = PressedSensors(item, mesh, DT, 2)
     with pytest.raises(ParameterError, match=r"The poses of the target are float64 of shape \(3, 7\): .* \(2, 7\)\."):

@@ -221,7 +221,7 @@ def test_who_was_too_deep_between_two_frames_is_named():
     assert (recording.sensors["pad"].normal_force == 0).all()
     (warning,) = (one for one in recording.warnings if "past their maximum penetration" in one)
     assert warning.startswith(
-        "Frame 2: 84 texels are pressed past their maximum penetration by 'probe' into 'pad' and do not act"
+        "Frame 2: 84 texels are pressed past their maximum penetration by 'probe' into 'pad' and exert no force"
     )
 
 

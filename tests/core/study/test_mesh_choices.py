@@ -65,9 +65,9 @@ def test_another_content_makes_other_runs(folder):
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        ('["shapes/*.obj"]', "No file fits the meshes 'shapes/\\*.obj'"),
+        ('["shapes/*.obj"]', "No file next to the study matches the meshes 'shapes/\\*.obj'"),
         ('["shapes/bal.stl"]', "There is no mesh file"),
-        ('["study.toml"]', "is no mesh file: give one that ends with .stl"),
+        ('["study.toml"]', "is not a mesh file: give one that ends with .stl"),
         ('["broken.ply"]', "'.*broken.ply' could not be read as a mesh"),
         ('["empty.obj"]', "empty.obj"),
     ],

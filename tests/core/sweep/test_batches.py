@@ -5,19 +5,25 @@ import errno
 import hashlib
 import json
 import os
+import random
+from itertools import pairwise
 
 import pytest
 from sweep_runs import new_study
 
-from palpate.attack.sweep_study import write_study
+from palpate.attack.sweep_study import run_hashes, write_study
+from palpate.attack.trees import tree
 from palpate.core.errors import FileError
 from palpate.core.io import group_sync
 from palpate.core.io.group_sync import GroupSync
+from palpate.core.study import run_shards
 from palpate.core.study.run_files import done_runs, make_folders, run_batch, write_failure
 from palpate.sweep.child import Scenes, compute_run
+from palpate.sweep.dataset import publish
 from palpate.sweep.study_folder import begin_study
 from palpate.sweep.worker import compute_batch, end_children
 
+SPREAD = '"Pad.k" = { log-uniform = [20, 2000] }\n"Pad.unit" = { choice = ["N", "V"] }'
 DIGESTS = [f"{number:024x}" for number in range(3)]
 
 
@@ -48,25 +54,44 @@ def files_of(folder) -> dict[str, str]:
     return found
 
 
-@pytest.mark.slow("computes a study in three orders")
-def test_a_run_has_the_same_bytes_in_any_batch(tmp_path):
-    """One by one in processes that know nothing of each other, all at once, and backwards in batches of three."""
-    opened = [begin_study(write_study(tmp_path / name, 7), tmp_path / name / "out", lambda *_: None) for name in "abc"]
-    for run in opened[0].runs:
-        with run_batch(opened[0].folder) as batch:
-            compute_run(Scenes(opened[0].folder), run, batch.place)
-            batch.add(run.digest)
-    orders = (opened[1].runs,), (opened[2].runs[:3:-1], opened[2].runs[3:0:-1], opened[2].runs[:1])
-    for one, parts in zip(opened[1:], orders, strict=True):
-        scenes = Scenes(one.folder)
-        for part in parts:
-            with run_batch(one.folder) as batch:
-                for run in part:
-                    compute_run(scenes, run, batch.place)
-                    batch.add(run.digest)
-    expected = files_of(opened[0].folder)
-    assert len([name for name in expected if name.endswith("run.json")]) == 7
-    assert files_of(opened[1].folder) == files_of(opened[2].folder) == expected
+def computed(folder, batches, shared_scenes: bool = True):
+    """Compute batches of runs, one after the other, in processes that know each other's scenes or do not."""
+    scenes = Scenes(folder)
+    for batch_of_runs in batches:
+        with run_batch(folder) as batch:
+            for run in batch_of_runs:
+                compute_run(scenes if shared_scenes else Scenes(folder), run, batch.place)
+                batch.add(run.digest)
+
+
+@pytest.mark.slow("computes a study in seven orders")
+@pytest.mark.parametrize("recordings", [False, True])
+def test_a_run_has_the_same_bytes_in_any_batch(tmp_path, recordings):
+    """One by one in processes that know nothing of each other, and then in random orders and batches of random sizes."""
+    orders = 2 if recordings else 5
+    folders = [tmp_path / str(number) for number in range(1 + orders)]
+    studies = [write_study(folder, 7, more=SPREAD) for folder in folders]
+    for study in studies:
+        study.write_text(study.read_text().replace("fps = 100", f"fps = 100\nrecordings = {str(recordings).lower()}"))
+    opened = [begin_study(study, study.parent / "out", lambda *_: None) for study in studies]
+    computed(opened[0].folder, [[run] for run in opened[0].runs], shared_scenes=False)
+    for seed, one in enumerate(opened[1:]):
+        dice = random.Random(seed)
+        runs = dice.sample(one.runs, len(one.runs))
+        cuts = sorted({0, len(runs), *(dice.randrange(len(runs)) for _ in range(dice.randrange(5)))})
+        if dice.random() < 0.5:
+            run_shards._open.clear()  # a process of its own begins a shard of its own
+        computed(one.folder, [runs[begin:end] for begin, end in pairwise(cuts)])
+    expected = files_of(opened[0].folder) if recordings else run_hashes(opened[0].folder)
+    assert len(done_runs(opened[0].folder)) == 7
+    publish(opened[0].folder, opened[0].runs)
+    dataset = tree(opened[0].folder / "dataset")
+    for one in opened[1:]:
+        assert (files_of(one.folder) if recordings else run_hashes(one.folder)) == expected
+        publish(one.folder, one.runs)
+        assert tree(one.folder / "dataset") == dataset
+    if recordings:
+        assert len([name for name in expected if name.endswith("run.json")]) == 7
 
 
 @pytest.mark.parametrize("as_a_whole", [True, False])
@@ -143,4 +168,5 @@ def test_a_worker_leaves_no_hidden_folder_behind(tmp_path):
     finally:
         end_children()
     assert [answer["status"] for answer in answers] == ["done"] * 3
-    assert {path.name for path in (opened.folder / "runs").iterdir()} == {run.digest for run in opened.runs}
+    assert done_runs(opened.folder) == {run.digest for run in opened.runs}
+    assert [path.suffix for path in (opened.folder / "runs").iterdir()] == [".shard"]

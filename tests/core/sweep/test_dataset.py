@@ -246,7 +246,7 @@ def test_a_damaged_run_is_named_and_the_dataset_of_before_stays(tmp_path, damage
 
 def test_a_number_that_32_bits_cannot_hold_is_refused(tmp_path):
     study = made_up(tmp_path, scale=1e40)
-    with pytest.raises(FileError, match="observation.tactile.pad.*no 32-bit number"):
+    with pytest.raises(FileError, match="A number of 'observation.tactile.pad' has no place in 32 bits"):
         publish(study)
 
 
@@ -295,3 +295,32 @@ def test_nothing_is_printed_where_the_disk_is_full(tmp_path, monkeypatch, capfd)
     gc.collect()
     assert capfd.readouterr().err == ""
     assert not (study / "dataset").exists() and not list(study.glob(".palpate*"))
+
+
+def test_a_study_may_ask_for_points_and_half_precision(tmp_path):
+    """Lists in the order of meta/texels.parquet hold what pictures hold, and 16 bits hold it with the error that is stated."""
+    plain, points = made_up(tmp_path, name="plain"), made_up(tmp_path, name="points")
+    study = points / "study.toml"
+    study.write_text(study.read_text() + "points = true\nhalf_precision = true\n")
+    publish(plain)
+    publish(points)
+    info = json.loads((points / "dataset" / "meta" / "info.json").read_text(encoding="utf-8"))["features"]
+    for name, shape in (("observation.tactile.pad", [15, 3]), ("observation.reading.pad", [15]), ("contact.touch.pad", [15])):
+        assert info[name]["shape"] == shape
+    assert info["observation.tactile.pad"]["dtype"] == "float16" and info["observation.net_force.pad"]["dtype"] == "float32"
+    assert "relative error of 2^-11" in info["observation.tactile.pad"]["palpate"]["about"]
+    texels = parquet.read_table(points / "dataset" / "meta" / "texels.parquet").to_pydict()
+    pictures = column(rows(plain), "observation.tactile.pad", (5, 3, 3))[:, texels["row"], texels["column"]]
+    values = column(rows(points), "observation.tactile.pad", (15, 3))
+    error = np.abs(values - pictures)
+    assert (error <= np.maximum(2.0**-11 * np.abs(pictures), 3e-8)).all() and error.max() > 0.0
+    stats = json.loads((points / "dataset" / "meta" / "stats.json").read_text())["observation.tactile.pad"]
+    np.testing.assert_allclose(stats["mean"], values.mean(0), rtol=1e-9)
+
+
+def test_a_number_that_16_bits_cannot_hold_is_refused(tmp_path):
+    study = made_up(tmp_path, scale=1e6)
+    file = study / "study.toml"
+    file.write_text(file.read_text() + "half_precision = true\n")
+    with pytest.raises(FileError, match="observation.tactile.pad' has no place in 16 bits.*too large"):
+        publish(study)

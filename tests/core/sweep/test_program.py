@@ -166,7 +166,7 @@ def test_words_of_scenes_mean_nothing_to_a_job():
     table = {"format": "palpate-sweep/1", "job": "count.py", "design": "random", "samples": 1}
     assert study_of(table, "s").is_job
     for word, value in (("fps", 10), ("images", True), ("press", {})):
-        with pytest.raises(PalpateError, match=f"{word} of 's' means nothing beside a job"):
+        with pytest.raises(PalpateError, match=f"{word} of 's' has no meaning for a job"):
             study_of({**table, word: value}, "s")
     with pytest.raises(PalpateError, match="one of them"):
         study_of({**table, "scene": "a.blend"}, "s")

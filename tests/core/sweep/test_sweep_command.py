@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """``palpate sweep`` from the command line: what is done stays done, whatever is killed, and mistakes are one sentence."""
 
-import hashlib
 import json
 import os
 import shutil
@@ -9,12 +8,14 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 import pytest
 from study_scenes import HEAD, tiny_scene
 
+from palpate.attack.sweep_study import run_hashes
 from palpate.core.errors import PalpateError
 from palpate.core.io.bake_folder import IMAGE_LIST_NAME, check_sha256, frame_file, read_manifest
 from palpate.core.io.bake_reader import read_bake
@@ -23,7 +24,9 @@ from palpate.core.io.recording_npz import load_recording
 from palpate.core.io.scenario_npz import save_scenario
 from palpate.core.io.tactile_exr import read_exr
 from palpate.core.study.run_files import SCENES, done_runs, make_folders, run_batch, write_failure
+from palpate.core.study.run_shards import RUN, ShardScan
 from palpate.sweep.driver import dask_client
+from palpate.sweep.finished_runs import StoredRuns
 from palpate.sweep.study_folder import begin_study
 from palpate.sweep.worker import Child, Limits, compute_batch, end_children
 
@@ -55,23 +58,15 @@ def sweep(*words):
     return subprocess.run(command(*words), capture_output=True, text=True, timeout=LONGEST, check=False)
 
 
+def names(table: np.ndarray) -> list[str]:
+    """The digests of the runs in a group of a shard."""
+    return [row["name"].tobytes().hex() for row in table if row["kind"] == RUN]
+
+
 def write_study(folder: Path, text: str = STUDY) -> Path:
     save_scenario(folder / "tiny.npz", tiny_scene())
     (folder / "study.toml").write_text(text, encoding="utf-8")
     return folder / "study.toml"
-
-
-def contents(folder: Path) -> dict[str, str]:
-    """Hashes of all files of the runs; the seconds that a run took are left out."""
-    found = {}
-    for file in sorted((folder / "runs").rglob("*")):
-        if file.name == "run.json":
-            words = json.loads(file.read_bytes())
-            words.pop("seconds")
-            found[str(file.relative_to(folder))] = json.dumps(words, sort_keys=True)
-        elif file.is_file():
-            found[str(file.relative_to(folder))] = hashlib.sha256(file.read_bytes()).hexdigest()
-    return found
 
 
 @pytest.fixture(scope="module")
@@ -85,8 +80,17 @@ def undisturbed(tmp_path_factory):
 
 
 @pytest.mark.slow("computes the study that the tests of this file share")
-def test_a_run_holds_what_it_promises(undisturbed):
-    (place,) = [path for path in (undisturbed / "runs").iterdir() if json.loads((path / "run.json").read_bytes())["index"] == 5]
+def test_a_run_holds_what_it_promises(undisturbed, tmp_path):
+    """With recordings it has a folder as a bake has, and the same numbers as without."""
+    study = write_study(tmp_path, STUDY.replace("fps = 200", "fps = 200\nrecordings = true"))
+    opened = begin_study(study, tmp_path / "out", lambda blend, target: None)
+    (one,) = [run for run in opened.runs if run.index == 5]
+    words = {"index": one.index, "scene": one.scene, "values": dict(one.values), "digest": one.digest}
+    try:
+        assert compute_batch(str(opened.folder), [words])[0]["status"] == "done"
+    finally:
+        end_children()
+    place = opened.folder / "runs" / one.digest
     run = json.loads((place / "run.json").read_bytes())
     recording = load_recording(place / "Pad" / "recording.npz")
     assert run["digest"] == place.name
@@ -96,6 +100,10 @@ def test_a_run_holds_what_it_promises(undisturbed):
     baked = read_bake(place)  # a run is read like a bake
     assert baked.parameters["Pad"].k == run["values"]["Pad.k"]
     assert baked.manifests["Pad"].unit == baked.parameters["Pad"].unit == "N"
+    runs = StoredRuns(undisturbed)
+    assert asdict(runs.record(one.digest))["metrics"] == run["metrics"]
+    own, kept = StoredRuns(opened.folder).run(one.digest)[1], runs.run(one.digest)[1]
+    assert [bytes(column.content) for column in own.columns] == [bytes(column.content) for column in kept.columns]
 
 
 def test_the_dataset_of_a_study_knows_units_and_slip(undisturbed):
@@ -120,11 +128,9 @@ def test_a_finished_study_is_exported(undisturbed):
 
 @pytest.mark.long("computes a study twice")
 def test_failed_runs_are_left_alone_until_they_are_asked_for(undisturbed, tmp_path):
-    folder = tmp_path / "study"
-    shutil.copytree(undisturbed, folder)
-    lost = sorted(done_runs(folder))[:2]
+    study, folder = write_study(tmp_path), tmp_path / "study"
+    lost = [run.digest for run in begin_study(study, folder, lambda blend, target: None).runs[::20]]
     for digest in lost:
-        shutil.rmtree(folder / "runs" / digest)
         write_failure(folder, digest, "The lamp went out.")
     finished = sweep(folder, "--workers", 1)
     assert (finished.returncode, finished.stderr) == (0, "")
@@ -137,7 +143,7 @@ def test_failed_runs_are_left_alone_until_they_are_asked_for(undisturbed, tmp_pa
         assert all(row[name] == expected[row["run"]][name] for name in row if name.startswith("varied.") or name == "digest")
     again = sweep(folder, "--workers", 1, "--retry-failed")
     assert "24 runs: 24 done, 0 failed, 0 left" in again.stdout
-    assert contents(folder) == contents(undisturbed)
+    assert run_hashes(folder) == run_hashes(undisturbed)
     assert (folder / "runs.parquet").read_bytes() == (undisturbed / "runs.parquet").read_bytes()
 
 
@@ -154,14 +160,16 @@ def test_a_stopped_study_goes_on_where_it_was(undisturbed, tmp_path, number):
     stderr = process.communicate(timeout=LONGEST)[1]
     assert process.returncode == (130 if number == signal.SIGINT else -9), stderr
     if number == signal.SIGINT:
-        assert stderr.splitlines()[-1] == "palpate sweep: stopped; the same command goes on where it was.", stderr
+        assert stderr.splitlines()[-1] == "palpate sweep: stopped; the same command continues.", stderr
         assert "Traceback" not in stderr
     earlier = done_runs(folder)
-    before = {name: (folder / "runs" / name / "run.json").stat().st_mtime_ns for name in earlier}
+    before = {path: path.read_bytes() for path in (folder / "runs").glob("*.shard")}
     finished = sweep(folder, "--workers", 2)
     assert (finished.returncode, finished.stderr) == (0, "")
-    assert contents(folder) == contents(undisturbed)
-    assert before == {name: (folder / "runs" / name / "run.json").stat().st_mtime_ns for name in earlier}  # not computed again
+    assert run_hashes(folder) == run_hashes(undisturbed)
+    assert earlier and all(path.read_bytes().startswith(content) for path, content in before.items())
+    found = [digest for _, _, table in ShardScan(folder / "runs").new_groups() for digest in names(table)]
+    assert all(found.count(digest) == 1 for digest in earlier), "it was computed again"
     assert not list((folder / "runs").glob(".*"))
 
 
@@ -305,9 +313,9 @@ def test_a_run_that_is_done_is_not_computed_again(by_hand):
     write_failure(by_hand, words_of(0)["digest"], "An earlier failure.")
     compute_batch(str(by_hand), [words_of(0)])
     assert not list((by_hand / "failed").iterdir())
-    before = (by_hand / "runs" / words_of(0)["digest"] / "run.json").stat().st_mtime_ns
+    before = {path: path.read_bytes() for path in (by_hand / "runs").iterdir()}
     assert compute_batch(str(by_hand), [words_of(0)])[0]["status"] == "done"
-    assert (by_hand / "runs" / words_of(0)["digest"] / "run.json").stat().st_mtime_ns == before
+    assert {path: path.read_bytes() for path in (by_hand / "runs").iterdir()} == before
 
 
 @pytest.mark.long("computes a study in five commands")
@@ -327,7 +335,7 @@ def test_parts_make_the_whole(undisturbed, tmp_path):
     assert not (out / "dataset").exists()
     finished = sweep(out)
     assert (finished.returncode, finished.stderr) == (0, "")
-    assert contents(out) == contents(undisturbed)
+    assert run_hashes(out) == run_hashes(undisturbed)
     assert (out / "dataset").is_dir()
 
 

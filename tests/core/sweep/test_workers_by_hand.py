@@ -14,7 +14,7 @@ from study_scenes import HEAD, tiny_scene
 
 from palpate.core.io.scenario_npz import save_scenario
 from palpate.core.study.run_files import done_runs
-from palpate.core.study.run_record import read_run_record
+from palpate.sweep.finished_runs import StoredRuns
 from palpate.sweep.study_folder import begin_study
 from palpate.sweep.worker import compute_batch, end_children
 
@@ -125,7 +125,7 @@ def assert_like_here(study: Path, folder: Path, table: dict, every: int) -> None
     finally:
         end_children()
     for run in chosen:
-        record = read_run_record(folder / "runs" / run.digest)
+        record = StoredRuns(folder).record(run.digest)
         assert record.digest == table["digest"][run.index]
         for name, value in record.metrics.items():
             assert table[f"metric.{name}"][run.index] == value, (run.index, name)

@@ -46,10 +46,13 @@ class FakePainter:
     def image(self, texture, x, y, width, height):
         self.images.append((x, y, width, height))
 
+    def text(self, *args, **settings):
+        return 0.0
+
     def nothing(self, *args, **settings):
         pass
 
-    text = rectangle = line = nothing
+    rectangle = line = nothing
 
 
 def inset_spots(region, shares):

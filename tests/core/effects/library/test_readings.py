@@ -247,6 +247,32 @@ def test_crosstalk():
     assert found[7, 3] == pytest.approx(1 + 0.6 / COLUMNS + 0.6 / ROWS) and found[0, 0] == 0.0
     found = read(effect("crosstalk", "common", share=0.5), image(texel))[0]
     assert found[0] == pytest.approx(0.5 / N)
+    found = read(effect("crosstalk", "previous", share=0.3), image(texel))[0]
+    np.testing.assert_allclose(found, image(texel)[0] + 0.3 * np.eye(N)[texel + 1], atol=1e-15)
+
+
+def test_a_cover_beyond_the_rim_loses_what_falls_outside():
+    """The array is a part of a large one: the same readings as if the texels outside were there and were not read."""
+    wide, inner, pitch = 37, 5, 0.003  # few enough for a matrix of all pairs
+    y, x = np.mgrid[0:wide, 0:wide] * pitch
+    everywhere = np.stack([x.ravel(), y.ravel(), np.zeros(wide * wide)], axis=1)
+    first = (wide - inner) // 2
+    inside = (np.arange(wide) >= first) & (np.arange(wide) < first + inner)
+    kept = (inside[:, None] & inside[None]).ravel()
+    loads = np.zeros((1, wide * wide))
+    loads[0, kept] = np.random.default_rng(1).random(inner**2)
+    for width in (0.5 * pitch, 1.2 * pitch):
+        spread = [
+            readings(
+                (effect("load-spreading", form, width=width),),
+                TransducerArray(place, np.full(len(place), pitch**2)),
+                np.zeros(1),
+                load,
+            )
+            for form, place, load in (("gaussian", everywhere, loads), ("open", everywhere[kept], loads[:, kept]))
+        ]
+        np.testing.assert_allclose(spread[1][0], spread[0][0, kept], rtol=1e-6)
+        assert spread[1].sum() < 0.95 * loads.sum()
 
 
 def test_lines_need_rows_and_columns():

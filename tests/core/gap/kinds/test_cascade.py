@@ -14,10 +14,9 @@ from palpate.core.gap.fitting.noise_floor import force_noise, reading_noise
 from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.kinds.cascade import TEXEL, Cascade, Point
 from palpate.core.gap.kinds.decision_numbers import PRIORS
-from palpate.core.gap.kinds.dictionaries import MISALIGNMENT, VARIANTS
+from palpate.core.gap.kinds.dictionaries import VARIANTS
 from palpate.core.gap.kinds.normal_equations import BOUNDS, normal_equations
 from palpate.core.gap.kinds.recorded import recorded
-from palpate.core.gap.kinds.search import refined
 
 BY_LABEL = {variant.label: variant for variant in VARIANTS}
 
@@ -110,37 +109,6 @@ def test_eliminated_texels_give_the_solution_of_all_unknowns_at_once(plain):
     np.testing.assert_allclose(solution.point.texel["gain"], exact.x[len(pairs) :], atol=2e-3)
 
 
-def test_what_is_left_out_is_predicted_by_the_other_halves(plain):
-    """The error of one half under the fit to the others, from the samples."""
-    cascade, members = Cascade(plain), (BY_LABEL["stiffening"],)
-    equations = normal_equations(cascade, Point(), members)
-    solution, total = equations.solve(members), 0.0
-    parts = []
-    for number, run in enumerate(plain.runs):
-        made = cascade.columns(Point(), number, members)
-        pairs = [(name, pair[0]) for name, columns in made.items() for pair in columns]
-        low, high = zip(*(BOUNDS.get(name, (0.0, 3.0)) for name, _ in pairs), strict=True)
-        for half in run.halves:
-            columns = np.stack([column[half].ravel() for _, column in pairs], axis=1) / plain.noise[0]
-            parts.append((columns, (run.reading - run.load)[half].ravel() / plain.noise[0]))
-    for index, (own, target) in enumerate(parts):
-        others = [part for i, part in enumerate(parts) if i != index]
-        matrix, right = np.vstack([a for a, _ in others]), np.concatenate([b for _, b in others])
-        x = lsq_linear(matrix, right, (low, high), method="bvls", tol=1e-12).x
-        total += float(((own @ x - target) ** 2).sum())
-    assert solution.left_out == pytest.approx(total / sum(len(b) for _, b in parts), rel=1e-3)
-    assert solution.excess == max(solution.left_out, solution.fitted, 1.0) - 1.0
-
-
-def test_turns_lead_to_kinds_that_act_one_behind_the_other():
-    """A bend behind a creep: neither is linear in the other, and the fit to both leaves the noise alone."""
-    seen = _recorded(contact=cases.relaxing(0.3), change=lambda reading, time: reading - 0.4 * np.maximum(reading - 0.05, 0.0))
-    members = (BY_LABEL["creep"], BY_LABEL["saturation"])
-    once = normal_equations(Cascade(seen), Point(), members).solve(members)
-    found = refined(Cascade(seen), Point(members))
-    assert found.fitted < 1.1 and found.excess < 0.5 * once.excess + 0.1
-
-
 def test_missing_readings_do_not_count(plain):
     rng, holes = np.random.default_rng(4), []
     for run in plain.runs:
@@ -152,15 +120,3 @@ def test_missing_readings_do_not_count(plain):
     solution = normal_equations(Cascade(some), Point(), members).solve(members)
     assert np.isfinite(solution.fitted) and some.count < 0.75 * plain.count
     assert normal_equations(Cascade(some), Point(), ()).count.sum() == some.count
-
-
-def test_texels_in_another_place_are_found_by_their_loads():
-    """Texels shifted by half a millimetre, as the loads of the displaced sensor tell."""
-    rig = cases.rig(trials=3, seconds=6.0)
-    predictors = predictors_of(rig.trials[:2], rig)
-    seen = recorded(predictors, Model(replace(rig.parameters, k=80.0)), {"zero"}, _noise(predictors))
-    moved = seen.source.loads((5e-4, -3e-4, 0.0, 0.0, 0.0, 0.0))
-    shifted = tuple(replace(run, reading=load) for run, (load, _) in zip(seen.runs, moved, strict=True))
-    found = refined(Cascade(replace(seen, runs=shifted)), Point((MISALIGNMENT,)), turns=6)
-    assert found.fitted < 1e-2  # under a ball a shift is hardly told from a tilt: the loads are right, whichever it is
-    np.testing.assert_allclose(found.point.displacement[:2], (5e-4, -3e-4), atol=2e-4)

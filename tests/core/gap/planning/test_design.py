@@ -16,8 +16,8 @@ from palpate.core.errors import ParameterError
 from palpate.core.gap.fitting.noise_floor import ChannelNoise
 from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.kinds.cascade import Cascade, Point
+from palpate.core.gap.kinds.distinguishability import possible_variants
 from palpate.core.gap.kinds.recorded import planned, recorded
-from palpate.core.gap.kinds.search import possible_variants
 from palpate.core.gap.planning.design import DesignSpace, best_design
 from palpate.core.gap.planning.experiment_plan import Wishes, plan_experiment
 from palpate.core.gap.planning.limits import limits_of
@@ -174,9 +174,9 @@ def test_a_trajectory_that_tells_no_more_is_not_recommended():
         "sure_before": 0.5,
         "sure_after": 0.9,
     }
-    assert planned_sentence(words).endswith("about 90% sure with it, 50% without.")
+    assert planned_sentence(words).endswith("confidence 90% with it, 50% without.")
     said = planned_sentence(words | {"sure_after": 0.52})
-    assert said.startswith("No trajectory within these limits tells creep from lag better") and "allow more depth" in said
+    assert said.startswith("No trajectory within these limits separates creep from lag better") and "allow more depth" in said
 
 
 def test_options_of_a_plan_that_do_not_go_together_are_refused(rig, tmp_path, capsys):

@@ -86,7 +86,7 @@ def test_a_check_that_fails_is_said_with_what_differs(tmp_path):
     assert [one.name for one in result.findings] == ["creep"] and result.findings[0].confidence < 0.5
     assert result.verdict == "unexplained" and result.findings[0].doubts == (REFUTED,)
     errors = gap_errors(result)
-    assert f"creep: {REFUTED}, so its name is not sure" in sentences.evidence(result, errors)
+    assert f"creep: {REFUTED}, so its name is in doubt" in sentences.evidence(result, errors)
     said = sentences.headline(result, errors)
     assert "creep fits the fitted recordings" in said and "'t3'" in said and "40% less" in said
     assert sentences.caution(result) in sentences.warnings(result)
@@ -158,7 +158,7 @@ def test_what_an_effect_closes_alone_counts_where_another_one_imitates_it(left, 
 @pytest.mark.parametrize(("values", "interval", "why"), [
     ({"z": 0.0199}, (0.019, 0.02), "bound"),
     ({"z": 0.001}, (0.0005, 0.0015), ""),
-    ({"z": 0.001}, (-0.02, 0.02), "open"),
+    ({"z": 0.001}, (-0.02, 0.02), "do not identify"),
     ({"z": 0.0}, (-0.001, 0.001), ""),
 ])  # fmt: skip
 def test_numbers_at_their_bounds_and_open_ones_do_not_make_a_sure_name(values, interval, why):
@@ -171,7 +171,7 @@ def test_numbers_at_their_bounds_and_open_ones_do_not_make_a_sure_name(values, i
     result.intervals = [ParameterInterval(0, "z", values["z"], *interval, (-0.02, 0.02))]
     said = unsettled_parameters(one, 0, result)
     assert len(said) == bool(why) and all(why in text for text in said)
-    assert ("open" in why) == (why != "" and not unsettled_parameters(one, 0, result, CLEAR_LEAD) and bool(said))
+    assert ("identify" in why) == (why != "" and not unsettled_parameters(one, 0, result, CLEAR_LEAD) and bool(said))
 
 
 def test_a_share_of_all_is_no_bound():

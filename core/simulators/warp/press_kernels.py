@@ -1,0 +1,469 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A step of pressed sensors in many environments, in the part of Python that :mod:`.translation` makes Warp kernels of.
+
+A step is three kernels, one after the other, without a word to the host between them: where the bodies of each environment are
+and how they move (:func:`move_world`); what each texel measures (:func:`press_texel`); and the wrenches (:func:`sum_world`).
+The steps of :mod:`.pressing`, on which they are modelled, find the contacts where a step begins and again where it ends. Here
+they are kept from one step to the next, as both places are the same. All formulas are those of :mod:`.laws` and of the solver.
+These functions also run as plain Python.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ...effects.engine.compiled_program import TexelMotion
+from ...geometry.bvh import Segment, Tree, segment_entry
+from ...geometry.rotations import write_backward_step_motion, write_rotation, write_step_motion, write_velocity
+from ...laws.contact_law import ContactLaw, read_law, scaled_law, whole_texel_law, with_friction
+from ...laws.friction import (
+    bristle_rate,
+    deflection_scale,
+    friction_force,
+    max_bristle_deflection,
+    next_deflection,
+    turned_into_plane,
+)
+from ...laws.normal_force import normal_force, normal_tangent
+from ...solver.detection.narrow_phase import NEARLY_TOO_DEEP
+from ...solver.dynamics.contact_assembly import LinearContact, Tangent, linearise_contact
+from ...solver.dynamics.effect_kernels import NOW, STEP
+from ...solver.dynamics.relative_kinematics import relative_motion, velocity_at
+from .effect_functions import force_with_effects, friction_with_effects, reading_with_effects
+from .press_arrays import (
+    BOX,
+    CAPSULE,
+    MESH,
+    PLANE,
+    SPHERE,
+    BoolArray,
+    Results,
+    SensorArrays,
+    Slots,
+    TargetArrays,
+    Worlds,
+)
+from .shapes import box_entry, capsule_entry, plane_entry, sphere_entry
+
+NO_CONTACT, TOO_DEEP = -1.0, -2.0
+"""Instead of a share in :attr:`.Slots.pressed`."""
+HAS_EFFECTS = 0
+"""Whether effects act on forces; the translation of a sensor puts its own number here."""
+
+
+class Entry(NamedTuple):
+    """Where a segment enters a target.
+
+    Attributes
+    ----------
+    t : float
+        Position on the segment, 0 at its base and 1 at its tip; another number where it does not.
+    nx, ny, nz : float
+        Outward normal there, in the target's frame.
+    triangle : int
+    inside : bool
+        The base is inside the target, as far as the segment tells.
+    """
+
+    t: float
+    nx: float
+    ny: float
+    nz: float
+    triangle: int
+    inside: bool
+
+
+class Sliding(NamedTuple):
+    """How a target moves at a contact point, relative to the sensor.
+
+    Attributes
+    ----------
+    rate : float, m/s
+        Of the depth.
+    x, y, z : float, m/s
+        In the plane of the surface.
+    """
+
+    rate: float
+    x: float
+    y: float
+    z: float
+
+
+# --- where the bodies are
+
+
+def move_world(world: int, sensor: SensorArrays, worlds: Worlds) -> None:
+    """Bring the bodies of an environment to the step's end, and write how targets moved relative to the sensor."""
+    valid = _are_poses(worlds.poses[world])
+    worlds.valid[world] = valid
+    if not valid:
+        worlds.begins[world] = True
+        return
+    begins, dt = worlds.begins[world], sensor.dt
+    worlds.fresh[world] = begins
+    worlds.begins[world] = False
+    for body in range(worlds.poses.shape[1]):
+        _place_next(worlds.poses[world, body], worlds.next_position[world, body], worlds.next_quaternion[world, body])
+        if begins:
+            _copy(worlds.next_position[world, body], worlds.position[world, body])
+            _copy(worlds.next_quaternion[world, body], worlds.quaternion[world, body])
+        write_velocity(
+            worlds.position[world, body], worlds.quaternion[world, body],
+            worlds.next_position[world, body], worlds.next_quaternion[world, body], dt, worlds.velocity[world, body],
+        )  # fmt: skip
+        write_rotation(worlds.quaternion[world, body], worlds.rotation[world, body])
+        write_step_motion(worlds.velocity[world, body], dt, worlds.step_motion[world, body])
+    for target in range(worlds.pose.shape[1]):
+        _write_motion(world, 1 + target, worlds, worlds.motion[world, target])
+        _turn_motion(dt, worlds.step_motion[world, 0], worlds.rotation[world, 0], worlds.motion[world, target],
+                     worlds.end_motion[world, target])  # fmt: skip
+    for body in range(worlds.poses.shape[1]):
+        _copy(worlds.next_position[world, body], worlds.position[world, body])
+        _copy(worlds.next_quaternion[world, body], worlds.quaternion[world, body])
+        write_rotation(worlds.quaternion[world, body], worlds.rotation[world, body])
+        write_backward_step_motion(worlds.velocity[world, body], dt, worlds.step_motion[world, body])
+    for target in range(worlds.pose.shape[1]):
+        _write_motion(world, 1 + target, worlds, worlds.past_motion[world, target])
+        _write_pose(worlds.position[world], worlds.rotation[world], 1 + target, worlds.pose[world, target])
+
+
+def _are_poses(poses: np.ndarray) -> bool:
+    """Whether all of the poses (b, 7) are finite, with quaternions that are not zero."""
+    good = True
+    for body in range(poses.shape[0]):
+        size, square = 0.0, 0.0
+        for i in range(7):
+            size += abs(poses[body, i])
+        for i in range(3, 7):
+            square += poses[body, i] * poses[body, i]
+        if not (size < math.inf and 0.0 < square < math.inf):
+            good = False
+    return good
+
+
+def _place_next(pose: np.ndarray, position: np.ndarray, quaternion: np.ndarray) -> None:
+    """Write a pose (7,) as position and unit quaternion."""
+    w, x, y, z = pose[3], pose[4], pose[5], pose[6]
+    length = math.sqrt(w * w + x * x + y * y + z * z)
+    for i in range(3):
+        position[i] = pose[i]
+    for i in range(4):
+        quaternion[i] = pose[3 + i] / length
+
+
+def _copy(values: np.ndarray, out: np.ndarray) -> None:
+    for i in range(values.shape[0]):
+        out[i] = values[i]
+
+
+def _write_motion(world: int, body: int, worlds: Worlds, motion: np.ndarray) -> None:
+    """Write the motion of a body relative to the sensor, as the present step motions say it."""
+    relative_motion(0, body, worlds.step_motion[world], worlds.position[world], worlds.rotation[world], motion)
+
+
+def _turn_motion(dt: float, step_motion: np.ndarray, rotation: np.ndarray, motion: np.ndarray, out: np.ndarray) -> None:
+    """Write a relative motion (12,), given in the sensor's axes at the step's beginning, in those at its end."""
+    for i in range(12):
+        out[i] = motion[i]
+    for k in range(3):
+        for m in range(3):
+            turn = 0.0  # entry (m, k) of the sensor's W in its own axes
+            for i in range(3):
+                for j in range(3):
+                    turn += rotation[i, m] * step_motion[3 + 3 * i + j] * rotation[j, k]
+            out[k] += dt * turn * motion[m]
+            for j in range(3):
+                out[3 + 3 * k + j] += dt * turn * motion[3 + 3 * m + j]
+
+
+def _write_pose(position: np.ndarray, rotation: np.ndarray, body: int, pose: np.ndarray) -> None:
+    """Write the sensor's rotation (row by row) and position in the frame of a target's body."""
+    for i in range(3):
+        total = 0.0
+        for k in range(3):
+            total += rotation[body, k, i] * (position[0, k] - position[body, k])
+        pose[9 + i] = total
+        for j in range(3):
+            pose[3 * i + j] = (
+                rotation[body, 0, i] * rotation[0, 0, j]
+                + rotation[body, 1, i] * rotation[0, 1, j]
+                + rotation[body, 2, i] * rotation[0, 2, j]
+            )
+
+
+# --- what a texel measures
+
+
+def press_texel(
+    world: int, texel: int, sensor: SensorArrays, targets: TargetArrays, tree: Tree, worlds: Worlds, slots: Slots, out: Results
+) -> None:
+    """Bring the contact points of a texel to the step's end, and write down what the texel measures there."""
+    force, along_x, along_y, touched = 0.0, 0.0, 0.0, False
+    valid, count = worlds.valid[world], targets.kind.shape[0]
+    if valid:
+        for point in range(sensor.first_point[texel], sensor.first_point[texel + 1]):
+            law = read_law(sensor.law, world % sensor.law.shape[0])
+            if worlds.fresh[world]:
+                _begin_point(world, point, slots)
+                for target in range(count):
+                    _find_contact(world, target, point, sensor, targets, tree, worlds, slots)
+            _advance_point(world, point, law, sensor, worlds, slots)
+            for target in range(count):
+                _find_contact(world, target, point, sensor, targets, tree, worlds, slots)
+                if slots.pressed[world, target, point] >= 0.0:
+                    fn = _write_force(world, target, point, law, sensor, worlds, slots)
+                    fx, fy, fz = (
+                        slots.force[world, target, point, 0],
+                        slots.force[world, target, point, 1],
+                        slots.force[world, target, point, 2],
+                    )
+                    force += fn
+                    along_x += fx * sensor.frame[point, 6] + fy * sensor.frame[point, 7] + fz * sensor.frame[point, 8]
+                    along_y += fx * sensor.frame[point, 9] + fy * sensor.frame[point, 10] + fz * sensor.frame[point, 11]
+                    touched = True
+    out.texels[world, texel, 0] = force
+    out.texels[world, texel, 1] = along_x
+    out.texels[world, texel, 2] = along_y
+    out.contact[world, texel] = touched
+    reading = 0.0
+    if valid:
+        zero, scale = sensor.conversion[texel, 0], sensor.conversion[texel, 1]
+        when = 0 if worlds.fresh[world] else 1
+        if worlds.fresh[world]:
+            for i in range(slots.reading_memory.shape[2]):
+                for j in range(slots.reading_memory.shape[3]):
+                    slots.reading_memory[world, texel, i, j] = 0.0
+        reading = reading_with_effects(
+            force, zero, scale, when, sensor.reading_constants, slots.reading_memory[world, texel]
+        )  # fmt: skip
+    out.readings[world, texel] = reading
+
+
+def _begin_point(world: int, point: int, slots: Slots) -> None:
+    """Forget all that a contact point remembers."""
+    for target in range(slots.pressed.shape[1]):
+        slots.pressed[world, target, point] = NO_CONTACT
+        slots.triangle[world, target, point] = -1
+        for i in range(3):
+            slots.bristle[world, target, point, i] = 0.0
+    for i in range(slots.memory.shape[2]):
+        for j in range(slots.memory.shape[3]):
+            slots.memory[world, point, i, j] = 0.0
+
+
+def _sliding_at(px: float, py: float, pz: float, nx: float, ny: float, nz: float, m: np.ndarray) -> Sliding:
+    """Motion of a target at a point (m), given its relative motion (12,), as rate along the normal and sliding."""
+    vx, vy, vz = velocity_at(
+        (px, py, pz), (m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], m[9], m[10], m[11])
+    )  # fmt: skip
+    rate = vx * nx + vy * ny + vz * nz
+    return Sliding(rate, vx - rate * nx, vy - rate * ny, vz - rate * nz)
+
+
+def _advance_point(world: int, point: int, law: ContactLaw, sensor: SensorArrays, worlds: Worlds, slots: Slots) -> None:
+    """Bring bristles and the memory of effects from the step's beginning to its end."""
+    stiff, scale = sensor.multipliers[point, 0], sensor.multipliers[point, 1]
+    painted = scaled_law(law, stiff, scale)
+    deepest, deepest_rate, deepest_slide = 0.0, 0.0, 0.0
+    for target in range(slots.pressed.shape[1]):
+        if slots.pressed[world, target, point] >= 0.0:
+            p, n = slots.point[world, target, point], slots.normal[world, target, point]
+            px, py, pz, nx, ny, nz = p[0], p[1], p[2], n[0], n[1], n[2]
+            moved = _sliding_at(px, py, pz, nx, ny, nz, worlds.motion[world, target])
+            square = moved.x * moved.x + moved.y * moved.y + moved.z * moved.z
+            end = slots.depth[world, target, point] + sensor.dt * moved.rate
+            tangent = _tangent(
+                TexelMotion(slots.depth[world, target, point], moved.rate, 0.0, math.sqrt(square)), painted, scale, sensor,
+                slots.memory[world, point],
+            )  # fmt: skip
+            z = slots.bristle[world, target, point]
+            zx, zy, zz = z[0], z[1], z[2]
+            contact = linearise_contact(
+                (nx, ny, nz), (zx, zy, zz),
+                (moved.x + moved.rate * nx, moved.y + moved.rate * ny, moved.z + moved.rate * nz), tangent, sensor.dt, law,
+            )  # fmt: skip
+            _move_bristle(contact, px, py, pz, nx, ny, nz, worlds.end_motion[world, target], z)
+            if end > deepest:
+                deepest, deepest_rate, deepest_slide = end, moved.rate, sensor.dt * math.sqrt(square)
+    if HAS_EFFECTS == 1:
+        force_with_effects(
+            STEP, TexelMotion(deepest, deepest_rate, deepest_slide, 0.0), whole_texel_law(painted, sensor.share, 1.0),
+            sensor.force_constants, slots.memory[world, point], True,
+        )  # fmt: skip
+
+
+def _tangent(motion: TexelMotion, painted: ContactLaw, scale: float, sensor: SensorArrays, memory: np.ndarray) -> Tangent:
+    """Return the normal law at the step's end, linearised, and what effects and paint make of friction."""
+    bias, slope = normal_tangent(motion.depth, motion.rate, sensor.dt, painted)
+    viscosity, pulls = 0.0, sensor.pulls == 1
+    if HAS_EFFECTS == 1:
+        end = motion.depth + sensor.dt * motion.rate
+        force, by_depth, by_rate = force_with_effects(
+            STEP, TexelMotion(end, motion.rate, 0.0, motion.speed), whole_texel_law(painted, sensor.share, 1.0),
+            sensor.force_constants, memory, False,
+        )  # fmt: skip
+        factor, viscosity = friction_with_effects(motion.speed, force, sensor.friction_constants)
+        slope = sensor.share * max(by_depth * sensor.dt + by_rate, 0.0) if end > 0.0 else 0.0
+        bias = sensor.share * force - slope * motion.rate
+        scale, viscosity = scale * factor, sensor.share * viscosity
+    return Tangent(bias, slope, scale, viscosity, pulls)
+
+
+def _move_bristle(
+    contact: LinearContact, px: float, py: float, pz: float, nx: float, ny: float, nz: float, motion: np.ndarray, z: np.ndarray
+) -> None:
+    """Bring a bristle (3,) to the step's end, in the sensor's axes at that time."""
+    v = _sliding_at(px, py, pz, nx, ny, nz, motion)
+    zx = next_deflection(contact.keep, z[0], contact.gain, v.x)
+    zy = next_deflection(contact.keep, z[1], contact.gain, v.y)
+    zz = next_deflection(contact.keep, z[2], contact.gain, v.z)
+    scale = deflection_scale(zx * zx + zy * zy + zz * zz, contact.limit)
+    z[0], z[1], z[2] = scale * zx, scale * zy, scale * zz
+
+
+def _find_contact(
+    world: int, target: int, point: int, sensor: SensorArrays, targets: TargetArrays, tree: Tree, worlds: Worlds, slots: Slots
+) -> None:
+    """Find where a contact point touches a target now, and write it down; a bristle is zero where nothing touches."""
+    m, f, reach = worlds.pose[world, target], sensor.frame[point], sensor.reach
+    tx = m[9] + m[0] * f[0] + m[1] * f[1] + m[2] * f[2]
+    ty = m[10] + m[3] * f[0] + m[4] * f[1] + m[5] * f[2]
+    tz = m[11] + m[6] * f[0] + m[7] * f[1] + m[8] * f[2]
+    dx = reach * (m[0] * f[3] + m[1] * f[4] + m[2] * f[5])
+    dy = reach * (m[3] * f[3] + m[4] * f[4] + m[5] * f[5])
+    dz = reach * (m[6] * f[3] + m[7] * f[4] + m[8] * f[5])
+    segment, before = Segment(tx - dx, ty - dy, tz - dz, dx, dy, dz), slots.pressed[world, target, point]
+    found = _entry(segment, target, before, slots.triangle[world, target, point], targets, tree)
+    slots.triangle[world, target, point] = found.triangle
+    if not (0.0 <= found.t <= 1.0):
+        slots.pressed[world, target, point] = TOO_DEEP if found.inside else NO_CONTACT
+        for i in range(3):
+            slots.bristle[world, target, point, i] = 0.0
+            slots.force[world, target, point, i] = 0.0
+        return
+    pressed, n, p = 1.0 - found.t, slots.normal[world, target, point], slots.point[world, target, point]
+    slots.pressed[world, target, point] = pressed
+    slots.depth[world, target, point] = pressed * abs(dx * found.nx + dy * found.ny + dz * found.nz)
+    z = slots.bristle[world, target, point]
+    for i in range(3):
+        n[i] = m[i] * found.nx + m[3 + i] * found.ny + m[6 + i] * found.nz
+        p[i] = f[i] - pressed * reach * f[3 + i]
+    zx, zy, zz = turned_into_plane((z[0], z[1], z[2]), (n[0], n[1], n[2]))
+    z[0], z[1], z[2] = zx, zy, zz
+
+
+def _entry(segment: Segment, target: int, before: float, hint: int, targets: TargetArrays, tree: Tree) -> Entry:
+    """Return where a segment enters a target."""
+    kind = targets.kind[target]
+    t, nx, ny, nz, inside = 2.0, 0.0, 0.0, 0.0, False
+    if kind == MESH:
+        return _mesh_entry(segment, targets.mesh[target], before, hint, tree)
+    if kind == SPHERE:
+        t, nx, ny, nz, inside = sphere_entry(segment, targets.size[target, 0])
+    if kind == BOX:
+        t, nx, ny, nz, inside = box_entry(segment, targets.size[target, 0], targets.size[target, 1], targets.size[target, 2])
+    if kind == CAPSULE:
+        t, nx, ny, nz, inside = capsule_entry(segment, targets.size[target, 0], targets.size[target, 1])
+    if kind == PLANE:
+        t, nx, ny, nz, inside = plane_entry(segment)
+    return Entry(t, nx, ny, nz, -1, inside)
+
+
+def _mesh_entry(segment: Segment, mesh: int, before: float, hint: int, tree: Tree) -> Entry:
+    """Return where a segment enters a mesh; past the maximum penetration as :mod:`.narrow_phase` has it."""
+    t, triangle, leaving = segment_entry(segment, mesh, hint, tree)
+    if triangle >= 0:
+        return Entry(t, tree.faces[triangle, 9], tree.faces[triangle, 10], tree.faces[triangle, 11], triangle, False)
+    inside = leaving <= 1.0
+    ox, oy, oz, dx, dy, dz = segment
+    if not inside and (before == TOO_DEEP or before > NEARLY_TOO_DEEP):
+        size, root = 1.0, tree.roots[mesh]
+        b = tree.bounds[root]
+        in_box = (
+            min(ox, ox + dx) <= b[3] and max(ox, ox + dx) >= b[0]
+            and min(oy, oy + dy) <= b[4] and max(oy, oy + dy) >= b[1]
+            and min(oz, oz + dz) <= b[5] and max(oz, oz + dz) >= b[2]
+        )  # fmt: skip
+        inside = in_box
+        if in_box and before >= 0.0:  # a long line from the base leaves the surface before it enters it
+            length = math.sqrt(dx * dx + dy * dy + dz * dz)
+            for i in range(3):
+                size += (b[3 + i] - b[i]) / length
+            far, _, out = segment_entry(Segment(ox, oy, oz, size * dx, size * dy, size * dz), mesh, -1, tree)
+            inside = out < far
+    return Entry(2.0, 0.0, 0.0, 0.0, -1, inside)
+
+
+def _write_force(
+    world: int, target: int, point: int, law: ContactLaw, sensor: SensorArrays, worlds: Worlds, slots: Slots
+) -> float:
+    """Write the force of a contact on the sensor, and return its normal part (N)."""
+    stiff, scale = sensor.multipliers[point, 0], sensor.multipliers[point, 1]
+    painted, depth = scaled_law(law, stiff, scale), slots.depth[world, target, point]
+    p, n, z = slots.point[world, target, point], slots.normal[world, target, point], slots.bristle[world, target, point]
+    v = _sliding_at(p[0], p[1], p[2], n[0], n[1], n[2], worlds.past_motion[world, target])
+    square = v.x * v.x + v.y * v.y + v.z * v.z
+    fn = normal_force(depth, v.rate, painted)
+    factor, viscosity = 1.0, 0.0
+    if HAS_EFFECTS == 1:
+        speed = math.sqrt(square)
+        whole, _, _ = force_with_effects(
+            NOW, TexelMotion(depth, v.rate, 0.0, speed), whole_texel_law(painted, sensor.share, 1.0),
+            sensor.force_constants, slots.memory[world, point], False,
+        )  # fmt: skip
+        factor, viscosity = friction_with_effects(speed, whole, sensor.friction_constants)
+        fn = sensor.share * whole
+    friction = with_friction(painted, factor, sensor.share * viscosity)
+    held = deflection_scale(z[0] * z[0] + z[1] * z[1] + z[2] * z[2], max_bristle_deflection(fn, friction))
+    fx, fy, fz = 0.0, 0.0, 0.0
+    if fn > 0.0:
+        zx, zy, zz = held * z[0], held * z[1], held * z[2]
+        fx = friction_force(zx, bristle_rate(zx, v.x, square, fn, friction), v.x, friction)
+        fy = friction_force(zy, bristle_rate(zy, v.y, square, fn, friction), v.y, friction)
+        fz = friction_force(zz, bristle_rate(zz, v.z, square, fn, friction), v.z, friction)
+    f = slots.force[world, target, point]
+    f[0], f[1], f[2] = fx + fn * n[0], fy + fn * n[1], fz + fn * n[2]
+    return fn
+
+
+# --- wrenches
+
+
+def sum_world(world: int, worlds: Worlds, slots: Slots, out: Results) -> None:
+    """Sum up the wrench on each target of an environment, in the world about the target's origin."""
+    too_deep = 0
+    for target in range(out.wrench.shape[1]):
+        fx, fy, fz, mx, my, mz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        if worlds.valid[world]:
+            for point in range(slots.pressed.shape[2]):
+                if slots.pressed[world, target, point] == TOO_DEEP:
+                    too_deep += 1
+                if slots.pressed[world, target, point] >= 0.0:
+                    p, f = slots.point[world, target, point], slots.force[world, target, point]
+                    fx, fy, fz = fx + f[0], fy + f[1], fz + f[2]
+                    mx += p[1] * f[2] - p[2] * f[1]
+                    my += p[2] * f[0] - p[0] * f[2]
+                    mz += p[0] * f[1] - p[1] * f[0]
+        w = out.wrench[world, target]
+        for i in range(3):
+            w[i] = -(worlds.rotation[world, 0, i, 0] * fx + worlds.rotation[world, 0, i, 1] * fy
+                     + worlds.rotation[world, 0, i, 2] * fz)  # fmt: skip
+            w[3 + i] = -(worlds.rotation[world, 0, i, 0] * mx + worlds.rotation[world, 0, i, 1] * my
+                         + worlds.rotation[world, 0, i, 2] * mz)  # fmt: skip
+        x = worlds.position[world, 0, 0] - worlds.position[world, 1 + target, 0]
+        y = worlds.position[world, 0, 1] - worlds.position[world, 1 + target, 1]
+        z = worlds.position[world, 0, 2] - worlds.position[world, 1 + target, 2]
+        w[3] += y * w[2] - z * w[1]
+        w[4] += z * w[0] - x * w[2]
+        w[5] += x * w[1] - y * w[0]
+    out.too_deep[world] = too_deep
+
+
+def reset_worlds(world: int, mask: BoolArray, worlds: Worlds) -> None:
+    """Let the environments of a mask begin with their next step."""
+    if mask[world]:
+        worlds.begins[world] = True

@@ -1,0 +1,294 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One sensor in many environments on Warp: on a processor, and by the same code on a GPU."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...effects.engine.readout_chain import transducers_of
+from ...effects.engine.sensor_effects import check_scenario, mounted_texels
+from ...errors import ParameterError
+from ...geometry.bvh import build_tree
+from ...geometry.contact_points import ContactPoints, contact_points
+from ...geometry.mesh import TriangleMesh
+from ...laws.contact_law import contact_law
+from ...model.body import Body
+from ...model.motion import Motion
+from ...model.scenario import Scenario
+from ...model.sensor import Sensor
+from ...model.target import Target
+from ...solver.detection.deforming_surfaces import point_rows
+from ..sensor_on_mesh import SensorOnMesh
+from . import press_kernels
+from .effect_functions import EffectFunctions, functions_of
+from .engine import require_warp
+from .press_arrays import BOX, CAPSULE, MESH, PLANE, SPHERE, Results, SensorArrays, Slots, TargetArrays, Worlds
+from .translation import Translation
+
+
+class Sphere(NamedTuple):
+    """A sphere around the origin of its frame."""
+
+    radius: float
+
+
+class Box(NamedTuple):
+    """A box around the origin of its frame, of half sizes in metres."""
+
+    x: float
+    y: float
+    z: float
+
+
+class Capsule(NamedTuple):
+    """A capsule around the origin of its frame, whose axis of length 2 `half` lies along z; metres."""
+
+    radius: float
+    half: float
+
+
+class Plane(NamedTuple):
+    """All that is below z = 0 of its frame."""
+
+
+Shape = TriangleMesh | Sphere | Box | Capsule | Plane
+KINDS: dict[type, int] = {TriangleMesh: MESH, Sphere: SPHERE, Box: BOX, Capsule: CAPSULE, Plane: PLANE}
+
+_TRANSLATIONS: dict[Any, Translation] = {}
+
+
+class WarpSensors:
+    """A sensor and what presses on it in many environments, computed by Warp.
+
+    In float64 the results are those of :class:`.PressedSensors` within 1e-9; a step asks nothing of the host, so that it may be
+    captured as a CUDA graph.
+
+    Parameters
+    ----------
+    item : SensorOnMesh
+    target : TriangleMesh, Sphere, Box, Capsule or Plane, or a sequence of these
+        Each in the frame of what presses, metres.
+    dt : float, seconds
+        Step of the other program.
+    environments : int
+    device : str
+        As Warp names it: ``cpu``, ``cuda:0``.
+    single : bool
+        Compute in float32, which is faster on most GPUs. Depths then carry the rounding of the poses, 6e-8 of a coordinate.
+
+    Raises
+    ------
+    PalpateError
+        The sensor, the targets or the step make no run, an effect has no kernel, or Warp or the device is missing.
+
+    Attributes
+    ----------
+    texels : (E, n, 3) warp.array, N
+        Normal force, and shear along the texel's x and y axis, on the sensor.
+    readings : (E, n) warp.array, the sensor's unit
+    contact : (E, n) warp.array of bool
+    wrench : (E, T, 6) warp.array, N and N·m
+        Force on each target in the world, and torque about the origin of its frame.
+    too_deep : (E,) warp.array of int
+        How many contact points are pressed past their maximum penetration, and measure nothing. Simple shapes also tell those
+        that were as deep when the environment began.
+    valid : (E,) warp.array of bool
+        False where a pose is not finite or a quaternion is zero: everything is zero there, and the environment begins again
+        with its next valid poses.
+    poses : (E, 1 + T, 7) warp.array
+        Of the sensor and of each target: position (m) and quaternion (w, x, y, z). A program on the device may write them
+        itself, and then call :meth:`step` without poses.
+    """
+
+    def __init__(
+        self,
+        item: SensorOnMesh,
+        target: Shape | Sequence[Shape],
+        dt: float,
+        environments: int,
+        device: str = "cpu",
+        single: bool = False,
+    ):
+        warp = require_warp()
+        targets: list[Any] = [target] if type(target) in KINDS else list(target)  # type: ignore[arg-type]  # a shape is a tuple
+        _check(item.sensor, targets, dt, environments)
+        self._warp, self.device = warp, _device(warp, device)
+        self._environments, sensor = environments, item.sensor
+        points = contact_points(sensor.texels, sensor.parameters.points_per_texel)
+        effects = functions_of(sensor, dt)
+        e, n, t, p = environments, len(sensor.texels), len(targets), len(points.texel)
+        self._size = e, n, t
+        tree = build_tree([one for one in targets if isinstance(one, TriangleMesh)] or [_NO_MESH])
+        translation = _translation(warp, single, effects, sensor)
+        slots = Slots.zero(e, t, p, n, effects.laws, effects.reading_laws)
+        parts = _sensor_arrays(sensor, points, effects, dt), _target_arrays(targets), tree, Worlds.zero(e, t), slots
+        values = [translation.value(part, self.device) for part in (*parts, Results.zero(e, n, t))]
+        self._sensor, self._targets, self._tree, self._worlds, self._slots, out = values
+        self._out = out
+        self.texels, self.readings, self.contact = out.texels, out.readings, out.contact
+        self.wrench, self.too_deep, self.valid, self.poses = out.wrench, out.too_deep, self._worlds.valid, self._worlds.poses
+        self._mask = warp.zeros(e, dtype=warp.bool, device=self.device)
+        kernels = press_kernels
+        self._move, self._sum = translation.kernel(kernels.move_world, 1), translation.kernel(kernels.sum_world, 1)
+        self._press, self._reset = translation.kernel(kernels.press_texel, 2), translation.kernel(kernels.reset_worlds, 1)
+
+    def __len__(self) -> int:
+        """Return the number of environments."""
+        return self._environments
+
+    def __repr__(self) -> str:
+        return f"<WarpSensors: {self._size[0]} environments, {self._size[1]} texels, {self._size[2]} targets, on {self.device}>"
+
+    def step(self, sensor_poses: Any = None, target_poses: Any = None) -> WarpSensors:
+        """Go on by one step, to these poses; the results are in the arrays of this object.
+
+        Parameters
+        ----------
+        sensor_poses : (E, 7) float, optional
+            Arrays of NumPy; by default :attr:`poses` holds the poses already.
+        target_poses : (E, T, 7) or, of one target, (E, 7) float, optional
+
+        Raises
+        ------
+        ParameterError
+            Poses have another shape. Those that are not finite are no error (see :attr:`valid`).
+        """
+        if sensor_poses is not None or target_poses is not None:
+            self._take(sensor_poses, target_poses)
+        e, n, _ = self._size
+        launch, device = self._warp.launch, self.device
+        launch(self._move, dim=e, inputs=[self._sensor, self._worlds], device=device)
+        arrays = [self._sensor, self._targets, self._tree, self._worlds, self._slots, self._out]
+        launch(self._press, dim=(e, n), inputs=arrays, device=device)
+        launch(self._sum, dim=e, inputs=[self._worlds, self._slots, self._out], device=device)
+        return self
+
+    def reset(self, mask: Any = None) -> None:
+        """Let environments begin again with their next step: at rest, without bristles and memory of effects.
+
+        Parameters
+        ----------
+        mask : (E,) bool, optional
+            Which, as an array of NumPy or of Warp on the device; by default all.
+        """
+        warp = self._warp
+        if mask is None:
+            self._worlds.begins.fill_(True)
+            return
+        chosen = mask
+        if not isinstance(mask, warp.array):
+            found = np.asarray(mask)
+            if found.dtype != np.bool_ or found.shape != (len(self),):
+                raise ParameterError(
+                    f"The mask of environments to reset is {found.dtype} of shape {found.shape}: give ({len(self)},) bool."
+                )
+            chosen = warp.array(found, dtype=warp.bool, device=self.device)
+        elif mask.dtype is not warp.bool or mask.shape != (len(self),) or str(mask.device) != str(self.device):
+            raise ParameterError(
+                f"The mask of environments to reset is {mask.dtype.__name__} of shape {mask.shape} on {mask.device}: "
+                f"give ({len(self)},) bool on {self.device}."
+            )
+        warp.launch(self._reset, dim=len(self), inputs=[chosen, self._worlds], device=self.device)
+
+    def _take(self, sensor_poses: Any, target_poses: Any) -> None:
+        """Copy poses of NumPy to the device."""
+        e, _, t = self._size
+        sensor, target = np.asarray(sensor_poses), np.asarray(target_poses)
+        shapes = [(e, t, 7)] if t > 1 else [(e, t, 7), (e, 7)]
+        for whose, values, wanted in (("sensor", sensor, [(e, 7)]), ("target", target, shapes)):
+            if values.shape not in wanted or values.dtype.kind not in "fiu":
+                raise ParameterError(
+                    f"The poses of the {whose} are {values.dtype} of shape {values.shape}: give numbers of shape {wanted[-1]}."
+                )
+        poses = np.concatenate([sensor[:, None], target.reshape(e, t, 7)], axis=1)
+        self._warp.copy(self.poses, self._warp.array(poses, dtype=self.poses.dtype, device=self.device))
+
+
+_NO_MESH = TriangleMesh(np.eye(3), np.array([[0, 1, 2]]))
+"""Stands for the tree where all targets are simple shapes."""
+
+
+def _check(sensor: Sensor, targets: Sequence[Shape], dt: float, environments: int) -> None:
+    """Raise :class:`.PalpateError` for what makes no run."""
+    if not (np.isfinite(dt) and dt > 0):
+        raise ParameterError(f"The step is {dt:g} s: give a number above zero.")
+    if environments < 1:
+        raise ParameterError(f"There are {environments} environments: ask for one at least.")
+    if not targets:
+        raise ParameterError(f"Nothing presses on '{sensor.name}': give a target's mesh or shape, or several.")
+    if sensor.deformation is not None:
+        raise ParameterError(f"'{sensor.name}' deforms by prescription: take a sensor that keeps its shape in this loop.")
+    meshes = []
+    for number, target in enumerate(targets, start=1):
+        if type(target) not in KINDS:
+            raise ParameterError(
+                f"Target {number} is a {type(target).__name__}: give a TriangleMesh, Sphere, Box, Capsule or Plane."
+            )
+        if isinstance(target, TriangleMesh):
+            meshes.append(target)
+        elif not all(np.isfinite(size) and size > 0 for size in target):
+            raise ParameterError(f"Target {number} is {target}: give finite sizes above zero.")
+    meshes = meshes or [_NO_MESH]
+    names = [f"target {number}" for number in range(1, len(meshes) + 1)]
+    check_scenario(
+        Scenario(
+            bodies=(Body("sensor", Motion.at_rest()), *(Body(name, Motion.at_rest()) for name in names)),
+            sensors=(sensor,),
+            targets=tuple(Target(name, 1 + i, mesh) for i, (name, mesh) in enumerate(zip(names, meshes, strict=True))),
+            frame_start=0,
+            frame_end=1,
+            fps=1.0 / dt,
+            dt=dt,
+        )
+    )
+
+
+def _device(warp: ModuleType, name: str) -> str:
+    """Return a device that is there; raise :class:`.ParameterError` for another."""
+    known = [str(one) for one in warp.get_devices()]
+    if name not in known:
+        raise ParameterError(f"Warp has no device '{name}' here: take one of {', '.join(known)}.")
+    return name
+
+
+def _translation(warp: ModuleType, single: bool, effects: EffectFunctions, sensor: Sensor) -> Translation:
+    """Return the functions of Warp for a sensor with these effects; sensors with the same laws share them."""
+    laws = "_".join(f"{item.name}_{item.form or 'usual'}" for item in sensor.effects).replace("-", "_") or "plain"
+    key = single, laws
+    if key not in _TRANSLATIONS:
+        _TRANSLATIONS[key] = Translation(warp, warp.float32 if single else warp.float64, laws, effects.instead)
+    return _TRANSLATIONS[key]
+
+
+def _sensor_arrays(sensor: Sensor, points: ContactPoints, effects: EffectFunctions, dt: float) -> SensorArrays:
+    parameters, transducers = sensor.parameters, transducers_of(sensor)
+    share, n = 1.0 / parameters.points_per_texel, len(sensor.texels)
+    painted = [np.ones(n) if values is None else values for values in (sensor.painted.k, sensor.painted.friction)]
+    scale = np.broadcast_to(transducers.gain * transducers.painted, n)
+    return SensorArrays(
+        dt=dt,
+        reach=float(parameters.max_penetration),
+        share=share,
+        pulls=int(effects.pulls),
+        frame=point_rows(mounted_texels(sensor), points, np.zeros(3)),
+        first_point=np.searchsorted(points.texel, np.arange(n + 1)),
+        multipliers=np.column_stack([values[points.texel] for values in painted]),
+        law=np.array([contact_law(parameters, share)], float),
+        conversion=np.column_stack([np.full(n, float(transducers.zero)), scale]),
+        force_constants=effects.force_constants,
+        friction_constants=effects.friction_constants,
+        reading_constants=effects.reading_constants,
+    )
+
+
+def _target_arrays(targets: Sequence[Shape]) -> TargetArrays:
+    kind = np.array([KINDS[type(target)] for target in targets])
+    size = np.zeros((len(targets), 3))
+    for row, target in zip(size, targets, strict=True):
+        if not isinstance(target, TriangleMesh):
+            row[: len(target)] = target
+    return TargetArrays(kind, size, np.cumsum(kind == MESH) - 1)

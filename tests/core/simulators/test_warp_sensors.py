@@ -1,0 +1,312 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sensors on Warp: the numbers of PressedSensors, simple shapes, physics in an explicit loop, and what is refused."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from exported_sensors import ball, pad
+from scipy.spatial.transform import Rotation
+from solver_scenes import box
+
+from palpate.core.effects.engine.registry import effect
+from palpate.core.errors import ParameterError
+from palpate.core.geometry.bvh import Segment
+from palpate.core.simulators.pressed_sensors import PressedSensors
+from palpate.core.simulators.warp import shapes
+from palpate.core.simulators.warp.warp_sensors import Box, Capsule, Plane, Sphere, WarpSensors
+
+warp = pytest.importorskip("warp", reason="Warp runs the kernels: pip install warp-lang")
+CUDA = next((str(one) for one in warp.get_devices() if one.is_cuda), "")
+needs_gpu = pytest.mark.skipif(not CUDA, reason="Warp finds no GPU on this machine")
+
+DT, SIZE = 0.002, 0.02
+LEVEL = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+CUBE = box(SIZE, SIZE, SIZE)
+HALVES = Box(SIZE / 2, SIZE / 2, SIZE / 2)
+AGREE = 1e-9
+"""Newtons (and units of a reading, N·m) to which Warp in float64 and the solver agree: forces here are up to some newtons."""
+
+
+def random_poses(seed, steps, environments, targets=1, height=SIZE / 2):
+    """(steps, E, 1 + T, 7): objects that slide, sink in and turn on a sensor that moves along."""
+    draw = np.random.default_rng(seed)
+    shape = (steps, environments, 1 + targets)
+    poses = np.zeros((*shape, 7))
+    poses[..., :2] = 2e-4 * draw.standard_normal((*shape, 2)) + 0.01 * draw.standard_normal((*shape[1:], 2))
+    poses[..., 2] = height - 1e-3 * draw.random(shape[1:]) - 1e-4 * draw.standard_normal(shape)
+    turns = Rotation.from_rotvec(0.01 * draw.standard_normal((np.prod(shape), 3))).as_quat()
+    poses[..., 3:] = 1.5 * np.roll(turns, 1, axis=1).reshape(*shape, 4)  # quaternions of any length are taken
+    poses[:, :, 0, :3] = 1e-4 * draw.standard_normal((steps, environments, 3))
+    return poses
+
+
+def assert_agree(item, meshes, targets, poses, device="cpu"):
+    """Take the same steps with both; an environment is reset on the way. Return the largest force."""
+    e, largest = poses.shape[1], 0.0
+    core, ours = PressedSensors(item, meshes, DT, e), WarpSensors(item, targets, DT, e, device)
+    for step, now in enumerate(poses):
+        if step == 3:
+            core.reset(np.arange(e) == 1)
+            ours.reset(np.arange(e) == 1)
+        expected, found = core.step(now[:, 0], now[:, 1:]), ours.step(now[:, 0], now[:, 1:])
+        for name in ("texels", "readings", "wrench"):
+            assert np.abs(getattr(found, name).numpy() - getattr(expected, name)).max() < AGREE, (step, name)
+        for name in ("contact", "valid"):
+            assert np.array_equal(getattr(found, name).numpy(), getattr(expected, name)), (step, name)
+        if any(one is CUBE for one in targets):  # meshes do not tell points that were inside at the beginning
+            assert np.array_equal(found.too_deep.numpy(), expected.too_deep)
+        else:
+            assert (found.too_deep.numpy() >= expected.too_deep).all()
+        largest = max(largest, float(np.abs(expected.texels[..., 1:]).max()))
+    return largest
+
+
+@pytest.mark.slow("Warp compiles the kernels")
+@pytest.mark.parametrize("target", [CUBE, HALVES], ids=["mesh", "shape"])
+@pytest.mark.parametrize(
+    "item",
+    [pad(5, 4), pad(4, 3, normal_law="hunt-crossley", k=3e4), pad(3, 4, points_per_texel=4, max_penetration=1e-3), ball()],
+    ids=["pad", "Hunt-Crossley", "four points, some too deep", "painted ball"],
+)
+def test_results_are_those_of_pressed_sensors(item, target):
+    poses = random_poses(5, 6, 4, height=0.03 if item.name == "Ball" else SIZE / 2)
+    assert assert_agree(item, [CUBE], [target], poses) > 1e-3
+
+
+@pytest.mark.slow("Warp compiles the kernels")
+def test_several_targets_share_a_sensor():
+    assert assert_agree(pad(5, 8), [CUBE, CUBE], [CUBE, HALVES], random_poses(6, 5, 3, 2)) > 1e-3
+
+
+EFFECTS = {
+    "forces": ("creep", "hysteresis", "stribeck", "viscous-friction"),
+    "memory and pull": ("softening", "wear", "stiffening", "adhesion"),
+    "readings": ("lag",),
+}
+
+
+@pytest.mark.long("Warp compiles kernels for each set of effects")
+@pytest.mark.parametrize("names", EFFECTS.values(), ids=EFFECTS)
+def test_effects_are_those_of_pressed_sensors(names):
+    """With two targets on four points, the deepest of which is remembered."""
+    item = pad(4, 3, points_per_texel=4)
+    item = replace(item, sensor=replace(item.sensor, effects=tuple(effect(name) for name in names)))
+    assert assert_agree(item, [CUBE, CUBE], [HALVES, CUBE], random_poses(7, 6, 3, 2)) > 1e-3
+
+
+@needs_gpu
+def test_a_gpu_gives_the_same_numbers():
+    assert assert_agree(pad(5, 4), [CUBE], [CUBE], random_poses(5, 6, 4), CUDA) > 1e-3
+
+
+@needs_gpu
+def test_a_step_is_captured_as_a_graph():
+    item, poses = pad(5, 4), random_poses(8, 4, 3)
+    plain, graph = (WarpSensors(item, CUBE, DT, 3, CUDA) for _ in range(2))
+    plain.step(poses[0, :, 0], poses[0, :, 1])
+    graph.step(poses[0, :, 0], poses[0, :, 1])
+    with warp.ScopedCapture(CUDA) as capture:
+        graph.step()
+    for now in poses[1:]:
+        plain.step(now[:, 0], now[:, 1])
+        warp.copy(graph.poses, warp.array(now, dtype=warp.float64, device=CUDA))
+        warp.capture_launch(capture.graph)
+        assert np.array_equal(graph.texels.numpy(), plain.texels.numpy())
+
+
+# --- simple shapes
+
+
+def distance(shape, points):
+    """Signed distance of points (n, 3) from a shape's surface, negative inside."""
+    if isinstance(shape, Sphere):
+        return np.linalg.norm(points, axis=1) - shape.radius
+    if isinstance(shape, Plane):
+        return points[:, 2]
+    if isinstance(shape, Capsule):
+        along = np.clip(points[:, 2], -shape.half, shape.half)
+        return np.linalg.norm(points - np.stack([0 * along, 0 * along, along], axis=1), axis=1) - shape.radius
+    return (np.abs(points) - np.array(shape)).max(axis=1)
+
+
+ENTRIES = {
+    Sphere(0.9): lambda s: shapes.sphere_entry(s, 0.9),
+    Box(0.9, 0.5, 0.7): lambda s: shapes.box_entry(s, 0.9, 0.5, 0.7),
+    Capsule(0.5, 0.6): lambda s: shapes.capsule_entry(s, 0.5, 0.6),
+    Plane(): shapes.plane_entry,
+}
+
+
+@pytest.mark.parametrize("shape", ENTRIES, ids=lambda shape: type(shape).__name__)
+def test_segments_enter_shapes_where_the_distance_is_zero(shape):
+    """Against 4,001 points of each segment: the first that is inside, and none where none is."""
+    draw, share, met = np.random.default_rng(3), np.linspace(0.0, 1.0, 4001), 0
+    for number in range(600):
+        base, way = draw.uniform(-1.6, 1.6, 3), draw.uniform(-2.5, 2.5, 3)
+        if number % 3 == 0:
+            way[draw.integers(3)] = 0.0  # along a face
+        if number % 5 == 0:
+            way[:2] = 0.0  # along the axis
+        depth = distance(shape, base + share[:, None] * way)
+        t, nx, ny, nz, inside = ENTRIES[shape](Segment(*base, *way))
+        assert inside == (depth[0] < 0.0)
+        if inside or depth.min() > 1e-3:
+            assert not 0.0 <= t <= 1.0
+        elif depth.min() < 0.0:
+            met += 1
+            first = int(np.argmax(depth < 0.0))
+            assert share[first - 1] - 1e-9 <= t <= share[first] + 1e-9
+            at, normal = base + t * way, np.array([nx, ny, nz])
+            assert distance(shape, at[None])[0] == pytest.approx(0.0, abs=1e-12)
+            slope = [
+                distance(shape, (at + 1e-6 * axis)[None])[0] - distance(shape, (at - 1e-6 * axis)[None])[0]
+                for axis in np.eye(3)
+            ]
+            assert np.linalg.norm(normal) == pytest.approx(1.0, abs=1e-12)
+            assert normal @ slope / 2e-6 > 0.99  # along an edge the gradient is that of one of two faces
+    assert met > 30
+
+
+@pytest.mark.slow("Warp compiles the kernels")
+@pytest.mark.parametrize("shape", [Sphere(0.01), Capsule(0.01, 0.004), Plane()], ids=lambda shape: type(shape).__name__)
+def test_shapes_are_limits_of_fine_meshes(shape):
+    """A mesh of edges h lies h²/8R below the surface: forces differ by this times k, and by as much for the normals."""
+    import trimesh
+
+    from palpate.core.geometry.mesh import TriangleMesh
+
+    height, scale = 0.01, 1.0
+    solid = trimesh.creation.icosphere(subdivisions=5, radius=0.01)
+    edge = solid.edges_unique_length.max()
+    if isinstance(shape, Capsule):
+        solid.vertices += np.where(solid.vertices[:, 2:] < 0.0, -0.004, 0.004) * [0.0, 0.0, 1.0]
+        height = 0.014
+    if isinstance(shape, Plane):
+        solid, height, scale = trimesh.creation.box((0.2, 0.2, 0.2)), 0.0, 0.0
+        solid.apply_translation([0.0, 0.0, -0.1])
+    mesh = TriangleMesh(np.array(solid.vertices), np.array(solid.faces))
+    poses = random_poses(9, 5, 3, height=height)
+    poses[..., 3:] = [0.0, 1.0, 0.0, 0.0] if isinstance(shape, Plane) else [1.0, 0.0, 0.0, 0.0]  # the plane's top downwards
+    poses[:, :, 0, 3:] = [1.0, 0.0, 0.0, 0.0]
+    core, ours = PressedSensors(pad(6, 6), mesh, DT, 3), WarpSensors(pad(6, 6), shape, DT, 3)
+    bound = 1e-9 + scale * 6.0 * (1000.0 + 10.0 / DT) * edge**2 / (8 * 0.01)
+    for now in poses:
+        expected, found = core.step(now[:, 0], now[:, 1]).texels, ours.step(now[:, 0], now[:, 1]).texels.numpy()
+        assert expected[..., 0].max() > 0.1
+        assert np.abs(found - expected).max() < bound
+    assert bound < 0.1 * expected[..., 0].max() + 1e-8
+
+
+# --- physics
+
+
+def slide(pressed, tilt, steps, dt, mass=1.0, start=0.05):
+    """Let a cube go on a pad that is tilted about x, coupled explicitly; return where it was, by steps."""
+    pull = mass * 9.81 * np.array([0.0, -np.sin(tilt), -np.cos(tilt)])
+    where, speed, path = np.array([0.0, 0.0, start]), np.zeros(3), []
+    sensor, target = LEVEL[None], LEVEL[None].copy()
+    target[0, :3] = where
+    pressed.step(sensor, target)
+    for _ in range(steps):
+        speed += dt * (pressed.wrench.numpy()[0, 0, :3] + pull) / mass
+        where += dt * speed
+        target[0, :3] = where
+        pressed.step(sensor, target)
+        path.append(where.copy())
+    return np.array(path)
+
+
+def slope_sensor(dt):
+    return WarpSensors(pad(8, 8, k=1000.0, cn=10.0, sigma0=1000.0, sigma1=10.0), Box(0.05, 0.05, 0.05), dt, 1)
+
+
+@pytest.mark.slow("Warp compiles the kernels, and 2,000 steps")
+@pytest.mark.parametrize(("degrees", "weight", "shear"), [(0.0, 9.81, 0.0), (10.0, 9.6610, 1.7035)])
+def test_a_cube_at_rest_weighs_and_holds_what_it_should(degrees, weight, shear):
+    pressed = slope_sensor(5e-4)
+    slide(pressed, np.radians(degrees), 2000, 5e-4)
+    texels, wrench = pressed.texels.numpy()[0], pressed.wrench.numpy()[0, 0]
+    assert pressed.contact.numpy().all()
+    assert texels[:, 0].sum() == pytest.approx(weight, abs=1e-4)
+    assert wrench[:3] == pytest.approx([0.0, shear, weight], abs=1e-4)
+    along = np.abs(texels[:, 1:].sum(axis=0))
+    assert along.max() == pytest.approx(shear, abs=1e-3)
+    assert along.min() == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.long("120,000 steps of a minute on a slope")
+def test_friction_holds_for_a_minute():
+    path = slide(slope_sensor(5e-4), np.radians(10.0), 122_000, 5e-4)
+    assert np.abs(path[-1] - path[2000]).max() < 1e-6
+
+
+# --- use
+
+
+@pytest.mark.slow("Warp compiles the kernels")
+def test_environments_without_poses_are_flagged_and_the_others_go_on():
+    item, poses = pad(4, 4), random_poses(2, 4, 3)
+    core, ours = PressedSensors(item, CUBE, DT, 3), WarpSensors(item, CUBE, DT, 3)
+    for step, now in enumerate(poses):
+        if step == 1:
+            now[1, 1, 4] = np.nan
+        if step == 2:
+            now[2, 0, 3:] = 0.0
+        expected, found = core.step(now[:, 0], now[:, 1]), ours.step(now[:, 0], now[:, 1])
+        assert found.valid.numpy().tolist() == [True, step != 1, step != 2] == expected.valid.tolist()
+        for name in ("texels", "readings"):
+            assert np.abs(getattr(found, name).numpy() - getattr(expected, name)).max() < AGREE
+        assert np.abs(found.wrench.numpy()[:, 0] - expected.wrench).max() < AGREE
+    assert expected.texels.any()
+
+
+@pytest.mark.slow("Warp compiles the kernels in float32")
+def test_single_precision_errs_by_the_rounding_of_poses():
+    """Positions of 0.1 m round to 7e-9 m: of depth, times k; of the rate over a step, times cn, which is the larger part."""
+    item, poses = pad(5, 4), random_poses(5, 6, 4)
+    poses[..., :3] += [0.1, -0.1, 0.1]
+    double, single = (WarpSensors(item, CUBE, DT, 4, single=single) for single in (False, True))
+    for now in poses:
+        expected, found = (one.step(now[:, 0], now[:, 1]).texels.numpy() for one in (double, single))
+        assert found.dtype == np.float32
+        assert np.abs(found - expected).max() < 4 * 7e-9 * (1000.0 + 10.0 / DT)
+    assert np.abs(expected).max() > 0.1
+
+
+def test_what_makes_no_environments_is_one_sentence():
+    item = pad(4, 4)
+    noisy = replace(item, sensor=replace(item.sensor, effects=(effect("noise"),)))
+    for arguments, words in (
+        ((item, CUBE, 0.0, 2), "The step is 0 s"),
+        ((item, CUBE, DT, 0), "There are 0 environments"),
+        ((item, [], DT, 2), "Nothing presses on 'Pad'"),
+        ((item, ["cube"], DT, 2), "Target 1 is a str: give a TriangleMesh, Sphere"),
+        ((item, [CUBE, Sphere(-1.0)], DT, 2), r"Target 2 is Sphere\(radius=-1.0\): give finite sizes"),
+        ((item, CUBE, DT, 2, "cuda:77"), "Warp has no device 'cuda:77' here: take one of cpu"),
+        ((noisy, CUBE, DT, 2), r"The effect 'noise' \(\w+\) of 'Pad' has no Warp kernel: .* PressedSensors\.$"),
+    ):
+        with pytest.raises(ParameterError, match=words):
+            WarpSensors(*arguments)
+
+
+def test_poses_and_masks_of_another_shape_are_one_sentence():
+    many = WarpSensors(pad(4, 4), CUBE, DT, 2)
+    assert len(many) == 2 and "2 environments, 16 texels" in repr(many)
+    with pytest.raises(ParameterError, match=r"The poses of the target are float64 of shape \(3, 7\): .* \(2, 7\)\."):
+        many.step(np.zeros((2, 7)), np.zeros((3, 7)))
+    with pytest.raises(ParameterError, match=r"The poses of the sensor are .* of shape \(7,\)"):
+        many.step(["far"] * 7, np.zeros((2, 7)))
+    with pytest.raises(ParameterError, match=r"The mask of environments to reset is int64 of shape \(1,\)"):
+        many.reset(np.array([1]))
+    with pytest.raises(ParameterError, match=r"The mask of environments to reset is int32 of shape \(2,\) on cpu"):
+        many.reset(warp.zeros(2, dtype=warp.int32, device="cpu"))
+
+
+def test_warp_is_imported_only_on_demand():
+    code = "import sys, palpate; from palpate.core.simulators.warp import warp_sensors; print('warp' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "False"

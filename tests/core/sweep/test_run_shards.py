@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shards keep every group of runs that was brought onto the disk, and nothing of one that was cut off."""
+
+import errno
+import hashlib
+import os
+
+import pytest
+
+from palpate.attack.sweep_study import write_study
+from palpate.attack.trees import tree
+from palpate.core.errors import FileError
+from palpate.core.study import run_shards
+from palpate.core.study.run_files import RUNS, done_runs, run_batch
+from palpate.core.study.run_shards import KnownRuns, ShardIndex, ShardScan, append, digests_in
+from palpate.sweep.child import Scenes, compute_run
+from palpate.sweep.dataset import MOST_FILES, publish
+from palpate.sweep.report import write_report
+from palpate.sweep.study_folder import begin_study
+from palpate.sweep.worker import compute_batch, end_children
+
+COMMON = {"c" * 24: b"what they have in common"}
+
+
+@pytest.fixture
+def runs(tmp_path):
+    """A folder of runs in which this process has no shard yet."""
+    folder = tmp_path / "out" / "runs"
+    folder.mkdir(parents=True)
+    run_shards._open.pop(folder, None)
+    return folder
+
+
+def digest_of(number: int) -> str:
+    return hashlib.sha256(bytes((number,))).hexdigest()[:24]
+
+
+def content_of(number: int) -> bytes:
+    return bytes((number,)) * (1 + 37 * number)
+
+
+def put(folder, *numbers: int) -> None:
+    append(folder, folder.parent, {digest_of(number): content_of(number) for number in numbers}, COMMON)
+
+
+def shards(folder) -> list:
+    return sorted(folder.glob("*.shard"))
+
+
+def test_what_was_appended_is_read(runs):
+    assert digests_in(runs) == set()
+    put(runs, 1, 2, 3)
+    put(runs, 4)
+    put(runs, 5, 0)
+    assert len(shards(runs)) == 1 and digests_in(runs) == {digest_of(number) for number in range(6)}
+    index = ShardIndex(runs)
+    for number in range(6):
+        assert index.read(digest_of(number)) == content_of(number)
+        assert index.start(digest_of(number), 20) == content_of(number)[:20]
+    assert index.common("c" * 24) == COMMON["c" * 24]
+    assert index.size == sum(len(content_of(number)) for number in range(6))
+    assert digest_of(7) not in index
+    with pytest.raises(KeyError):
+        index.read(digest_of(7))
+
+
+def test_every_cut_leaves_the_groups_before_it(runs):
+    """At each byte of the file: as a kill leaves it, and as a power cut does, which may leave zeros or noise behind."""
+    ends = []
+    for numbers in ((1, 2), (3,), (4, 5)):
+        put(runs, *numbers)
+        ends.append(shards(runs)[0].stat().st_size)
+    (path,) = shards(runs)
+    whole = path.read_bytes()
+    groups = [{digest_of(1), digest_of(2)}, {digest_of(3)}, {digest_of(4), digest_of(5)}]
+    for cut in range(len(whole)):
+        expected = set().union(*(group for group, end in zip(groups, ends, strict=True) if end <= cut))
+        for tail in (b"", bytes(len(whole) - cut), bytes(byte ^ 255 for byte in whole[cut:])):
+            path.write_bytes(whole[:cut] + tail)
+            assert digests_in(runs) == expected, (cut, len(tail))
+
+
+def test_nothing_is_appended_to_a_shard_that_somebody_changed(runs):
+    put(runs, 1)
+    shards(runs)[0].write_bytes(shards(runs)[0].read_bytes()[:-1])
+    put(runs, 2)
+    assert digests_in(runs) == {digest_of(2)} and len(shards(runs)) == 2
+    assert ShardIndex(runs).common("c" * 24) == COMMON["c" * 24], "the new shard has it, too"
+    for path in shards(runs):
+        path.unlink()
+    put(runs, 3)
+    assert digests_in(runs) == {digest_of(3)}
+
+
+def test_a_run_that_two_processes_computed_is_there_once(runs):
+    put(runs, 1, 2)
+    run_shards._open.clear()
+    put(runs, 2, 3)
+    assert len(shards(runs)) == 2 and len(digests_in(runs)) == 3
+    assert ShardIndex(runs).read(digest_of(2)) == content_of(2)
+
+
+@pytest.mark.parametrize("operation", ["write", "fsync"])
+def test_a_full_disk_leaves_the_shard_as_it_was(runs, monkeypatch, operation):
+    put(runs, 1)
+    before = shards(runs)[0].read_bytes()
+
+    def full(*_words):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patched:
+        if operation == "fsync":
+            patched.setattr(os, "fsync", full)
+        else:
+            write = run_shards._write
+
+            def half(path, at, content, mode):
+                write(path, at, content[: len(content) // 2], mode)
+                full()
+
+            patched.setattr(run_shards, "_write", half)
+        with pytest.raises(OSError, match="No space"):
+            put(runs, 2)
+    assert shards(runs)[0].read_bytes() == before
+    put(runs, 3)
+    assert digests_in(runs) == {digest_of(1), digest_of(3)}
+
+
+def test_a_scan_goes_on_where_it_was(runs):
+    scan, known = ShardScan(runs), KnownRuns(runs)
+    assert not list(scan.new_groups()) and not known.among([digest_of(1)])
+    seen = []
+    for number in range(20):
+        if number == 10:
+            run_shards._open.clear()
+        put(runs, number)
+        ((_, _, table),) = scan.new_groups()
+        seen.append(len(table))
+        assert known.among([digest_of(number), digest_of(number // 2), digest_of(number + 1)]) == {
+            digest_of(number),
+            digest_of(number // 2),
+        }
+    assert seen == [2 if number in (0, 10) else 1 for number in range(20)]
+    assert len(known._keys) <= 5
+    for path in shards(runs):
+        path.unlink()
+    assert not known.among([digest_of(1)]), "it looks once more before it says that a run is done"
+
+
+def test_a_million_runs_are_in_ten_thousand_files(runs, monkeypatch):
+    """Shards and files of frames, of runs of 12 kB to 5 MB, by 1,000 processes; small sizes show that the rules hold."""
+    monkeypatch.setattr(run_shards, "SHARD_BYTES", 300)
+    for number in range(40):
+        put(runs, number % 10)
+    sizes = [path.stat().st_size for path in shards(runs)]
+    assert sum(size < 300 for size in sizes) <= 1 and len(sizes) <= 1 + sum(sizes) // 300
+    monkeypatch.undo()
+    for size in (12e3, 5e6):
+        in_shards = 1000 + 1e6 * size / run_shards.SHARD_BYTES
+        assert in_shards + MOST_FILES < 10_000
+
+
+@pytest.fixture
+def study(tmp_path):
+    """A study of six runs in two groups, and its runs."""
+    opened = begin_study(write_study(tmp_path / "study", 6), tmp_path / "study" / "out", lambda *_: None)
+    compute(opened, opened.runs[:4], opened.runs[4:])
+    return opened
+
+
+def compute(opened, *batches):
+    scenes = Scenes(opened.folder)
+    for runs in batches:
+        with run_batch(opened.folder) as batch:
+            for run in runs:
+                compute_run(scenes, run, batch.place)
+                batch.add(run.digest)
+
+
+def test_a_damaged_run_is_named_and_what_to_do_helps(study):
+    publish(study.folder, study.runs)
+    before = tree(study.folder / "dataset")
+    (path,) = shards(study.folder / RUNS)
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(FileError, match=rf"{path.name}' is damaged: delete this file and run the sweep again"):
+        publish(study.folder, study.runs)
+    assert tree(study.folder / "dataset") == before
+    path.unlink()
+    assert not done_runs(study.folder)
+    compute(study, study.runs)
+    publish(study.folder, study.runs)
+    assert tree(study.folder / "dataset") == before
+
+
+def test_runs_with_folders_give_the_same_dataset_and_report(study, tmp_path):
+    """A study that was begun when each run had a folder goes on with shards; one that asks for recordings keeps folders."""
+    publish(study.folder, study.runs)
+    write_report(study.folder, study.runs)
+    file = write_study(tmp_path / "other", 6)
+    file.write_text(file.read_text().replace("fps = 100", "fps = 100\nrecordings = true"))
+    other = begin_study(file, file.parent / "out", lambda *_: None)
+    compute(other, other.runs[:3])
+    assert len(list((other.folder / RUNS).glob("*/run.json"))) == 3
+    frozen = other.folder / "study.toml"
+    frozen.write_text(frozen.read_text().replace("recordings = true\n", ""))  # as a version before it was written
+    compute(other, other.runs[3:])
+    assert done_runs(other.folder) == {run.digest for run in study.runs} and len(shards(other.folder / RUNS)) == 1
+    publish(other.folder, other.runs)
+    assert tree(other.folder / "dataset") == tree(study.folder / "dataset")
+    assert (other.folder / "runs.parquet").read_bytes() == (study.folder / "runs.parquet").read_bytes()
+
+
+@pytest.mark.slow("starts the process of a worker")
+def test_a_run_that_is_done_is_not_computed_again(study):
+    words = [{"index": run.index, "scene": run.scene, "values": run.values, "digest": run.digest} for run in study.runs]
+    before = tree(study.folder / RUNS)
+    try:
+        assert [answer["status"] for answer in compute_batch(str(study.folder), words)] == ["done"] * 6
+    finally:
+        end_children()
+    assert tree(study.folder / RUNS) == before
