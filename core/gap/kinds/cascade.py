@@ -58,19 +58,10 @@ class Point:
     texel: dict[str, np.ndarray] = field(default_factory=dict)
 
     @property
-    def kinds(self) -> tuple[str, ...]:
-        """Names of its kinds, in alphabetical order."""
-        return tuple(sorted({member.kind for member in self.members}))
-
-    @property
     def displacement(self) -> tuple[float, ...]:
         """Displacement of the texels, m and rad."""
         own = self.coefficients.get(MISALIGNMENT.label)
         return (0.0,) * 6 if own is None else tuple(float(v) for v in own * POSE_SCALE)
-
-    def with_member(self, variant: Variant) -> Point:
-        """Return the same point with another member, which does nothing yet."""
-        return replace(self, members=(*self.members, variant))
 
     def of(self, variant: Variant) -> np.ndarray | None:
         """Return the coefficients of a member that does something, else None."""

@@ -108,7 +108,7 @@ class Recorded:
 
     @property
     def has_readings(self) -> bool:
-        """Whether any texel was read, rather than net forces alone."""
+        """True if any texel was read, rather than net forces alone."""
         return any(bool(np.isfinite(run.reading).any()) for run in self.runs)
 
     @property
@@ -157,7 +157,6 @@ def recorded(
     model: Model,
     free: Set[str],
     noise: tuple[ChannelNoise, ChannelNoise],
-    silent: np.ndarray | None = None,
 ) -> Recorded:
     """Return fitted recordings without units.
 
@@ -171,8 +170,6 @@ def recorded(
         Names of the parameters that the base model has free.
     noise : (ChannelNoise, ChannelNoise)
         Of readings and of net forces.
-    silent : (n,) bool, optional
-        Texels whose readings do not count, because they are dead.
     """
     rig, stride = predictors[0].rig, _stride(predictors)
     groups = _groups(predictors, stride)
@@ -184,7 +181,7 @@ def recorded(
     loads = source.loads()
     works = [_work(group, load * scale) for group, (load, _) in zip(groups, loads, strict=True)]
     source = replace(source, most_work=max(max(float(work.max(initial=0.0)) for work in works), 1e-300))
-    runs = tuple(_run(group, source, pair, work, silent) for group, pair, work in zip(groups, loads, works, strict=True))
+    runs = tuple(_run(group, source, pair, work) for group, pair, work in zip(groups, loads, works, strict=True))
     ranges = [np.ptp(run.force[np.isfinite(run.force)]) for run in runs if np.isfinite(run.force).any()]
     read = any(np.isfinite(run.reading).any() for run in runs)
     level = max(noise[1].deviation / scale, FORCE_RESOLUTION * float(max(ranges, default=1.0)) if read else 0.0)
@@ -222,7 +219,7 @@ def planned(recorded: Recorded, trial: Trial) -> Recorded:
     group = tuple(predictors_of([_thinned(replace(trial, reading=None, force=None), before.stride)], before.rig))
     source = replace(before, predictors=(group,), kept={})
     (pair,) = source.loads()
-    run = _run(group, source, pair, _work(group, pair[0] * source.scale), None)
+    run = _run(group, source, pair, _work(group, pair[0] * source.scale))
     weighs = any(np.isfinite(one.force).any() for one in recorded.runs)
     silent = np.all([~np.isfinite(one.reading).any(axis=0) for one in recorded.runs], axis=0)
     reading = np.where(silent, np.nan, np.zeros_like(run.reading)) if recorded.has_readings else run.reading
@@ -269,7 +266,6 @@ def _run(
     source: Source,
     pair: tuple[np.ndarray, np.ndarray],
     work: np.ndarray,
-    silent: np.ndarray | None,
 ) -> RecordedRun:
     """A run from the predictors of its trials; `work` is in joules."""
     (load, elastic), model, scale = pair, source.model, source.scale
@@ -290,8 +286,6 @@ def _run(
             assert predicted is not None
             friction = -(predicted @ axis) / scale - (load[rows] * towards[rows]).sum(axis=1)
             force[rows] = -(trial.force @ axis) / scale - friction
-    if silent is not None:
-        reading[:, silent] = np.nan
     middle = len(load) // 2
     return RecordedRun(
         stimulus.time,

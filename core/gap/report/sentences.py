@@ -28,7 +28,7 @@ MANY_FLOORS = 3.0
 LEAST_SHARE = 0.01
 """Smallest share of the residual that a quantity must predict to be named."""
 ASSUMED_SESSION = "If they were recorded in another order or with pauses that matter, name their session and its times."
-TOLD_BY = {
+EVIDENCE_TEXTS = {
     USE: " The gains fall with the accumulated load, not with time.",
     CLOCK: " The gains fall with time or the number of recordings, not with the accumulated load.",
     TEXELS: " All texels change alike, whatever their load: this is not wear of single texels.",
@@ -39,6 +39,7 @@ NOT_TOLD = (
     "The gains fall, and the recordings do not show whether with the accumulated load or with time: name their session and "
     "when they started, and load the sensor far more in some recordings than in others."
 )
+CHANGED_ONCE = "It follows neither the accumulated load nor time: check what was done to the sensor or its electronics before."
 FRICTION_MATTERS = 1.5
 """The headline mentions the base model's friction if without it the error would be at least this many times as large."""
 
@@ -62,12 +63,15 @@ def _outcome(result: Diagnosis, errors: GapErrors) -> str:
         return _effects(result, errors)
     own, after = result.between, errors.amended["fit"] or 0.0
     shrinks = f"the error shrinks from {own.before:.2%} to {after:.2%} of the range"
-    if own.rival:
+    if own.changed_from:
+        said = f"Between recordings the gain changes once, by {own.change_of_gain:+.0%} from '{own.changed_from}' on"
+        said += f" ({shrinks}). {CHANGED_ONCE}"
+    elif own.rival:
         said = f"Indistinguishable between recordings (each with its own level and gain): {own.name} or {own.rival}"
         said += f" ({shrinks}). {NOT_TOLD}"
     else:
         said = f"Missing: {own.name} between recordings (each with its own level and gain); {shrinks}."
-        said += f"{TOLD_BY[own.told_by]}{_odd_one(result)} Name their session to learn more."
+        said += f"{EVIDENCE_TEXTS[own.evidence]}{_odd_one(result)} Name their session to learn more."
     return f"{said} Also: {_effects(result, errors)}" if result.findings else said
 
 
@@ -113,7 +117,7 @@ def by_share_closed(result: Diagnosis) -> list[Finding]:
 
 
 def _is_noise(finding: Finding) -> bool:
-    """Whether a finding is noise, of which no model predicts a sample."""
+    """True if a finding is noise, of which no model predicts a sample."""
     return kind_of(finding.name).found_by == SCATTER
 
 

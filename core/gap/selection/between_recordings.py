@@ -21,7 +21,7 @@ from ..dataset.sessions import COMMON, TrialHistory, on_common_clocks
 from ..dataset.trial import Trial
 from ..forward.predictor import Model, Predictor, number_name
 from .identifiability import LOSING
-from .wear_or_drift import CLOCK, NOTHING, TEXELS, USE, texels_can_tell, told_by_recordings
+from .wear_or_drift import CLOCK, NOTHING, TEXELS, USE, changed_from, evidence_of_recordings, texels_can_tell
 
 LEAST_RECORDINGS = 3
 """Number of fitted recordings from which on they are compared: of two, each may be the odd one."""
@@ -59,10 +59,13 @@ class RecordingDifferences:
         NRMSE on the fitted recordings of the base model without them.
     factors, zeros : dict of str to float
         Of the fitted recordings, in order of the rig; zeros in the sensor's unit.
-    told_by : str
+    evidence : str
         What tells gains that fall apart as wear or drift (see :mod:`.wear_or_drift`); empty if nothing does, or if none fall.
     rival : str
         The other name, if gains fall and nothing tells which it is.
+    changed_from : str
+        The recording from which on gains are others, if they change once and neither with use nor with time: then the name is
+        in doubt. Empty if they do not.
     """
 
     name: str
@@ -71,8 +74,18 @@ class RecordingDifferences:
     before: float
     factors: dict[str, float]
     zeros: dict[str, float]
-    told_by: str = NOTHING
+    evidence: str = NOTHING
     rival: str = ""
+    changed_from: str = ""
+
+    @property
+    def change_of_gain(self) -> float:
+        """Ratio of the mean gains from :attr:`changed_from` on and before it, less 1; zero if gains do not change once."""
+        names = list(self.factors)
+        if self.changed_from not in names:
+            return 0.0
+        before, after = np.split(np.array(list(self.factors.values())), [names.index(self.changed_from)])
+        return float(after.mean() / before.mean()) - 1.0
 
     def odd_recording(self, full: float) -> OddRecording | None:
         """Return the recording that alone differs from the others; None if several do, or none.
@@ -152,7 +165,7 @@ def differences(
     full : float
         Range of the readings.
     texels_alike : bool
-        Whether gains that all texels share describe the recordings far better than what each texel was loaded with.
+        True if gains that all texels share describe the recordings far better than what each texel was loaded with.
     """
     names = [one.trial.name for one in order if one.trial.use == "fit"]
     factors = {name: model.recordings.get(number_name("factor", name), 1.0) for name in names}
@@ -160,13 +173,16 @@ def differences(
     confidence = round(0.5 + 0.5 * float(np.clip(closes, 0.0, 1.0)), 3)
     drift = RecordingDifferences(DRIFT, closes, confidence, before, factors, zeros)
     gain, level = np.array(list(factors.values())), np.array(list(zeros.values()))
-    order_of_gains = np.argsort(np.argsort(gain)), gain  # a gain that falls once has an order of chance on either side
-    falls = any(float(np.corrcoef(one, np.arange(len(gain)))[0, 1]) < WEAR_ORDER for one in order_of_gains if np.ptp(one) > 0)
-    if not falls or float(gain.std()) * full <= float(level.std()):
+    in_order = [(g, np.arange(len(g))) for g in (np.argsort(np.argsort(gain)), gain) if np.ptp(g) > 0]  # on either side of a
+    falls = any(float(np.corrcoef(g, number)[0, 1]) < WEAR_ORDER for g, number in in_order)  # change, ranks are of chance
+    if float(gain.std()) * full <= float(level.std()):
         return drift
     stimuli = [one.stimulus for one in order]
+    drift = replace(drift, changed_from=changed_from(stimuli, factors))
+    if not falls:
+        return drift
     by_texels = TEXELS if texels_alike and texels_can_tell(stimuli) else NOTHING
-    told_by = told_by_recordings(stimuli, factors) or by_texels
-    if told_by == NOTHING:
+    evidence = evidence_of_recordings(stimuli, factors) or by_texels
+    if evidence == NOTHING:
         return replace(drift, rival=WEAR)
-    return replace(drift, name=WEAR if told_by == USE else DRIFT, told_by=told_by)
+    return replace(drift, name=WEAR if evidence == USE else DRIFT, evidence=evidence)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tell wear from drift where recordings differ by their gains: gains that fall with use, or with the clock.
 
-The pauses between the recordings are not known. So gains that fall by as much from each recording to the next go with the clock
+Gains that change once, from one recording on, go with neither: nothing in the recordings says what changed. The pauses between
+the recordings are not known. So gains that fall by as much from each recording to the next go with the clock
 if the recordings load the sensor unequally, and gains that fall most where most was pressed go with use. Recordings that load
 the sensor alike tell nothing.
 """
@@ -50,8 +51,8 @@ def texels_can_tell(order: Sequence[Stimulus]) -> bool:
     return bool(high >= LEAST_RATIO_OF_LOADS * low)
 
 
-def told_by_recordings(order: Sequence[Stimulus], gains: dict[str, float]) -> str:
-    """Return whether gains of recordings follow use or clock, as :func:`told_by_courses` does.
+def evidence_of_recordings(order: Sequence[Stimulus], gains: dict[str, float]) -> str:
+    """Return whether gains of recordings follow use or clock, as :func:`evidence_of_courses` does.
 
     Parameters
     ----------
@@ -60,6 +61,23 @@ def told_by_recordings(order: Sequence[Stimulus], gains: dict[str, float]) -> st
     gains : dict of str to float
         Of those recordings that were fitted.
     """
+    return evidence_of_courses(*_courses(order, gains))
+
+
+def changed_from(order: Sequence[Stimulus], gains: dict[str, float]) -> str:
+    """Return the recording from which on gains are others, if they change once and neither with use nor clock; else empty.
+
+    Parameters
+    ----------
+    order, gains
+        As of :func:`evidence_of_recordings`.
+    """
+    first = change_of_level(*_courses(order, gains))
+    return "" if first is None else [one.trial.name for one in order if one.trial.name in gains][first]
+
+
+def _courses(order: Sequence[Stimulus], gains: dict[str, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Gains in the order of the recordings, and measures of use and of time at each of them."""
     chosen = [i for i, one in enumerate(order) if one.trial.name in gains]
     lengths = [float(np.ptp(one.time)) for one in order]
     rises = [float(np.maximum(np.diff(one.load, axis=0), 0.0).sum()) for one in order]
@@ -69,7 +87,7 @@ def told_by_recordings(order: Sequence[Stimulus], gains: dict[str, float]) -> st
     clocks = [pauses, lengths, [length + same for length in lengths]]
     values = np.array([gains[order[i].trial.name] for i in chosen])
     uses, times = (np.array([_middles(one)[chosen] for one in several]) for several in ([rises, impulses], clocks))
-    return told_by_courses(values, uses, times)
+    return values, uses, times
 
 
 def _middles(amounts: Sequence[float]) -> np.ndarray:
@@ -79,7 +97,7 @@ def _middles(amounts: Sequence[float]) -> np.ndarray:
     return found
 
 
-def told_by_courses(gains: np.ndarray, uses: np.ndarray, clocks: np.ndarray) -> str:
+def evidence_of_courses(gains: np.ndarray, uses: np.ndarray, clocks: np.ndarray) -> str:
     """Return what gains that fall go with.
 
     Parameters
@@ -96,12 +114,39 @@ def told_by_courses(gains: np.ndarray, uses: np.ndarray, clocks: np.ndarray) -> 
     """
     if len(gains) < LEAST_GAINS or not (gains > 0.0).all():
         return NOTHING
-    by_use, by_clock = (min(_left_share(gains, one**power) for one, power in product(m, POWERS)) for m in (uses, clocks))
-    free = len(gains) - (2 if len(gains) < BENT_FROM else 3)
-    least = float(scipy.stats.f.ppf(CHANCE, free, free))
+    by_use, by_clock = (_least_left(gains, courses) for courses in (uses, clocks))
+    least = _least_ratio(len(gains))
     if by_use < least * by_clock:
         return USE
     return CLOCK if by_clock < least * by_use else NOTHING
+
+
+def change_of_level(gains: np.ndarray, uses: np.ndarray, clocks: np.ndarray) -> int | None:
+    """Return the number of the first gain after a change, if two levels leave far less than any course; else None.
+
+    Parameters
+    ----------
+    gains, uses, clocks
+        As of :func:`evidence_of_courses`. Two levels and the place of the change are as many numbers as a parabola has.
+    """
+    if len(gains) < LEAST_GAINS or not (gains > 0.0).all():
+        return None
+    logs = np.log(gains)
+    left = [float(sum(((part - part.mean()) ** 2).sum() for part in np.split(logs, [i]))) for i in range(1, len(logs))]
+    share = max(min(left) / max(float(((logs - logs.mean()) ** 2).sum()), 1e-300), UNRESOLVED_SHARE)
+    by_course = min(_least_left(gains, uses), _least_left(gains, clocks))
+    return int(np.argmin(left)) + 1 if share < _least_ratio(len(gains)) * by_course else None
+
+
+def _least_ratio(count: int) -> float:
+    """Ratio of what two courses leave of so many gains below which it is no chance."""
+    free = count - (2 if count < BENT_FROM else 3)
+    return float(scipy.stats.f.ppf(CHANCE, free, free))
+
+
+def _least_left(gains: np.ndarray, courses: np.ndarray) -> float:
+    """What the best of some courses leaves."""
+    return min(_left_share(gains, one**power) for one, power in product(courses, POWERS))
 
 
 def _left_share(gains: np.ndarray, course: np.ndarray) -> float:

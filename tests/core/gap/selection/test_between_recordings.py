@@ -24,7 +24,15 @@ from palpate.core.gap.selection.between_recordings import (
 )
 from palpate.core.gap.selection.confidence import SURE
 from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.gap.selection.wear_or_drift import CLOCK, NOTHING, TEXELS, USE, texels_can_tell, told_by_courses
+from palpate.core.gap.selection.wear_or_drift import (
+    CLOCK,
+    NOTHING,
+    TEXELS,
+    USE,
+    change_of_level,
+    evidence_of_courses,
+    texels_can_tell,
+)
 from palpate.core.jobs.job_runner import run_job
 from palpate.core.model.sensor_parameters import SensorParameters
 
@@ -64,18 +72,47 @@ def test_levels_and_gains_are_named_between_recordings(change, name):
 def test_gains_that_fall_with_use_and_with_the_clock_are_told_apart_where_use_is_uneven():
     used, passed = np.array([0.02, 0.3, 0.34, 0.75, 0.8, 0.97]), (np.arange(6) + 0.5) / 6
     uses, clocks = np.array([used, used**1.1]), np.array([passed, passed])
-    assert told_by_courses(np.exp(-0.4 * used), uses, clocks) == USE
-    assert told_by_courses(1.0 - 0.4 * passed, uses, clocks) == CLOCK
-    assert told_by_courses(1.0 - 0.4 * used, np.array([passed]), clocks) == NOTHING
-    assert told_by_courses(np.exp(-0.4 * used)[:3], uses[:, :3], clocks[:, :3]) == NOTHING
-    assert told_by_courses(np.array([1.0, -0.1, 0.5, 0.4, 0.3, 0.2]), uses, clocks) == NOTHING
+    assert evidence_of_courses(np.exp(-0.4 * used), uses, clocks) == USE
+    assert evidence_of_courses(1.0 - 0.4 * passed, uses, clocks) == CLOCK
+    assert evidence_of_courses(1.0 - 0.4 * used, np.array([passed]), clocks) == NOTHING
+    assert evidence_of_courses(np.exp(-0.4 * used)[:3], uses[:, :3], clocks[:, :3]) == NOTHING
+    assert evidence_of_courses(np.array([1.0, -0.1, 0.5, 0.4, 0.3, 0.2]), uses, clocks) == NOTHING
+
+
+def test_a_gain_that_changes_once_goes_with_neither_use_nor_clock():
+    used, passed = np.array([0.02, 0.3, 0.34, 0.75, 0.8, 0.97]), (np.arange(6) + 0.5) / 6
+    uses, clocks = np.array([used, used**1.1]), np.array([passed, passed])
+    tremble = 0.002 * np.random.default_rng(0).normal(size=6)
+    for first in (1, 3, 5):
+        for size in (-0.15, 0.1):
+            gains = 1.0 + size * (np.arange(6) >= first) + tremble
+            assert change_of_level(gains, uses, clocks) == first
+            assert change_of_level(gains[1:], uses[:, 1:], clocks[:, 1:]) == (first - 1 or None)
+    for course in (used, passed, np.sqrt(used), 1.0 - np.exp(-3.0 * passed)):
+        assert change_of_level(1.0 - 0.3 * course + tremble, uses, clocks) is None
+    scattered = [
+        change_of_level(1.0 + 0.1 * rng.normal(size=6), uses, clocks) for rng in map(np.random.default_rng, range(300))
+    ]
+    assert sum(one is not None for one in scattered) < 0.1 * 300  # two levels and a parabola are equally free
+
+
+@pytest.mark.slow("a whole diagnosis of six recordings")
+def test_a_gain_that_falls_once_is_no_sure_drift():
+    count = iter(range(6))
+    rig = cases.rig(lambda force, time: force * (1.0 if next(count) < 4 else 0.85), seed=2, trials=6, seconds=8.0)
+    result = run_job(diagnose(rig))
+    assert result.between is not None and result.between.changed_from == "t4" and result.between.confidence < SURE
+    assert result.verdict == "explained" and not any(one.confidence >= SURE for one in result.findings)
+    errors = gap_errors(result)
+    assert headline(result, errors).startswith("Between recordings the gain changes once, by -15% from 't4' on")
+    assert summary(result, errors)["between_recordings"]["changed_from"] == "t4"
 
 
 def test_steps_drawn_at_random_are_hardly_ever_taken_for_use():
     rng, said = np.random.default_rng(3), []
     for _ in range(300):
         used, passed, fallen = (np.cumsum(np.exp(0.8 * rng.normal(size=6))) for _ in range(3))
-        said.append(told_by_courses(1.0 - 0.4 * fallen / fallen[-1], used[None] / used[-1], passed[None] / passed[-1]))
+        said.append(evidence_of_courses(1.0 - 0.4 * fallen / fallen[-1], used[None] / used[-1], passed[None] / passed[-1]))
     assert said.count(USE) < 0.1 * len(said)  # 5 % by the rule's chance, on either side, and twice its deviation of 1.7 %
 
 
@@ -103,23 +140,25 @@ def test_texels_can_tell_wear_from_drift_only_where_they_carry_unequal_loads():
 def test_gains_that_fall_alike_in_recordings_that_are_alike_are_wear_or_drift(monkeypatch):
     falling = 1.0 - 0.06 * np.arange(6)
     alike = differing(falling, [4] * 6, False)
-    assert (alike.name, alike.rival, alike.told_by) == ("drift", "wear", NOTHING)
+    assert (alike.name, alike.rival, alike.evidence) == ("drift", "wear", NOTHING)
     equal_loads = differing(falling, [4] * 6, True)
-    assert (equal_loads.rival, equal_loads.told_by) == ("wear", NOTHING), "wear of texels that carry the same is alike, too"
+    assert (equal_loads.rival, equal_loads.evidence) == ("wear", NOTHING), "wear of texels that carry the same is alike, too"
     with monkeypatch.context() as patch:
         patch.setattr(between_recordings, "texels_can_tell", lambda order: True)
         of_all_texels = differing(falling, [4] * 6, True)
-    assert (of_all_texels.name, of_all_texels.rival, of_all_texels.told_by) == ("drift", "", TEXELS)
+    assert (of_all_texels.name, of_all_texels.rival, of_all_texels.evidence) == ("drift", "", TEXELS)
     once = differing(np.array([0.999, 1.0, 1.001, 1.002, 0.9, 0.903]), [4] * 6, False)
-    assert (once.name, once.rival, once.told_by) == ("drift", "wear", NOTHING), (
+    assert (once.name, once.rival, once.evidence) == ("drift", "wear", NOTHING), (
         "a fall from one recording on is told by nothing"
     )
+    assert once.changed_from == "t4" and alike.changed_from == "" == differing(falling[::-1], [4] * 6, False).changed_from
+    assert once.change_of_gain == pytest.approx(-0.0989, abs=1e-3)
     scattered = differing(np.array([1.0, 0.9, 1.05, 0.95, 1.1, 0.97]), [4] * 6, False)
     assert (scattered.name, scattered.rival) == ("drift", "")
     amounts = [2, 16, 2, 2, 20, 4]
     used = (np.cumsum(amounts) - 0.5 * np.array(amounts)) / sum(amounts)
     worn = differing(np.exp(-0.4 * used), amounts, False)
-    assert (worn.name, worn.rival, worn.told_by) == ("wear", "", USE)
+    assert (worn.name, worn.rival, worn.evidence) == ("wear", "", USE)
     assert differing(falling[::-1], amounts, False).name == "drift"
 
 
