@@ -58,7 +58,7 @@ def _examined(kind: str, number: int) -> tuple[set[str], list[tuple[str, ...]], 
     sure = {one.name for one in result.findings if one.confidence >= SURE}
     if result.between is not None and result.between.confidence >= SURE:
         sure.add(result.between.name)
-    told = result.between.told_by if result.between else "session" if result.assumed_session else "-"
+    told = result.between.evidence if result.between else "session" if result.assumed_session else "-"
     print(f"  told by {told} ({clock.process_time() - began:.0f} s)", file=sys.stderr)
     return sure, result.ambiguous, result.verdict
 

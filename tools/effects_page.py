@@ -74,7 +74,7 @@ def section(kind) -> str:
         source = source_of(form.reference, cited)
         site = kind.site_of(form)
         marks = f" ({site})" * (site != kind.site) + "†" * form.after_conversion + "⚄" * form.random
-        formula = " ".join(form.formula.replace(" · ", "·").split())
+        formula = " ".join(form.formula.replace(" · ", "·").replace(" / ", "/").split())
         lines.append(f"- **{form.name}**{marks}: {formula}. *{source.removesuffix('.')}.*")
     return "\n".join([*lines, "", *parameter_lines(kind)]) + "\n"
 

@@ -8,7 +8,18 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 READ_BY_USERS = (
-    *("addon", "api", "commands", "core/effects", "core/export", "core/model", "core/simulators", "core/solver", "core/study"),
+    *(
+        "addon",
+        "api",
+        "commands",
+        "core/effects",
+        "core/export",
+        "core/gap",
+        "core/model",
+        "core/simulators",
+        "core/solver",
+        "core/study",
+    ),
     *("operators", "panels", "docs", "sweep"),
 )
 """Folders whose strings and pages a user reads."""
@@ -16,7 +27,6 @@ READ_BY_USERS = (
 INSTEAD = {
     r"\bAdvised (step|are)\b": "Recommended",
     r"\bTexels that touch\b": "Texels in contact",
-    r"\breading trembles\b": "reading is noisy",
     r"\bbrightest texel errs\b": "Largest texel error",
     r"\bsomething has changed since\b": "The scene has changed since this bake",
     r"\bwhich can do without\b": "optional",
@@ -40,6 +50,19 @@ INSTEAD = {
     r"\bgoes on where it was\b": "continues",
     r"\bWhat an impact loses\b": "Energy loss of an impact",
     r"\bshare 1 - α v\b": "Restitution",
+    r"\btold from (all )?others\b": "distinguishable from all others",
+    r"\b(is|are) to be told (apart|from)\b": "to distinguish",
+    r"\b[Nn]ot told apart\b": "indistinguishable",
+    r"\btrembl(e|es|ing)\b": "noisy, noise",
+    r"\bnone came near\b": "no close alternative",
+    r"\bmemory of the noise\b": "noise correlation",
+    r"\bsomething without load\b": "non-zero reading without load",
+    r"\ba first look (promised|found)\b": "screening estimate",
+    r"\b(borne|bears? (the|a|an) [\w ]{1,40}) out\b": "confirmed, passes, fails",
+    r"\bwhat is left (varies|of it|\()": "the residual",
+    r"\blooked at predicts\b": "does not correlate with any measured quantity",
+    r"\bnot held against\b": "does not count",
+    r"\b(may|only) makes? up for\b": "compensates for",
 }
 """Each expression, and the words to use in its place."""
 

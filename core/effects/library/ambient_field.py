@@ -41,7 +41,7 @@ def _parameters(unit: str, size: float, limit: float, what: str) -> tuple[Parame
 KIND = Kind(
     name="ambient-field",
     title="Ambient Field",
-    text="All magnetometers see the same field of their surroundings beside that of the magnets; channels come as x, y, z.",
+    text="All magnetometers also measure the field of their surroundings; channels come as x, y, z.",
     site="readout",
     order=65,
     forms=(

@@ -35,7 +35,7 @@ _POLYNOMIAL = "ISO/IEC Guide 99 (2007), 4.31: calibration curve, here with a sig
 KIND = Kind(
     name="channel-curve",
     title="Channel Curve",
-    text="Each channel has a curve of its own over the force: one rises, another falls, and both stiffen or saturate.",
+    text="Each channel has its own curve over the force: it rises or falls, and stiffens or saturates.",
     site="readout",
     order=42,
     forms=(
@@ -72,7 +72,7 @@ KIND = Kind(
             memoryless=curve,
         ),
     ),
-    experiment="press slowly up to the largest load and back, several times, at one place",
+    experiment="press slowly to the largest load and back, several times, at one place",
     drawing=Drawing(
         "force",
         values={

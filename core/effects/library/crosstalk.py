@@ -74,7 +74,7 @@ def couplings(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]
 KIND = Kind(
     name="crosstalk",
     title="Crosstalk",
-    text="The signal of a texel leaks into those of neighbours, of its lines, or of the texel that is scanned next.",
+    text="The signal of a texel leaks into neighbours, its lines or the texel scanned next.",
     site="readout",
     order=50,
     forms=(

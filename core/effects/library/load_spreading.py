@@ -110,7 +110,7 @@ KIND = Kind(
         Form(
             "open",
             "rᵢ = Σⱼ wᵢⱼ fⱼ,  wᵢⱼ = exp(−r²/2s²) / Σ exp(−r²/2s²) over all lattice points",
-            "Shimojo, IEEE Trans. Robot. Autom. 13 (1997), under a cover that is wider than the array: loads leave at the rim",
+            "Shimojo, IEEE Trans. Robot. Autom. 13 (1997): under a cover that is wider than the array: loads leave at the rim",
             (_WIDTH,),
             neutral={"width": 0.0},
             coupling=open_rim,

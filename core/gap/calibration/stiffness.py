@@ -47,7 +47,7 @@ class StiffnessFit:
         From the line with an offset.
     slope, slope_offset : float, Pa/m
     offset : Estimate, Pa
-        Pressure of the second line at compression zero. If it is negative, the foam yields before it carries.
+        Pressure of the second line at compression zero. If it is negative, the foam has a dead zone.
     dead_zone : float, metres
         Compression at which the second line becomes positive; zero if it is positive from the start.
     """

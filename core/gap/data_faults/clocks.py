@@ -161,7 +161,7 @@ def course_of(stimulus: Stimulus) -> Course | None:
 
 
 def _is_clearly_better(new: float, old: float) -> bool:
-    """Whether one correlation is so much larger than another one that this is no accident."""
+    """True if one correlation is so much larger than another one that this is no accident."""
     return new - old >= LEAST_GAIN and 1.0 - new < MOST_LEFT * (1.0 - old)
 
 
@@ -188,7 +188,7 @@ def _correlation_of_lag(stimulus: Stimulus, course: Course) -> float:
 def _stays_quiet_without_load(
     stimulus: Stimulus, prepared: tuple[np.ndarray, np.ndarray, np.ndarray, float], course: Course
 ) -> bool:
-    """Whether responses without load change far less if they are moved by a course; True if nothing is ever unloaded.
+    """True if responses without load change far less if they are moved by a course; True if nothing is ever unloaded.
 
     A sensor that answers to a part of its loads only, as one that softens does, may fit as well at another period of a
     recording that repeats itself. But then it would answer where nothing touches.
@@ -269,7 +269,7 @@ def _best_line(table: np.ndarray, shifts: np.ndarray, middles: np.ndarray, unshi
 
 
 def _returns_on_both_sides(load: np.ndarray) -> np.ndarray:
-    """Whether the load both rises and falls before and after the end of each window but the last, (windows - 1,) bool."""
+    """True if the load both rises and falls before and after the end of each window but the last, (windows - 1,) bool."""
     edges = _window_edges(len(load))
     ways = [np.add.reduceat(np.maximum(sign * load, 0.0).sum(axis=1), edges) for sign in (1.0, -1.0)]
 

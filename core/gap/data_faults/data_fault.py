@@ -29,7 +29,7 @@ class DataFault:
     corrections : dict of str to callable
         For each of these recordings a function that returns it without the fault.
     put_right : bool
-        Whether this was done.
+        True if this was done.
     """
 
     kind: str

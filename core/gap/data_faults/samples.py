@@ -95,7 +95,7 @@ def _frozen(stimulus: Stimulus, equal: np.ndarray) -> np.ndarray:
 
 
 def _is_coarse(stimulus: Stimulus, equal: np.ndarray) -> bool:
-    """Whether equal responses may be steps of a converter: between samples they change by a few steps only."""
+    """True if equal responses may be steps of a converter: between samples they change by a few steps only."""
     values = _responses(stimulus.trial)
     change = np.abs(np.diff(values, axis=0))
     step = np.where(change > 0, change, np.inf).min(axis=0, initial=np.inf)

@@ -42,7 +42,7 @@ class ColumnRule:
         Name of the column in the file; of texels with ``{}`` in place of the number.
     factor : float
     inverse : bool
-        Whether one over the values is wanted, before the factor.
+        True if one over the values is wanted, before the factor.
     first : int
         Number of the first texel.
     shift : float

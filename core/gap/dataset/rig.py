@@ -490,7 +490,7 @@ class _TrialReader:
 
 
 def _meaning(name: str) -> bool:
-    """Whether a column of this name is used."""
+    """True if a column of this name is used."""
     return name in ("time", "depth", "force", "temperature", *POSE, *TURN, *SLIDE, *FORCE) or name.startswith("texel_")
 
 
@@ -658,7 +658,7 @@ def _known_responses(part: np.ndarray | None, unknown: np.ndarray) -> np.ndarray
 
 
 def _responds(trial: Trial) -> bool:
-    """Whether a trial has any response that is not zero but for rounding."""
+    """True if a trial has any response that is not zero but for rounding."""
     parts = [part for part in (trial.reading, trial.force) if part is not None]
     return any(np.nanmax(np.abs(part), initial=0.0) > SMALLEST_RESPONSE for part in parts if not np.isnan(part).all())
 

@@ -41,7 +41,7 @@ class TrialHistory:
     started : float or None, s
         When its first sample was taken.
     has_date : bool or None
-        Whether the start was given as a date rather than as seconds; None without a start.
+        True if the start was given as a date rather than as seconds; None without a start.
     """
 
     session: str = ""
@@ -142,13 +142,13 @@ def on_common_clocks(
 
 
 def _go_on(trials: Sequence[Trial]) -> bool:
-    """Whether each trial begins after the one before it ended, in order of their beginnings."""
+    """True if each trial begins after the one before it ended, in order of their beginnings."""
     order = sorted(trials, key=lambda trial: float(trial.time[0]))
     return all(after.time[0] > before.time[-1] for before, after in zip(order[:-1], order[1:], strict=True))
 
 
 def _is_mixed(trials: Sequence[Trial]) -> bool:
-    """Whether forces are known in some trials and depths in others: no state of a sensor goes on between them."""
+    """True if forces are known in some trials and depths in others: no state of a sensor goes on between them."""
     return len({trial.stimulus == "force" for trial in trials}) > 1
 
 

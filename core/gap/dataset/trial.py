@@ -33,7 +33,7 @@ class Trial:
     session : str
         Name of the session in which the sensor's state goes on from recording to recording; empty if it belongs to none.
     tared : bool
-        Whether the responses of its first sample were subtracted from all its responses.
+        True if the responses of its first sample were subtracted from all its responses.
     factor, zero : str or float
         Numbers of this recording by which its readings differ from those of the sensor: they are multiplied (about the sensor's
         zero) and shifted. Of recordings without readings it is the net force that is multiplied. Free numbers have a name.

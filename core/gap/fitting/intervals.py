@@ -44,7 +44,7 @@ class ParameterInterval:
 
     @property
     def fills_bounds(self) -> bool:
-        """Whether the recordings tell no more of the parameter than its bounds do."""
+        """True if the recordings tell no more of the parameter than its bounds do."""
         return self.low <= self.bounds[0] and self.high >= self.bounds[1]
 
 

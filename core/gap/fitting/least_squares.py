@@ -62,7 +62,7 @@ class FreeParameter:
     low, high : float
         Bounds.
     log : bool
-        Whether it is fitted on a logarithmic scale.
+        True if it is fitted on a logarithmic scale.
     scale : float
         A change that matters, for parameters that are not on a logarithmic scale.
     per_texel : bool
@@ -144,7 +144,7 @@ class TrialView:
     stretch_count : int
         Number of stretches of time into which the trial is cut if a part of it has to be left out of a fit.
     with_forces : bool
-        Whether measured net forces are part of the residual.
+        True if measured net forces are part of the residual.
     """
 
     predictor: Predictor
@@ -293,7 +293,7 @@ def fit(
         Derivatives by the first `frozen` parameters are computed once and kept for all steps, unless no step with them leads
         down. This takes more steps and ends at the same place.
     with_equations : bool
-        Whether the normal equations at the end are wanted as well.
+        True if the normal equations at the end are wanted as well.
     initial_derivatives : sequence of (frozen or more, T, c + 3) float, optional
         Derivatives by the first parameters, for each view, near the start.
     """

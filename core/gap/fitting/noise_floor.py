@@ -201,15 +201,15 @@ class Coverage:
         Ratio of fast to slow loading: 90th to 10th percentile of the speed during loading.
     longest_hold : float, s
     unloading : bool
-        Whether a load ever decreased by more than a tenth of the largest.
+        True if a load ever decreased by more than a tenth of the largest.
     cycles : int
         Number of times that contact began, in the trial or session with most.
     slides : bool
-        Whether a surface slid over the sensor.
+        True if a surface slid over the sensor.
     unloaded_share : float
         Share of a trial between the first and the last time that a texel was unloaded; the largest of all trials.
     load_moves : bool
-        Whether the load moved over the texels, or touched most of them.
+        True if the load moved over the texels, or touched most of them.
     held_load_ratio : float
         Ratio of the largest to the smallest load that was held.
     """
@@ -322,7 +322,7 @@ def _cycle_count(load: np.ndarray, band: float) -> int:
 
 
 def _load_moves(centre: np.ndarray, area: np.ndarray, touched: np.ndarray) -> bool:
-    """Whether the centre of the load (T, 3) moved by more than the width of a texel, or most texels are touched."""
+    """True if the centre of the load (T, 3) moved by more than the width of a texel, or most texels are touched."""
     if len(centre) == 0 or touched.mean() > MOST_OF_THE_TEXELS:
         return True
     return float(np.ptp(centre, axis=0).max()) > float(np.sqrt(np.median(area)))

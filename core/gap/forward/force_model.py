@@ -44,7 +44,7 @@ class ContactSamples(NamedTuple):
     sample, texel : (m,) int
         Index of the sample in the trial, and of the texel or group.
     continues : (m,) bool
-        Whether the sample before was in contact too.
+        True if the sample before was in contact too.
     weight : (m,) float
         Number of equal texels; under a cover the sum of their shares of a texel.
     normal : (m, 3) float

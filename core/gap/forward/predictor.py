@@ -59,7 +59,7 @@ class Model:
 
     @cached_property
     def is_stepped(self) -> bool:
-        """Whether readings come in steps."""
+        """True if readings come in steps."""
         return any(kind_of(e.name).found_by == STEPS for e in self.effects)
 
     @cached_property
@@ -314,7 +314,7 @@ class Predictor:
         subset : (c,) int, optional
             Only these texels. This is right only if no effect couples texels.
         with_forces : bool
-            Whether the net force is wanted, if it was measured.
+            True if the net force is wanted, if it was measured.
         """
         wanted = with_forces and self.trial.force is not None
         reading = self.responses.reading(model, subset)[self.samples]

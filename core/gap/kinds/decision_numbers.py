@@ -24,7 +24,7 @@ LEAST_SHARE_TOLD = 0.1
 """Share of a signal that another kind has to leave. By eye: a sensor's own formula differs from all that are known, so that the
 right kind leaves a part of the gap as well."""
 TOLD_APART = 0.04
-"""An effect that changes readings by this share of full load should be told from others: the least size of the hidden effects
+"""An effect that changes readings by this share of full load should be distinguishable: the least size of the hidden effects
 of benchmarks/_hidden."""
 LEAST_EXCESS = 0.284
 """Least excess that tells a kind from another, in units of what no fit resolves. By eye: a further effect must lower what is

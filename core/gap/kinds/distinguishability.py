@@ -51,7 +51,7 @@ class KindSignal:
 
 @dataclass(frozen=True)
 class Distinction:
-    """Whether recordings tell one kind from another.
+    """Share of a kind's signal that another kind cannot imitate.
 
     Attributes
     ----------
@@ -60,7 +60,8 @@ class Distinction:
     share : float
         Of the square of its signal, that the other kind cannot imitate: 0 to 1.
     smallest : float
-        Least effect that is told from the other kind: root mean square of what it does to the readings, full load being 1.
+        Least effect that is distinguishable from the other kind: root mean square of its change of the
+        readings, full load being 1.
     """
 
     signal: str
@@ -70,7 +71,7 @@ class Distinction:
 
     @property
     def is_told(self) -> bool:
-        """Whether an effect of a usual size is told from the other kind, although its formula may be another one."""
+        """True if an effect of a usual size is distinguishable from the other kind, although its formula may be another one."""
         return self.margin >= 1.0
 
     @property
@@ -130,7 +131,7 @@ class Comparison:
         further : Trial, optional
             One recording more, of which only the stimulus counts.
         wanted : set of (str, str), optional
-            Directions of kinds and the other kinds that they are to be told from; all of them if it is left out.
+            Directions of kinds and the kinds to distinguish them from; all of them by default.
         """
         equations = self._equations
         if further is not None:

@@ -108,7 +108,7 @@ class Recorded:
 
     @property
     def has_readings(self) -> bool:
-        """Whether any texel was read, rather than net forces alone."""
+        """True if any texel was read, rather than net forces alone."""
         return any(bool(np.isfinite(run.reading).any()) for run in self.runs)
 
     @property

@@ -109,7 +109,7 @@ def spoiled_samples(
 
 
 def _is_spike(value: np.ndarray, begin: int, end: int) -> bool:
-    """Whether a few samples leave the way between those before and after them."""
+    """True if a few samples leave the way between those before and after them."""
     if end - begin > LONGEST_SPIKE:
         return False
     before, after = float(value[begin - 1]), float(value[end])

@@ -25,7 +25,7 @@ BEST_KEPT = 4
 """Number of best programmes of which one is changed at a time."""
 
 Question = frozenset[tuple[str, str]]
-"""Directions of kinds, each with the kind that it is to be told from."""
+"""Directions of kinds, each with the kind to distinguish it from."""
 
 
 @dataclass(frozen=True)

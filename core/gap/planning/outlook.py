@@ -29,7 +29,7 @@ class Outlook:
     ----------
     distinction : Distinction
     is_shown : bool
-        Whether the recordings contain what the kind that acts is known by, such as an unloading, or a second place.
+        True if the recordings contain what the kind that acts is known by, such as an unloading, or a second place.
     """
 
     distinction: Distinction
@@ -47,7 +47,7 @@ class Outlook:
 
     @property
     def is_told(self) -> bool:
-        """Whether an effect of a usual size is told from the other kind."""
+        """True if an effect of a usual size is distinguishable from the other kind."""
         return self.is_shown and self.distinction.is_told
 
     @property

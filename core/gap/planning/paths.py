@@ -153,7 +153,7 @@ class Ground:
 
     @property
     def is_posed(self) -> bool:
-        """Whether the rig knows poses, rather than depths or forces."""
+        """True if the rig knows poses, rather than depths or forces."""
         return self.like.stimulus == "pose"
 
     @property
@@ -245,7 +245,7 @@ class Ground:
         return high
 
     def _touches(self, heights: np.ndarray) -> np.ndarray:
-        """Whether the probe touches at heights over its places, (m,) bool."""
+        """True if the probe touches at heights over its places, (m,) bool."""
         count = len(self.places)
         position = self.places + heights[:, None] * self.up
         nothing = np.zeros((count, 2))

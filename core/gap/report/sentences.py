@@ -28,7 +28,7 @@ MANY_FLOORS = 3.0
 LEAST_SHARE = 0.01
 """Smallest share of the residual that a quantity must predict to be named."""
 ASSUMED_SESSION = "If they were recorded in another order or with pauses that matter, name their session and its times."
-TOLD_BY = {
+EVIDENCE_TEXTS = {
     USE: " The gains fall with the accumulated load, not with time.",
     CLOCK: " The gains fall with time or the number of recordings, not with the accumulated load.",
     TEXELS: " All texels change alike, whatever their load: this is not wear of single texels.",
@@ -71,7 +71,7 @@ def _outcome(result: Diagnosis, errors: GapErrors) -> str:
         said += f" ({shrinks}). {NOT_TOLD}"
     else:
         said = f"Missing: {own.name} between recordings (each with its own level and gain); {shrinks}."
-        said += f"{TOLD_BY[own.told_by]}{_odd_one(result)} Name their session to learn more."
+        said += f"{EVIDENCE_TEXTS[own.evidence]}{_odd_one(result)} Name their session to learn more."
     return f"{said} Also: {_effects(result, errors)}" if result.findings else said
 
 
@@ -117,7 +117,7 @@ def by_share_closed(result: Diagnosis) -> list[Finding]:
 
 
 def _is_noise(finding: Finding) -> bool:
-    """Whether a finding is noise, of which no model predicts a sample."""
+    """True if a finding is noise, of which no model predicts a sample."""
     return kind_of(finding.name).found_by == SCATTER
 
 

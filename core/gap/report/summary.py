@@ -99,7 +99,7 @@ def _between(result: Diagnosis) -> dict[str, Any] | None:
         "closes": round(own.closes, 4),
         "gap_before": own.before,
         "confidence": own.confidence,
-        "told_by": own.told_by or None,
+        "evidence": own.evidence or None,
         "rival": own.rival or None,
         "changed_from": own.changed_from or None,
     }

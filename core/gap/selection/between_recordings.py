@@ -21,7 +21,7 @@ from ..dataset.sessions import COMMON, TrialHistory, on_common_clocks
 from ..dataset.trial import Trial
 from ..forward.predictor import Model, Predictor, number_name
 from .identifiability import LOSING
-from .wear_or_drift import CLOCK, NOTHING, TEXELS, USE, changed_from, texels_can_tell, told_by_recordings
+from .wear_or_drift import CLOCK, NOTHING, TEXELS, USE, changed_from, evidence_of_recordings, texels_can_tell
 
 LEAST_RECORDINGS = 3
 """Number of fitted recordings from which on they are compared: of two, each may be the odd one."""
@@ -59,7 +59,7 @@ class RecordingDifferences:
         NRMSE on the fitted recordings of the base model without them.
     factors, zeros : dict of str to float
         Of the fitted recordings, in order of the rig; zeros in the sensor's unit.
-    told_by : str
+    evidence : str
         What tells gains that fall apart as wear or drift (see :mod:`.wear_or_drift`); empty if nothing does, or if none fall.
     rival : str
         The other name, if gains fall and nothing tells which it is.
@@ -74,7 +74,7 @@ class RecordingDifferences:
     before: float
     factors: dict[str, float]
     zeros: dict[str, float]
-    told_by: str = NOTHING
+    evidence: str = NOTHING
     rival: str = ""
     changed_from: str = ""
 
@@ -165,7 +165,7 @@ def differences(
     full : float
         Range of the readings.
     texels_alike : bool
-        Whether gains that all texels share describe the recordings far better than what each texel was loaded with.
+        True if gains that all texels share describe the recordings far better than what each texel was loaded with.
     """
     names = [one.trial.name for one in order if one.trial.use == "fit"]
     factors = {name: model.recordings.get(number_name("factor", name), 1.0) for name in names}
@@ -182,7 +182,7 @@ def differences(
     if not falls:
         return drift
     by_texels = TEXELS if texels_alike and texels_can_tell(stimuli) else NOTHING
-    told_by = told_by_recordings(stimuli, factors) or by_texels
-    if told_by == NOTHING:
+    evidence = evidence_of_recordings(stimuli, factors) or by_texels
+    if evidence == NOTHING:
         return replace(drift, rival=WEAR)
-    return replace(drift, name=WEAR if told_by == USE else DRIFT, told_by=told_by)
+    return replace(drift, name=WEAR if evidence == USE else DRIFT, evidence=evidence)

@@ -174,7 +174,7 @@ class Candidate:
 
     @property
     def has_texel_parameters(self) -> bool:
-        """Whether it has parameters of single texels."""
+        """True if it has parameters of single texels."""
         return any(p.per_texel for p in self.form.parameters)
 
     def free_parameters(self, index: int, scales: Scales, gain: float) -> list[FreeParameter]:
@@ -370,7 +370,7 @@ def _without(form: Form, names: Sequence[str]) -> Form:
 
 
 def _needs_rows(form: Form) -> bool:
-    """Whether a form is only defined for texels in rows and columns."""
+    """True if a form is only defined for texels in rows and columns."""
     if form.memoryless is None or any(p.per_texel for p in form.parameters):
         return False
     site = TransducerArray(np.zeros((1, 3)), np.full(1, 9e-6))

@@ -78,7 +78,7 @@ class CheckOutcome:
 
     @property
     def is_refuted(self) -> bool:
-        """Whether the amended model fails on readings or forces."""
+        """True if the amended model fails on readings or forces."""
         return self.refutes(READINGS) or self.refutes(FORCES)
 
     @property

@@ -55,7 +55,7 @@ class CompandedSteps:
     Attributes
     ----------
     logarithmic : bool
-        Whether the transform is ``ln(1 + r/A)``; else it is a power.
+        True if the transform is ``ln(1 + r/A)``; else it is a power.
     bend : float
         By which power of the reading the steps grow at `middle`: zero for even steps, one half behind a square root.
     middle : float

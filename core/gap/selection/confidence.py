@@ -133,7 +133,7 @@ def may_absorb_misfit(effect: Effect, state: SelectionState) -> bool:
 
 
 def _has_texel_numbers(effect: Effect) -> bool:
-    """Whether an effect has a parameter of which each texel has its own value."""
+    """True if an effect has a parameter of which each texel has its own value."""
     return any(isinstance(value, tuple) for value in effect.values.values())
 
 
@@ -166,7 +166,7 @@ def unsettled_parameters(effect: Effect, index: int, result: Diagnosis, lead: fl
 
 
 def _larger_effect_of_same_kind(effect: Effect, state: SelectionState, fitted: Sequence[Effect], gap_sizes: GapSizes) -> bool:
-    """Whether a similar effect closes more already, so that this one may be the misfit of its formula.
+    """True if a similar effect closes more already, so that this one may be the misfit of its formula.
 
     Load spreading and crosstalk both pass load on to neighbours. Wear and softening both take force away with use. A nonlinear
     contact law and a nonlinear readout both bend the readings, but only the contact law bends the net force.
@@ -181,7 +181,7 @@ def _larger_effect_of_same_kind(effect: Effect, state: SelectionState, fitted: S
 
 
 def _describes_dead_texels(effect: Effect, fitted: Sequence[Effect]) -> bool:
-    """Whether the variation of an effect over the texels is mostly on dead texels, which still answer a little."""
+    """True if the variation of an effect over the texels is mostly on dead texels, which still answer a little."""
     for other in fitted:
         dead = np.asarray(other.values.get("dead", 0.0))
         for value in effect.values.values():
@@ -234,7 +234,7 @@ def unsure_names(result: Diagnosis, view_set: ViewSet, state: SelectionState, ga
 
 
 def _closes_most(name: str, others: set[str], state: SelectionState, gap_sizes: GapSizes) -> bool:
-    """Whether an effect closes most of the gap, and each of some others little of it beside the rest.
+    """True if an effect closes most of the gap, and each of some others little of it beside the rest.
 
     What it closes alone counts as well: beside an effect that imitates a part of it, it closes less.
     """

@@ -52,7 +52,7 @@ from .outlying_channels import outlying_channels, without_channels
 from .screening import screen
 from .verdict import conclude
 from .view_set import ViewSet, view_set_of
-from .wear_or_drift import USE, texels_can_tell, told_by_recordings
+from .wear_or_drift import USE, evidence_of_recordings, texels_can_tell
 
 TOTAL_WORK = 1000
 BASE_MODEL_BEGINS, SELECTION_BEGINS = 40, 60
@@ -121,7 +121,7 @@ def _progress_of(
 
 
 def _is_settled(plain: _Search) -> bool:
-    """Whether recordings that each begin with an untouched sensor leave nothing to say about differences between them."""
+    """True if recordings that each begin with an untouched sensor leave nothing to say about differences between them."""
     return plain.result.verdict == "no gap" or (
         plain.result.verdict == "explained" and plain.left < SETTLED_SHARE * plain.left_of_base
     )
@@ -164,7 +164,7 @@ class _Search:
     closes : float
         Share of the gap that is closed before the search for effects, by what recordings do not share.
     is_wanted : bool
-        Whether this is enough for a search for effects.
+        True if this is enough for a search for effects.
     left_by_load : float
         What wear or softening alone leaves, in a search of one session.
     """
@@ -234,7 +234,7 @@ def _search_of_one_session(plain: _Search) -> _Search | None:
 
 
 def _is_one_session(session: _Search, plain: _Search) -> bool:
-    """Whether what recordings remember of each other explains them far better than if each begins untouched."""
+    """True if what recordings remember of each other explains them far better than if each begins untouched."""
     result = session.result
     remembers = any(one.name in LOAD_HISTORY and one.confidence > UNSURE_CONFIDENCE for one in result.findings)
     return remembers and result.verdict == "explained" and session.left < MOST_LEFT * plain.left
@@ -253,7 +253,7 @@ def _doubt_wear(session: _Search, own: _Search) -> None:
     }
     by_texels = texels_can_tell(stimuli) and session.left < MOST_LEFT * own.left_of_base
     wears = any(one.name == WEAR and one.confidence > UNSURE_CONFIDENCE for one in result.findings)
-    if wears and not by_texels and told_by_recordings(stimuli, factors) != USE:
+    if wears and not by_texels and evidence_of_recordings(stimuli, factors) != USE:
         result.findings = [_in_doubt(one) if one.name == WEAR else one for one in result.findings]
         result.ambiguous.append((WEAR, DRIFT))
 

@@ -123,7 +123,7 @@ class Diagnosis:
     alike : Diagnosis or None
         The same recordings without levels and gains of their own, if `between` is given: what the gap was before them.
     assumed_session : bool
-        Whether the recordings, of which the rig names no session, are explained as one session in their order.
+        True if the recordings, of which the rig names no session, are explained as one session in their order.
     check : CheckOutcome
         What the check recordings say of the amended model, or of the base model if there are no effects.
     outlying : list of OutlyingChannel

@@ -318,7 +318,7 @@ class ForwardSelection:
         return SelectionState(best.fit, best.held_out, {**state.steps, name: step}, {**state.improvements, name: improvement})
 
     def _earns_its_place(self, one: FittedCandidate, state: SelectionState, first: bool) -> bool:
-        """Whether a candidate closes enough of the gap, and does worse in hardly any trial."""
+        """True if a candidate closes enough of the gap, and does worse in hardly any trial."""
         g, quantity = self.gap_sizes, self.gap_sizes.quantity_for(one.candidate.name)
         before, after = state.means[quantity], means_of(one.held_out, one.fit)[quantity]
         gained, left = float(before - after), max(float(before - g.noise[quantity]), 1e-12)
@@ -341,7 +341,7 @@ class ForwardSelection:
         return len(state.fit.model.effects)
 
     def _is_gap_open(self, state: SelectionState, structure: StructureOfFit) -> bool:
-        """Whether enough is left that a further effect could improve the model."""
+        """True if enough is left that a further effect could improve the model."""
         g, mean = self.gap_sizes, float(state.means[self.gap_sizes.main_quantity])
         if state.fit.model.is_stepped:
             return False  # the rest lies within a quantization step
@@ -428,12 +428,12 @@ class ForwardSelection:
 
 
 def _is_displaced(state: SelectionState) -> bool:
-    """Whether an effect of the model displaces the texels."""
+    """True if an effect of the model displaces the texels."""
     return any(form_of(effect.name, effect.form).placement is not None for effect in state.fit.model.effects)
 
 
 def _is_at_bounds(one: FittedCandidate) -> bool:
-    """Whether a parameter of a fitted candidate is at a bound."""
+    """True if a parameter of a fitted candidate is at a bound."""
     return bool(parameters_at_bounds(one.fit.model, one.fit.free, len(one.fit.model.effects) - 1))
 
 

@@ -51,7 +51,7 @@ class GapSizes:
 
     @property
     def both(self) -> bool:
-        """Whether readings and net forces were measured."""
+        """True if readings and net forces were measured."""
         return bool((self.count > 0).all())
 
     @property

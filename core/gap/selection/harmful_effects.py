@@ -44,7 +44,7 @@ def without_harmful_effects(
 
 
 def _is_worse_in_all(check: Sequence[TrialView], without: Model, beside: Model, gap_sizes: GapSizes, quantity: int) -> bool:
-    """Whether an effect raises the mean square of all check recordings together by more than their noise."""
+    """True if an effect raises the mean square of all check recordings together by more than their noise."""
     outcomes = [checked_recording(view, without, beside, gap_sizes, (1.0, 1.0)) for view in check]
     count = np.array([one.count[quantity] for one in outcomes])
     if not count.any():

@@ -47,7 +47,7 @@ def is_plausible(found: FittedCandidate, view_set: ViewSet) -> bool:
 
 
 def is_height_alone(model: Model, index: int, view_set: ViewSet) -> bool:
-    """Whether a fitted displacement of the texels is hardly more than a height.
+    """True if a fitted displacement of the texels is hardly more than a height.
 
     Then contact begins earlier or later than the rig says, and nothing else is known of the place of the sensor. A gap at small
     loads, hysteresis or adhesion look much the same. The squares of the model are compared with those of the model without its
@@ -66,7 +66,7 @@ def is_height_alone(model: Model, index: int, view_set: ViewSet) -> bool:
 
 
 def _loss_comes_to_an_end(found: FittedCandidate) -> bool:
-    """Whether a fitted loss is over when its session ends: no path is at the bound that says so."""
+    """True if a fitted loss is over when its session ends: no path is at the bound that says so."""
     index, paths = len(found.fit.model.effects) - 1, found.candidate.form.over_within
     at = parameters_at_bounds(found.fit.model, found.fit.free, index)
     own = (item for item in found.fit.free if item.effect == index and item.name in paths)
@@ -74,7 +74,7 @@ def _loss_comes_to_an_end(found: FittedCandidate) -> bool:
 
 
 def _adhesion_pulls(found: FittedCandidate, view_set: ViewSet) -> bool:
-    """Whether readings are negative where fitted adhesion predicts a pull, and there is such a place."""
+    """True if readings are negative where fitted adhesion predicts a pull, and there is such a place."""
     predicted, measured = [], []
     for view in view_set.whole:
         p = found.fit.model.parameters
@@ -91,7 +91,7 @@ def _adhesion_pulls(found: FittedCandidate, view_set: ViewSet) -> bool:
 
 
 def _offset_is_present_unloaded(found: FittedCandidate, view_set: ViewSet) -> bool:
-    """Whether a fitted offset is measured without load, from the beginning of the trials on and in each of them.
+    """True if a fitted offset is measured without load, from the beginning of the trials on and in each of them.
 
     What appears only under load, or with time (as the misfit of a drift's formula does), is something else. So is what appears
     from recording to recording, as the drift of a session that differs from texel to texel does.
@@ -119,7 +119,7 @@ def _offset_is_present_unloaded(found: FittedCandidate, view_set: ViewSet) -> bo
 
 
 def _is_supported(claimed: np.ndarray, total: np.ndarray, count: np.ndarray, is_common: bool) -> bool:
-    """Whether the mean of each texel's samples agrees with the claimed offsets; True if there are too few samples."""
+    """True if the mean of each texel's samples agrees with the claimed offsets; True if there are too few samples."""
     resting = count >= ENOUGH_SAMPLES
     if resting.sum() < 2:
         return True

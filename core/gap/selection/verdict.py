@@ -156,7 +156,7 @@ def _least_share_closed(result: Diagnosis, left_out: list[float], quantity: int)
 
 
 def _is_out_of_reach(result: Diagnosis, gap_sizes: GapSizes, quantity: int) -> bool:
-    """Whether effects on friction are all there is, and what readings leave would be no gap by itself.
+    """True if effects on friction are all there is, and what readings leave would be no gap by itself.
 
     Friction cannot change readings, so the share of their gap that it closes does not count.
     """

@@ -51,8 +51,8 @@ def texels_can_tell(order: Sequence[Stimulus]) -> bool:
     return bool(high >= LEAST_RATIO_OF_LOADS * low)
 
 
-def told_by_recordings(order: Sequence[Stimulus], gains: dict[str, float]) -> str:
-    """Return whether gains of recordings follow use or clock, as :func:`told_by_courses` does.
+def evidence_of_recordings(order: Sequence[Stimulus], gains: dict[str, float]) -> str:
+    """Return whether gains of recordings follow use or clock, as :func:`evidence_of_courses` does.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def told_by_recordings(order: Sequence[Stimulus], gains: dict[str, float]) -> st
     gains : dict of str to float
         Of those recordings that were fitted.
     """
-    return told_by_courses(*_courses(order, gains))
+    return evidence_of_courses(*_courses(order, gains))
 
 
 def changed_from(order: Sequence[Stimulus], gains: dict[str, float]) -> str:
@@ -70,7 +70,7 @@ def changed_from(order: Sequence[Stimulus], gains: dict[str, float]) -> str:
     Parameters
     ----------
     order, gains
-        As of :func:`told_by_recordings`.
+        As of :func:`evidence_of_recordings`.
     """
     first = change_of_level(*_courses(order, gains))
     return "" if first is None else [one.trial.name for one in order if one.trial.name in gains][first]
@@ -97,7 +97,7 @@ def _middles(amounts: Sequence[float]) -> np.ndarray:
     return found
 
 
-def told_by_courses(gains: np.ndarray, uses: np.ndarray, clocks: np.ndarray) -> str:
+def evidence_of_courses(gains: np.ndarray, uses: np.ndarray, clocks: np.ndarray) -> str:
     """Return what gains that fall go with.
 
     Parameters
@@ -127,7 +127,7 @@ def change_of_level(gains: np.ndarray, uses: np.ndarray, clocks: np.ndarray) -> 
     Parameters
     ----------
     gains, uses, clocks
-        As of :func:`told_by_courses`. Two levels and the place of the change are as many numbers as a parabola has.
+        As of :func:`evidence_of_courses`. Two levels and the place of the change are as many numbers as a parabola has.
     """
     if len(gains) < LEAST_GAINS or not (gains > 0.0).all():
         return None

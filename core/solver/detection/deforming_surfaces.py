@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The deforming targets and sensors of a scenario, frame by frame, for the kernels of :mod:`.deformation`."""
+"""The deforming targets and sensors of a scenario, frame by frame, for the kernels of :mod:`.detection.deformation`."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 """Controllers of a gripper. They use tactile data and nothing of the simulation, so that they can drive real hardware.
 
 A controller receives an array of values from the sensor's electronics, at its own rate, and returns a :class:`Command` to the
-drive of the finger. In a simulation :mod:`.drive_commands` calls it; on a robot, a loop of five lines does:
+drive of the finger. In a simulation :mod:`.drive_commands` calls it; on a robot, a loop of five lines does::
 
     controller = GripControl(speed=0.05, max_force=40.0)
     while True:

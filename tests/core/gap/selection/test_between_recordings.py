@@ -30,8 +30,8 @@ from palpate.core.gap.selection.wear_or_drift import (
     TEXELS,
     USE,
     change_of_level,
+    evidence_of_courses,
     texels_can_tell,
-    told_by_courses,
 )
 from palpate.core.jobs.job_runner import run_job
 from palpate.core.model.sensor_parameters import SensorParameters
@@ -72,11 +72,11 @@ def test_levels_and_gains_are_named_between_recordings(change, name):
 def test_gains_that_fall_with_use_and_with_the_clock_are_told_apart_where_use_is_uneven():
     used, passed = np.array([0.02, 0.3, 0.34, 0.75, 0.8, 0.97]), (np.arange(6) + 0.5) / 6
     uses, clocks = np.array([used, used**1.1]), np.array([passed, passed])
-    assert told_by_courses(np.exp(-0.4 * used), uses, clocks) == USE
-    assert told_by_courses(1.0 - 0.4 * passed, uses, clocks) == CLOCK
-    assert told_by_courses(1.0 - 0.4 * used, np.array([passed]), clocks) == NOTHING
-    assert told_by_courses(np.exp(-0.4 * used)[:3], uses[:, :3], clocks[:, :3]) == NOTHING
-    assert told_by_courses(np.array([1.0, -0.1, 0.5, 0.4, 0.3, 0.2]), uses, clocks) == NOTHING
+    assert evidence_of_courses(np.exp(-0.4 * used), uses, clocks) == USE
+    assert evidence_of_courses(1.0 - 0.4 * passed, uses, clocks) == CLOCK
+    assert evidence_of_courses(1.0 - 0.4 * used, np.array([passed]), clocks) == NOTHING
+    assert evidence_of_courses(np.exp(-0.4 * used)[:3], uses[:, :3], clocks[:, :3]) == NOTHING
+    assert evidence_of_courses(np.array([1.0, -0.1, 0.5, 0.4, 0.3, 0.2]), uses, clocks) == NOTHING
 
 
 def test_a_gain_that_changes_once_goes_with_neither_use_nor_clock():
@@ -112,7 +112,7 @@ def test_steps_drawn_at_random_are_hardly_ever_taken_for_use():
     rng, said = np.random.default_rng(3), []
     for _ in range(300):
         used, passed, fallen = (np.cumsum(np.exp(0.8 * rng.normal(size=6))) for _ in range(3))
-        said.append(told_by_courses(1.0 - 0.4 * fallen / fallen[-1], used[None] / used[-1], passed[None] / passed[-1]))
+        said.append(evidence_of_courses(1.0 - 0.4 * fallen / fallen[-1], used[None] / used[-1], passed[None] / passed[-1]))
     assert said.count(USE) < 0.1 * len(said)  # 5 % by the rule's chance, on either side, and twice its deviation of 1.7 %
 
 
@@ -140,15 +140,15 @@ def test_texels_can_tell_wear_from_drift_only_where_they_carry_unequal_loads():
 def test_gains_that_fall_alike_in_recordings_that_are_alike_are_wear_or_drift(monkeypatch):
     falling = 1.0 - 0.06 * np.arange(6)
     alike = differing(falling, [4] * 6, False)
-    assert (alike.name, alike.rival, alike.told_by) == ("drift", "wear", NOTHING)
+    assert (alike.name, alike.rival, alike.evidence) == ("drift", "wear", NOTHING)
     equal_loads = differing(falling, [4] * 6, True)
-    assert (equal_loads.rival, equal_loads.told_by) == ("wear", NOTHING), "wear of texels that carry the same is alike, too"
+    assert (equal_loads.rival, equal_loads.evidence) == ("wear", NOTHING), "wear of texels that carry the same is alike, too"
     with monkeypatch.context() as patch:
         patch.setattr(between_recordings, "texels_can_tell", lambda order: True)
         of_all_texels = differing(falling, [4] * 6, True)
-    assert (of_all_texels.name, of_all_texels.rival, of_all_texels.told_by) == ("drift", "", TEXELS)
+    assert (of_all_texels.name, of_all_texels.rival, of_all_texels.evidence) == ("drift", "", TEXELS)
     once = differing(np.array([0.999, 1.0, 1.001, 1.002, 0.9, 0.903]), [4] * 6, False)
-    assert (once.name, once.rival, once.told_by) == ("drift", "wear", NOTHING), (
+    assert (once.name, once.rival, once.evidence) == ("drift", "wear", NOTHING), (
         "a fall from one recording on is told by nothing"
     )
     assert once.changed_from == "t4" and alike.changed_from == "" == differing(falling[::-1], [4] * 6, False).changed_from
@@ -158,7 +158,7 @@ def test_gains_that_fall_alike_in_recordings_that_are_alike_are_wear_or_drift(mo
     amounts = [2, 16, 2, 2, 20, 4]
     used = (np.cumsum(amounts) - 0.5 * np.array(amounts)) / sum(amounts)
     worn = differing(np.exp(-0.4 * used), amounts, False)
-    assert (worn.name, worn.rival, worn.told_by) == ("wear", "", USE)
+    assert (worn.name, worn.rival, worn.evidence) == ("wear", "", USE)
     assert differing(falling[::-1], amounts, False).name == "drift"
 
 
