@@ -38,7 +38,7 @@ RUN, COMMON = 1, 2
 _MAGIC = b"PALPRUN1"
 _HEAD = struct.Struct("<8sII")
 _ROW = np.dtype([("kind", "<u4"), ("name", "u1", 12), ("length", "<u8"), ("crc", "<u4")])
-_PLACE = np.dtype([("high", ">u8"), ("low", ">u4"), ("shard", "<u4"), ("offset", "<u8"), ("length", "<u8"), ("crc", "<u4")])
+_PLACE = np.dtype([("high", ">u8"), ("low", ">u4"), ("shard", "<u4"), ("start", "<u8"), ("length", "<u8"), ("crc", "<u4")])
 _BLOCK = 1 << 20
 
 
@@ -278,7 +278,7 @@ class ShardIndex:
         found["high"] = np.ascontiguousarray(names[:, :8]).view(">u8").reshape(-1)
         found["low"] = np.ascontiguousarray(names[:, 8:]).view(">u4").reshape(-1)
         found["shard"] = len(self._paths) - 1
-        for name, values in (("offset", offsets), ("length", table["length"]), ("crc", table["crc"])):
+        for name, values in (("start", offsets), ("length", table["length"]), ("crc", table["crc"])):
             found[name] = values[mine]
         return found
 
@@ -305,13 +305,13 @@ class ShardIndex:
             The run is in no shard.
         """
         row = self._known(digest)
-        return _read(self.path(digest), int(row["offset"]), min(most, int(row["length"])))
+        return _read(self.path(digest), int(row["start"]), min(most, int(row["length"])))
 
     def read(self, digest: str) -> bytes:
         """Return the results of a run; raises as :meth:`start`, and FileError where they are damaged."""
         row = self._known(digest)
         path = self.path(digest)
-        return _checked(path, _read(path, int(row["offset"]), int(row["length"])), int(row["crc"]))
+        return _checked(path, _read(path, int(row["start"]), int(row["length"])), int(row["crc"]))
 
     def common(self, name: str) -> bytes:
         """Return what runs have in common; raises as :meth:`read`."""
