@@ -21,7 +21,7 @@ STIFFNESS, DAMPING, MAX_FORCE, MAX_SPEED = range(4)
 TRAVEL, SPEED, FORCE = range(3)
 """Columns of :attr:`.State.drives`."""
 TARGET_TRAVEL, HOLD_TRAVEL, TARGET_SPEED, PUSH = range(4)
-"""Columns of a command: travel (m), whether it is held (0 or 1), speed (m/s), and a force that is added (N)."""
+"""The columns of a command are travel (m), whether it is held (0 or 1), speed (m/s), and a force that is added (N)."""
 
 
 def drive_table(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
