@@ -32,7 +32,9 @@ if TYPE_CHECKING:
     from .api.sensors import export_sensor as export_sensor
     from .api.sensors import read_sensor as read_sensor
     from .api.simulation import simulate as simulate
+    from .api.skins import draw_channels as draw_channels
     from .api.skins import magnetic_skin as magnetic_skin
+    from .api.skins import save_channels as save_channels
     from .api.study import run_study as run_study
     from .core.errors import PalpateError as PalpateError
     from .core.gap.dataset.rig import Rig as Rig
@@ -49,6 +51,7 @@ _PUBLIC = {
     "Rig": "core.gap.dataset.rig",
     "Scenario": "core.model.scenario",
     "Sensor": "api.sensors",
+    "draw_channels": "api.skins",
     "export_sensor": "api.sensors",
     "find_gap": "api.gap",
     "fit_friction": "api.fits",
@@ -61,6 +64,7 @@ _PUBLIC = {
     "read_rig": "api.gap",
     "read_sensor": "api.sensors",
     "run_study": "api.study",
+    "save_channels": "api.skins",
     "scenario_of": "addon.scripting.scene_objects",
     "sensor_of": "addon.scripting.scene_objects",
     "simulate": "api.simulation",

@@ -6,6 +6,7 @@ from __future__ import annotations
 from ..core.geometry.mesh import TriangleMesh
 from ..core.geometry.shapes import Shape
 from ..core.simulators import pressed_sensor, pressed_sensors
+from ..core.simulators.environment_parameters import Columns
 from ..core.simulators.sensor_on_mesh import SensorOnMesh
 from . import arguments
 from .arguments import ArgumentError
@@ -76,6 +77,8 @@ class PressedSensors(pressed_sensors.PressedSensors):
         Step of the other program.
     threads : int, optional
         How many to compute with; by default as many as pay off.
+    parameters : mapping of str to (E,) float, optional
+        In which the sensors of environments differ, as ``{"k": …, "mus": …, "effect.creep.amount": …}``.
 
     Raises
     ------
@@ -90,6 +93,7 @@ class PressedSensors(pressed_sensors.PressedSensors):
         environments: int,
         dt: float,
         threads: int | None = None,
+        parameters: Columns | None = None,
     ):
         if not isinstance(sensor, SensorOnMesh):
             raise ArgumentError(f"sensor is {arguments.brief(sensor)}: give a Sensor.")
@@ -98,4 +102,4 @@ class PressedSensors(pressed_sensors.PressedSensors):
             raise ArgumentError(f"target is {arguments.brief(target)}: give a Body.")
         count = arguments.count(environments, "environments")
         prepare_solver()
-        super().__init__(sensor, surface, dt, count, threads)
+        super().__init__(sensor, surface, dt, count, threads, parameters)

@@ -18,11 +18,15 @@ from palpate.core.gap.dataset.second_logger import interpolated
 from palpate.core.gap.logs.column_meaning import GRAVITY
 
 from ._further.handmade import HandmadeModel, low_pass
-from ._recordings import SETS, Columns, Recording, thinned
+from ._recordings import SETS, Columns, Recording, sheet, thinned
 
 RUNS = (("20250401_014340_probe", "fit"), ("20250401_015037_probe", "check"))
 """Of eFlesh's normal force: whole runs."""
 SHEAR = "20250416_200533_probe"
+LARGEST = ("1d5", "2d0", "2d5", "3d0")
+"""Largest stretches of the tape."""
+TAPE_SAMPLES = 200
+"""Even samples of each recording of the tape, and of the foam in shear."""
 THINNED = 2
 """Samples of eFlesh of which means are taken."""
 
@@ -85,6 +89,42 @@ def eflesh_shear(data: Path) -> Recording:
     return _as_recording("eFlesh, shear", trials)
 
 
+def tape(data: Path) -> Recording:
+    """VHB 4910 that is stretched and released: nominal stress (kPa, taken as newtons) over stretch, a stretch of two as 1 mm.
+
+    Rates of 0.01 and 0.05 a second are fitted, up to four largest stretches each; the rate between them is checked.
+    """
+    trials: list[tuple[str, str, Columns]] = []
+    for rate, stretches, use in (("01", LARGEST, "fit"), ("05", LARGEST, "fit"), ("03", LARGEST[:3], "check")):
+        for largest in stretches:
+            time, stretch, stress = sheet(data / "oca_vhb_viscoelastic_mit" / f"loading_{largest}_unloading_0d{rate}.xlsx").T
+            time, first = np.unique(time, return_index=True)
+            even = np.linspace(time[0], time[-1], TAPE_SAMPLES)
+            depth = np.maximum(np.interp(even, time, stretch[first]) - 1.0, 0.0) * 1e-3
+            columns = {"time": even - even[0], "depth": depth, "texel_0": np.interp(even, time, stress[first])}
+            trials.append((f"stretch_{largest}_rate_{rate}", use, columns))
+    stiff = max(float(c["texel_0"].max() / c["depth"].max()) for _, _, c in trials)
+    words = f"grid = {{ rows = 1, columns = 1, pitch = 0.01 }}\nk = {stiff:.4g}\ncn = 0.0\nmax_penetration = 0.1"
+    return Recording("acrylic tape in tension", words, trials)
+
+
+def foam_shear(data: Path) -> Recording:
+    """Simple shear of 10 mm of foam under 1 cm² at 1 % a second; held out is another foam, scaled to the same slope at rest."""
+    curves = {}
+    for name in ("leap", "turbo"):
+        strain, stress = np.loadtxt(data / "foam_leap_turbo_avg_mit" / f"{name}_foam_SS.csv", delimiter=",", skiprows=1).T
+        kept = strain >= 0.0
+        curves[name] = strain[kept] * 0.01, stress[kept] * 1e6 * 1e-4
+    slopes = {name: float(np.polyfit(depth[:10], force[:10], 1)[0]) for name, (depth, force) in curves.items()}
+    trials: list[tuple[str, str, Columns]] = []
+    for (name, (depth, force)), use in zip(curves.items(), ("fit", "check"), strict=True):
+        even = np.linspace(0.0, depth[-1], TAPE_SAMPLES)
+        scaled = np.interp(even, depth, force) * slopes["leap"] / slopes[name]
+        trials.append((name, use, {"time": even / 1e-4, "depth": even, "texel_0": scaled}))
+    words = f"grid = {{ rows = 1, columns = 1, pitch = 0.01 }}\nk = {slopes['leap']:.4g}\ncn = 0.0\nmax_penetration = 0.1"
+    return Recording("shoe foam in shear", words, trials)
+
+
 def _cubic(p, c, channel):
     """A cubic of the force, and what is there without one."""
     force = c["force"] / 5e2
@@ -112,6 +152,19 @@ def _foam(p, c, channel):
     """A spring, and a densification that goes with a power of the strain."""
     strain = c["depth"] * 1e2
     return [strain, strain ** p[0]]
+
+
+def _tape(p, c, channel):
+    """A neo-Hookean strip and two Maxwell branches."""
+    stretch = 1.0 + c["depth"] * 1e3
+    stress = stretch - stretch**-2.0
+    return [stress, *(stress - low_pass(c["time"], stress, tau) for tau in p)]
+
+
+def _foam_shear(p, c, channel):
+    """A spring, and a cubic part."""
+    strain = c["depth"] * 1e2
+    return [strain, strain**3]
 
 
 def _brake(p, c, channel):
@@ -165,6 +218,16 @@ FOREIGN: dict[str, ForeignSet] = {
         "one foam, another",
         SETS["foam"],
         HandmadeModel(_foam, (6.0,), (1.5,), (30.0,), "spring and a power"),
+    ),
+    "tape": ForeignSet(
+        "acrylic tape",
+        "MIT",
+        "two rates, a third between them",
+        tape,
+        HandmadeModel(_tape, (5.0, 100.0), (0.1, 5.0), (50.0, 5000.0), "neo-Hookean strip and two Maxwell branches"),
+    ),
+    "foam-shear": ForeignSet(
+        "shoe foam", "MIT", "one foam, another", foam_shear, HandmadeModel(_foam_shear, (), (), (), "spring and a cubic part")
     ),
     "brake": ForeignSet(
         "band brake",

@@ -14,7 +14,9 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from palpate.core.geometry import shapes
 from palpate.core.geometry.mesh import TriangleMesh
+from palpate.core.geometry.shapes import Shape
 from palpate.core.geometry.texels import texels_from_region
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import SensorParameters
@@ -30,8 +32,8 @@ ROUNDS, STEPS = 9, 300
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 GOALS = {84: 25.0, 1024: 150.0}
 """Microseconds of a step."""
-BATCH_GOAL = 20.0
-"""Milliseconds of a step of all environments."""
+BATCH_GOALS = {"cube": 20.0, "ball": 20.0, "box": 4.0, "sphere": 4.0, "capsule": 4.0, "plane": 4.0}
+"""Milliseconds of a step of all environments: with meshes, and with shapes in closed form."""
 
 
 def item(texels: int) -> SensorOnMesh:
@@ -42,11 +44,21 @@ def item(texels: int) -> SensorOnMesh:
     return SensorOnMesh(Sensor("pad", 0, texels_from_region(sheet, np.ones(len(sheet.vertices), bool)), parameters), sheet)
 
 
-def objects() -> dict[str, tuple[TriangleMesh, float]]:
-    """Return what presses and how high its origin is when it touches: a cube that covers all texels, and a ball of 5k faces."""
-    cube = solver.cube(4)
+def objects() -> dict[str, tuple[TriangleMesh | Shape, float, np.ndarray]]:
+    """Return what presses, how high its origin is when it touches, and its orientation.
+
+    A cube that covers all texels and a ball of 5k faces as meshes, and such a box, sphere, capsule and plane in closed form.
+    """
+    cube, edge, radius = solver.cube(4), solver.CUBE, solver.BALL
     flat = TriangleMesh(np.array(cube.vertices), np.array(cube.faces))
-    return {"cube": (flat, solver.CUBE / 2), "ball": (solver.ball(20), solver.BALL)}
+    return {
+        "cube": (flat, edge / 2, LEVEL),
+        "ball": (solver.ball(20), radius, LEVEL),
+        "box": (shapes.box((edge, edge, edge)), edge / 2, LEVEL),
+        "sphere": (shapes.sphere(radius), radius, LEVEL),
+        "capsule": (shapes.capsule(radius, 2 * radius), radius, np.sqrt([0.5, 0.5, 0.0, 0.0])),
+        "plane": (shapes.plane(), 0.0, np.array([0.0, 1.0, 0.0, 0.0])),
+    }
 
 
 def positions(height: float, phases: np.ndarray) -> np.ndarray:
@@ -59,26 +71,26 @@ def least(measure: Callable[[], float]) -> float:
     return min(measure() for _ in range(ROUNDS))
 
 
-def single_step(texels: int, mesh: TriangleMesh, height: float) -> Callable[[], float]:
+def single_step(texels: int, mesh: TriangleMesh | Shape, height: float, turn: np.ndarray) -> Callable[[], float]:
     """Return a function that gives the microseconds of a step of one sensor."""
     path = positions(height, np.linspace(0.0, 2 * np.pi, STEPS))
     still = np.zeros(3), LEVEL
-    pressed = PressedSensor(item(texels), mesh, DT, still, (path[0], LEVEL), 1)
-    out = pressed.step(still, (path[0], LEVEL))
+    pressed = PressedSensor(item(texels), mesh, DT, still, (path[0], turn), 1)
+    out = pressed.step(still, (path[0], turn))
 
     def measure() -> float:
         start = time.thread_time()
         for where in path:
-            pressed.step(still, (where, LEVEL), out)
+            pressed.step(still, (where, turn), out)
         return (time.thread_time() - start) / STEPS * 1e6
 
     return measure
 
 
-def loaded_step(texels: int, mesh: TriangleMesh, height: float) -> Callable[[], float]:
+def loaded_step(texels: int, mesh: TriangleMesh | Shape, height: float, turn: np.ndarray) -> Callable[[], float]:
     """Return a function that gives the microseconds of a step under a given load, which swings by a tenth."""
     still = np.zeros(3), LEVEL
-    top = np.array([0.0, 0.0, height]), LEVEL
+    top = np.array([0.0, 0.0, height]), turn
     pressed = PressedSensor(item(texels), mesh, DT, still, top, 1)
     loads = np.zeros((STEPS, 6))
     loads[:, 2] = 9.81 + np.sin(np.linspace(0.0, 2 * np.pi, STEPS))
@@ -95,11 +107,11 @@ def loaded_step(texels: int, mesh: TriangleMesh, height: float) -> Callable[[], 
     return measure
 
 
-def batch_step(mesh: TriangleMesh, height: float) -> Callable[[], tuple[float, float]]:
+def batch_step(mesh: TriangleMesh | Shape, height: float, turn: np.ndarray) -> Callable[[], tuple[float, float]]:
     """Return a function that gives milliseconds of a step of all environments: by the wall, and of processors over threads."""
     many = PressedSensors(item(84), mesh, DT, ENVIRONMENTS, THREADS)
     phases = np.random.default_rng(1).random(ENVIRONMENTS) * 2 * np.pi
-    still, poses = np.array([0.0, 0.0, 0.0, *LEVEL]), np.tile([0.0, 0.0, 0.0, *LEVEL], (ENVIRONMENTS, 1))
+    still, poses = np.array([0.0, 0.0, 0.0, *LEVEL]), np.tile([0.0, 0.0, 0.0, *turn], (ENVIRONMENTS, 1))
 
     def measure() -> tuple[float, float]:
         phases[:] += 2 * np.pi / STEPS
@@ -118,8 +130,8 @@ def run() -> Iterator[dict]:
     peer = f"mujoco-{mujoco.__version__} tactile"
     for texels, goal in GOALS.items():
         theirs = least(solver.mujoco_step(texels, solver.cube(4)))
-        for name, (mesh, height) in objects().items():
-            ours = least(single_step(texels, mesh, height))
+        for name, pressing in objects().items():
+            ours = least(single_step(texels, *pressing))
             yield {
                 "name": f"loop.step.{name}.{texels}", "value": ours, "unit": "us",
                 "peer": peer, "peer_value": theirs, "ratio": ours / theirs, "goal": goal / theirs,
@@ -131,12 +143,13 @@ def run() -> Iterator[dict]:
         "peer": peer, "peer_value": theirs, "ratio": loaded / theirs,
     }  # fmt: skip
     theirs *= ENVIRONMENTS / THREADS / 1e3
-    for name, (mesh, height) in objects().items():
-        measure = batch_step(mesh, height)
+    for name, pressing in objects().items():
+        measure = batch_step(*pressing)
         measured = np.array([measure() for _ in range(3 * ROUNDS)])
         wall, used = measured.min(axis=0)
         yield {
             "name": f"loop.batch.{name}.{ENVIRONMENTS}x84", "value": float(used), "unit": "ms on two processors",
-            "peer": f"{peer}, as many steps", "peer_value": theirs, "ratio": float(used) / theirs, "goal": BATCH_GOAL / theirs,
+            "peer": f"{peer}, as many steps", "peer_value": theirs, "ratio": float(used) / theirs,
+            "goal": BATCH_GOALS[name] / theirs,
         }  # fmt: skip
         yield {"name": f"loop.batch.{name}.{ENVIRONMENTS}x84.wall", "value": float(wall), "unit": "ms"}

@@ -53,6 +53,8 @@ SPEED = 0.1
 """Of the approach, m/s: short runs are mostly contact then."""
 LENGTHS = {"50_ms": 0.02, "500_ms": 0.47}
 """Rest after the press, s, by the length of a run."""
+STUDIES = {"presses": (0.55, TEXELS, 1500), "long": (19.9, 1024, 10)}
+"""Whole studies: rest after the press, s, texels, and runs; of 60 frames, and of 2,000. They stand for 10,000 and 100 runs."""
 DATASET_RUNS = 300
 """Enough that what a dataset has once, as its statistics, is small beside its frames."""
 STIFFNESS = 1000.0
@@ -61,9 +63,9 @@ STEP = 1e-3
 """MuJoCo's usual step, s."""
 
 
-def scene() -> Scenario:
+def scene(texels_wanted: int = TEXELS) -> Scenario:
     """Return a ball over a pad."""
-    sheet = pad(*GRIDS[TEXELS])
+    sheet = pad(*GRIDS[texels_wanted])
     texels = texels_from_region(sheet, np.ones(len(sheet.vertices), bool))
     return Scenario(
         bodies=(Body("pad", Motion.at_rest()), Body("ball", Motion.at_rest((0.0, 0.0, 0.05)))),
@@ -76,10 +78,10 @@ def scene() -> Scenario:
     )
 
 
-def begun(folder: Path, hold: float, count: int) -> list[Run]:
+def begun(folder: Path, hold: float, count: int, texels: int = TEXELS) -> list[Run]:
     """Make the folder of a study of presses and return its runs."""
     make_folders(folder)
-    save_scenario(folder / SCENES / "pad.npz", scene())
+    save_scenario(folder / SCENES / "pad.npz", scene(texels))
     (folder / STUDY_NAME).write_text(
         f'format = "palpate-sweep/1"\nscene = "pad.npz"\ndesign = "random"\nsamples = {count}\nfps = {FPS}\n'
         f"[press]\ndepth = {{ uniform = [{DEPTH / 2}, {DEPTH}] }}\nspeed = {SPEED}\nhold = {hold}\n",
@@ -140,6 +142,72 @@ def shares(name: str, hold: float) -> Iterator[dict]:
             "name": f"sweep.share.{name}.{kind}", "value": 1.0 / ours, "unit": "simulated s/s",
             "peer": "the bare solver", "peer_value": 1.0 / theirs, "ratio": theirs / ours, "goal": 0.9,
         }  # fmt: skip
+
+
+def solve_bare(folder: Path, runs: Sequence[Run]) -> tuple[float, float, float]:
+    """Solve runs without a study; return seconds of the clock and of the processor, and simulated seconds."""
+    scenes = Scenes(folder)
+    plan = scenes.plan("pad")
+    scenarios = [varied_scenario(plan.scenario, {**plan.fixed, **run.values}, plan.press) for run in runs]
+    clock, processor = time.perf_counter(), time.process_time()
+    for scenario in scenarios:
+        Simulation(scenario, threads=1).advance_all()
+    taken = time.perf_counter() - clock, time.process_time() - processor
+    return *taken, sum((one.frame_end - one.frame_start) / one.fps for one in scenarios)
+
+
+def processor_seconds() -> float:
+    """Return the seconds of the processor that this process and those that it has started have taken."""
+    import psutil
+
+    own = psutil.Process()
+    times = [one.cpu_times() for one in (own, *own.children(recursive=True))]
+    return sum(time.user + time.system for time in times)
+
+
+def whole_study(name: str, hold: float, texels: int, count: int) -> Iterator[dict]:
+    """A study on two cores, from the first task to the last, against two processes that solve the same runs; in turn."""
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    from palpate.sweep.dataset import publish
+    from palpate.sweep.driver import dask_client, run_study
+    from palpate.sweep.worker import Limits
+
+    clocks, processors, each = [], [], count // ROUNDS
+    with (
+        tempfile.TemporaryDirectory() as place,
+        ProcessPoolExecutor(2, get_context("spawn")) as pool,
+        dask_client(None, 2) as client,
+    ):
+        folder = Path(place)
+        runs = begun(folder, hold, count, texels)
+        first = [replace(runs[0], index=count + i, digest=f"{i:x}" * 24) for i in range(12, 16)]
+        list(pool.map(solve_bare, [folder] * 2, [runs[:1]] * 2))  # both load what was compiled
+        run_study(client, folder, first, Limits(), lambda tally: None)
+        for number in range(ROUNDS):
+            part = runs[number * each : (number + 1) * each]
+            clock, processor, _ = zip(*pool.map(solve_bare, [folder] * 2, [part[::2], part[1::2]]), strict=True)
+            began, before = time.perf_counter(), processor_seconds()
+            run_study(client, folder, part, Limits(), lambda tally: None)
+            clocks.append((max(clock), time.perf_counter() - began))
+            processors.append((sum(processor), processor_seconds() - before))
+        began = time.perf_counter()
+        publish(folder, runs)
+        closing = time.perf_counter() - began
+        lengths = solve_bare(folder, runs[:1])[2] * each  # they differ by a hundredth
+    for kind, found, goal in (("clock", clocks, 0.85), ("processor", processors, 0.9)):
+        bare, ours = (statistics.median(one) for one in zip(*found, strict=True))
+        yield {
+            "name": f"sweep.two_cores.{name}.{kind}", "value": lengths / ours, "unit": "simulated s/s",
+            "peer": "the bare solver in two processes", "peer_value": lengths / bare,
+            "ratio": statistics.median(theirs / mine for theirs, mine in found), "goal": goal,
+        }  # fmt: skip
+    share = closing / (closing + sum(mine for _, mine in clocks))
+    yield {
+        "name": f"sweep.two_cores.{name}.dataset", "value": share, "unit": "of the clock",
+        "peer": "a tenth", "peer_value": 0.1, "ratio": share / 0.1, "goal": 1.0,
+    }  # fmt: skip
 
 
 def parts() -> Iterator[dict]:
@@ -268,6 +336,7 @@ def dataset_share() -> Iterator[dict]:
         start = time.process_time()
         computed(scenes, runs)
         computing = time.process_time() - start
+        publish(folder, runs)  # loads pyarrow, a second that a study of 10,000 runs does not notice
         start = time.process_time()
         publish(folder, runs)
         writing = time.process_time() - start
@@ -285,9 +354,11 @@ def dataset_share() -> Iterator[dict]:
 
 
 def run() -> Iterator[dict]:
-    """Shares of short and of longer runs, their parts, the same presses with MuJoCo, and the dataset."""
+    """Shares of short and of longer runs, whole studies, parts of a run, the same presses with MuJoCo, and the dataset."""
     for name, hold in LENGTHS.items():
         yield from shares(name, hold)
+    for name, (hold, texels, count) in STUDIES.items():
+        yield from whole_study(name, hold, texels, count)
     yield from parts()
     yield from against_mujoco()
     yield from dataset_share()

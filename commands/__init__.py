@@ -26,13 +26,14 @@ COMMANDS = {
     "export": "write a bake as CSV, NPZ, HDF5, PNG, MCAP or LeRobot dataset",
     "fit": "estimate stiffness and friction from measurements",
     "gap": "find the effects of a real sensor that its model lacks",
+    "gap-table": "one table of the gaps of many rigs, beside models made by hand",
     "rig": "make a rig for gap from logs of a real sensor: CSV, MCAP, ROS bags, HDF5, NPZ, MAT",
     "paper": "repeat the experiments of the paper",
     "sweep": "simulate a scene thousands of times with varied parameters, resumable",
     "sensor": "write sensors for other simulators, and read theirs",
     "openrave": "read and write OpenRAVE sensor definitions",
 }
-"""Commands in the order of the help. This package has a module of each name."""
+"""Commands in the order of the help. This package has a module of each name, with _ for -."""
 
 STOPPED, NO_READER = 130, 141
 """Exit statuses after Ctrl-C and after a closed pipe: 128 plus the number of the signal, as of other programs."""
@@ -139,7 +140,7 @@ def _parser() -> argparse.ArgumentParser:
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
     for name, summary in COMMANDS.items():
         sub = subparsers.add_parser(name, help=summary, description=f"{summary[0].upper()}{summary[1:]}.")
-        module = importlib.import_module(f".{name}", __package__)
+        module = importlib.import_module(f".{name.replace('-', '_')}", __package__)
         module.add_arguments(sub)
         if name in limits.COMMANDS:
             limits.add_arguments(sub)

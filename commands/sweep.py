@@ -45,7 +45,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of each job: queue, account, cores, memory, walltime and others; --dry-run prints the job's script",
     )
     where.add_argument(
-        "--scheduler", metavar="ADDRESS", help="use a running Dask scheduler, as tcp://HOST:8786; all machines need the folder"
+        "--scheduler",
+        metavar="ADDRESS",
+        help="use a running Dask scheduler, as tcp://HOST:8786; all machines need the folder, unless --own-disks is given",
+    )
+    parser.add_argument(
+        "--own-disks",
+        action="store_true",
+        help="with --scheduler or --slurm: workers do not see the folder; they get a copy of the study, and runs come back",
     )
     parser.add_argument(
         "--format",
@@ -94,6 +101,10 @@ def run(arguments: argparse.Namespace) -> int:
 
     driver.require_dask()
     exports.require_packages(arguments.format)
+    if arguments.own_disks and not (arguments.scheduler or arguments.slurm):
+        raise PalpateError(
+            "--own-disks is for workers of other machines: give --scheduler or --slurm with it, or leave it out."
+        )
     if arguments.part is not None:
         if not place.is_dir() or arguments.begin or arguments.dry_run or arguments.list:
             raise PalpateError("--part computes runs of a study that has begun: give its folder, and --begin before that.")
@@ -229,6 +240,7 @@ def _compute(opened: OpenStudy, arguments: argparse.Namespace) -> int:
         scripts=arguments.scripts,
         part=arguments.part or (1, 1),
         retry_failed=arguments.retry_failed,
+        own_disks=arguments.own_disks,
     )
     with console.shown_progress("sweep", "run") as show:
         failures = studies.compute_runs(opened, how, show)

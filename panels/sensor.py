@@ -216,6 +216,10 @@ class Readout(Subpanel):
         box.label(text=f"Frame {context.scene.frame_current}:" + ("" if readings else " not computed"))
         for name, value in _measured(readings, settings.unit):  # as many lines without numbers: what is below does not jump
             box.label(text=f"{name}: {value}")
+        draw_sentences(box, NET, "NONE", context)
+
+
+NET = "Net is the vector sum of normals and shear: what points in different directions cancels in part."
 
 
 def _measured(readings, unit: str) -> list[tuple[str, str]]:

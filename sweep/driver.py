@@ -21,7 +21,8 @@ from .worker import Limits, compute_batch
 
 BATCH_SECONDS = 2.0
 """Length of a batch: long beside the milliseconds that Dask needs for a task, short for who waits for Ctrl-C."""
-LARGEST_BATCH = 500
+FIRST_BATCH, LARGEST_BATCH = 1, 500
+"""Runs of the first batches, as nobody knows how long they take, and the most of any."""
 BATCHES_AHEAD = 2
 """Batches that wait at each worker, so that it is never idle."""
 MOST_LOSSES = 20
@@ -52,6 +53,22 @@ class Tally:
     def finished(self) -> int:
         """Runs that are done or failed."""
         return self.done + self.failed
+
+
+@dataclass(frozen=True)
+class Way:
+    """How batches go to workers and come back.
+
+    Attributes
+    ----------
+    task : callable
+        Returns a function and its arguments for the fields of the runs of a batch.
+    answers : callable
+        Returns what became of these runs from the result of the task.
+    """
+
+    task: Callable[[list[dict[str, Any]]], tuple[Any, ...]]
+    answers: Callable[[Any], list[dict[str, Any]]]
 
 
 def require_dask() -> None:
@@ -142,6 +159,7 @@ def run_study(
     limits: Limits,
     on_progress: Callable[[Tally], object],
     scripts: str = REFUSE,
+    way: Way | None = None,
 ) -> Tally:
     """Compute runs and return what became of them.
 
@@ -149,7 +167,7 @@ def run_study(
     ----------
     client : distributed.Client
     folder : Path
-        Of the study, under the same path on all machines.
+        Of the study, under the same path on all machines unless they have disks of their own.
     runs : sequence of Run
         Those that are not done.
     limits : Limits
@@ -158,6 +176,8 @@ def run_study(
         Called several times a second. An exception that it raises, KeyboardInterrupt included, stops the study.
     scripts : str
         What is done about the Python in a .blend, one of :data:`.scene_evaluation.SCRIPTS`.
+    way : Way, optional
+        Of batches to the workers and back, where these do not see the folder.
 
     Raises
     ------
@@ -166,17 +186,26 @@ def run_study(
     PalpateError
         Workers are lost again and again.
     """
-    return _Dispatch(client, folder, runs, limits, scripts).run(on_progress)
+    if way is None:
+        way = Way(lambda batch: (compute_batch, os.fspath(folder), batch, limits, scripts), list)
+    return _Dispatch(client, runs, way).run(on_progress)
 
 
 class _Dispatch:
-    """Batches at the workers and those to come."""
+    """Batches at the workers and those to come.
 
-    def __init__(self, client: Any, folder: Path, runs: Sequence[Run], limits: Limits, scripts: str):
-        self.client, self.folder, self.runs, self.limits, self.scripts = client, folder, runs, limits, scripts
+    Parameters
+    ----------
+    client : distributed.Client
+    runs : sequence of Run
+    way : Way
+    """
+
+    def __init__(self, client: Any, runs: Sequence[Run], way: Way):
+        self.client, self.runs, self.way = client, runs, way
         self.index_of = {run.digest: run.index for run in runs}
         self.next = 0
-        self.batch = 1
+        self.batch = FIRST_BATCH
         self.waiting: dict[Any, tuple[Sequence[Run], int]] = {}
         self.tally = Tally()
 
@@ -218,8 +247,7 @@ class _Dispatch:
             self.next += size
 
     def _send(self, runs: Sequence[Run], losses: int) -> None:
-        words = [asdict(run) for run in runs]
-        future = self.client.submit(compute_batch, os.fspath(self.folder), words, self.limits, self.scripts, pure=False)
+        future = self.client.submit(*self.way.task([asdict(run) for run in runs]), pure=False)
         self.waiting[future] = runs, losses
 
     def _take(self, future: Any) -> None:
@@ -237,7 +265,7 @@ class _Dispatch:
                 )
             self._send(runs, losses + 1)
             return
-        answers = future.result()
+        answers = self.way.answers(future.result())
         for answer in answers:
             if answer["status"] == UNWRITABLE:
                 raise FileError(answer["sentence"])

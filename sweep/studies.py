@@ -43,6 +43,8 @@ class Computing:
         Number and count: which of so many parts of the runs is computed.
     retry_failed : bool
         Compute failed runs again.
+    own_disks : bool
+        Whether workers do not see the study's folder, and runs come back from them.
     """
 
     workers: int | None = None
@@ -51,6 +53,7 @@ class Computing:
     scripts: str = REFUSE
     part: tuple[int, int] = (1, 1)
     retry_failed: bool = False
+    own_disks: bool = False
 
     def runs_of(self, opened: OpenStudy) -> list[Run]:
         """Return the runs of the part."""
@@ -128,7 +131,13 @@ def compute_runs(opened: OpenStudy, how: Computing, show: Callable[[Progress], o
     show_tally(driver.Tally())
     workers = min(how.workers or count_of_cores(), len(left))
     with driver.dask_client(how.scheduler, workers, how.make_cluster) as client:
-        tally = driver.run_study(client, opened.folder, left, Limits.of(opened.study), show_tally, how.scripts)
+        limits = Limits.of(opened.study)
+        way = None
+        if how.own_disks:
+            from .own_disks import way_to
+
+            way = way_to(client, opened.folder, limits, how.scripts)
+        tally = driver.run_study(client, opened.folder, left, limits, show_tally, how.scripts, way)
     return tally.failures
 
 

@@ -12,7 +12,7 @@ from import_graph import ROOT, Graph, module_name
 
 
 def pages(graph: Graph) -> Iterator[tuple[str, str]]:
-    """Pairs of a page's name and its text, in the order of the rooms."""
+    """Pairs of a page's name and its text, in the order of imports."""
     docstrings = {module_name(file): ast.get_docstring(ast.parse(source)) for file, source in graph.sources.items()}
     for package in _in_order("core", graph):
         offered = graph.public[package] or []
@@ -46,6 +46,6 @@ def write(folder: Path) -> None:
         (folder / f"{name}.md").write_text(text, encoding="utf-8")
         names.append(name)
     listed = "\n".join(names)
-    intro = "What the modules of core offer to each other, to the add-on and to scripts, in the order of the rooms."
+    intro = "Modules of core that other packages, the add-on and scripts use, in the order of their imports."
     text = f"# API of core\n\n{intro}\n\n```{{toctree}}\n:maxdepth: 1\n\n{listed}\n```\n"
     (folder / "index.md").write_text(text, encoding="utf-8")

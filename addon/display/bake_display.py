@@ -103,11 +103,16 @@ def _largest(tables) -> float:
 
 def color_range(settings, baked_sensors: list[BakedSensor]) -> float:
     """Return the end of the colour scale, N or Pa: as set, or as in figures (:meth:`.FigureStyle.scale_limit`)."""
-    unit = 1e3 if settings.quantity == "PRESSURE" else 1.0
     if not settings.use_auto_range:
         return user_range(settings)
     largest = _largest(displayed_values(settings, item.readings.normal_force, item.texels) for item in baked_sensors)
-    return unit * metrics.scale_limit(largest / unit) if largest > 0 else MIN_COLOR_RANGE
+    return rounded_range(settings, largest) if largest > 0 else MIN_COLOR_RANGE
+
+
+def rounded_range(settings, largest: float) -> float:
+    """Return the end of the automatic colour scale for a largest value, both N or Pa."""
+    unit = 1e3 if settings.quantity == "PRESSURE" else 1.0
+    return unit * metrics.scale_limit(largest / unit)
 
 
 def user_range(settings) -> float:

@@ -40,6 +40,13 @@ def clear_scene(scene) -> None:
     scene.palpate.baked_digest = scene.palpate.baked_id = ""
 
 
+def clear_copies(scene) -> None:
+    """Remove the bake from duplicates of baked objects: it is that of their originals. Those that share a mesh keep it."""
+    for obj in baked_objects(scene):
+        if identity.is_copy(obj) and obj.is_editable and (obj.data is None or obj.data.users == 1):
+            clear_object(scene, obj)
+
+
 def remove_orphans() -> None:
     """Remove the markers, materials, nodes and images of sensors that were deleted, and copied markers in copied scenes."""
     markers.remove_orphans()

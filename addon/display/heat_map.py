@@ -135,6 +135,8 @@ def _assign(obj, texels: Texels, material) -> None:
         mesh.update()
     else:  # another object with this mesh already shows a heat map in this slot
         slot = _slot_of(mesh)
+        if slot is None:  # it showed that of its original, whose new bake has removed it; the faces still point at the slot
+            slot = int(np.bincount(index[faces]).argmax())
     obj.material_slots[slot].link = "OBJECT"
     obj.material_slots[slot].material = material
 

@@ -17,7 +17,7 @@ import numpy as np
 from mathutils import Quaternion, Vector
 
 from ...core.response import metrics
-from ..session import fcurves
+from ..session import fcurves, identity
 from . import marker_meshes, materials
 from .baked_sensor import BakedSensor
 
@@ -116,6 +116,17 @@ def _outward_direction(sensor: BakedSensor) -> np.ndarray:
 
 
 _DIRECTION_AND_SIZE = {"FORCE": _force, "TORQUE": _torque, "CENTRE": _centre, "SLIP": _slip}
+
+
+def follow_names(scene, sensors) -> None:
+    """Name the markers of renamed sensors after them, unless the user has named a marker himself."""
+    names = {obj.palpate.uid: obj.name for obj in sensors if not identity.is_copy(obj)}
+    for marker in scene.objects:
+        sensor, (label, _) = names.get(marker.get(materials.SENSOR_KEY)), KINDS.get(marker.get(KIND_KEY, "FORCE"), ("", ""))
+        if sensor and label and marker.is_editable and marker.name.startswith(f"{label} "):
+            wanted = f"{label} {sensor}"
+            if not marker.name.startswith(wanted):
+                marker.name = wanted
 
 
 def clear(scene, uid: str) -> None:

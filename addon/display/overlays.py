@@ -21,7 +21,7 @@ from .indented_surface import IndentedSurface
 LIFT = 0.004
 """Distance of the overlay from the sensor's surface, as a share of the sensor's size: at zero the two would flicker."""
 ARROW_SHARE = 1.0
-"""Length of the longest arrow, as a share of the sensor's size."""
+"""Length of the longest arrow, as a share of the largest sensor's size, as on a bake."""
 SHOWING_MATERIALS = {"RENDERED"}
 """Kinds of shading in which a bake's own materials suffice. In the light of Material Preview, which is not the user's choice,
 they are up to 7 % darker than their bar."""
@@ -83,6 +83,7 @@ def sensor_overlays(scene, run, frame) -> list[SensorOverlay]:
     """Return the heat maps and arrows of one frame of a live simulation; all sensors share one scale."""
     maximum, strongest = _scale(scene, run, frame)
     scale, overlays = run.reading.metres_per_unit, []
+    length = ARROW_SHARE * max((_size(sensor.texels) for sensor in _read_out(run)), default=0.0) / strongest
     settings = scene.palpate
     factor = settings.indentation_factor if settings.show_indentation else 0.0
     for sensor, obj in zip(run.scenario.sensors, run.reading.sensor_objects(scene), strict=True):
@@ -91,7 +92,7 @@ def sensor_overlays(scene, run, frame) -> list[SensorOverlay]:
         readings, pose = frame.sensors[sensor.name], frame.poses[sensor.body]
         surface = _indented_surface(scene, obj, sensor.texels, factor * readings.depth)
         overlay = _heat_map(scene, sensor.texels, readings.normal_force, pose, maximum, scale, surface)
-        overlay.line = _net_force(sensor.texels, readings, pose, strongest, scale)
+        overlay.line = _net_force(readings, pose, length, scale)
         overlays.append(overlay)
     return overlays
 
@@ -144,7 +145,7 @@ def _read_out(run) -> list:
 
 
 def _scale(scene, run, frame) -> tuple[float, float]:
-    """Return the end of the colours (N or Pa) and the net force (N) that the longest arrow shows."""
+    """Return the end of the colours (N or Pa) and the net force (N) that the longest arrow shows, as a bake so far would."""
     settings = scene.palpate
     key = hash((scene.session_uid, settings.quantity))
     value, net = _largest.get(key, (inset.NO_LOAD, inset.NO_LOAD))
@@ -155,7 +156,8 @@ def _scale(scene, run, frame) -> tuple[float, float]:
         )
         net = max(net, float(np.linalg.norm(readings.net_force)))
     _largest[key] = value, net
-    return (value if settings.use_auto_range else bake_display.user_range(settings)), net
+    limit = bake_display.rounded_range(settings, value) if value > inset.NO_LOAD else value
+    return (limit if settings.use_auto_range else bake_display.user_range(settings)), net
 
 
 @dataclass(frozen=True)
@@ -185,7 +187,7 @@ def _heat_map(
 
     It lies on both sides of the surface, because the body of a sensor that is a sheet is seen from both.
     """
-    lift = LIFT * float(np.ptp(texels.position, axis=0).max())
+    lift = LIFT * _size(texels)
     rotation = transforms.rotation(pose[3:])
     rgb = color_maps.colors(scene.palpate.color_map, bake_display.displayed_values(scene.palpate, force, texels) / maximum)
 
@@ -215,14 +217,18 @@ def _opaque(rgb: np.ndarray) -> np.ndarray:
     return np.column_stack([rgb, np.ones(len(rgb))]).astype(np.float32)
 
 
-def _net_force(texels, readings, pose: np.ndarray, strongest: float, scale: float) -> np.ndarray | None:
-    """Return the ends of the net-force arrow; None without contact."""
+def _net_force(readings, pose: np.ndarray, length: float, scale: float) -> np.ndarray | None:
+    """Return the ends of the net-force arrow, of `length` metres per newton; None without contact."""
     if not readings.contact.any():
         return None
-    size = float(np.ptp(texels.position, axis=0).max())
     foot = readings.centre_of_pressure
-    tip = foot - readings.net_force * (ARROW_SHARE * size / strongest)
+    tip = foot - readings.net_force * length
     return (pose[:3] + np.array([foot, tip]) @ transforms.rotation(pose[3:]).T) / scale
+
+
+def _size(texels) -> float:
+    """Return the longest side of a sensor, metres."""
+    return float(np.ptp(texels.position, axis=0).max())
 
 
 def clear(scene=None) -> None:

@@ -27,12 +27,17 @@ def ensure_uid(obj) -> None:
     settings = obj.palpate
     if not obj.is_editable:
         return
-    is_copy = _owners.get(settings.uid, obj.session_uid) != obj.session_uid
-    if is_copy and not settings.is_baked:
+    copied = is_copy(obj)
+    if copied and not settings.is_baked:
         settings.property_unset("has_start")  # this belongs to the original; a copy starts where the user puts it
-    if not settings.uid or is_copy:
+    if not settings.uid or copied:
         settings.uid = uuid.uuid4().hex
     _owners[settings.uid] = obj.session_uid
+
+
+def is_copy(obj) -> bool:
+    """Return True for an object that still has the uid of the object of which it is a copy."""
+    return _owners.get(obj.palpate.uid, obj.session_uid) != obj.session_uid
 
 
 def key(obj) -> str:

@@ -12,11 +12,13 @@ from ...core.errors import PalpateError
 from ...core.io.bake_reader import Bake, read_sensors
 from ...core.model.recording import Frame, Recording
 from ..display import bake_display, bake_identity, baked_scene, inset, overlays
-from ..session import animation_time, frame_status
+from ..session import animation_time, frame_status, identity
 from . import staleness
 
 _new: dict[Path, Recording] = {}
 """By folder of a sensor's bake: the recording of the bake that has just been made."""
+_names: dict[Path, str] = {}
+"""By folder of a sensor's bake: the name that the sensor has in it."""
 _read: dict[tuple[Path, ...], tuple[list[tuple[int, ...]], Bake | PalpateError]] = {}
 """By the folders of a scene's sensors: the stamps of their manifests and their bake, read and checked when it is first needed
 and when another one has taken its place, or why it cannot be read."""
@@ -26,12 +28,14 @@ def forget() -> None:
     """Forget all that was read."""
     _new.clear()
     _read.clear()
+    _names.clear()
 
 
 def remember(recording: Recording, folders: dict[str, Path]) -> None:
     """Keep the recording of a new bake in memory, for the folders of its sensors; others are forgotten."""
     forget()
     _new.update(dict.fromkeys(folders.values(), recording))
+    _names.update({folder: name for name, folder in folders.items()})
 
 
 def show(scene, depsgraph) -> None:
@@ -51,7 +55,8 @@ def show(scene, depsgraph) -> None:
         text, note = other, "not the bake of this file"
     elif staleness.is_stale(scene, depsgraph, recording):
         text, note = "The scene has changed since this bake. Bake again.", "out of date: bake again"
-    sensors = recording.at(number).sensors
+    present = _present_names(scene)
+    sensors = {present.get(name, name): readings for name, readings in recording.at(number).sensors.items()}
     frame = Frame(number, 0.0, sensors, poses=np.zeros((0, 7)), velocities=np.zeros((0, 6)))
     frame_status.set_status(scene, text, frame, recording.step_reason, " ".join(recording.warnings))
     if not bpy.app.background:
@@ -66,13 +71,20 @@ def _show_in_views(scene, frame: Frame, note: str) -> None:
         return  # a new bake whose files are damaged already; its numbers are shown
     if bake is None or frame.frame not in bake.recording.frames:
         return
-    recording, texels = bake.recording, bake.texels
+    recording, present = bake.recording, _present_names(scene)
     style = bake_display.figure_style(scene)
-    top = style.scale_limit(recording, texels) * (1e3 if style.quantity == "pressure" else 1.0)
+    top = style.scale_limit(recording, bake.texels) * (1e3 if style.quantity == "pressure" else 1.0)
     overlays.show_bake(scene, bake, frame.frame, top)
     if scene.palpate.show_inset:
-        loads = {name: readings.normal_force.sum(axis=1) for name, readings in recording.sensors.items()}
+        texels = {present.get(name, name): own for name, own in bake.texels.items()}
+        loads = {present.get(name, name): readings.normal_force.sum(axis=1) for name, readings in recording.sensors.items()}
         inset.show(scene, inset.inset_content(scene, frame, texels, recording.frames.astype(float), loads, top, note))
+
+
+def _present_names(scene) -> dict[str, str]:
+    """Return what the sensors of a bake are called now, by their names in the bake: they may have been renamed since."""
+    folders = baked_scene.bake_folders(scene)
+    return {_names[folder]: obj.name for obj, folder in folders.items() if folder in _names and not identity.is_copy(obj)}
 
 
 def _recording(scene) -> Recording | None:
@@ -93,6 +105,7 @@ def _bake(scene) -> Bake | None:
     if folders not in _read or _read[folders][0] != stamps:
         try:
             _read[folders] = stamps, read_sensors(folders, images=False)
+            _names.update({folder: name for name, folder in _read[folders][1].folders.items()})
         except PalpateError as error:
             _read[folders] = stamps, error
     found = _read[folders][1]

@@ -11,7 +11,7 @@ from contextlib import suppress
 
 import bpy
 
-from ..display import baked_scene, overlays
+from ..display import baked_scene, markers, overlays
 from ..scene import participants
 from ..session import animation_time, frame_status, redraw, session_state
 from . import baked_frames, live_cache, playback
@@ -62,7 +62,9 @@ def look_again(scene) -> None:
     if not playback.has_participants(scene):
         return
     depsgraph = participants.depsgraph_of(scene)
-    if baked_scene.baked_objects(scene):
+    if baked := baked_scene.baked_objects(scene):
+        baked_scene.clear_copies(scene)
+        markers.follow_names(scene, baked)
         baked_frames.show(scene, depsgraph)
         redraw.views()
         return

@@ -40,5 +40,6 @@ __all__ = [
     "tactile_exr",
     "temporary_folder",
     "toml_file",
+    "vector_exr",
     "xml_file",
 ]

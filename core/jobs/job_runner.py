@@ -11,7 +11,7 @@ from .progress import Job, Progress, Result
 
 SLICE = 0.1
 """Seconds of work between two looks at the keyboard, where the window draws quickly."""
-LONGEST_SLICE = 1.0
+LONGEST_SLICE = 5.0
 """Seconds of work at most, where the window draws slowly: as long as it draws, so that drawing takes half of the time."""
 
 

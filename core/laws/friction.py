@@ -102,16 +102,15 @@ def deflection_scale(square: float, limit: float) -> float:
     return limit / math.sqrt(square) if square > limit * limit else 1.0
 
 
-@kernel
+@inlined
 def bristle_rate(z: float, velocity: float, speed_squared: float, normal_force: float, law: ContactLaw) -> float:
     """One component of Eq. 9, m/s."""
     g = normal_force * stribeck_coefficient(speed_squared, law)
-    if g <= 0.0:
-        return 0.0
-    return velocity - law.sigma0 * math.sqrt(speed_squared) / g * z
+    held = g > 0.0
+    return velocity - law.sigma0 * math.sqrt(speed_squared) / (g if held else 1.0) * z if held else 0.0
 
 
-@kernel
+@inlined
 def friction_force(z: float, bristle_rate: float, velocity: float, law: ContactLaw) -> float:
     """One component of Eq. 13, N."""
     return law.sigma0 * z + law.sigma1 * bristle_rate + law.ct * velocity

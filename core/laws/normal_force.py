@@ -73,11 +73,18 @@ def damped_force_derivatives(
     return elastic + by_rate * rate, by_depth, by_rate
 
 
+@inlined
+def linear_normal_force(depth: float, rate: float, law: ContactLaw) -> float:
+    """Do as :func:`normal_force` for the linear law."""
+    return max(law.k * depth + law.cn * rate, 0.0)
+
+
 @kernel
 def normal_force(depth: float, rate: float, law: ContactLaw) -> float:
     """Normal force at a depth (m) and its rate (m/s), N; never negative."""
-    inside = depth if law.exponent == LINEAR_EXPONENT else max(depth, 0.0)
-    return max(damped_force(elastic_force(inside, law), rate, law), 0.0)
+    if law.exponent == LINEAR_EXPONENT:
+        return linear_normal_force(depth, rate, law)
+    return max(damped_force(elastic_force(max(depth, 0.0), law), rate, law), 0.0)
 
 
 @inlined

@@ -9,11 +9,11 @@ import numpy as np
 
 from ..errors import ParameterError, SensorError, counted
 from ..geometry.texels import Texels
-from .dipoles import dipole_field, dipole_gradient
+from .dipoles import dipole_gradient, summed_field
 from .layer import layer_weights
 
-BLOCK_NUMBERS = 1 << 20
-"""Offsets between magnets and magnetometers that are worked on at once."""
+BLOCK_NUMBERS = 1 << 14
+"""Offsets between magnets and magnetometers that are worked on at once: their arrays stay in a processor's cache."""
 
 
 @dataclass(frozen=True)
@@ -166,15 +166,14 @@ class MagneticSkin:
 
     def _seen(self, place: np.ndarray) -> np.ndarray:
         """Fields of magnets at some places (T, m, 3) along the axes of the magnetometers, (T, k, 3)."""
-        offset = self.magnetometers.place[None, :, None] - place[:, None]
-        nearest = float(np.sqrt(np.min(np.sum(offset**2, axis=-1)))) if offset.size else np.inf
+        field, square = summed_field(self.magnetometers.place, place, self.magnets.moment)
+        nearest = float(np.sqrt(square.min(initial=np.inf)))
         if nearest < self.magnetometers.size:
-            _, chip, magnet = np.unravel_index(int(np.argmin(np.sum(offset**2, axis=-1))), offset.shape[:3])
+            _, chip, magnet = np.unravel_index(int(np.argmin(square)), square.shape)
             raise ParameterError(
                 f"Magnet {magnet} comes within {1e3 * nearest:.3g} mm of magnetometer {chip}, inside its chip: "
                 "place it higher, or press less deep."
             )
-        field = dipole_field(offset, self.magnets.moment).sum(axis=2)
         found: np.ndarray = np.einsum("kij,tkj->tki", self.magnetometers.axes, field)
         return found
 

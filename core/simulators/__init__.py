@@ -7,4 +7,13 @@ those of many environments. :mod:`.warp` does the same as :mod:`.pressed_sensors
 :mod:`.probe_list` has all that they need of a sensor.
 """
 
-__all__ = ["pressed_sensor", "pressed_sensors", "probe_list", "registry", "sensor_format", "sensor_on_mesh", "warp"]
+__all__ = [
+    "environment_parameters",
+    "pressed_sensor",
+    "pressed_sensors",
+    "probe_list",
+    "registry",
+    "sensor_format",
+    "sensor_on_mesh",
+    "warp",
+]

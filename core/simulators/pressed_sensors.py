@@ -16,6 +16,7 @@ from ..geometry.mesh import TriangleMesh
 from ..geometry.shapes import Shape
 from ..solver.pressed_model import PressedModel
 from ..solver.pressing import PressedTexels, Presser, StepMemory
+from .environment_parameters import Columns, sensors_of
 from .load_balance import LoadBalance
 from .sensor_on_mesh import SensorOnMesh
 
@@ -78,6 +79,9 @@ class PressedSensors:
     dt : float, seconds
         Step of the other program.
     environments : int
+    parameters : mapping of str to (E,) float, optional
+        Parameters and effects' parameters in which the sensors of environments differ, by name: ``k``, ``mus``,
+        ``effect.creep.amount`` (see :mod:`.environment_parameters`).
     threads : int, optional
         How many to compute with; by default the environment variable ``PALPATE_THREADS``, or as many as pay off.
 
@@ -95,7 +99,7 @@ class PressedSensors:
 
     Notes
     -----
-    Effects draw the same random numbers in every environment.
+    Effects draw the same random numbers in every environment, unless `parameters` has seeds.
     """
 
     def __init__(
@@ -105,6 +109,7 @@ class PressedSensors:
         dt: float,
         environments: int,
         threads: int | None = None,
+        parameters: Columns | None = None,
     ):
         if environments < 1:
             raise ParameterError(f"There are {environments} environments: ask for one at least.")
@@ -114,7 +119,8 @@ class PressedSensors:
         n = model.texels
         _check_memory(environments, model.bytes_of_environment() + n * BYTES_OF_TEXEL)
         self._out = PressedTexels.zero(environments, n, len(targets))
-        self._environments = model.environments(environments)
+        sensors = sensors_of(item.sensor, parameters, environments) if parameters else []
+        self._environments, self._sensors = model.environments(environments, sensors), sensors
         self._threads = [
             model.presser(StepMemory.zero(n, len(targets)), self._out, self._environments, model.workspace())
             for _ in range(model.threads(environments, threads))
@@ -178,7 +184,10 @@ class PressedSensors:
         ParameterError
             Poses or loads have another shape. Those that are not finite are no error (see :attr:`Contacts.valid`).
         """
-        e, t = len(self), self._out.wrench.shape[1]
+        e, t, o = len(self), self._out.wrench.shape[1], self._out
+        found = Contacts(o.texels, o.readings, o.contact, o.wrench[:, 0] if self._one_target else o.wrench, o.too_deep, o.valid)
+        if out is not None:
+            _check_room(out, found)
         self._take("sensor", sensor_poses, [(e, 7), (7,)], self._out.poses[:, 0])
         if self._one_target:
             self._take("target", target_poses, [(e, 7)], self._out.poses[:, 1])
@@ -193,9 +202,6 @@ class PressedSensors:
         else:
             self._press_under(wrench)
         self._read(fresh)
-        wrench = self._out.wrench[:, 0] if self._one_target else self._out.wrench
-        o = self._out
-        found = Contacts(o.texels, o.readings, o.contact, wrench, o.too_deep, o.valid)
         if out is None:
             return found
         for name in CONTACT_FIELDS:
@@ -250,7 +256,8 @@ class PressedSensors:
         for number in np.flatnonzero(self._out.valid):
             chain = self._chains[number]
             if fresh[number]:
-                chain = self._chains[number] = self._model.readout_chain()
+                sensor = self._sensors[number] if self._sensors else None
+                chain = self._chains[number] = self._model.readout_chain(sensor)
             assert chain is not None
             time, force = self._steps[number] / self._model.rate, np.ascontiguousarray(self._out.texels[number, :, 0])
             self._out.readings[number] = chain.step(float(time), force)
@@ -259,6 +266,16 @@ class PressedSensors:
 CONTACT_FIELDS = tuple(Contacts.__dataclass_fields__)
 BYTES_OF_TEXEL = 3 * 8 + 8 + 1
 """What the results of a texel take in memory."""
+
+
+def _check_room(out: Contacts, found: Contacts) -> None:
+    """Raise :class:`.ParameterError` where arrays to write into are not like those to be written."""
+    for name in CONTACT_FIELDS:
+        values, wanted = np.asarray(getattr(out, name)), getattr(found, name)
+        if values.shape != wanted.shape or values.dtype != wanted.dtype:
+            raise ParameterError(
+                f"'{name}' of out is {values.dtype} of shape {values.shape}: give {wanted.dtype} of shape {wanted.shape}."
+            )
 
 
 def _check_memory(environments: int, size: int) -> None:

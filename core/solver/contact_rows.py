@@ -27,6 +27,8 @@ LIMIT = 12 * LANES  # largest |z|, m
 # multiplier of the friction coefficients, and what is added to ct (N·s/m).
 NORMAL_BIAS, NORMAL_SLOPE = 13 * LANES, 14 * LANES
 FRICTION_SCALE, EXTRA_VISCOSITY = 15 * LANES, 16 * LANES
+# What the readout writes over columns that only a step reads: friction (N), normal force (N) and sliding speed (m/s).
+FRICTION, PUSH, SPEED = KEEP, NORMAL_BIAS, NORMAL_SLOPE
 ROW = 17 * LANES
 """Numbers in a block."""
 

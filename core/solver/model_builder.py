@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from ..effects.engine.compiled_program import compile_program
+from ..effects.engine.compiled_program import EffectProgram, compile_program
 from ..effects.engine.sensor_effects import mounted_texels
 from ..geometry.contact_points import ContactPoints
 from ..geometry.mesh import TriangleMesh
@@ -52,8 +54,13 @@ def build_model(
         points=_points(scenario, rows, points),
         pairs=_pairs(scenario, first_point, shared),
         drives=_drives(scenario, drive_of, drive_unknown, gains),
-        effects=compile_program([sensor.effects for sensor in scenario.sensors], [dt, 0.0]),  # STEP and NOW of effect_kernels
+        effects=step_program(scenario.sensors, dt),
     )
+
+
+def step_program(sensors: Sequence[Sensor], dt: float) -> EffectProgram:
+    """Return the laws that act on the forces of sensors, for steps of `dt` seconds."""
+    return compile_program([sensor.effects for sensor in sensors], [dt, 0.0])  # STEP and NOW of effect_kernels
 
 
 def texel_starts(scenario: Scenario) -> np.ndarray:

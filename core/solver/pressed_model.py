@@ -14,6 +14,7 @@ from ..effects.engine.registry import in_signal_order
 from ..errors import ParameterError
 from ..geometry.mesh import TriangleMesh
 from ..geometry.shapes import Shape
+from ..laws.contact_law import contact_law
 from ..model.body import Body
 from ..model.motion import Motion
 from ..model.scenario import Scenario
@@ -21,9 +22,11 @@ from ..model.sensor import Sensor
 from ..model.target import Target
 from ..response.readings import ReadoutChain
 from .detection.detection_data import TargetShapes
+from .model_builder import step_program
 from .parallel_loops import help_with_loops, prepare_pair_loops
 from .pressing import (
     Environment,
+    OwnNumbers,
     PressedTexels,
     Presser,
     Pressing,
@@ -98,17 +101,30 @@ class PressedModel:
         self._queue = workspace.queue
         self.helpers = simulation.helpers
         transducers = transducers_of(sensor)
-        scale = np.broadcast_to(transducers.gain * transducers.painted, self.texels)
-        self._conversion = np.stack([np.full(self.texels, float(transducers.zero)), scale])
+        self._painted = np.array(np.broadcast_to(transducers.painted, self.texels), float)
         self.reads_by_chain = bool(in_signal_order(sensor.effects, readout=True))
 
-    def readout_chain(self) -> ReadoutChain | None:
-        """Return what turns forces into readings, from its beginning; None where that is a scale and a zero."""
-        return ReadoutChain.of(self.sensor) if self.reads_by_chain else None
+    def readout_chain(self, sensor: Sensor | None = None) -> ReadoutChain | None:
+        """Return what turns forces into readings, from its beginning; None where that is a scale and a zero.
 
-    def environments(self, count: int) -> list[Environment]:
-        """Return environments at their beginning."""
-        return make_environments(count, self._detection, self._state)
+        `sensor` is one that differs in parameters.
+        """
+        return ReadoutChain.of(sensor or self.sensor) if self.reads_by_chain else None
+
+    def environments(self, count: int, sensors: Sequence[Sensor] = ()) -> list[Environment]:
+        """Return environments at their beginning; `sensors` are those of each, which differ in parameters, or none."""
+        same = self._own_numbers(self.sensor)
+        own = [self._own_numbers(sensor) for sensor in sensors]
+        return make_environments(count, self._detection, self._state, lambda number: own[number] if own else same)
+
+    def _own_numbers(self, sensor: Sensor) -> OwnNumbers:
+        """Return the parameters of a sensor as the kernels take them."""
+        p, pairs = sensor.parameters, self._model.pairs
+        laws = [contact_law(p, *shares) for shares in zip(pairs.force_share, pairs.overlap_share, strict=True)]
+        constants = self._model.effects.constants
+        if len(constants):
+            constants = step_program([sensor], self._dt).constants
+        return OwnNumbers(np.array(laws, float), constants, np.array([p.zero, p.gain], float))
 
     def threads(self, environments: int, wanted: int | None) -> int:
         """Return how many threads to divide environments among, of those that are wanted or, with None, pay off."""
@@ -129,10 +145,15 @@ class PressedModel:
         self, memory: StepMemory, pressed: PressedTexels, environments: list[Environment], workspace: Workspace
     ) -> Presser:
         """Return what runs steps of these environments in one thread."""
+        model = self._model
+        model = model._replace(
+            pairs=model.pairs._replace(law=model.pairs.law.copy()),
+            effects=model.effects._replace(constants=model.effects.constants.copy()),
+        )
         pressing = Pressing(
             dt=np.array([self._dt]),
-            conversion=self._conversion,
-            model=self._model,
+            painted=self._painted,
+            model=model,
             workspace=workspace,
             memory=memory,
             pressed=pressed,

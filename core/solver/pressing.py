@@ -26,6 +26,25 @@ from .workspace import Workspace
 
 
 @by_reference
+class OwnNumbers(NamedTuple):
+    """The parameters of an environment's sensor.
+
+    Attributes
+    ----------
+    law : (q, 10) float
+        As :attr:`.Pairs.law`.
+    constants : (rows, c) float
+        As :attr:`.EffectProgram.constants`.
+    readout : (2,) float
+        Zero and gain of the readings.
+    """
+
+    law: np.ndarray
+    constants: np.ndarray
+    readout: np.ndarray
+
+
+@by_reference
 class Environment(NamedTuple):
     """What an environment carries from step to step.
 
@@ -35,11 +54,13 @@ class Environment(NamedTuple):
     state : State
     found : (1,) bool
         The state has the contacts at the poses where the bodies are.
+    own : OwnNumbers
     """
 
     detection: DetectionData
     state: State
     found: np.ndarray
+    own: OwnNumbers
 
 
 @by_reference
@@ -128,9 +149,10 @@ class Pressing(NamedTuple):
     Attributes
     ----------
     dt : (1,) float, seconds
-    conversion : (2, n) float
-        Zero and scale of each texel's reading.
+    painted : (n,) float
+        Factors of the texels' gains.
     model : SolverModel
+        Whose laws and constants of effects are this thread's, and become those of the environment that it works on.
     workspace : Workspace
     memory : StepMemory
     pressed : PressedTexels
@@ -141,7 +163,7 @@ class Pressing(NamedTuple):
     """
 
     dt: np.ndarray
-    conversion: np.ndarray
+    painted: np.ndarray
     model: SolverModel
     workspace: Workspace
     memory: StepMemory
@@ -150,8 +172,13 @@ class Pressing(NamedTuple):
     example: Environment
 
 
-def make_environments(count: int, detection: DetectionData, state: State) -> list[Environment]:
-    """Return environments that begin as this one; the arrays of all of them lie behind one another."""
+def make_environments(
+    count: int, detection: DetectionData, state: State, own: Callable[[int], OwnNumbers]
+) -> list[Environment]:
+    """Return environments that begin as this one; the arrays of all of them lie behind one another.
+
+    `own` returns the parameters of each, by number.
+    """
     found = np.zeros((count, 1), np.bool_)
     lists, states = ([np.repeat(field[None], count, axis=0) for field in part] for part in (detection.neighbours, state))
     return [
@@ -159,6 +186,7 @@ def make_environments(count: int, detection: DetectionData, state: State) -> lis
             DetectionData(detection.tree, NeighbourLists(*(rows[i] for rows in lists)), detection.surfaces, detection.shapes),
             State(*(rows[i] for rows in states)),
             found[i],
+            own(i),
         )
         for i in range(count)
     ]
@@ -221,12 +249,14 @@ def press_environments(first: int, last: int, pressing: Pressing) -> None:
 def press_environment(number: int, pressing: Pressing, environment: Environment) -> None:
     """Run one step of an environment and write down what its sensor measures."""
     out, poses, model, workspace = pressing.pressed, pressing.pressed.poses[number], pressing.model, pressing.workspace
-    memory, state, dt = pressing.memory, environment.state, pressing.dt[0]
+    memory, state, dt, own = pressing.memory, environment.state, pressing.dt[0], environment.own
     out.valid[number] = _are_poses(poses)
     if not out.valid[number]:
         out.begins[number] = True
         _clear(number, out)
         return
+    _copy_table(own.law, model.pairs.law)
+    _copy_table(own.constants, model.effects.constants)
     _write_path(dt, poses, out.begins[number], state, memory)
     if out.begins[number]:
         forget(state)
@@ -238,7 +268,15 @@ def press_environment(number: int, pressing: Pressing, environment: Environment)
     advance_steps(dt, 0, 1, path, model, environment.detection, state, workspace, environment.found[0])
     out.too_deep[number] = find_all_contacts(-dt, model, environment.detection, state, workspace)
     environment.found[0] = True
-    _read(number, pressing, state)
+    _read(number, pressing, own.readout, state)
+
+
+@kernel
+def _copy_table(values: np.ndarray, out: np.ndarray) -> None:
+    """Write the values (r, c) into `out`."""
+    for i in range(values.shape[0]):
+        for j in range(values.shape[1]):
+            out[i, j] = values[i, j]
 
 
 @kernel
@@ -304,7 +342,7 @@ def forget(state: State) -> None:
 
 
 @kernel
-def _read(number: int, pressing: Pressing, state: State) -> None:
+def _read(number: int, pressing: Pressing, readout: np.ndarray, state: State) -> None:
     """Write down what the sensor measures, from contacts that were just found."""
     t, out, model, workspace = pressing.memory, pressing.pressed, pressing.model, pressing.workspace
     for texel in range(len(t.force)):
@@ -324,10 +362,10 @@ def _read(number: int, pressing: Pressing, state: State) -> None:
         for i in range(6):
             t.net[0, i] = 0.0
         while pair < pairs and model.pairs.target[pair] == target:
-            readout = TexelReadout(
+            texels = TexelReadout(
                 t.force, t.shear, t.friction, t.depth, t.slip, t.contact, t.strongest, t.net, t.moment
             )  # fmt: skip
-            read_pair(pair, model, state, workspace, readout)
+            read_pair(pair, model, state, workspace, texels)
             pair += 1
         for i in range(6):
             t.whole_net[i] += t.net[0, i]
@@ -340,7 +378,7 @@ def _read(number: int, pressing: Pressing, state: State) -> None:
         out.texels[number, texel, 1] = t.shear[texel, 0]
         out.texels[number, texel, 2] = t.shear[texel, 1]
         out.contact[number, texel] = t.contact[texel]
-        out.readings[number, texel] = pressing.conversion[0, texel] + pressing.conversion[1, texel] * t.force[texel]
+        out.readings[number, texel] = readout[0] + readout[1] * pressing.painted[texel] * t.force[texel]
 
 
 @kernel

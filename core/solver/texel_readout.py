@@ -10,12 +10,12 @@ import numpy as np
 
 from ..compiled.kernels import inlined, kernel
 from ..effects.engine.compiled_program import TexelMotion, has_effects
-from ..laws.contact_law import ContactLaw, read_law
+from ..laws.contact_law import LINEAR_EXPONENT, ContactLaw, read_law
 from ..laws.friction import bristle_rate, deflection_scale, friction_force, max_bristle_deflection
-from ..laws.normal_force import normal_force
-from .contact_rows import BRISTLE, DEPTH, NORMAL, POINT, read_vector
+from ..laws.normal_force import linear_normal_force, normal_force
+from .contact_rows import BRISTLE, DEPTH, FRICTION, LANES, NORMAL, POINT, PUSH, SPEED, read_vector, write_vector
 from .dynamics.effect_kernels import NOW, apply_effects, force_and_friction_law, lane_range, press_texel
-from .dynamics.relative_kinematics import motion_values, point_law, row_of, row_velocity, write_pair_motion
+from .dynamics.relative_kinematics import motion_values, point_law, row_of, row_velocity, velocity_at, write_pair_motion
 from .solver_model import SolverModel, State
 from .workspace import Workspace
 
@@ -83,80 +83,118 @@ def read_texels(model: SolverModel, state: State, workspace: Workspace, out: Tex
 def read_pair(pair: int, model: SolverModel, state: State, workspace: Workspace, out: TexelReadout) -> None:
     """Add the contacts of one pair to the readout."""
     write_pair_motion(pair, model, state, workspace)
-    motion, law = motion_values(workspace.pairs.motion[pair]), read_law(model.pairs.law, pair)
-    for r in range(workspace.contacts.number[pair]):
-        block, lane = row_of(r, pair, workspace.contacts)
-        _read_contact(pair, block, lane, motion, law, model, state, workspace, out)
+    law, varies = read_law(model.pairs.law, pair), has_effects(model.pairs.sensor[pair], model.effects)
+    varies = varies or len(model.points.multipliers) > 0 or workspace.contacts.deforming[pair]
+    if varies or law.exponent != LINEAR_EXPONENT:
+        _write_forces_one_by_one(pair, law, model, state, workspace)
+    else:
+        _write_forces(pair, law, workspace)
+    _add_forces(pair, model, workspace, out)
 
 
 @inlined
-def _read_contact(
-    pair: int,
-    block: int,
-    lane: int,
-    motion: tuple[float, ...],
+def _friction(
+    bristle: tuple[float, float, float],
+    velocity: tuple[float, float, float],
+    normal: tuple[float, float, float],
+    rate: float,
+    fn: float,
     law: ContactLaw,
-    model: SolverModel,
-    state: State,
-    workspace: Workspace,
-    out: TexelReadout,
-) -> None:
-    """Add one contact to the readout."""
-    contacts, sensor, whole = workspace.contacts, model.pairs.sensor[pair], 1.0 / model.pairs.force_weight[pair]
-    rows, frame = contacts.rows, model.points.frame
-    point = model.pairs.first_point[pair] + contacts.slots[block, lane] - model.pairs.first_slot[pair]
-    texel, depth = model.points.texel[point], contacts.rows[block, DEPTH + lane]
-    p = point_law(law, model.points.multipliers, point)
-    nx, ny, nz = read_vector(rows, block, NORMAL, lane)
-    px, py, pz = read_vector(rows, block, POINT, lane)
-    vx, vy, vz, rate = row_velocity(block, lane, motion, contacts.deforming[pair], contacts)
-    tx, ty, tz = vx - rate * nx, vy - rate * ny, vz - rate * nz
+) -> tuple[float, float, float]:
+    """Friction on a contact point under the normal force `fn`, N.
+
+    It drags the sensor along with the target; the target's surface normal points into the sensor.
+    """
+    (zx, zy, zz), (tx, ty, tz) = bristle, tangential_velocity(velocity, normal, rate)
     square = tx * tx + ty * ty + tz * tz
-    fn = normal_force(depth, rate, p)
-    if has_effects(sensor, model.effects):
-        texels = workspace.effects.contacts
-        press_texel(texels, block, lane, pair, TexelMotion(depth, rate, 0.0, math.sqrt(square)), p, model)
-        points = lane_range(pair, block, lane, 1, model, workspace)
-        apply_effects(pair, NOW, points, p, model, state.effect_memory, workspace)
-        fn, p = force_and_friction_law(pair, block, lane, p, model, texels)
-    zx, zy, zz = read_vector(rows, block, BRISTLE, lane)
-    held = deflection_scale(zx * zx + zy * zy + zz * zz, max_bristle_deflection(fn, p))
+    held = deflection_scale(zx * zx + zy * zy + zz * zz, max_bristle_deflection(fn, law))
     zx, zy, zz = held * zx, held * zy, held * zz
-    # Friction drags the sensor along with the target; the target's surface normal points into the sensor.
-    fx, fy, fz = 0.0, 0.0, 0.0
-    if fn > 0.0:
-        fx = friction_force(zx, bristle_rate(zx, tx, square, fn, p), tx, p)
-        fy = friction_force(zy, bristle_rate(zy, ty, square, fn, p), ty, p)
-        fz = friction_force(zz, bristle_rate(zz, tz, square, fn, p), tz, p)
-    fx, fy, fz, fn = whole * fx, whole * fy, whole * fz, whole * fn
-    out.friction[texel] += math.sqrt(fx * fx + fy * fy + fz * fz)
-    # Shear is the part of the whole force in the texel's plane: where the object's surface leans, some of it is normal force.
-    fx, fy, fz = fx + fn * nx, fy + fn * ny, fz + fn * nz
-    out.shear[texel, 0] += fx * frame[point, 6] + fy * frame[point, 7] + fz * frame[point, 8]
-    out.shear[texel, 1] += fx * frame[point, 9] + fy * frame[point, 10] + fz * frame[point, 11]
-    if fn > out.strongest[texel]:  # the slip is that of the target and the point which press hardest
-        out.strongest[texel] = fn
-        out.slip[texel] = math.sqrt(square)
-    out.contact[texel] = True
-    out.force[texel] += fn
-    out.depth[texel] = max(out.depth[texel], depth)
-    _add_to_wrench(sensor, (px, py, pz), (fx, fy, fz), fn, out)
+    fx = friction_force(zx, bristle_rate(zx, tx, square, fn, law), tx, law)
+    fy = friction_force(zy, bristle_rate(zy, ty, square, fn, law), ty, law)
+    fz = friction_force(zz, bristle_rate(zz, tz, square, fn, law), tz, law)
+    pressed = fn > 0.0
+    return (fx if pressed else 0.0), (fy if pressed else 0.0), (fz if pressed else 0.0)
 
 
 @inlined
-def _add_to_wrench(
-    sensor: int, point: tuple[float, float, float], force: tuple[float, float, float], normal_force: float, out: TexelReadout
-) -> None:
-    """Add the force on a point (m) to a sensor's wrench, and its normal force to the sums for the centre of pressure."""
-    (px, py, pz), (fx, fy, fz) = point, force
-    net, moment = out.net, out.moment
-    net[sensor, 0] += fx
-    net[sensor, 1] += fy
-    net[sensor, 2] += fz
-    net[sensor, 3] += py * fz - pz * fy
-    net[sensor, 4] += pz * fx - px * fz
-    net[sensor, 5] += px * fy - py * fx
-    moment[sensor, 0] += normal_force * px
-    moment[sensor, 1] += normal_force * py
-    moment[sensor, 2] += normal_force * pz
-    moment[sensor, 3] += normal_force
+def tangential_velocity(
+    velocity: tuple[float, float, float], normal: tuple[float, float, float], rate: float
+) -> tuple[float, float, float]:
+    """Return the part of a velocity in the surface, whose part along the normal is `rate`."""
+    (vx, vy, vz), (nx, ny, nz) = velocity, normal
+    return vx - rate * nx, vy - rate * ny, vz - rate * nz
+
+
+@kernel
+def _write_forces(pair: int, law: ContactLaw, workspace: Workspace) -> None:
+    """Write normal force, friction and sliding speed into the rows of a pair with the linear law, alike for all its points."""
+    contacts, motion, rows = workspace.contacts, motion_values(workspace.pairs.motion[pair]), workspace.contacts.rows
+    first = contacts.first_block[pair]
+    for b in range(first, first + (contacts.number[pair] + LANES - 1) // LANES):
+        for lane in range(LANES):  # runs in vector registers: no branches, no calls
+            normal, bristle = read_vector(rows, b, NORMAL, lane), read_vector(rows, b, BRISTLE, lane)
+            vx, vy, vz = velocity_at(read_vector(rows, b, POINT, lane), motion)
+            rate = vx * normal[0] + vy * normal[1] + vz * normal[2]
+            fn = linear_normal_force(rows[b, DEPTH + lane], rate, law)
+            fx, fy, fz = _friction(bristle, (vx, vy, vz), normal, rate, fn, law)
+            tx, ty, tz = tangential_velocity((vx, vy, vz), normal, rate)
+            write_vector(rows, b, FRICTION, lane, fx, fy, fz)
+            rows[b, PUSH + lane], rows[b, SPEED + lane] = fn, math.sqrt(tx * tx + ty * ty + tz * tz)
+
+
+@kernel
+def _write_forces_one_by_one(pair: int, law: ContactLaw, model: SolverModel, state: State, workspace: Workspace) -> None:
+    """Do as :func:`_write_forces` where effects act, points are painted, surfaces deform or the law is curved."""
+    contacts, motion, rows = workspace.contacts, motion_values(workspace.pairs.motion[pair]), workspace.contacts.rows
+    effects = has_effects(model.pairs.sensor[pair], model.effects)
+    for r in range(contacts.number[pair]):
+        b, lane = row_of(r, pair, contacts)
+        point = model.pairs.first_point[pair] + contacts.slots[b, lane] - model.pairs.first_slot[pair]
+        depth, p = rows[b, DEPTH + lane], point_law(law, model.points.multipliers, point)
+        normal, bristle = read_vector(rows, b, NORMAL, lane), read_vector(rows, b, BRISTLE, lane)
+        vx, vy, vz, rate = row_velocity(b, lane, motion, contacts.deforming[pair], contacts)
+        tx, ty, tz = tangential_velocity((vx, vy, vz), normal, rate)
+        speed, fn = math.sqrt(tx * tx + ty * ty + tz * tz), normal_force(depth, rate, p)
+        if effects:
+            texels = workspace.effects.contacts
+            press_texel(texels, b, lane, pair, TexelMotion(depth, rate, 0.0, speed), p, model)
+            points = lane_range(pair, b, lane, 1, model, workspace)
+            apply_effects(pair, NOW, points, p, model, state.effect_memory, workspace)
+            fn, p = force_and_friction_law(pair, b, lane, p, model, texels)
+        fx, fy, fz = _friction(bristle, (vx, vy, vz), normal, rate, fn, p)
+        write_vector(rows, b, FRICTION, lane, fx, fy, fz)
+        rows[b, PUSH + lane], rows[b, SPEED + lane] = fn, speed
+
+
+@kernel
+def _add_forces(pair: int, model: SolverModel, workspace: Workspace, out: TexelReadout) -> None:
+    """Add the forces in the rows of a pair to its texels, to the sensor's wrench and to the sums for the centre of pressure."""
+    contacts, sensor, whole = workspace.contacts, model.pairs.sensor[pair], 1.0 / model.pairs.force_weight[pair]
+    rows, frame, net, moment = contacts.rows, model.points.frame, out.net[sensor], out.moment[sensor]
+    first_point = model.pairs.first_point[pair] - model.pairs.first_slot[pair]
+    net_x, net_y, net_z, turn_x, turn_y, turn_z = net[0], net[1], net[2], net[3], net[4], net[5]
+    mean_x, mean_y, mean_z, total = moment[0], moment[1], moment[2], moment[3]
+    for r in range(contacts.number[pair]):
+        b, lane = row_of(r, pair, contacts)
+        point = first_point + contacts.slots[b, lane]
+        texel, depth = model.points.texel[point], rows[b, DEPTH + lane]
+        nx, ny, nz = read_vector(rows, b, NORMAL, lane)
+        px, py, pz = read_vector(rows, b, POINT, lane)
+        fx, fy, fz = read_vector(rows, b, FRICTION, lane)
+        fx, fy, fz, fn = whole * fx, whole * fy, whole * fz, whole * rows[b, PUSH + lane]
+        out.friction[texel] += math.sqrt(fx * fx + fy * fy + fz * fz)
+        # Shear is the part of the whole force in the texel's plane: where the object's surface leans, some is normal force.
+        fx, fy, fz = fx + fn * nx, fy + fn * ny, fz + fn * nz
+        out.shear[texel, 0] += fx * frame[point, 6] + fy * frame[point, 7] + fz * frame[point, 8]
+        out.shear[texel, 1] += fx * frame[point, 9] + fy * frame[point, 10] + fz * frame[point, 11]
+        if fn > out.strongest[texel]:  # the slip is that of the target and the point which press hardest
+            out.strongest[texel] = fn
+            out.slip[texel] = rows[b, SPEED + lane]
+        out.contact[texel] = True
+        out.force[texel] += fn
+        out.depth[texel] = max(out.depth[texel], depth)
+        net_x, net_y, net_z = net_x + fx, net_y + fy, net_z + fz
+        turn_x, turn_y, turn_z = turn_x + (py * fz - pz * fy), turn_y + (pz * fx - px * fz), turn_z + (px * fy - py * fx)
+        mean_x, mean_y, mean_z, total = mean_x + fn * px, mean_y + fn * py, mean_z + fn * pz, total + fn
+    net[0], net[1], net[2], net[3], net[4], net[5] = net_x, net_y, net_z, turn_x, turn_y, turn_z
+    moment[0], moment[1], moment[2], moment[3] = mean_x, mean_y, mean_z, total

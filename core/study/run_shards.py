@@ -151,8 +151,8 @@ class ShardScan:
             if sizes[name] > self._ends.get(name, 0):
                 path = self._runs / name
                 try:
-                    with open(path, "rb") as file:
-                        yield from self._groups_of(path, file, sizes[name])
+                    with open(path, "rb") as file:  # a network file system knows the size best when a file is opened
+                        yield from self._groups_of(path, file, os.fstat(file.fileno()).st_size)
                 except OSError as error:
                     raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): check its permissions.") from error
 
@@ -317,6 +317,10 @@ class ShardIndex:
         """Return what runs have in common; raises as :meth:`read`."""
         path, offset, length, checksum = self._common[name]
         return _checked(path, _read(path, offset, length), checksum)
+
+    def all_common(self) -> dict[str, bytes]:
+        """Return all that runs have in common, by name; raises as :meth:`read`."""
+        return {name: self.common(name) for name in self._common}
 
     def _known(self, digest: str) -> np.void:
         found = self._row(digest)

@@ -40,6 +40,11 @@ def test_press(play_road):
     assert result["values"]["arrow"][0] > 0.0
 
 
+def test_sample(play_road):
+    """A sample scene is worth a picture at the moment when it opens."""
+    assert play_road("sample", timeout=600)["values"]["force"] == pytest.approx(0.393, abs=0.005)
+
+
 def test_tutorial(play_road):
     """The README's five minutes, word by word."""
     values = play_road("tutorial", timeout=1200)["values"]
@@ -92,7 +97,7 @@ def test_gap(play_road, real_blender, repository):
 
 def test_out_of_date(play_road):
     """Numbers that are no longer true are taken away or named so, at once."""
-    assert play_road("out_of_date", timeout=900)["screenshots"] == ["solid.png", "out-of-date.png", "opened.png"]
+    assert play_road("out_of_date", timeout=900)["screenshots"] == ["solid.png", "out-of-date.png", "opened.png", "renamed.png"]
 
 
 def test_study(play_road):

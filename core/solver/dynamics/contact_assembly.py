@@ -139,7 +139,12 @@ def sum_pair_contacts(pair: int, dt: float, model: SolverModel, state: State, wo
     bodies, pairs = workspace.bodies, workspace.pairs
     relative_motion(a, b, bodies.step_motion, state.position, bodies.rotation, pairs.motion[pair])
     relative_motion(a, b, bodies.known_step_motion, state.position, bodies.rotation, pairs.known_motion[pair])
-    _sum_contacts(pair, dt, read_law(model.pairs.law, pair), model, state.effect_memory, workspace)
+    law, unknown = read_law(model.pairs.law, pair), model.bodies.first_unknown
+    alike = law.exponent == LINEAR_EXPONENT and len(model.points.multipliers) == 0 and not workspace.contacts.deforming[pair]
+    if alike and unknown[a] < 0 and unknown[b] < 0 and not has_effects(model.pairs.sensor[pair], model.effects):
+        _linearise_contacts(pair, dt, law, workspace)
+    else:
+        _sum_contacts(pair, dt, law, model, state.effect_memory, workspace)
 
 
 @kernel
@@ -238,6 +243,20 @@ def _add_contact(
     sums[24 * LANES + lane] += py * fz - pz * fy
     sums[25 * LANES + lane] += pz * fx - px * fz
     sums[26 * LANES + lane] += px * fy - py * fx
+
+
+@kernel
+def _linearise_contacts(pair: int, dt: float, law: ContactLaw, workspace: Workspace) -> None:
+    """Do as :func:`_sum_contacts` for bodies whose motion is prescribed, which need no sums, and contacts that are alike."""
+    contacts, motion = workspace.contacts, motion_values(workspace.pairs.motion[pair])
+    rows, first = contacts.rows, contacts.first_block[pair]
+    for b in range(first, first + (contacts.number[pair] + LANES - 1) // LANES):
+        for lane in range(LANES):  # runs in vector registers: no branches, no calls
+            normal, bristle = read_vector(rows, b, NORMAL, lane), read_vector(rows, b, BRISTLE, lane)
+            velocity = velocity_at(read_vector(rows, b, POINT, lane), motion)
+            bias, slope = linear_tangent(rows[b, DEPTH + lane], dt, law)
+            contact = linearise_contact(normal, bristle, velocity, Tangent(bias, slope, 1.0, 0.0, False), dt, law)
+            rows[b, LIMIT + lane], rows[b, KEEP + lane], rows[b, GAIN + lane] = contact.limit, contact.keep, contact.gain
 
 
 @kernel

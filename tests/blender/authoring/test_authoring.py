@@ -147,7 +147,7 @@ def test_what_automatic_means():
     assert sensors.automatic_source(pad, "EDIT") == "SELECTION"
 
 
-@pytest.mark.parametrize(("size", "expected"), [(2.0, 0.5), (0.05, 0.012), (0.01, 0.002)])
+@pytest.mark.parametrize(("size", "expected"), [(2.0, 0.1), (0.2, 0.012), (0.05, 0.012), (0.01, 0.003)])
 def test_the_maximum_penetration_follows_the_size_of_the_region(size, expected):
     pad = grid(size=size)
     bpy.ops.palpate.sensor_add()
@@ -165,11 +165,11 @@ def test_a_maximum_penetration_that_was_set_stays():
 def test_a_painted_region_has_its_size_when_it_is_probed():
     pad = grid(columns=41, rows=41, size=2.0)
     pad.scale = 0.5, 0.5, 0.5
-    bpy.context.scene.unit_settings.scale_length = 0.5
+    bpy.context.scene.unit_settings.scale_length = 0.8
     bpy.ops.palpate.weight_paint()
     bpy.ops.object.mode_set(mode="OBJECT")
     corner = [v.index for v in pad.data.vertices if max(v.co.xy) < 0.0]
     pad.vertex_groups["Palpate Sensor"].add(corner, 1.0, "REPLACE")
     assert pad.palpate.max_penetration == pytest.approx(0.012)
     bpy.ops.palpate.probe_add()
-    assert pad.palpate.max_penetration == pytest.approx(0.06)  # a quarter of 0.95 × 0.5 × 0.5 m
+    assert pad.palpate.max_penetration == pytest.approx(0.02)  # a twentieth of 0.95 × 0.5 × 0.8 m

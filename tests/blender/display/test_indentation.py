@@ -16,6 +16,7 @@ from palpate.addon.session import frame_status
 from palpate.addon.timeline import live_cache
 from palpate.core.figures import color_maps
 from palpate.core.jobs.job_runner import run_job
+from palpate.core.response import metrics
 
 
 def surface(obj):
@@ -241,7 +242,7 @@ def flat_colors(scene, overlay, run):
     scene.palpate.show_indentation = True
     surface_of = indented_surface.surface_of(scene, scene.objects["Pad"], run.scenario.sensors[0].texels)
     force = run.frames[6].sensors["Pad"].normal_force
-    own = color_maps.colors(scene.palpate.color_map, force / max(force.max(), 1e-9))
+    own = color_maps.colors(scene.palpate.color_map, force / metrics.scale_limit(force.max()))  # as on a bake so far
     return np.tile(surface_of.between(own), (2, 1)).max(axis=1)
 
 

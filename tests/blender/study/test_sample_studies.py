@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sample studies, each with a few runs instead of hundreds."""
 
-import json
+from dataclasses import asdict
 
 import pytest
 from solver_scenes import GRAVITY
 
+from palpate.sweep.finished_runs import StoredRuns
 from palpate.sweep.scene_evaluation import read_blend
 from palpate.sweep.study_folder import begin_study
 from palpate.sweep.worker import compute_batch, end_children
@@ -25,7 +26,8 @@ def finished(folder, tmp_path, name: str, order, count: int) -> list[dict]:
     chosen = [*ordered[:count], *ordered[-count:]]
     words = [{"index": r.index, "scene": r.scene, "values": dict(r.values), "digest": r.digest} for r in chosen]
     assert [answer["status"] for answer in compute_batch(str(opened.folder), words)] == ["done"] * 2 * count
-    return [json.loads((opened.folder / "runs" / run.digest / "run.json").read_bytes()) for run in chosen]
+    stored = StoredRuns(opened.folder)
+    return [asdict(stored.record(run.digest)) for run in chosen]
 
 
 @pytest.mark.long("computes runs of a sample study")

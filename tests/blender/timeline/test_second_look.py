@@ -68,6 +68,58 @@ def test_a_baked_file_that_was_opened_shows_its_numbers_at_once(tmp_path):
     assert status.text == f"Frame {scene.frame_current} of the bake." and "Pad" in status.frame.sensors
 
 
+def test_a_renamed_sensor_takes_numbers_and_arrows_along(tmp_path):
+    scene, pad, _ = press(frames=4)
+    save(tmp_path)
+    run_job(bake(scene))
+    scene.frame_set(4)
+    for name in ("Skin", "Palm"):
+        pad.name = name
+        second_look.look_again(scene)
+        assert set(frame_status.status_of(scene).frame.sensors) == {name}
+        assert f"Net Force {name}" in scene.objects
+    scene.objects["Net Force Palm"].name = "My arrow"
+    pad.name = "Pad"
+    second_look.look_again(scene)
+    assert "My arrow" in scene.objects and "Net Force Pad" not in scene.objects
+
+
+@pytest.mark.parametrize("linked", [False, True])
+def test_a_duplicate_of_a_baked_sensor_is_not_baked(tmp_path, linked):
+    scene, pad, _ = press(frames=4)
+    save(tmp_path)
+    run_job(bake(scene))
+    scene.frame_set(4)
+    for obj in scene.objects:
+        obj.select_set(obj == pad)
+    bpy.context.view_layer.objects.active = pad
+    shown = [slot.material for slot in pad.material_slots]
+    assert any(shown)
+    bpy.ops.object.duplicate(linked=linked)
+    copy = bpy.context.object
+    second_look.look_again(scene)
+    assert copy.palpate.is_baked == linked  # a linked duplicate shows the heat map of the shared mesh
+    assert pad.palpate.is_baked and pad.palpate.bake_folder and "Net Force Pad" in scene.objects
+    assert copy.palpate.uid != pad.palpate.uid or linked
+    assert [slot.material for slot in pad.material_slots] == shown
+    assert "Pad" in frame_status.status_of(scene).frame.sensors
+    run_job(bake(scene))
+    assert copy.palpate.is_baked and set(frame_status.status_of(scene).frame.sensors) == {"Pad", "Pad.001"}
+
+
+def test_warnings_of_a_bake_stay_in_its_status(tmp_path):
+    scene, pad, _ = press(frames=8)
+    pad.palpate.max_penetration = 0.0003
+    save(tmp_path)
+    run_job(bake(scene))
+    scene.frame_set(2)
+    assert "maximum penetration" in frame_status.status_of(scene).warnings
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
+    second_look.look_again(bpy.context.scene)
+    assert "maximum penetration" in frame_status.status_of(bpy.context.scene).warnings
+
+
 def test_a_slider_gives_the_numbers_of_playing_anew(monkeypatch):
     monkeypatch.setattr(second_look, "QUICK", 60.0)
     scene, pad, *_ = press_and_drop(frames=6)

@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Magnetic skins from scripts: what a recording shows through them, and arguments that cannot be."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import palpate as pp
+from palpate.core.io import exr_codec
 from palpate.core.response.layer import texel_displacements
 
 
@@ -65,6 +70,11 @@ def test_arguments_that_cannot_be(pressed, changes, sentence):
         skin(pressed[0], **changes)
 
 
+def test_a_skin_without_magnetometers_is_refused(pressed):
+    with pytest.raises(pp.PalpateError, match="needs moments, magnetometers and a thickness: give them, or .* one of uskin"):
+        pp.magnetic_skin(pressed[0], pressed[0].texels.position - [0, 0, 3e-3], [0, 0, 4e-3])
+
+
 def test_another_sensor_and_a_stiffness_that_cannot_be(pressed):
     _, rec = pressed
     other = pp.Sensor.grid(2, 2, 4e-3)
@@ -72,3 +82,80 @@ def test_another_sensor_and_a_stiffness_that_cannot_be(pressed):
         rec.channels(skin(other))
     with pytest.raises(pp.PalpateError, match="shear_stiffness is 0"):
         rec.channels(skin(pressed[0]), shear_stiffness=0.0)
+
+
+@pytest.mark.parametrize(("name", "magnets", "chips"), [("uskin", 16, 16), ("eflesh", 5, 5), ("anyskin", 36, 5)])
+def test_a_preset_is_a_whole_skin_in_the_frame_of_its_pad(name, magnets, chips):
+    """Of a turned and shifted pad all turn with it, so that readings stay; a press in the middle changes them symmetrically."""
+    plain = pp.Sensor.grid(9, 9, 2.5e-3)
+    own = pp.magnetic_skin(plain, name)
+    assert own.magnets.place.shape == (magnets, 3) and own.magnetometers.place.shape == (chips, 3)
+    turn = Rotation.from_rotvec([0.3, -1.2, 0.7]).as_matrix()
+    texels, shift = plain.texels, [0.1, 0.2, 0.3]
+    moved = {key: getattr(texels, key) @ turn.T for key in ("position", "normal", "tangent")}
+    turned = replace(texels, **(moved | {"position": moved["position"] + shift}))
+    other = pp.magnetic_skin(SimpleNamespace(texels=turned), name)
+    press = np.zeros((1, 81, 3))
+    press[0, 40] = [2e-4, 0.0, -1e-3]
+    np.testing.assert_allclose(other.readings(press @ turn.T).values, own.readings(press).values, rtol=1e-9, atol=1e-12)
+    press[0, 40, 0] = 0.0
+    change = (own.readings(press).values[0] - own.field_at_rest())[:, :2]
+    assert np.abs(change.sum(axis=0)).max() < 1e-9 * np.abs(change).max()
+
+
+def test_what_a_preset_gives_may_be_replaced():
+    pad = pp.Sensor.grid(9, 9, 2.5e-3)
+    twice = pp.magnetic_skin(pad, "uskin", moments=[0.0, 0.0, 8e-3]).field_at_rest()
+    np.testing.assert_allclose(twice, 2.0 * pp.magnetic_skin(pad, "uskin").field_at_rest(), rtol=1e-14)
+    assert pp.magnetic_skin(pad, "uskin", full_scale=1e-3).magnetometers.full_scale == 1e-3
+
+
+@pytest.mark.parametrize(
+    ("pad", "name", "sentence"),
+    [
+        (pp.Sensor.grid(9, 9, 2.5e-3), "usking", "There is no skin 'usking'.* there are uskin, eflesh, anyskin"),
+        (
+            pp.Sensor.grid(4, 4, 2e-3),
+            "uskin",
+            "The pad covers 8 × 8 mm and the magnets of the skin 'uskin' lie within 14.1 × 14.1 mm",
+        ),
+    ],
+)
+def test_presets_that_cannot_be_used(pad, name, sentence):
+    with pytest.raises(pp.PalpateError, match=sentence):
+        pp.magnetic_skin(pad, name)
+
+
+def test_a_vector_image_shows_changes_from_rest(pressed):
+    pad, rec = pressed
+    own = skin(pad)
+    seen = rec.channels(own, shear_stiffness=300.0)
+    figure = pp.draw_channels(own, seen, frames=(5, -1))
+    first, last, bar = figure.axes
+    assert first.get_title() == "frame 5" and last.get_title() == f"frame {len(rec) - 1}" and "mT" in bar.get_ylabel()
+    dots, arrows = last.collections
+    change = 1e3 * (seen.values[-1] - seen.values[0])
+    np.testing.assert_allclose(dots.get_array(), change[:, 2])
+    np.testing.assert_allclose(np.stack([arrows.U, arrows.V], axis=1), change[:, :2])
+    low, high = dots.get_clim()
+    both = 1e3 * (seen.values[[5, -1]] - seen.values[0])
+    assert low == -high and high == pytest.approx(np.abs(both[..., 2]).max())
+    longest = np.linalg.norm(both[..., :2], axis=-1).max()
+    assert arrows.scale * 0.9 * 4.0 == pytest.approx(longest) and f"longest arrow {longest:.3g} mT" in bar.get_ylabel()
+    with pytest.raises(pp.PalpateError, match="frame 99 is none of the 12 of the recording"):
+        pp.draw_channels(own, seen, frames=(99,))
+    with pytest.raises(pp.PalpateError, match="A vector image has the shape"):
+        pp.draw_channels(pp.magnetic_skin(pp.Sensor.grid(9, 9, 2.5e-3), "eflesh"), seen)
+
+
+def test_channels_are_saved_as_vector_images(pressed, tmp_path):
+    pad, rec = pressed
+    seen = rec.channels(skin(pad))
+    paths = pp.save_channels(seen, tmp_path / "images", 3, 3)
+    channels, attributes = exr_codec.read(paths[-1])
+    np.testing.assert_array_equal(channels["field.Z"][::-1].ravel(), seen.values[-1, :, 2].astype(np.float32))
+    assert len(paths) == len(rec) and attributes["palpate.unit"] == "T"
+    with pytest.raises(pp.PalpateError, match="4 × 4 places has 48 channels and these readings have 27"):
+        pp.save_channels(seen, tmp_path / "other", 4, 4)
+    with pytest.raises(pp.PalpateError, match="rows is 0"):
+        pp.save_channels(seen, tmp_path / "other", 0, 9)

@@ -13,7 +13,7 @@ from palpate.core.gap.logs.column_meaning import GRAVITY
 
 TIME = np.linspace(0.0, 40.0, 500)
 STIMULI = {"force": (0.0, 2000.0), "depth": (0.0, 1e-3), "slide_x": (-5e-3, 5e-3)}
-STIMULUS = {"adhesive": "depth", "foam": "depth", "brake": "slide_x"}
+STIMULUS = {"adhesive": "depth", "tape": "depth", "foam": "depth", "foam-shear": "depth", "brake": "slide_x"}
 
 
 def columns(name, phase):

@@ -6,7 +6,7 @@ import pytest
 
 from palpate.core.errors import ParameterError, SensorError
 from palpate.core.gap.dataset.rig import grid_texels
-from palpate.core.response.dipoles import MU0_4PI, dipole_field, dipole_gradient, moment_of_magnet
+from palpate.core.response.dipoles import MU0_4PI, dipole_field, dipole_gradient, moment_of_magnet, summed_field
 from palpate.core.response.layer import layer_weights, pressure_below_point_load, texel_displacements
 from palpate.core.response.magnetic_skin import Magnetometers, Magnets, magnetic_skin
 
@@ -71,6 +71,15 @@ def test_the_gradient_is_that_of_the_field_without_curl_and_divergence():
     np.testing.assert_allclose(gradient / size, moved / (2 * step) / size, atol=1e-6)
     assert np.abs(np.trace(gradient, axis1=1, axis2=2) / size[:, 0, 0]).max() < 1e-14
     assert np.abs(gradient - gradient.transpose(0, 2, 1)).max() < 1e-15 * size.max()
+
+
+def test_the_sum_of_fields_is_that_of_single_dipoles():
+    at, place, moment = random(6).normal(size=(7, 3)), random(7).normal(size=(5, 4, 3)), random(8).normal(size=(4, 3))
+    field, square = summed_field(at, place, moment)
+    offset = at[None, :, None] - place[:, None]
+    np.testing.assert_allclose(square, np.sum(offset**2, axis=3), rtol=1e-13)
+    size = np.linalg.norm(dipole_field(offset, moment), axis=3).sum(axis=2, keepdims=True)
+    assert (np.abs(field - dipole_field(offset, moment).sum(axis=2)) < 1e-13 * size).all()
 
 
 def test_two_magnets_have_one_energy():

@@ -90,6 +90,27 @@ def test_where_damping_jumps_at_most_the_jump_is_left():
     assert np.mean(left > EXACT) < 0.05
 
 
+def test_a_load_that_comes_back_is_left_for_one_step_at_most():
+    """Linear law: the target is let go and loaded again, across a gap of the engine.
+
+    As it touches, all texels' damping jumps to ``64 cn gap / dt``, and no displacement exerts less. The next step begins where
+    it touches, at rest, and the texels add up to the load again.
+    """
+    dt, gap = 0.02, 1e-4
+    pressed, before, left = pressed_by_box(dt), 1.0, 0
+    for step in range(300):
+        load = max(2.0 + 4.0 * np.sin(0.2 * step), 0.0)
+        pressed.step(pose(LEVEL), pose(at(z=gap)), wrench=[0.0, 0.0, load])
+        if np.linalg.norm(pressed.residual) > EXACT:
+            assert before == 0.0
+            assert 0.0 < load < 64 * LAW["cn"] * gap / dt
+            assert pressed.residual == pytest.approx([0.0, 0.0, load], abs=EXACT)
+            assert pressed.displacement[2] == pytest.approx(-gap, abs=1e-9)
+            left += 1
+        before = load
+    assert left > 5
+
+
 def test_the_displacement_is_that_of_springs():
     """64 springs of 1,000 N/m under 9.81 N, seen from an engine pose that penetrates by half a millimetre."""
     pressed = pressed_by_box()

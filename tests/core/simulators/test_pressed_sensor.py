@@ -108,7 +108,7 @@ def test_a_damaged_list_is_one_sentence(change, says, tmp_path):
 def test_what_is_no_list_is_one_sentence(text, tmp_path):
     path = tmp_path / "pad.json"
     path.write_bytes(text.encode("latin-1"))
-    with pytest.raises(PalpateError, match="is no "):
+    with pytest.raises(PalpateError, match="is not (JSON|a probe list)"):
         read_probe_list(path)
 
 

@@ -192,6 +192,9 @@ def test_what_makes_no_environments_is_one_sentence(monkeypatch):
         many.step(["far"] * 7, np.zeros((2, 7)))
     with pytest.raises(ParameterError, match=r"The mask of environments to reset is int64 of shape \(1,\)"):
         many.reset(np.array([1]))
+    found = many.step(LEVEL, np.stack([LEVEL] * 2))
+    with pytest.raises(ParameterError, match=r"'readings' of out is float32 of shape \(2, 16\): give float64 of shape"):
+        many.step(LEVEL, np.stack([LEVEL] * 2), replace(found, readings=found.readings.astype(np.float32)))
     monkeypatch.setattr(pressed_sensors, "_available_memory", lambda: 1e6)
     with pytest.raises(ParameterError, match=r"100000 environments take .* GiB of memory, .* ask for \d+ at most\.$"):
         PressedSensors(item, mesh, DT, 100_000)

@@ -4,14 +4,17 @@
 import errno
 import hashlib
 import os
+import random
+import shutil
 
 import pytest
 
-from palpate.attack.sweep_study import write_study
+from palpate.attack.injector import EXIT, Injector
+from palpate.attack.sweep_study import run_hashes, write_study
 from palpate.attack.trees import tree
 from palpate.core.errors import FileError
 from palpate.core.study import run_shards
-from palpate.core.study.run_files import RUNS, done_runs, run_batch
+from palpate.core.study.run_files import RUNS, done_runs, make_folders, run_batch
 from palpate.core.study.run_shards import KnownRuns, ShardIndex, ShardScan, append, digests_in
 from palpate.sweep.child import Scenes, compute_run
 from palpate.sweep.dataset import MOST_FILES, publish
@@ -19,6 +22,8 @@ from palpate.sweep.report import write_report
 from palpate.sweep.study_folder import begin_study
 from palpate.sweep.worker import compute_batch, end_children
 
+KILLED = 137
+"""Exit status of a process that an Injector ends."""
 COMMON = {"c" * 24: b"what they have in common"}
 
 
@@ -210,6 +215,85 @@ def test_runs_with_folders_give_the_same_dataset_and_report(study, tmp_path):
     publish(other.folder, other.runs)
     assert tree(other.folder / "dataset") == tree(study.folder / "dataset")
     assert (other.folder / "runs.parquet").read_bytes() == (study.folder / "runs.parquet").read_bytes()
+
+
+def write_until_killed(folder, contents: dict, common: dict, tell: int, dice: random.Random) -> None:
+    """Do what a worker does: write the runs that are left in groups, and tell which are on the disk."""
+    left = sorted(contents.keys() - done_runs(folder))
+    dice.shuffle(left)
+    while left:
+        size = dice.randrange(1, 4)
+        group, left = left[:size], left[size:]
+        with run_batch(folder) as batch:
+            for digest in group:
+                (batch.place / f"{digest}.run").write_bytes(contents[digest])
+                batch.add(digest)
+            for name, content in common.items():
+                (batch.place / f"{name}.common").write_bytes(content)
+        os.write(tell, "".join(group).encode())
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="processes that begin where this one is")
+@pytest.mark.slow("ends a hundred processes")
+def test_a_hundred_kills_lose_nothing_that_was_on_the_disk(study):
+    """Processes that write end at random file operations, in the middle of a write, too; shards are cut as a power cut may."""
+    publish(study.folder, study.runs)
+    expected, before = tree(study.folder / "dataset"), run_hashes(study.folder)
+    index = ShardIndex(study.folder / RUNS)
+    contents, common = {run.digest: index.read(run.digest) for run in study.runs}, index.all_common()
+    dice, kills, rounds = random.Random(7), 0, 0
+    while kills < 100:
+        for path in (study.folder / RUNS).glob("*"):
+            path.unlink() if path.is_file() else shutil.rmtree(path)
+        rounds += 1
+        while len(done_runs(study.folder)) < len(contents):
+            kept = done_runs(study.folder)
+            code, told = ended_process(study.folder, contents, common, dice)
+            kills += code == KILLED
+            kept |= told
+            make_folders(study.folder)  # as the next command does
+            assert kept <= done_runs(study.folder)
+            cut_after(study.folder / RUNS, kept, dice)
+            assert kept <= done_runs(study.folder)
+        assert run_hashes(study.folder) == before
+        assert not [path.name for path in (study.folder / RUNS).iterdir() if path.name.startswith(".")]
+    publish(study.folder, study.runs)
+    assert tree(study.folder / "dataset") == expected
+    assert rounds >= 5, "the processes ended before they wrote anything"
+
+
+def ended_process(folder, contents: dict, common: dict, dice: random.Random) -> tuple[int, set]:
+    """Let a process write until it ends at a random file operation; return its exit status, and the runs of which it told."""
+    run_shards._open.clear()
+    hear, tell = os.pipe()
+    at, seed = dice.randrange(1, 60), dice.random()
+    process = os.fork()
+    if process == 0:
+        try:
+            with Injector(folder, at, EXIT):
+                write_until_killed(folder, contents, common, tell, random.Random(seed))
+        finally:
+            os._exit(0)
+    os.close(tell)
+    with open(hear, "rb") as told:
+        said = told.read().decode()
+    code = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
+    return code, {said[at : at + 24] for at in range(0, len(said), 24)}
+
+
+def cut_after(folder, kept: set, dice: random.Random) -> None:
+    """Cut one shard somewhere behind the last group that was told to be on the disk, or fill that with zeros."""
+    ends = {path: 0 for path in shards(folder)}
+    for path, start, table in ShardScan(folder).new_groups():
+        if any(row["name"].tobytes().hex() in kept for row in table if row["kind"] == run_shards.RUN):
+            ends[path] = start + int(table["length"].sum())
+    for path, end in ends.items():
+        size = path.stat().st_size
+        if end < size and dice.random() < 0.5:
+            cut = dice.randrange(end, size)
+            os.truncate(path, cut)
+            if dice.random() < 0.5:
+                os.truncate(path, size)  # with zeros
 
 
 @pytest.mark.slow("starts the process of a worker")

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from study_scenes import HEAD, tiny_scene
 
+from palpate.attack.sweep_study import run_hashes
 from palpate.core.io.scenario_npz import save_scenario
 from palpate.core.study.run_files import done_runs
 from palpate.sweep.finished_runs import StoredRuns
@@ -113,6 +114,46 @@ def test_one_worker_joins_late_and_one_is_lost(tmp_path: Path, address: str):
     assert parquet.read_metadata(out / "dataset" / "meta" / "tasks.parquet").num_rows == 1
     assert_like_here(study, tmp_path / "here", table, every=40)
     print(f"{RUNS} runs, {left} of them after one of two workers was lost")
+
+
+@pytest.mark.long("two workers with disks of their own, one of which is killed")
+def test_runs_come_back_from_workers_with_disks_of_their_own(tmp_path: Path, address: str):
+    """Each computes in a copy of the study of its own, and only the driver writes into the study's folder."""
+    save_scenario(tmp_path / "tiny.npz", tiny_scene())
+    study, out = tmp_path / "study.toml", tmp_path / "out"
+    failing = STUDY.replace("[press]", '[vary]\n"Pad.mud" = { choice = [0.2, 0.25, 2.0] }\n[press]')
+    study.write_text(failing, encoding="utf-8")
+    port = address.rpartition(":")[2]
+    scheduler = ("dask", "scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard")
+    worker = ("dask", "worker", address, "--nworkers", "1", "--nthreads", "1", "--no-dashboard", "--local-directory")
+    command = ("palpate.commands", "sweep", str(study), "--out", str(out), "--scheduler", address, "--own-disks")
+    with (
+        started(*scheduler),
+        started(*worker, str(tmp_path / "first")) as first,
+        started(*worker, str(tmp_path / "second")) as second,
+        started(*command) as driver,
+    ):
+        until(lambda: len(done_runs(out)) >= 5 or driver.poll() is not None, "the first worker")
+        copies = [path for path in tmp_path.glob("*/**/palpate-study-*") if path.is_dir()]
+        lose(first)
+        said = driver.communicate(timeout=LONGEST)[0]
+        assert is_computing(second)
+    assert driver.returncode == 0, said
+    table = parquet.read_table(out / "runs.parquet").to_pydict()
+    assert sorted(table["run"]) == list(range(RUNS))
+    failed = [status == "failed" for status in table["status"]]
+    assert 0.2 * RUNS < sum(failed) < 0.5 * RUNS
+    assert all(("mud of sensor" in text) == is_failed for text, is_failed in zip(table["message"], failed, strict=True))
+    assert len(copies) == 2 and {path.relative_to(tmp_path).parts[0] for path in copies} == {"first", "second"}
+    assert len(list((out / "runs").glob("*.shard"))) == 1, "the driver alone writes into the folder of the study"
+    opened = begin_study(study, tmp_path / "here", lambda blend, target: None)
+    words = [{"index": r.index, "scene": r.scene, "values": dict(r.values), "digest": r.digest} for r in opened.runs[::20]]
+    try:
+        compute_batch(str(opened.folder), words)
+    finally:
+        end_children()
+    here, there = run_hashes(opened.folder), run_hashes(out)
+    assert here.items() <= there.items() and len(here) >= 4
 
 
 def assert_like_here(study: Path, folder: Path, table: dict, every: int) -> None:

@@ -66,6 +66,7 @@ def road(ui):
     yield from ui.screenshot("out-of-date")
 
     yield from open_again(ui)
+    yield from rename_and_duplicate(ui)
     yield from copy_whole(ui)
 
 
@@ -79,6 +80,27 @@ def open_again(ui):
     ui.check(scene.frame_current == frame, "at its own frame")
     yield 1.0
     yield from ui.screenshot("opened")
+
+
+def rename_and_duplicate(ui):
+    """Numbers, HUD and arrow take the new name of a sensor; its duplicate is not baked."""
+    scene, inset = bpy.context.scene, importlib.import_module("bl_ext.user_default.palpate.addon.display.inset")
+    press.obj("Pad").name = "Palm"
+    yield from ui.becomes(lambda: "Net Force Palm" in scene.objects, "a renamed sensor renames its arrow")
+    names = [one.name for one in inset._contents[scene.session_uid].insets]
+    ui.check("Palm" in names and "Pad" not in names, "and is called so in the HUD")
+    ui.check("Palm" in frame_status().status_of(scene).frame.sensors, "and in the panel")
+    yield from ui.screenshot("renamed")
+    for thing in scene.objects:
+        thing.select_set(thing.name == "Palm")
+    ui.window.view_layer.objects.active = press.obj("Palm")
+    with ui.context(ui.area("VIEW_3D")):
+        bpy.ops.object.duplicate()
+    yield from ui.becomes(lambda: not press.obj("Palm.001").palpate.is_baked, "the duplicate is not baked")
+    ui.check(press.obj("Palm").palpate.is_baked, "and the original is")
+    bpy.data.objects.remove(press.obj("Palm.001"))
+    press.obj("Palm").name = "Pad"
+    yield from ui.becomes(lambda: "Net Force Pad" in scene.objects, "the old name comes back")
 
 
 def arrows():
