@@ -95,7 +95,7 @@ def law_rates() -> tuple[float, float]:
 
 def step_rates(name: str, shape: Any) -> tuple[float, float, float]:
     """Return the rates of whole steps: on Warp with a mesh and with a shape, and of the compiled core with the mesh."""
-    mesh, height = loop.objects()[name]
+    mesh, height, _ = loop.objects()[name]
     phases = np.random.default_rng(1).random(WORLDS) * 2 * np.pi
     still = np.tile([0.0, 0.0, 0.0, *loop.LEVEL], (WORLDS, 1))
     poses = still.copy()
