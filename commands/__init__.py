@@ -23,7 +23,7 @@ COMMANDS = {
     "demo": "build, bake and render the demo scene, and print the forces on the pads",
     "bake": "bake the sensors of a .blend to tactile images",
     "render": "make pictures, figures and a video of a baked scene",
-    "export": "write a bake as CSV, NPZ, HDF5, PNG, MCAP or LeRobot dataset",
+    "export": "write a bake in the formats of other programs",
     "fit": "estimate stiffness and friction from measurements",
     "gap": "find the effects of a real sensor that its model lacks",
     "gap-table": "one table of the gaps of many rigs, beside models made by hand",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``palpate export``: a bake as CSV, NPZ, HDF5, PNG, MCAP, or a dataset for LeRobot."""
+"""``palpate export``: a bake in the formats of other programs."""
 
 from __future__ import annotations
 
