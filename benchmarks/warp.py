@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from palpate.core.compiled.kernels import inlined, kernel
-from palpate.core.geometry.bvh import Segment
+from palpate.core.geometry.shapes import box, sphere, sphere_entry
 from palpate.core.laws.contact_law import contact_law, read_law
 from palpate.core.laws.friction import (
     bristle_step,
@@ -26,23 +26,20 @@ from palpate.core.laws.friction import (
 )
 from palpate.core.laws.normal_force import normal_force
 from palpate.core.simulators.pressed_sensors import PressedSensors
-from palpate.core.simulators.warp.shapes import sphere_entry
 from palpate.core.simulators.warp.translation import Translation
-from palpate.core.simulators.warp.warp_sensors import Box, Sphere, WarpSensors
+from palpate.core.simulators.warp.warp_sensors import WarpSensors
 
 from . import loop, solver
 
 WORLDS, TEXELS, ROUNDS = 1024, 84, 9
 LAW_GOAL, MESH_GOAL = 15.0, 3.5
 """Millions of texel-steps per second, of the contact law alone and of steps with mesh queries."""
-entry = inlined(sphere_entry)
 
 
 def law_alone(world: int, texel: int, motion: np.ndarray, law: np.ndarray, bristle: np.ndarray, force: np.ndarray) -> None:
     """Press a texel with a sphere: `motion` has height, rate and sliding velocity of each world, and the step."""
     p, dt, vx, vy = read_law(law, 0), motion[world, 4], motion[world, 2], motion[world, 3]
-    t, _, _, _, _ = entry(Segment(1e-4 * texel, 0.0, -motion[world, 0], 0.0, 0.0, 0.006), 0.04)
-    depth = 0.006 * (1.0 - t)
+    depth = 0.006 - sphere_entry((1e-4 * texel, 0.0, -motion[world, 0]), (0.0, 0.0, 1.0), 0.04)
     fn = normal_force(depth, motion[world, 1], p)
     keep, gain = bristle_step(vx * vx + vy * vy, fn, dt, p)
     zx = next_deflection(keep, bristle[world, texel, 0], gain, vx)
@@ -121,7 +118,7 @@ def run() -> Iterator[dict]:
         "name": "warp.law", "value": ours, "unit": unit, "peer": peer, "peer_value": theirs,
         "ratio": ours / theirs, "goal": LAW_GOAL / theirs,
     }  # fmt: skip
-    for name, shape in (("cube", Box(*[solver.CUBE / 2] * 3)), ("ball", Sphere(solver.BALL))):
+    for name, shape in (("cube", box((solver.CUBE,) * 3)), ("ball", sphere(solver.BALL))):
         with_mesh, with_shape, core = step_rates(name, shape)
         yield {
             "name": f"warp.step.{name}.mesh", "value": with_mesh, "unit": unit, "peer": peer, "peer_value": core,

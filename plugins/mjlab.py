@@ -10,9 +10,10 @@ import numpy as np
 
 from ..core.errors import ParameterError
 from ..core.geometry.mesh import TriangleMesh
+from ..core.geometry.shapes import Shape, box, capsule, plane, sphere
 from ..core.simulators.sensor_on_mesh import SensorOnMesh
 from ..core.simulators.warp.engine import require_warp
-from ..core.simulators.warp.warp_sensors import Box, Capsule, Plane, Shape, Sphere, WarpSensors
+from ..core.simulators.warp.warp_sensors import WarpSensors
 from .engines import require_engine
 
 require_engine("mjlab", "mjlab", (1, 6))
@@ -153,17 +154,17 @@ def _index(mj_model: Any, kind: Any, what: str, name: str) -> int:
     return int(found)
 
 
-def _shape(mj_model: Any, geom: int) -> Shape:
+def _shape(mj_model: Any, geom: int) -> TriangleMesh | Shape:
     """Return a geom as a target."""
     kind, size = mujoco.mjtGeom(mj_model.geom_type[geom]), mj_model.geom_size[geom].astype(float)
     if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
-        return Sphere(size[0])
+        return sphere(size[0])
     if kind == mujoco.mjtGeom.mjGEOM_BOX:
-        return Box(*size)
+        return box(tuple(2.0 * size))
     if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
-        return Capsule(size[0], size[1])
+        return capsule(size[0], 2.0 * size[1])
     if kind == mujoco.mjtGeom.mjGEOM_PLANE:
-        return Plane()
+        return plane()
     if kind == mujoco.mjtGeom.mjGEOM_MESH:
         mesh = mj_model.geom_dataid[geom]
         vertex, face = mj_model.mesh_vertadr[mesh], mj_model.mesh_faceadr[mesh]

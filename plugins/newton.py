@@ -12,8 +12,9 @@ import numpy as np
 
 from ..core.errors import ParameterError
 from ..core.geometry.mesh import TriangleMesh
+from ..core.geometry.shapes import Shape, box, capsule, plane, sphere
 from ..core.simulators.sensor_on_mesh import SensorOnMesh
-from ..core.simulators.warp.warp_sensors import Box, Capsule, Plane, Shape, Sphere, WarpSensors
+from ..core.simulators.warp.warp_sensors import WarpSensors
 from .engines import require_engine
 
 Labels = str | Sequence[str] | re.Pattern[str] | Sequence[int]
@@ -143,20 +144,20 @@ def _is_named(label: str, pattern: str | int) -> bool:
     return isinstance(pattern, str) and fnmatch.fnmatch(label, pattern)
 
 
-def _shapes(newton: Any, model: Any, indices: list[int]) -> list[Shape]:
+def _shapes(newton: Any, model: Any, indices: list[int]) -> list[TriangleMesh | Shape]:
     """Return shapes of the model as targets."""
     kinds, scales = model.shape_type.numpy(), model.shape_scale.numpy().astype(float)
-    found: list[Shape] = []
+    found: list[TriangleMesh | Shape] = []
     for index in indices:
         kind, scale = newton.GeoType(int(kinds[index])), scales[index]
         if kind == newton.GeoType.SPHERE:
-            found.append(Sphere(scale[0]))
+            found.append(sphere(scale[0]))
         elif kind == newton.GeoType.BOX:
-            found.append(Box(*scale))
+            found.append(box(tuple(2.0 * scale)))
         elif kind == newton.GeoType.CAPSULE:
-            found.append(Capsule(scale[0], scale[1]))
+            found.append(capsule(scale[0], 2.0 * scale[1]))
         elif kind == newton.GeoType.PLANE and not scale[:2].any():
-            found.append(Plane())
+            found.append(plane())
         elif kind in (newton.GeoType.MESH, newton.GeoType.CONVEX_MESH):
             mesh = model.shape_source[index]
             vertices = np.array(mesh.vertices, float) * scale
@@ -169,7 +170,7 @@ def _shapes(newton: Any, model: Any, indices: list[int]) -> list[Shape]:
     return found
 
 
-def _are_same(these: list[Shape], others: list[Shape]) -> bool:
+def _are_same(these: list[TriangleMesh | Shape], others: list[TriangleMesh | Shape]) -> bool:
     if len(these) != len(others):
         return False
     pairs = zip(these, others, strict=True)

@@ -172,7 +172,7 @@ def compile_effect_laws() -> None:
 
 
 def scenario() -> Scenario:
-    """Return a small box that falls on a pad of four texels, for one frame of 10 ms."""
+    """Return a small box that falls on a pad of six texels (some effects want three channels each), for one frame of 10 ms."""
     import numpy as np
 
     from ..geometry.mesh import TriangleMesh
@@ -186,14 +186,15 @@ def scenario() -> Scenario:
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
     quads = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
     box = TriangleMesh(0.01 * (corners - 0.5), np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))
-    sheet = 0.002 * (corners[[0, 4, 2, 6]] - 0.5) * [1.0, 1.0, 0.0]
-    pad = TriangleMesh(sheet, np.array([[0, 1, 3], [0, 3, 2]]), np.array([[0, 1, 3, 2]]))
+    sheet = np.array([[0.001 * x, 0.002 * y, 0.0] for y in (-0.5, 0.5) for x in (-1, 0, 1)])
+    cells = np.array([[0, 1, 4, 3], [1, 2, 5, 4]])
+    pad = TriangleMesh(sheet, np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]]), cells)
     return Scenario(
         bodies=(
             Body("pad", Motion.at_rest()),
             Body("box", Motion.at_rest([0.0, 0.0, 0.0049]), True, 0.001, np.zeros(3), 1e-8 * np.eye(3)),
         ),
-        sensors=(Sensor("pad", 0, texels_from_region(pad, np.ones(4, bool), "pad")),),
+        sensors=(Sensor("pad", 0, texels_from_region(pad, np.ones(6, bool), "pad")),),
         targets=(Target("box", 1, box),),
         frame_end=2,
         fps=100.0,

@@ -5,4 +5,4 @@
 has the class that programs use. Warp is imported when one is made.
 """
 
-__all__ = ["effect_functions", "engine", "press_arrays", "press_kernels", "shapes", "translation", "warp_sensors"]
+__all__ = ["effect_functions", "engine", "press_arrays", "press_kernels", "translation", "warp_sensors"]

@@ -60,7 +60,7 @@ class TargetArrays(NamedTuple):
     kind : (T,) int
         MESH, SPHERE, BOX, CAPSULE or PLANE.
     size : (T, 3) float, metres
-        Radius of a sphere; half sizes of a box; radius and half the length of a capsule's axis.
+        See :attr:`.Shape.size`.
     mesh : (T,) int
         Which of the tree's meshes.
     """

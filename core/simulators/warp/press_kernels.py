@@ -18,7 +18,7 @@ import numpy as np
 from ...effects.engine.compiled_program import TexelMotion
 from ...geometry.bvh import Segment, Tree, segment_entry
 from ...geometry.rotations import write_backward_step_motion, write_rotation, write_step_motion, write_velocity
-from ...geometry.shapes import BOX, CAPSULE, MESH, PLANE, SPHERE
+from ...geometry.shapes import MESH, Vector, is_in_shape, shape_entry, shape_normal
 from ...laws.contact_law import ContactLaw, read_law, scaled_law, whole_texel_law, with_friction
 from ...laws.friction import (
     bristle_rate,
@@ -35,7 +35,6 @@ from ...solver.dynamics.effect_kernels import NOW, STEP
 from ...solver.dynamics.relative_kinematics import relative_motion, velocity_at
 from .effect_functions import force_with_effects, friction_with_effects, reading_with_effects
 from .press_arrays import BoolArray, Results, SensorArrays, Slots, TargetArrays, Worlds
-from .shapes import box_entry, capsule_entry, plane_entry, sphere_entry
 
 NO_CONTACT, TOO_DEEP = -1.0, -2.0
 """Instead of a share in :attr:`.Slots.pressed`."""
@@ -327,7 +326,7 @@ def _find_contact(
     dy = reach * (m[3] * f[3] + m[4] * f[4] + m[5] * f[5])
     dz = reach * (m[6] * f[3] + m[7] * f[4] + m[8] * f[5])
     segment, before = Segment(tx - dx, ty - dy, tz - dz, dx, dy, dz), slots.pressed[world, target, point]
-    found = _entry(segment, target, before, slots.triangle[world, target, point], targets, tree)
+    found = _entry(segment, target, before, slots.triangle[world, target, point], reach, targets, tree)
     slots.triangle[world, target, point] = found.triangle
     if not (0.0 <= found.t <= 1.0):
         slots.pressed[world, target, point] = TOO_DEEP if found.inside else NO_CONTACT
@@ -346,21 +345,27 @@ def _find_contact(
     z[0], z[1], z[2] = zx, zy, zz
 
 
-def _entry(segment: Segment, target: int, before: float, hint: int, targets: TargetArrays, tree: Tree) -> Entry:
-    """Return where a segment enters a target."""
-    kind = targets.kind[target]
-    t, nx, ny, nz, inside = 2.0, 0.0, 0.0, 0.0, False
-    if kind == MESH:
+def _entry(segment: Segment, target: int, before: float, hint: int, length: float, targets: TargetArrays, tree: Tree) -> Entry:
+    """Return where a segment of a length (m) enters a target."""
+    if targets.kind[target] == MESH:
         return _mesh_entry(segment, targets.mesh[target], before, hint, tree)
-    if kind == SPHERE:
-        t, nx, ny, nz, inside = sphere_entry(segment, targets.size[target, 0])
-    if kind == BOX:
-        t, nx, ny, nz, inside = box_entry(segment, targets.size[target, 0], targets.size[target, 1], targets.size[target, 2])
-    if kind == CAPSULE:
-        t, nx, ny, nz, inside = capsule_entry(segment, targets.size[target, 0], targets.size[target, 1])
-    if kind == PLANE:
-        t, nx, ny, nz, inside = plane_entry(segment)
-    return Entry(t, nx, ny, nz, -1, inside)
+    return _shape_entry(
+        targets.kind[target], (targets.size[target, 0], targets.size[target, 1], targets.size[target, 2]),
+        (segment.ox, segment.oy, segment.oz), (segment.dx / length, segment.dy / length, segment.dz / length), length,
+    )  # fmt: skip
+
+
+def _shape_entry(kind: int, size: Vector, base: Vector, way: Vector, length: float) -> Entry:
+    """Return where a segment of a length (m) enters a shape, as :mod:`.shape_contacts` has it."""
+    if is_in_shape(kind, size, base):
+        return Entry(2.0, 0.0, 0.0, 0.0, -1, True)
+    enters, axis = shape_entry(kind, size, base, way)
+    if not (0.0 <= enters <= length):
+        return Entry(2.0, 0.0, 0.0, 0.0, -1, False)
+    nx, ny, nz = shape_normal(
+        kind, size, axis, (base[0] + enters * way[0], base[1] + enters * way[1], base[2] + enters * way[2])
+    )  # fmt: skip
+    return Entry(enters / length, nx, ny, nz, -1, False)
 
 
 def _mesh_entry(segment: Segment, mesh: int, before: float, hint: int, tree: Tree) -> Entry:

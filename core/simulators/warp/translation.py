@@ -20,7 +20,7 @@ import linecache
 import math
 import textwrap
 from collections.abc import Callable, Mapping
-from types import ModuleType
+from types import GenericAlias, ModuleType
 from typing import Any
 
 import numpy as np
@@ -33,7 +33,7 @@ KIND_OF_ANNOTATION = {"float": REAL, "int": INTEGER, "bool": BOOLEAN, "np.ndarra
 ARRAYS = {"np.ndarray": REAL, "IntArray": INTEGER, "BoolArray": BOOLEAN}
 """Names of annotations of arrays, and the kind of what they hold."""
 SAME_IN_WARP = ("min", "max", "abs", "range", "len")
-NATIVE = {"expm1": "x", "log1p": "x", "hypot": "x, y"}
+NATIVE = {"expm1": "x", "log1p": "x", "hypot": "x, y", "copysign": "x, y"}
 """Functions of C that Warp does not have, and their arguments."""
 
 
@@ -187,7 +187,7 @@ class _Rewriter:
         self._translation, self._tree, self._outside = translation, tree, outside
         self.scope: dict[str, Any] = {}
         self._temporaries = 0
-        self._text = {argument.arg: ast.unparse(argument.annotation) for argument in tree.args.args if argument.annotation}
+        self._text = {one.arg: self._named_text(ast.unparse(one.annotation)) for one in tree.args.args if one.annotation}
         self._kinds = {name: KIND_OF_ANNOTATION.get(text, OTHER) for name, text in self._text.items()}
         self._arrays = {name: ARRAYS[text] for name, text in self._text.items() if text in ARRAYS}
         self._axes = self._count_axes()
@@ -204,6 +204,11 @@ class _Rewriter:
         return self._block(self._tree.body)
 
     # --- what is known of names
+
+    def _named_text(self, text: str) -> str:
+        """Return an annotation, written out where it is the name of a kind of tuple."""
+        named = self._outside.get(text)
+        return str(named) if isinstance(named, GenericAlias) else text
 
     def _count_axes(self) -> dict[str, int]:
         """Return how many axes each array has, and how many entries each tuple that is indexed."""
@@ -270,6 +275,8 @@ class _Rewriter:
     def _kind_of_entry(self, node: ast.Subscript) -> str:
         """Return the kind of an entry of an array; a row of it is OTHER."""
         value, taken = node.value, len(node.slice.elts) if isinstance(node.slice, ast.Tuple) else 1
+        if isinstance(value, ast.Name) and self._text.get(value.id, "").startswith("tuple"):
+            return REAL
         if isinstance(value, ast.Attribute):
             kind, axes = self._field_array(value)
         elif isinstance(value, ast.Name):

@@ -5,17 +5,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ...effects.engine.readout_chain import transducers_of
 from ...effects.engine.sensor_effects import check_scenario, mounted_texels
 from ...errors import ParameterError
-from ...geometry import shapes
 from ...geometry.bvh import build_tree
 from ...geometry.contact_points import ContactPoints, contact_points
 from ...geometry.mesh import TriangleMesh
+from ...geometry.shapes import MESH, Shape
 from ...laws.contact_law import contact_law
 from ...model.body import Body
 from ...model.motion import Motion
@@ -30,41 +30,6 @@ from .engine import require_warp
 from .press_arrays import Results, SensorArrays, Slots, TargetArrays, Worlds
 from .translation import Translation
 
-
-class Sphere(NamedTuple):
-    """A sphere around the origin of its frame."""
-
-    radius: float
-
-
-class Box(NamedTuple):
-    """A box around the origin of its frame, of half sizes in metres."""
-
-    x: float
-    y: float
-    z: float
-
-
-class Capsule(NamedTuple):
-    """A capsule around the origin of its frame, whose axis of length 2 `half` lies along z; metres."""
-
-    radius: float
-    half: float
-
-
-class Plane(NamedTuple):
-    """All that is below z = 0 of its frame."""
-
-
-Shape = TriangleMesh | shapes.Shape | Sphere | Box | Capsule | Plane
-KINDS: dict[type, int] = {
-    TriangleMesh: shapes.MESH,
-    Sphere: shapes.SPHERE,
-    Box: shapes.BOX,
-    Capsule: shapes.CAPSULE,
-    Plane: shapes.PLANE,
-}
-
 _TRANSLATIONS: dict[Any, Translation] = {}
 
 
@@ -77,8 +42,8 @@ class WarpSensors:
     Parameters
     ----------
     item : SensorOnMesh
-    target : TriangleMesh, shapes.Shape, Sphere, Box, Capsule or Plane, or a sequence of these
-        Each in the frame of what presses, metres.
+    target : TriangleMesh or Shape, or a sequence of these
+        Each in the frame of what presses, metres; :mod:`.geometry.shapes` makes a box, sphere, capsule or plane.
     dt : float, seconds
         Step of the other program.
     environments : int
@@ -114,15 +79,14 @@ class WarpSensors:
     def __init__(
         self,
         item: SensorOnMesh,
-        target: Shape | Sequence[Shape],
+        target: TriangleMesh | Shape | Sequence[TriangleMesh | Shape],
         dt: float,
         environments: int,
         device: str = "cpu",
         single: bool = False,
     ):
         warp = require_warp()
-        single_target = type(target) in KINDS or isinstance(target, shapes.Shape)  # shapes of this module are tuples
-        targets: list[Any] = [target] if single_target else [*target]  # type: ignore[misc]
+        targets = [target] if isinstance(target, TriangleMesh | Shape) else list(target)
         _check(item.sensor, targets, dt, environments)
         self._warp, self.device = warp, _device(warp, device)
         self._environments, sensor = environments, item.sensor
@@ -220,7 +184,7 @@ _NO_MESH = TriangleMesh(np.eye(3), np.array([[0, 1, 2]]))
 """Stands for the tree where all targets are simple shapes."""
 
 
-def _check(sensor: Sensor, targets: Sequence[Shape], dt: float, environments: int) -> None:
+def _check(sensor: Sensor, targets: Sequence[TriangleMesh | Shape], dt: float, environments: int) -> None:
     """Raise :class:`.PalpateError` for what makes no run."""
     if not (np.isfinite(dt) and dt > 0):
         raise ParameterError(f"The step is {dt:g} s: give a number above zero.")
@@ -232,16 +196,10 @@ def _check(sensor: Sensor, targets: Sequence[Shape], dt: float, environments: in
         raise ParameterError(f"'{sensor.name}' deforms by prescription: take a sensor that keeps its shape in this loop.")
     meshes = []
     for number, target in enumerate(targets, start=1):
-        if isinstance(target, shapes.Shape):
-            continue
-        if type(target) not in KINDS:
-            raise ParameterError(
-                f"Target {number} is a {type(target).__name__}: give a TriangleMesh, Sphere, Box, Capsule or Plane."
-            )
         if isinstance(target, TriangleMesh):
             meshes.append(target)
-        elif not all(np.isfinite(size) and size > 0 for size in target):
-            raise ParameterError(f"Target {number} is {target}: give finite sizes above zero.")
+        elif not isinstance(target, Shape):
+            raise ParameterError(f"Target {number} is a {type(target).__name__}: give a TriangleMesh or a Shape.")
     meshes = meshes or [_NO_MESH]
     names = [f"target {number}" for number in range(1, len(meshes) + 1)]
     check_scenario(
@@ -295,12 +253,7 @@ def _sensor_arrays(sensor: Sensor, points: ContactPoints, effects: EffectFunctio
     )
 
 
-def _target_arrays(targets: Sequence[Shape]) -> TargetArrays:
-    kind = np.array([one.kind if isinstance(one, shapes.Shape) else KINDS[type(one)] for one in targets])
-    size = np.zeros((len(targets), 3))
-    for row, target in zip(size, targets, strict=True):
-        if isinstance(target, shapes.Shape):
-            row[:] = target.size
-        elif not isinstance(target, TriangleMesh):
-            row[: len(target)] = target
-    return TargetArrays(kind, size, np.cumsum(kind == shapes.MESH) - 1)
+def _target_arrays(targets: Sequence[TriangleMesh | Shape]) -> TargetArrays:
+    kind = np.array([one.kind if isinstance(one, Shape) else MESH for one in targets])
+    size = np.array([one.size if isinstance(one, Shape) else (0.0, 0.0, 0.0) for one in targets])
+    return TargetArrays(kind, size, np.cumsum(kind == MESH) - 1)

@@ -13,6 +13,8 @@ from palpate.core.compiled.kernels import inlined, plain
 from palpate.core.effects.engine.registry import complete_values, effect, form_of, library
 from palpate.core.effects.engine.specification import TexelInput
 from palpate.core.errors import PalpateError
+from palpate.core.geometry import shapes
+from palpate.core.geometry.shapes import is_in_shape, shape_distance, shape_entry, shape_normal
 from palpate.core.laws.contact_law import ContactLaw, read_law, scaled_law, whole_texel_law, with_friction
 from palpate.core.laws.friction import (
     bristle_rate,
@@ -38,6 +40,7 @@ from palpate.core.laws.normal_force import (
     normal_tangent,
 )
 from palpate.core.simulators.warp import engine
+from palpate.core.simulators.warp.press_arrays import IntArray
 from palpate.core.simulators.warp.translation import Translation, TranslationError
 
 warp = pytest.importorskip("warp", reason="Warp runs the kernels: pip install warp-lang")
@@ -93,6 +96,34 @@ def test_laws_of_contact_have_the_bits_of_their_source():
     found = arrays[2].numpy()
     assert np.count_nonzero(expected.any(axis=0)) == 33
     assert np.array_equal(found, expected, equal_nan=True)
+
+
+def shape_functions(i: int, kind: IntArray, x: np.ndarray, out: np.ndarray) -> None:
+    """Write the values of every function of shapes at a row of a size, a point and a unit vector."""
+    enters, axis = shape_entry(kind[i], (x[i, 0], x[i, 1], x[i, 2]), (x[i, 3], x[i, 4], x[i, 5]), (x[i, 6], x[i, 7], x[i, 8]))
+    nx, ny, nz = shape_normal(kind[i], (x[i, 0], x[i, 1], x[i, 2]), axis, (x[i, 3], x[i, 4], x[i, 5]))
+    out[i, 0], out[i, 1], out[i, 2], out[i, 3], out[i, 4] = enters, float(axis), nx, ny, nz
+    out[i, 5] = 1.0 if is_in_shape(kind[i], (x[i, 0], x[i, 1], x[i, 2]), (x[i, 3], x[i, 4], x[i, 5])) else 0.0
+    out[i, 6] = shape_distance(kind[i], (x[i, 0], x[i, 1], x[i, 2]), (x[i, 3], x[i, 4], x[i, 5]))
+
+
+@pytest.mark.slow("Warp compiles the functions")
+def test_shapes_have_the_bits_of_their_source():
+    """Lines in all directions and along the axes, which lead beside the faces of a box and along the axis of a capsule."""
+    draw, count = np.random.default_rng(3), 800
+    x, kind, expected = draw.normal(size=(count, 9)), 1 + np.arange(count) % 4, np.zeros((count, 7))
+    x[:, :3] = np.abs(x[:, :3]) + 0.1
+    x[:200, 6:] = np.repeat([*np.eye(3), *-np.eye(3)], 34, axis=0)[:200]
+    x[:, 6:] /= np.linalg.norm(x[:, 6:], axis=1, keepdims=True)
+    for i in range(count):
+        shape_functions(i, kind, x, expected)
+    translation = Translation(warp, warp.float64, "test_shapes")
+    arrays = [translation.array(values, "cpu") for values in (kind, x, np.zeros_like(expected))]
+    warp.launch(translation.kernel(shape_functions, 1), dim=count, inputs=arrays, device="cpu")
+    assert np.array_equal(arrays[2].numpy(), expected)
+    for one in (shapes.SPHERE, shapes.BOX, shapes.CAPSULE, shapes.PLANE):
+        met = np.isfinite(expected[kind == one, 0]).sum()
+        assert 50 < met < 200 and 20 < expected[kind == one, 5].sum() < 180, (one, met)
 
 
 def stand_in(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
