@@ -18,9 +18,8 @@ INTRODUCTION = """\
 
 <!-- Written by tools/effects_page.py from core/effects; change it there. -->
 
-An *effect* is a property of real sensors that the base model of [model.md](model.md) lacks. Most have several formulas,
-called *forms*. In Blender: Physics › Palpate › Effects › *Add Effect*. In a script or a file, an effect is its name, its form
-(by default the first) and its values:
+An *effect* is a property of real sensors that the [base model](model.md) lacks. Most have several formulas, called *forms*; the
+first is the default. In Blender: Physics › Palpate › Effects › *Add Effect*. In a script or a file:
 
 ```python
 from palpate.core.effects.engine.registry import effect
@@ -37,7 +36,7 @@ amount = 0.3
 
 ![Each effect in an experiment that shows it](images/effects.png)
 
-*Base model in grey, forms in colour, with their default values or slightly larger ones.*
+*Base model in grey, forms in colour.*
 
 ## Where effects act
 
@@ -46,16 +45,15 @@ Effects act in the order of this page, whatever their order in the stack:
 | site | what changes |
 | --- | --- |
 | contact | the contact law, without memory: forces, hence bodies and readings |
-| pad | the same, with a memory in each contact point: without contact creep recovers, hysteresis and adhesion reset |
+| pad | the same, with a memory in each contact point |
 | readout | the reading only |
 
 Readout forms act on the force in newtons, or, marked †, on `reading = zero + gain · force` in the unit of the sensor; their
-defaults and bounds then scale with the gain. Forms marked ⚄ take a `seed`. Random numbers depend on seed, texel and time only:
-a frame reads the same played, baked or computed alone. Time counts from the first frame.
+defaults and bounds then scale with the gain. Forms marked ⚄ take a `seed`; random numbers depend on seed, texel and time only.
+Time counts from the first frame.
 
 *fₑ* is the elastic force (`k d`, or Hunt and Crossley's), to which damping is added after the effects of the pad; *f* the
 resulting force, *r* the reading, *r₀* the reading before the effect. \\* marks one number per texel, or one for all.
-Tooltips state the bounds.
 """
 
 
