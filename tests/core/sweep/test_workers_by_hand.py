@@ -23,8 +23,8 @@ pytest.importorskip("distributed")
 psutil = pytest.importorskip("psutil")
 parquet = pytest.importorskip("pyarrow.parquet")
 
-RUNS = 240
-"""Of some 60 ms of the processor each: one worker alone is at work for longer than a second one takes to start."""
+RUNS = 1200
+"""Of some 20 ms of the processor each: one worker alone is at work for longer than a second one takes to start."""
 STUDY = f"""{HEAD}design = "random"
 samples = {RUNS}
 seed = 3
