@@ -54,7 +54,7 @@ class TouchSensorCfg(SensorCfg):
     body : str
         Whose frame is that of the texels; in mjlab a name such as ``robot/fingertip``.
     geoms : tuple of str
-        What presses: planes, spheres, capsules, boxes and meshes. MuJoCo's contact between them and the body has to be off if
+        Planes, spheres, capsules, boxes and meshes that press. MuJoCo's contact between them and the body has to be off if
         forces are applied.
     apply : bool
         Write the wrench on the geoms' bodies, and its opposite on the sensor's, to ``xfrc_applied`` of these bodies; other

@@ -24,7 +24,7 @@ Labels = str | Sequence[str] | re.Pattern[str] | Sequence[int]
 class SensorTouch:
     """A tactile sensor on shapes of a Newton model.
 
-    Each shape that `sensing_shapes` names carries the sensor: its frame is that of the texels. What presses on it are the
+    Each shape that `sensing_shapes` names carries the sensor: its frame is that of the texels. Its counterparts are the
     shapes of the same world, or of all worlds, that `counterpart_shapes` names. Between these, Newton's own contact has to be
     off where :meth:`update` adds the wrench to the bodies, as by ``has_shape_collision=False`` in their configuration.
 
@@ -81,7 +81,7 @@ class SensorTouch:
         for row, found in zip(self.sensing_indices, targets, strict=True):
             if not found or not _are_same(found, targets[0]):
                 raise ParameterError(
-                    f"What presses on shape '{model.shape_label[row]}' is other than in the first world: "
+                    f"The counterparts of shape '{model.shape_label[row]}' differ from those in the first world: "
                     "let counterpart_shapes name as many shapes, of equal sizes, in every world."
                 )
         self._sensors = WarpSensors(sensor, targets[0], dt, len(targets), str(model.device), single)

@@ -327,7 +327,7 @@ def varied_name(name: str) -> str:
 
 
 def _varied_feature(name: str, value: Any) -> Feature:
-    about = "What was varied; the same in all frames of a run."
+    about = "Varied properties; the same in all frames of a run."
     return Feature(varied_name(name), "string" if isinstance(value, str) else "float64", (1,), (), "", about)
 
 

@@ -159,7 +159,7 @@ def _pages(feature: Feature, content: Any) -> Iterator[tuple[int, int, memoryvie
 
 @lru_cache(maxsize=64)
 def _levels(rows: int, shape: tuple[int, ...]) -> bytes:
-    """Return the levels of a page: where a list of each depth begins anew, and that no number is missing.
+    """Return the levels of a page: where lists of each depth begin, and that no number is missing.
 
     Every list and every number counts as optional, as Arrow has them.
     """

@@ -36,7 +36,7 @@ def import_file(context, path, names=()) -> tuple[list, list[str]]:
     objects : list of Object
         Those that are new, and those that got parameters.
     notes : list of str
-        What was not imported, one sentence each.
+        The parts that are not imported, one sentence each.
 
     Raises
     ------

@@ -92,7 +92,7 @@ def follow_size(scene, obj) -> str:
     Returns
     -------
     str
-        What was set, as a sentence; empty where nothing was.
+        The properties that were set, as a sentence; empty if there are none.
     """
     settings = obj.palpate
     if settings.is_property_set("max_penetration") or not obj.is_editable:

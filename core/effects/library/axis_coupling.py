@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The three axes of a magnetometer couple: it is mounted askew, or soft iron beside it bends the field."""
+"""The three axes of a magnetometer couple: its axes are misaligned, or soft iron beside it distorts the field."""
 
 from __future__ import annotations
 

@@ -285,7 +285,7 @@ def _check(
 def _forward_check(data: ReadoutData) -> float | None:
     """Error of each channel's curve over the target on the check recordings, as a share of the range of all readings.
 
-    A curve is a polynomial, and beside it a share of what the skin remembers of the target. How long it remembers is chosen
+    A curve is a polynomial plus a share of the creep of the target. The time constant of the creep is chosen
     by leaving out parts of the fitted recordings.
     """
     if len(data.targets) > 1 or not data.check:

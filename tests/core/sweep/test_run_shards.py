@@ -182,6 +182,7 @@ def compute(opened, *batches):
                 batch.add(run.digest)
 
 
+@pytest.mark.slow("computes a study twice")
 def test_a_damaged_run_is_named_and_what_to_do_helps(study):
     publish(study.folder, study.runs)
     before = tree(study.folder / "dataset")
@@ -233,7 +234,7 @@ def write_until_killed(folder, contents: dict, common: dict, tell: int, dice: ra
         os.write(tell, "".join(group).encode())
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="processes that begin where this one is")
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the test ends forked processes, and this system has no fork")
 @pytest.mark.slow("ends a hundred processes")
 def test_a_hundred_kills_lose_nothing_that_was_on_the_disk(study):
     """Processes that write end at random file operations, in the middle of a write, too; shards are cut as a power cut may."""

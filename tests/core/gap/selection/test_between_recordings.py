@@ -82,14 +82,14 @@ def test_gains_that_fall_with_use_and_with_the_clock_are_told_apart_where_use_is
 def test_a_gain_that_changes_once_goes_with_neither_use_nor_clock():
     used, passed = np.array([0.02, 0.3, 0.34, 0.75, 0.8, 0.97]), (np.arange(6) + 0.5) / 6
     uses, clocks = np.array([used, used**1.1]), np.array([passed, passed])
-    tremble = 0.002 * np.random.default_rng(0).normal(size=6)
+    noise = 0.002 * np.random.default_rng(0).normal(size=6)
     for first in (1, 3, 5):
         for size in (-0.15, 0.1):
-            gains = 1.0 + size * (np.arange(6) >= first) + tremble
+            gains = 1.0 + size * (np.arange(6) >= first) + noise
             assert change_of_level(gains, uses, clocks) == first
             assert change_of_level(gains[1:], uses[:, 1:], clocks[:, 1:]) == (first - 1 or None)
     for course in (used, passed, np.sqrt(used), 1.0 - np.exp(-3.0 * passed)):
-        assert change_of_level(1.0 - 0.3 * course + tremble, uses, clocks) is None
+        assert change_of_level(1.0 - 0.3 * course + noise, uses, clocks) is None
     scattered = [
         change_of_level(1.0 + 0.1 * rng.normal(size=6), uses, clocks) for rng in map(np.random.default_rng, range(300))
     ]
