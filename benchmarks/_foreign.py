@@ -158,7 +158,7 @@ def damper(data: Path) -> Recording:
     trials: list[tuple[str, str, Columns]] = []
     for name, use, part in (("first", "fit", table[:half]), ("second", "check", table[half:])):
         columns = {"time": np.arange(half) * DAMPER_STEP, "force": 1e3 * part[:, 3], "slide_x": 1e-2 * part[:, 0]}
-        trials.append((name, use, columns | {"force_x": -part[:, 4]}))
+        trials.append((name, use, columns | {"force_x": part[:, 4]}))
     return Recording("Bouc–Wen damper", "grid = { rows = 1, columns = 1, pitch = 0.05 }", trials)
 
 
