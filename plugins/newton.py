@@ -38,7 +38,7 @@ class SensorTouch:
     sensing_shapes, counterpart_shapes : str, list of str, re.Pattern or list of int
         By label or index.
     apply : bool
-        Let :meth:`update` add the wrench on what presses, and its opposite on the sensor, to ``state.body_f``.
+        Let :meth:`update` add the wrench on the object in contact, and its opposite on the sensor, to ``state.body_f``.
     single : bool
         Compute in float32. Newton's poses are float32 in any case.
 

@@ -42,14 +42,14 @@ class Contact:
 
 
 class PressedSensor:
-    """A sensor and what presses on it, all moved by another program.
+    """A sensor and the object in contact with it, both moved by another program.
 
     Parameters
     ----------
     item : SensorOnMesh
         As :func:`.read_probe_list` or :func:`.sensors_on_meshes` returns it.
     target : TriangleMesh or Shape, or a sequence of them
-        Each in the frame of what presses, metres. Contacts with a shape (sphere, box, capsule, plane) are in closed form.
+        Each in the frame of the object, metres. Contacts with a shape (sphere, box, capsule, plane) are in closed form.
     dt : float, seconds
         Step of the other program.
     sensor_pose : Pose
@@ -122,7 +122,7 @@ class PressedSensor:
         return int(self._out.too_deep[0])
 
     def reset(self, sensor_pose: Pose, target_pose: Pose | Sequence[Pose]) -> None:
-        """Begin anew at these poses, at rest, without bristles and memory of effects.
+        """Reset to these poses, at rest, without bristles and memory of effects.
 
         Raises
         ------

@@ -41,7 +41,7 @@ class Contacts:
     too_deep : (E,) int
         How many contact points are pressed past their maximum penetration, and measure nothing.
     valid : (E,) bool
-        False where a pose is not finite or a quaternion is zero: everything is zero there, and the environment begins anew with
+        False where a pose is not finite or a quaternion is zero: everything is zero there, and the environment is reset with
         its next valid poses.
     """
 
@@ -65,7 +65,7 @@ class Contacts:
 
 
 class PressedSensors:
-    """A sensor and what presses on it in many environments, moved by another program.
+    """A sensor and the object in contact with it in many environments, moved by another program.
 
     Every environment gives the same bits as a :class:`.PressedSensor` of its own that begins where its first step ends,
     whatever the number of threads.
@@ -75,7 +75,7 @@ class PressedSensors:
     item : SensorOnMesh
         As :func:`.read_probe_list` or :func:`.sensors_on_meshes` returns it.
     target : TriangleMesh or Shape, or a sequence of them
-        Each in the frame of what presses, metres. Contacts with a shape (sphere, box, capsule, plane) are in closed form.
+        Each in the frame of the object, metres. Contacts with a shape (sphere, box, capsule, plane) are in closed form.
     dt : float, seconds
         Step of the other program.
     environments : int
@@ -146,7 +146,7 @@ class PressedSensors:
         return np.zeros((len(self), 6)) if self._balance is None else self._balance.displacement.copy()
 
     def reset(self, mask: ArrayLike | None = None) -> None:
-        """Let environments begin anew with their next step: at rest, without bristles and memory of effects.
+        """Reset environments before their next step: at rest, without bristles and memory of effects.
 
         Parameters
         ----------

@@ -61,7 +61,7 @@ def _models(result: Diagnosis) -> list[tuple[str, Model, str]]:
 
 
 def curves(result: Diagnosis) -> Figure:
-    """Measured, base and amended over time, for the two texels (or force components) where the base model errs most."""
+    """Measured, base and amended over time, for the two texels (or force components) with the largest base error."""
     trials = [*result.of("fit")[:2], *result.of("check")[:1]]
     figure = new_figure(WIDTHS["double"], 1.75 * len(trials) + 0.5)
     grid = figure.subplots(len(trials), 1, squeeze=False)[:, 0]

@@ -34,7 +34,7 @@ _TRANSLATIONS: dict[Any, Translation] = {}
 
 
 class WarpSensors:
-    """A sensor and what presses on it in many environments, computed by Warp.
+    """A sensor and the object in contact with it in many environments, computed by Warp.
 
     In float64 the results are those of :class:`.PressedSensors` within 1e-9; a step asks nothing of the host, so that it may be
     captured as a CUDA graph.
@@ -43,7 +43,7 @@ class WarpSensors:
     ----------
     item : SensorOnMesh
     target : TriangleMesh or Shape, or a sequence of these
-        Each in the frame of what presses, metres; :mod:`.geometry.shapes` makes a box, sphere, capsule or plane.
+        Each in the frame of the object, metres; :mod:`.geometry.shapes` makes a box, sphere, capsule or plane.
     dt : float, seconds
         Step of the other program.
     environments : int

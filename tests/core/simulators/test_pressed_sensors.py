@@ -139,7 +139,7 @@ def test_environments_without_poses_are_flagged_and_the_others_go_on():
         if step == 1:
             bad[1, 1, 4] = np.nan
         if step == 2:
-            clean.reset(np.array([False, True, False]))  # environment 1 begins anew
+            clean.reset(np.array([False, True, False]))  # environment 1 starts again
         found, expected = many.step(bad[:, 0], bad[:, 1]), clean.step(now[:, 0], now[:, 1])
         others = np.array([0, 2]) if step == 1 else np.arange(3)
         for name in ("texels", "readings", "contact", "wrench"):
