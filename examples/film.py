@@ -88,9 +88,10 @@ class Film:
 
     def play(self, name: str, numbers: Iterable[int], seconds: float = 1.0 / FPS) -> Iterator[tuple[float, int, Path]]:
         """Yield, for the numbers that are rendered, the seconds to show, the number and where its render goes."""
-        chosen = list(numbers)[:: self.every]
-        for number in chosen:
-            yield seconds * self.every, number, self.folder / f"{name}-{number:04d}.png"
+        numbers = list(numbers)
+        for start in range(0, len(numbers), self.every):
+            shown = min(self.every, len(numbers) - start)
+            yield seconds * shown, numbers[start], self.folder / f"{name}-{numbers[start]:04d}.png"
 
     def pixels(self, view: Place) -> tuple[int, int]:
         """Return the size of renders for a part of the frame: three quarters of its pixels, which saves half of the time."""
