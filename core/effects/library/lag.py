@@ -160,7 +160,7 @@ KIND = Kind(
         ),
     ),
     experiment="press and release as fast as possible, and record at a high rate",
-    drawing=Drawing(time=_SECOND, depth=0.002 * np.interp(_SECOND, [0.1, 0.12, 0.6, 0.62], [0, 1, 1, 0]), headroom=1.6),
+    drawing=Drawing(time=_SECOND, depth=0.002 * np.interp(_SECOND, [0.1, 0.12, 0.6, 0.62], [0, 1, 1, 0])),
     known_from=("timing",),
     families=("late",),
     variants=(Variant(80, late_shares),),
