@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from .api.sensors import Sensor as Sensor
     from .api.sensors import export_sensor as export_sensor
     from .api.sensors import read_sensor as read_sensor
+    from .api.sensors import sensors_from_blend as sensors_from_blend
     from .api.simulation import simulate as simulate
     from .api.skins import draw_channels as draw_channels
     from .api.skins import magnetic_skin as magnetic_skin
@@ -67,6 +68,7 @@ _PUBLIC = {
     "save_channels": "api.skins",
     "scenario_of": "addon.scripting.scene_objects",
     "sensor_of": "addon.scripting.scene_objects",
+    "sensors_from_blend": "api.sensors",
     "simulate": "api.simulation",
 }
 """The public names and their modules; what is not here is internal and may change."""

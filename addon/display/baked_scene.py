@@ -37,7 +37,7 @@ def clear_scene(scene) -> None:
     for obj in baked_objects(scene):
         clear_object(scene, obj)
     remove_orphans()
-    scene.palpate.baked_digest = scene.palpate.baked_id = ""
+    scene.palpate.baked_digest = scene.palpate.baked_id = scene.palpate.unchanged_note = ""
 
 
 def clear_copies(scene) -> None:

@@ -8,6 +8,7 @@ those of many environments. :mod:`.warp` does the same as :mod:`.pressed_sensors
 """
 
 __all__ = [
+    "baked_sensors",
     "environment_parameters",
     "pressed_sensor",
     "pressed_sensors",
