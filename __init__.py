@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from .addon.scripting.scene_objects import scenario_of as scenario_of
     from .addon.scripting.scene_objects import sensor_of as sensor_of
     from .api.bodies import Body as Body
+    from .api.contacts import mujoco_contact as mujoco_contact
+    from .api.contacts import newton_contact as newton_contact
     from .api.experiment import Plan as Plan
     from .api.experiment import plan_experiment as plan_experiment
     from .api.fits import fit_friction as fit_friction
@@ -59,6 +61,8 @@ _PUBLIC = {
     "fit_readout": "api.fits",
     "fit_stiffness": "api.fits",
     "magnetic_skin": "api.skins",
+    "mujoco_contact": "api.contacts",
+    "newton_contact": "api.contacts",
     "plan_experiment": "api.experiment",
     "read_bake": "api.recordings",
     "read_recording": "api.recordings",

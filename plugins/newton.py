@@ -13,6 +13,7 @@ import numpy as np
 from ..core.errors import ParameterError
 from ..core.geometry.mesh import TriangleMesh
 from ..core.geometry.shapes import Shape, box, capsule, plane, sphere
+from ..core.simulators.contact_translation import NewtonContact
 from ..core.simulators.sensor_on_mesh import SensorOnMesh
 from ..core.simulators.warp.warp_sensors import WarpSensors
 from .engines import require_engine
@@ -123,6 +124,39 @@ class SensorTouch:
     def reset(self, mask: Any = None) -> None:
         """Let rows begin again with their next update (see :meth:`.WarpSensors.reset`)."""
         self._sensors.reset(mask)
+
+
+def pressure_law(model: Any, contact: NewtonContact, sensing_shapes: Labels) -> tuple[Any, Any]:
+    """Return ``pressure_func`` and ``pressure_data`` for ``newton.geometry.HydroelasticSDF.Config``.
+
+    Newton's own contact then carries what presses, with the pressure of a sensor. Other shapes keep their `kh`, and should be
+    much stiffer.
+
+    Parameters
+    ----------
+    model : newton.Model
+    contact : NewtonContact
+        As ``palpate.newton_contact`` returns it.
+    sensing_shapes : str, list of str, re.Pattern or list of int
+        Shapes with this pressure, by label or index.
+
+    Raises
+    ------
+    PalpateError
+        Newton is missing or too old, or a label names no shape.
+    """
+    require_engine("newton", "newton", (1, 8))
+    import warp
+
+    from .newton_pressure import PressureData, sensor_pressure
+
+    is_sensor = np.zeros(len(model.shape_label), np.int32)
+    is_sensor[_matches(model, sensing_shapes, "sensing_shapes")] = 1
+    data = PressureData()
+    data.pressure, data.step = warp.array(contact.pressure, dtype=float, device=model.device), contact.step
+    data.is_sensor = warp.array(is_sensor, dtype=int, device=model.device)
+    data.stiffness = model.shape_material_kh
+    return sensor_pressure, data
 
 
 def _matches(model: Any, wanted: Labels, name: str) -> list[int]:
