@@ -23,11 +23,12 @@ from ...model.scenario import Scenario
 from ...model.sensor import Sensor
 from ...model.target import Target
 from ...solver.detection.deforming_surfaces import point_rows
+from ..pressed_sensors import fault_of
 from ..sensor_on_mesh import SensorOnMesh
 from . import press_kernels
 from .effect_functions import EffectFunctions, functions_of
 from .engine import require_warp
-from .press_arrays import Results, SensorArrays, Slots, TargetArrays, Worlds
+from .press_arrays import Jumps, Results, SensorArrays, Slots, TargetArrays, Worlds
 from .translation import Translation
 
 _TRANSLATIONS: dict[Any, Translation] = {}
@@ -71,6 +72,8 @@ class WarpSensors:
     valid : (E,) warp.array of bool
         False where a pose is not finite or a quaternion is zero: everything is zero there, and the environment begins again
         with its next valid poses.
+    jumped : (E,) warp.array of bool
+        True where a target went through the sensor within the last step (see :class:`.Contacts`).
     poses : (E, 1 + T, 7) warp.array
         Of the sensor and of each target: position (m) and quaternion (w, x, y, z). A program on the device may write them
         itself, and then call :meth:`step` without poses.
@@ -103,10 +106,13 @@ class WarpSensors:
         self._out = out
         self.texels, self.readings, self.contact = out.texels, out.readings, out.contact
         self.wrench, self.too_deep, self.valid, self.poses = out.wrench, out.too_deep, self._worlds.valid, self._worlds.poses
+        jumps = translation.value(Jumps.of(mounted_texels(sensor), targets, e), self.device)
+        self._jumps, self.jumped = jumps, jumps.jumped
         self._mask = warp.zeros(e, dtype=warp.bool, device=self.device)
         kernels = press_kernels
         self._move, self._sum = translation.kernel(kernels.move_world, 1), translation.kernel(kernels.sum_world, 1)
         self._press, self._reset = translation.kernel(kernels.press_texel, 2), translation.kernel(kernels.reset_worlds, 1)
+        self._mark = translation.kernel(kernels.mark_jumps, 1)
 
     def __len__(self) -> int:
         """Return the number of environments."""
@@ -137,7 +143,12 @@ class WarpSensors:
         arrays = [self._sensor, self._targets, self._tree, self._worlds, self._slots, self._out]
         launch(self._press, dim=(e, n), inputs=arrays, device=device)
         launch(self._sum, dim=e, inputs=[self._worlds, self._slots, self._out], device=device)
+        launch(self._mark, dim=e, inputs=[self._worlds, self._jumps, self._out], device=device)
         return self
+
+    def fault(self) -> str:
+        """Return what :meth:`.Contacts.fault` says; the arrays come to the host for it."""
+        return fault_of(self.valid.numpy(), self.jumped.numpy())
 
     def reset(self, mask: Any = None) -> None:
         """Let environments begin again with their next step: at rest, without bristles and memory of effects.
