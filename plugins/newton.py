@@ -14,6 +14,7 @@ from ..core.errors import ParameterError
 from ..core.geometry.mesh import TriangleMesh
 from ..core.geometry.shapes import Shape, box, capsule, plane, sphere
 from ..core.simulators.contact_translation import NewtonContact
+from ..core.simulators.environment_parameters import Columns
 from ..core.simulators.sensor_on_mesh import SensorOnMesh
 from ..core.simulators.warp.warp_sensors import WarpSensors
 from .engines import require_engine
@@ -42,6 +43,8 @@ class SensorTouch:
         Let :meth:`update` add the wrench on what presses, and its opposite on the sensor, to ``state.body_f``.
     single : bool
         Compute in float32. Newton's poses are float32 in any case.
+    parameters : mapping of str to (rows,) float, optional
+        In which the sensors of rows differ, as ``{"k": …, "mus": …}``.
 
     Raises
     ------
@@ -69,6 +72,7 @@ class SensorTouch:
         counterpart_shapes: Labels,
         apply: bool = True,
         single: bool = False,
+        parameters: Columns | None = None,
     ):
         newton = require_engine("newton", "newton", (1, 8))
         self._model, self._apply = model, apply
@@ -85,7 +89,7 @@ class SensorTouch:
                     f"The counterparts of shape '{model.shape_label[row]}' differ from those in the first world: "
                     "let counterpart_shapes name as many shapes, of equal sizes, in every world."
                 )
-        self._sensors = WarpSensors(sensor, targets[0], dt, len(targets), str(model.device), single)
+        self._sensors = WarpSensors(sensor, targets[0], dt, len(targets), str(model.device), single, parameters)
         self.texels, self.readings, self.contact = self._sensors.texels, self._sensors.readings, self._sensors.contact
         self.wrench, self.too_deep, self.valid = self._sensors.wrench, self._sensors.too_deep, self._sensors.valid
         import warp

@@ -140,7 +140,7 @@ class PressedSensors:
         targets = [target] if isinstance(target, TriangleMesh | Shape) else list(target)
         model = self._model = PressedModel(item.sensor, targets, dt, 1)
         n = model.texels
-        _check_memory(environments, model.bytes_of_environment() + n * BYTES_OF_TEXEL)
+        check_memory(environments, model.bytes_of_environment() + n * BYTES_OF_TEXEL, available_memory())
         self._out = PressedTexels.zero(environments, n, len(targets))
         sensors = sensors_of(item.sensor, parameters, environments) if parameters else []
         self._environments, self._sensors = model.environments(environments, sensors), sensors
@@ -305,9 +305,8 @@ def _check_room(out: Contacts, found: Contacts) -> None:
             )
 
 
-def _check_memory(environments: int, size: int) -> None:
+def check_memory(environments: int, size: int, there: float) -> None:
     """Raise :class:`.ParameterError` where so many environments of a size, bytes, are more than memory that is there."""
-    there = _available_memory()
     if environments * size > there:
         raise ParameterError(
             f"{environments} environments take {environments * size / 2**30:.1f} GiB of memory, and {there / 2**30:.1f} GiB "
@@ -315,7 +314,7 @@ def _check_memory(environments: int, size: int) -> None:
         )
 
 
-def _available_memory() -> float:
+def available_memory() -> float:
     """Return the bytes of memory that are free; infinite where the system does not say."""
     try:
         for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():

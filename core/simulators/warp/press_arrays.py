@@ -38,8 +38,8 @@ class SensorArrays(NamedTuple):
         Painted multipliers of stiffness and friction.
     law : (1 or E, 10) float
         Contact law of one contact point, the same for all environments or one for each.
-    conversion : (n, 2) float
-        Zero and scale of each texel's reading.
+    conversion : (n or E n, 2) float
+        Zero and scale of each texel's reading, the same for all environments or one after the other.
     force_constants, friction_constants, reading_constants : (laws, 2, c) float
         Constants of the laws of effects, for a step and for no time; for readings, for no time and for a step.
     """

@@ -221,7 +221,8 @@ def press_texel(
     out.contact[world, texel] = touched
     reading = 0.0
     if valid:
-        zero, scale = sensor.conversion[texel, 0], sensor.conversion[texel, 1]
+        row = (world * (sensor.first_point.shape[0] - 1) + texel) % sensor.conversion.shape[0]
+        zero, scale = sensor.conversion[row, 0], sensor.conversion[row, 1]
         when = 0 if worlds.fresh[world] else 1
         if worlds.fresh[world]:
             for i in range(slots.reading_memory.shape[2]):
