@@ -18,7 +18,8 @@ from .drawings import shown_in_notebooks
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..core.response.magnetic_skin import MagneticSkin, VectorReadings
+    from ..core.model.vector_readings import VectorReadings
+    from ..core.skins.magnetic_skin import MagneticSkin
     from .sensors import Sensor
 
 FULL_SCALE = 50e-3
@@ -65,8 +66,8 @@ def magnetic_skin(
     PalpateError
         Shapes do not agree, a magnet is outside of the layer, or a magnetometer is inside of a magnet's reach.
     """
-    from ..core.response import magnetic_skin as core
-    from ..core.response import skin_presets
+    from ..core.skins import magnetic_skin as core
+    from ..core.skins import skin_presets
 
     if isinstance(magnets, str):
         named = skin_presets.preset_named(magnets)

@@ -32,7 +32,7 @@ def dipole_field(offset: np.ndarray, moment: np.ndarray) -> np.ndarray:
     return field
 
 
-def summed_field(at: np.ndarray, place: np.ndarray, moment: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def summed_field(at: np.ndarray, place: np.ndarray, moment: np.ndarray, least: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Return the sum of :func:`dipole_field` of dipoles that move, component by component, which takes a third of the time.
 
     Parameters
@@ -42,15 +42,19 @@ def summed_field(at: np.ndarray, place: np.ndarray, moment: np.ndarray) -> tuple
     place : (T, m, 3) float, m
         Of the dipoles; a field at one of them is not finite.
     moment : (m, 3) float, A·m²
+    least : float, m
+        A nearer dipole counts as one at this distance.
 
     Returns
     -------
     field : (T, k, 3) float, T
     square : (T, k, m) float, m²
-        Squared distances.
+        Squared distances, not below the square of the least.
     """
     away = [at[:, i, None] - place[:, None, :, i] for i in range(3)]
     square = away[0] * away[0] + away[1] * away[1] + away[2] * away[2]
+    if least:
+        square = np.maximum(square, least**2)
     with np.errstate(divide="ignore", invalid="ignore"):
         inverse = 1.0 / square
         cube = MU0_4PI * inverse * np.sqrt(inverse)
