@@ -10,6 +10,7 @@ __all__ = [
     "animation_fingerprint",
     "attached_objects",
     "body_poses",
+    "channel_reader",
     "deforming_objects",
     "display_names",
     "drives",

@@ -8,7 +8,7 @@ import json
 from functools import lru_cache
 
 from ...core.model.sensor_parameters import SENSOR_PARAMETERS
-from ..properties import effect_stack, painted_maps
+from ..properties import effect_stack, magnetic_properties, painted_maps
 from ..session import session_state, units
 from . import animation_fingerprint, deforming_objects, drives, mesh_fingerprint, participants, uv_layouts
 
@@ -57,6 +57,7 @@ def settings_of(scene, objects) -> tuple:
             *obj.palpate.velocity,
             *obj.palpate.angular_velocity,
             *effect_stack.settings(obj),
+            *magnetic_properties.settings(obj),
         )
         for obj in objects
     )

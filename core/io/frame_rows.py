@@ -189,11 +189,10 @@ class FrameRows:
         )
 
     def _sensor(self, rows: np.ndarray, i: int, sensor: str) -> SensorRecording:
-        found = SensorRecording(**{name: rows[f"sensor_{i}/{name}"] for name in SENSOR_FIELDS})
-        if sensor in self._channels:
-            values, clipped = rows[f"sensor_{i}/{VALUES}"], rows[f"sensor_{i}/{CLIPPED}"]
-            found.channels = replace(self._channels[sensor], values=values, clipped=clipped)
-        return found
+        channels = self._channels.get(sensor)
+        if channels is not None:
+            channels = replace(channels, values=rows[f"sensor_{i}/{VALUES}"], clipped=rows[f"sensor_{i}/{CLIPPED}"])
+        return SensorRecording(**{name: rows[f"sensor_{i}/{name}"] for name in SENSOR_FIELDS}, channels=channels)
 
 
 def _in_memory(recording: Recording) -> Recording:

@@ -177,7 +177,8 @@ class PressedSensor:
         if self._chain is not None:
             self._out.readings[0] = self._chain.step(self._steps / self._model.rate, self._memory.force)
         if out is None:
-            texels = SensorFrame(*[values.copy() for values in self._texels])
+            arrays = zip(SENSOR_FIELDS, self._texels, strict=True)
+            texels = SensorFrame(**{name: values.copy() for name, values in arrays}, channels=None)
             return Contact(texels, self._force.copy(), self._torque.copy())
         for name, values in zip(SENSOR_FIELDS, self._texels, strict=True):
             np.copyto(getattr(out.texels, name), values)

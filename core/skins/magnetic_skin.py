@@ -15,6 +15,8 @@ from .layer import layer_weights
 
 BLOCK_NUMBERS = 1 << 14
 """Offsets between magnets and magnetometers that are worked on at once: their arrays stay in a processor's cache."""
+FULL_SCALE = 50e-3
+"""T: range of usual three-axis Hall chips."""
 
 
 @dataclass(frozen=True)

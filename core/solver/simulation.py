@@ -182,8 +182,9 @@ class Simulation:
         parts = [self._observed_now()]
         while self.frame < self.scenario.frame_end:
             parts.append(self._advance(self._frames_at_once()))
-        own = {"digest": self.scenario.digest(), "warnings": tuple(self.warnings), "step_reason": self.step_reason}
-        return with_clipping_warnings(replace(Recording.joined(parts), **own))
+        found, warnings = Recording.joined(parts), tuple(self.warnings)
+        found = replace(found, digest=self.scenario.digest(), warnings=warnings, step_reason=self.step_reason)
+        return with_clipping_warnings(found)
 
     def _frames_at_once(self) -> int:
         """Return how many of the next frames one call of the kernels may compute."""
