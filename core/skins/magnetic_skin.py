@@ -114,20 +114,16 @@ class MagneticSkin:
             raise ParameterError("The displacements have values that are not numbers: give metres for each texel and frame.")
         numbers = len(self.magnets.place) * len(self.magnetometers.place)
         step = max(1, BLOCK_NUMBERS // max(numbers, 1))
-        size = self.magnetometers.size
-        parts = [
-            self._seen(self.places(displacement[i : i + step]), 0.0 if refuses_near else size)
-            for i in range(0, len(displacement), step)
-        ]
-        none = np.zeros((0, len(self.magnetometers.place), 3))
-        values = np.concatenate([none, *(field for field, _ in parts)])
-        inside = np.concatenate([none[:, :, 0] > 0.0, *(square.min(axis=2) <= size**2 for _, square in parts)])
+        starts = range(0, max(len(displacement), 1), step)
+        parts = [self._seen(self.places(displacement[i : i + step]), refuses_near) for i in starts]
+        values, inside = parts[0] if len(parts) == 1 else map(np.concatenate, zip(*parts, strict=True))
         if ambient is not None:
             values = values + np.einsum("kij,tj->tki", self.magnetometers.axes, ambient)
         values = values + self.magnetometers.offset
         limit = np.reshape(self.magnetometers.full_scale, (-1, 1))
         clipped = (np.abs(values) > limit) | inside[:, :, None]
-        return VectorReadings(np.clip(values, -limit, limit), clipped, place=self.magnetometers.place)
+        values = np.minimum(np.maximum(values, -limit), limit)
+        return VectorReadings(values, clipped, place=self.magnetometers.place)
 
     def places(self, displacement: np.ndarray) -> np.ndarray:
         """Return where the magnets are, (T, m, 3) float, m, from the texels' displacements (T, n, 3)."""
@@ -151,18 +147,20 @@ class MagneticSkin:
         found: np.ndarray = np.einsum("kiml,mn->kinl", seen, self.weights)
         return found
 
-    def _seen(self, place: np.ndarray, least: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Return fields of magnets at some places (T, m, 3) along the magnetometers' axes, (T, k, 3), and squared distances."""
-        field, square = summed_field(self.magnetometers.place, place, self.magnets.moment, least)
-        nearest = float(np.sqrt(square.min(initial=np.inf)))
-        if nearest < self.magnetometers.size and not least:
+    def _seen(self, place: np.ndarray, refuses_near: bool = True) -> tuple[np.ndarray, np.ndarray]:
+        """Return fields of magnets at some places (T, m, 3) along the magnetometers' axes, (T, k, 3), and where one is inside
+        of a chip, (T, k) bool."""
+        size = self.magnetometers.size
+        field, square = summed_field(self.magnetometers.place, place, self.magnets.moment, 0.0 if refuses_near else size)
+        inside = square.min(axis=2) <= size**2
+        if refuses_near and inside.any():
             _, chip, magnet = np.unravel_index(int(np.argmin(square)), square.shape)
             raise ParameterError(
-                f"Magnet {magnet} comes within {1e3 * nearest:.3g} mm of magnetometer {chip}, inside its chip: "
+                f"Magnet {magnet} comes within {1e3 * np.sqrt(square.min()):.3g} mm of magnetometer {chip}, inside its chip: "
                 "place it higher, or press less deep."
             )
         found: np.ndarray = np.einsum("kij,tkj->tki", self.magnetometers.axes, field)
-        return found, square
+        return found, inside
 
 
 def magnetic_skin(texels: Texels, magnets: Magnets, magnetometers: Magnetometers, thickness: float) -> MagneticSkin:
