@@ -19,6 +19,7 @@ __all__ = [
     "file_list",
     "file_writing",
     "folder_lock",
+    "frame_images",
     "frame_rows",
     "growing_file",
     "growing_table",

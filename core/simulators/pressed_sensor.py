@@ -186,7 +186,8 @@ class PressedSensor:
         if self._jumps.jumped[0]:
             raise ParameterError(f"A target went through the sensor within one step: {REMEDY}")
         if out is None:
-            texels = SensorFrame(*[values.copy() for values in self._texels])
+            arrays = zip(SENSOR_FIELDS, self._texels, strict=True)
+            texels = SensorFrame(**{name: values.copy() for name, values in arrays}, channels=None)
             return Contact(texels, self._force.copy(), self._torque.copy())
         for name, values in zip(SENSOR_FIELDS, self._texels, strict=True):
             np.copyto(getattr(out.texels, name), values)

@@ -15,7 +15,7 @@ OBJECT_WITHOUT_FORCES = {
     *("has_start", "start_matrix", "start_channels"),
 }
 """Properties of an object that change no force: identity, file names, and what laying texels or a bake has left."""
-COMPARED_BY_COMPONENT = {"velocity", "angular_velocity", "effects"}
+COMPARED_BY_COMPONENT = {"velocity", "angular_velocity", "effects", "readout", "magnetic"}
 """Read component by component in `settings_of`."""
 COMPARED_WHEN_DRIVEN = set(drives.TARGET_PROPERTIES.values())
 """Targets of drives: the one that the drive follows is compared, with its keyframes."""

@@ -44,6 +44,7 @@ from palpate.core.model.effect import Effect
 from palpate.core.model.recording import Frame, Recording, SensorFrame, SensorRecording
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
+from palpate.core.model.vector_readings import VectorReadings
 
 on_linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks at Linux's /proc and /dev")
 
@@ -386,7 +387,7 @@ def test_damaged_manifest(tmp_path):
 # --- recordings
 
 
-def recording(seed=0, frames=5, sensors=(("Pad", 6), ("a/b\\..", 3)), bodies=3):
+def recording(seed=0, frames=5, sensors=(("Pad", 6), ("a/b\\..", 3)), bodies=3, channels=False):
     """Return a recording of random numbers, with the awkward ones among them."""
     rng = np.random.default_rng(seed)
     parts = {}
@@ -405,7 +406,11 @@ def recording(seed=0, frames=5, sensors=(("Pad", 6), ("a/b\\..", 3)), bodies=3):
         }
         values["shear"][0, 0] = -0.0, 5e-324
         values["reading"][0, :2] = np.finfo(float).max, -np.finfo(float).tiny
-        parts[name] = SensorRecording(**values)
+        shape = frames, 5, 3
+        vectors = VectorReadings(
+            rng.normal(size=shape), rng.random(shape) < 0.1, "mT", ("x", "y", "∥"), rng.normal(size=(5, 3))
+        )
+        parts[name] = SensorRecording(**values, channels=vectors if channels else None)
     return Recording(
         frames=np.arange(-1, frames - 1),
         times=np.arange(frames) / 24,
@@ -432,13 +437,17 @@ def same(a, b):
         else:
             assert x == y and type(x) is type(y)
     for name, sensor in a.sensors.items():
-        for item in fields(SensorRecording):
-            x, y = getattr(sensor, item.name), getattr(b.sensors[name], item.name)
+        other = b.sensors[name]
+        for x, y in zip(sensor.arrays(), other.arrays(), strict=True):
             assert x.dtype == y.dtype and x.shape == y.shape and x.tobytes() == y.tobytes()
+        if sensor.channels is not None:
+            assert (sensor.channels.unit, sensor.channels.names) == (other.channels.unit, other.channels.names)
+            assert np.array_equal(sensor.channels.place, other.channels.place)
 
 
 def test_recording_round_trip(tmp_path):
-    for case in (recording(), recording(frames=1), recording(sensors=(), bodies=0), recording(sensors=(("x", 84),))):
+    cases = recording(frames=1), recording(sensors=(), bodies=0), recording(sensors=(("x", 84),)), recording(channels=True)
+    for case in (recording(), *cases):
         save_recording(tmp_path / "recording.npz", case)
         same(load_recording(tmp_path / "recording.npz"), case)
         assert os.listdir(tmp_path) == ["recording.npz"]
