@@ -53,8 +53,11 @@ def find_shape_contacts(pair: int, model: SolverModel, detection: DetectionData,
         pose[0], pose[1], pose[2], pose[3], pose[4], pose[5], pose[6], pose[7], pose[8], pose[9], pose[10], pose[11],
     )  # fmt: skip
     _, middle = segment_at((center[0], center[1], center[2]), (0.0, 0.0, 0.0), 0.0, place)
+    if kind == SPHERE:
+        x, y, z = in_sensor_axes((pose[9], pose[10], pose[11]), pose)
+        place = 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, x, y, z
     near = shape_distance(kind, size, middle) <= model.sensors.radius[sensor]
-    first, slot, stop = contacts.first_block[pair], model.pairs.first_slot[pair], 0
+    first, slot = contacts.first_block[pair], model.pairs.first_slot[pair]
     stop = slot + model.pairs.stop_point[pair] - model.pairs.first_point[pair]
     contacts.number[pair], contacts.too_deep[pair], block = 0, 0, first
     if not near:
@@ -81,18 +84,24 @@ def find_shape_contacts(pair: int, model: SolverModel, detection: DetectionData,
 def _meet_block(
     kind: int, size: Vector, block: int, reach: float, pose: tuple[float, ...], points: np.ndarray, rows: np.ndarray
 ) -> None:
-    """Write what the points of a block meet into their own rows, but for the bristles."""
+    """Write what the points of a block meet into their own rows, but for the bristles.
+
+    `pose` is the pair's; that of a sphere, which looks the same from everywhere, is in the sensor's axes.
+    """
     for lane in range(LANES):  # runs in vector registers: no branches, no calls
         origin, outward = read_vector(points, block, 0, lane), read_vector(points, block, 3 * LANES, lane)
-        segment, tip = segment_at(origin, outward, reach, pose)
-        base, way = (segment.ox, segment.oy, segment.oz), in_target_axes(outward, pose)
+        way = outward if kind == SPHERE else in_target_axes(outward, pose)
+        tip = origin if kind == SPHERE else in_target_axes(origin, pose)
+        tip = tip[0] + pose[9], tip[1] + pose[10], tip[2] + pose[11]
+        base = tip[0] - reach * way[0], tip[1] - reach * way[1], tip[2] - reach * way[2]
         entry, axis = shape_entry(kind, size, base, way)
         inside = 1.0 - entry / reach
-        surface = tip[0] - inside * segment.dx, tip[1] - inside * segment.dy, tip[2] - inside * segment.dz
-        fx, fy, fz = shape_normal(kind, size, axis, surface)
-        write_vector(rows, block, NORMAL, lane, *in_sensor_axes((fx, fy, fz), pose))
-        write_vector(rows, block, POINT, lane, *place_behind(origin, outward, inside * reach))
-        rows[block, DEPTH + lane] = inside * abs(segment.dx * fx + segment.dy * fy + segment.dz * fz)
+        deep = reach * inside
+        normal = shape_normal(kind, size, axis, place_behind(tip, way, deep))
+        rows[block, DEPTH + lane] = deep * abs(way[0] * normal[0] + way[1] * normal[1] + way[2] * normal[2])
+        normal = normal if kind == SPHERE else in_sensor_axes(normal, pose)
+        write_vector(rows, block, NORMAL, lane, normal[0], normal[1], normal[2])
+        write_vector(rows, block, POINT, lane, *place_behind(origin, outward, deep))
         touched = TOUCHED if 0.0 <= entry <= reach else 0.0
         rows[block, FOUND + lane] = INSIDE if is_in_shape(kind, size, base) else touched
 
