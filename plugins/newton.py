@@ -133,7 +133,7 @@ class SensorTouch:
 def pressure_law(model: Any, contact: NewtonContact, sensing_shapes: Labels) -> tuple[Any, Any]:
     """Return ``pressure_func`` and ``pressure_data`` for ``newton.geometry.HydroelasticSDF.Config``.
 
-    Newton's own contact then carries what presses, with the pressure of a sensor. Other shapes keep their `kh`, and should be
+    Newton's own contact then carries the shape in contact, with the pressure of a sensor. Other shapes keep their `kh`, and should be
     much stiffer.
 
     Parameters

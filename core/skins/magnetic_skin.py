@@ -148,8 +148,10 @@ class MagneticSkin:
         return found
 
     def _seen(self, place: np.ndarray, refuses_near: bool = True) -> tuple[np.ndarray, np.ndarray]:
-        """Return fields of magnets at some places (T, m, 3) along the magnetometers' axes, (T, k, 3), and where one is inside
-        of a chip, (T, k) bool."""
+        """Return fields of magnets at some places (T, m, 3) along the magnetometers' axes, (T, k, 3).
+
+        Also return where one is inside of a chip, (T, k) bool.
+        """
         size = self.magnetometers.size
         field, square = summed_field(self.magnetometers.place, place, self.magnets.moment, 0.0 if refuses_near else size)
         inside = square.min(axis=2) <= size**2

@@ -34,7 +34,7 @@ TOUCHED, INSIDE = 1.0, -1.0
 
 
 def blocks_of_points(pairs: Pairs, frame: np.ndarray) -> np.ndarray:
-    """Return position and normal of each pair's contact points, (blocks, 6 · LANES), in blocks as contact rows; frame (N, 12)."""
+    """Return place and normal of each pair's contact points, (blocks, 6 · LANES), in blocks as contact rows; frame (N, 12)."""
     blocks = []
     for first, stop in zip(pairs.first_point, pairs.stop_point, strict=True):
         own = np.zeros((-(-(stop - first) // LANES) * LANES, 6))
