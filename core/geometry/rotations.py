@@ -23,8 +23,8 @@ def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
 
 def quaternion_product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Hamilton product of (…, 4) quaternions: first rotate by `b`, then by `a`."""
-    parts = [np.moveaxis(np.asarray(one, float), -1, 0) for one in (a, b)]
-    return np.stack(plain(multiply)(*parts[0], *parts[1]), axis=-1)
+    parts = [own[..., i] for own in (np.asarray(a, float), np.asarray(b, float)) for i in range(4)]
+    return np.stack(plain(multiply)(*parts), axis=-1)
 
 
 @kernel

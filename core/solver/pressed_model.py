@@ -41,13 +41,13 @@ from .workspace_builder import workspace_for
 
 
 class PressedModel:
-    """A sensor, what presses on it, and the solver's arrays for them.
+    """A sensor, the object in contact with it, and the solver's arrays for them.
 
     Parameters
     ----------
     sensor : Sensor
     targets : sequence of TriangleMesh or Shape
-        Each in the frame of what presses, metres.
+        Each in the frame of the object, metres.
     dt : float, seconds
         Of a step.
     threads : int, optional

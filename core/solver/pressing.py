@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Single steps of sensors and targets that another program moves, in any number of environments (kernels).
 
-An environment is one sensor with what presses on it. All environments share the model and the targets' tree; each has its own
-state and neighbour lists, and each thread its own working memory, of which nothing lasts from one environment to the next.
+An environment is one sensor with the object in contact with it. All environments share the model and the targets' tree; each
+has its own state and neighbour lists, and each thread its own working memory, of which nothing lasts from one environment to
+the next.
 """
 
 from __future__ import annotations
@@ -74,7 +75,7 @@ class PressedTexels(NamedTuple):
     begins : (E,) bool
         The environment begins with this step, at rest at these poses.
     valid : (E,) bool
-        Its poses are poses. Of others everything is zero, and they begin anew with their next valid poses.
+        Its poses are poses. Of others everything is zero, and they are reset with their next valid poses.
     texels : (E, n, 3) float, N
         Normal force, and shear along the texel's x and y axis.
     readings : (E, n) float

@@ -61,7 +61,7 @@ def _segment_travel(point: int, reach: float, pose: np.ndarray, old: np.ndarray,
 
 @inlined
 def _update_lists(pair: int, pose: np.ndarray, model: SolverModel, detection: DetectionData, state: State) -> None:
-    """Make the neighbour lists anew of those contact points that have moved further than their lists are valid."""
+    """Rebuild the neighbour lists of those contact points that have moved further than their lists are valid."""
     sensor, target = model.pairs.sensor[pair], model.pairs.target[pair]
     lists, surfaces = detection.neighbours, detection.surfaces
     deformed = surfaces.target_travel[target] + surfaces.sensor_travel[sensor]
@@ -85,10 +85,10 @@ def _rebuild_lists(
     detection: DetectionData,
     state: State,
 ) -> None:
-    """Reckon distances from the present pose, and make the lists anew that are due, or all that are not empty.
+    """Measure distances from the present pose, and rebuild the lists that are due, or all that are not empty.
 
     The radius of the tubes follows the motion: the travel of some thirty steps. All lists of a target that deforms are made
-    anew, since all of its triangles must be brought to the present moment for that.
+    again, since all of its triangles must be brought to the present moment for that.
 
     Parameters
     ----------
