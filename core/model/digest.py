@@ -5,10 +5,11 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import fields, is_dataclass
+from functools import cache
 
 import numpy as np
 
-from .recording import row_blocks
+from .recording import BLOCK_BYTES, row_blocks
 
 
 def digest_of(value: object) -> str:
@@ -27,12 +28,19 @@ def digest_of(value: object) -> str:
     return digest.hexdigest()
 
 
+@cache
+def _fields_of(kind: type) -> tuple[str, ...] | None:
+    """Return the names of the fields of a dataclass, None for another type."""
+    return tuple(item.name for item in fields(kind)) if is_dataclass(kind) else None
+
+
 def _feed(digest: hashlib._Hash, value: object) -> None:
     """Hash dataclasses field by field, arrays with type and shape, and everything else by its representation."""
-    if is_dataclass(value) and not isinstance(value, type):
-        for item in fields(value):
-            digest.update(item.name.encode())
-            _feed(digest, getattr(value, item.name))
+    names = _fields_of(type(value))
+    if names is not None:
+        for name in names:
+            digest.update(name.encode())
+            _feed(digest, getattr(value, name))
     elif isinstance(value, tuple | list):
         digest.update(f"[{len(value)}".encode())
         for item in value:
@@ -42,7 +50,7 @@ def _feed(digest: hashlib._Hash, value: object) -> None:
     elif isinstance(value, np.ndarray):
         array = np.ascontiguousarray(value)
         digest.update(f"{array.dtype.str}{array.shape}".encode())
-        for rows in row_blocks(array):
+        for rows in row_blocks(array) if array.nbytes > BLOCK_BYTES else (...,):
             digest.update(array[rows].tobytes())
     else:
         digest.update(repr(value).encode())
