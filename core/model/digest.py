@@ -4,12 +4,17 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import fields, is_dataclass
+from dataclasses import Field, fields, is_dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 
 from .recording import BLOCK_BYTES, row_blocks
+
+IF_GIVEN = "if given"
+"""Key of the metadata of a field that counts only if it is not None. What lacks it has the hash from before there was such a
+field."""
 
 
 def digest_of(value: object) -> str:
@@ -29,18 +34,23 @@ def digest_of(value: object) -> str:
 
 
 @cache
-def _fields_of(kind: type) -> tuple[str, ...] | None:
-    """Return the names of the fields of a dataclass, None for another type."""
-    return tuple(item.name for item in fields(kind)) if is_dataclass(kind) else None
+def _fields_of(kind: type) -> tuple[Field[Any], ...] | None:
+    """Return the fields of a dataclass, None for another type."""
+    return fields(kind) if is_dataclass(kind) else None
+
+
+def stated_fields(value: Any) -> list[Field[Any]]:
+    """Return the fields of a dataclass that count for its hash and stand in its file."""
+    own = _fields_of(type(value)) or ()
+    return [item for item in own if IF_GIVEN not in item.metadata or getattr(value, item.name) is not None]
 
 
 def _feed(digest: hashlib._Hash, value: object) -> None:
     """Hash dataclasses field by field, arrays with type and shape, and everything else by its representation."""
-    names = _fields_of(type(value))
-    if names is not None:
-        for name in names:
-            digest.update(name.encode())
-            _feed(digest, getattr(value, name))
+    if _fields_of(type(value)) is not None:
+        for item in stated_fields(value):
+            digest.update(item.name.encode())
+            _feed(digest, getattr(value, item.name))
     elif isinstance(value, tuple | list):
         digest.update(f"[{len(value)}".encode())
         for item in value:

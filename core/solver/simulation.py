@@ -27,6 +27,7 @@ from ..model.recording import BLOCK_BYTES, Frame, Recording, SensorRecording
 from ..model.scenario import Scenario
 from ..model.shared_results import SharedResults
 from ..response.readings import ReadoutChain
+from ..skins.channel_readouts import with_clipping_warnings
 from .detection.deformation import refit_boxes, set_moment
 from .detection.deforming_surfaces import DeformingSurfaces
 from .detection.detection_data import DetectionData, TargetShapes
@@ -189,7 +190,8 @@ class Simulation:
         while self.frame < self.scenario.frame_end:
             parts.append(self._advance_far(with_present=False))
         found = Recording.joined(parts) if len(parts) > 1 else parts[0]
-        return replace(found, digest=self.scenario.digest(), warnings=tuple(self.warnings), step_reason=self.step_reason)
+        found = replace(found, digest=self.scenario.digest(), warnings=tuple(self.warnings), step_reason=self.step_reason)
+        return with_clipping_warnings(found)
 
     def _advance_far(self, with_present: bool) -> Recording:
         """Go through the frames that are left, in a long run :data:`PART_BYTES` of them, and return their recording."""
@@ -311,7 +313,7 @@ class Simulation:
         pressed = moment[:, 3] > 0.0
         centre_of_pressure[pressed] = moment[pressed, :3] / moment[pressed, 3:] + center
         force = np.ascontiguousarray(seen.texels.force[:, own])
-        return SensorRecording(
+        recorded = SensorRecording(
             normal_force=force,
             shear=np.ascontiguousarray(seen.texels.shear[:, own]),
             friction=np.ascontiguousarray(seen.texels.friction[:, own]),
@@ -323,6 +325,10 @@ class Simulation:
             net_torque=net[:, 3:] + np.cross(center, net[:, :3]),
             centre_of_pressure=centre_of_pressure,
         )
+        readout = self.scenario.sensors[i].channels
+        if readout is not None:
+            recorded.channels = readout.channels(recorded)
+        return recorded
 
     def follow_state(self) -> None:
         """Bring to the state what follows from it, after the state of a later frame was put into a new simulation."""
@@ -549,7 +555,8 @@ def solve(scenario: Scenario, simulation: Simulation | None = None, frames: list
     frames = [] if frames is None else frames
     yield from solve_frames(simulation, frames.append, len(frames))
     names = [body.name for body in scenario.bodies]
-    return Recording.stack(frames, names, simulation.dt, scenario.digest(), simulation.warnings, simulation.step_reason)
+    found = Recording.stack(frames, names, simulation.dt, scenario.digest(), simulation.warnings, simulation.step_reason)
+    return with_clipping_warnings(found)
 
 
 def run(scenario: Scenario, progress: Callable[[Progress], None] | None = None) -> Recording:
