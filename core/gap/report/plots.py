@@ -301,8 +301,8 @@ def _base_squared_error(predictor: Predictor, result: Diagnosis) -> np.ndarray:
 
 
 CAPTIONS = {
-    "overview": "Where there are several texels, the error of each on the fitted trials; the error without and with each effect "
-    "that was found.",
+    "overview": "Where the error is, if there are several texels, on the fitted trials; and the error without and with each "
+    "effect that was found.",
     "gap": "The gap before and after. Check trials were never fitted: an effect that makes them worse is dropped, and they "
     "decide the verdict.",
     "curves": "Measured and simulated curves where the error of the base model is largest in each trial.",
