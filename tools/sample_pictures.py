@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Make the documentation's pictures of the sample scenes anew: python tools/sample_pictures.py [NAME …].
+"""Make the documentation's pictures of the sample scenes: python tools/sample_pictures.py [NAME …].
 
 Each sample is baked and drawn as `palpate bake` and `palpate render` do it for a user, without options that choose a camera or
 a light; the demo is what `palpate demo` makes. The gel's picture is drawn by the commands on its page, pictures of windows by
@@ -164,7 +164,7 @@ PICTURES: dict[str, Callable[[Path], None]] = {
 }
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description="Make the documentation's pictures of the sample scenes anew.")
+    parser = argparse.ArgumentParser(description="Make the documentation's pictures of the sample scenes.")
     parser.add_argument("name", nargs="*", help=f"only these of {', '.join(PICTURES)} (default: all)")
     for name in parser.parse_args().name or PICTURES:
         with tempfile.TemporaryDirectory() as folder:

@@ -13,11 +13,11 @@ from functools import partial
 from pathlib import Path
 
 from ...core.errors import FileError
-from ...core.io.bake_folder import IMAGE_LIST_NAME, frame_file
+from ...core.io.bake_folder import IMAGE_LIST_NAME, image_files
 from ...core.io.checksum_list import checksum_line, read_checksums
 from ...core.io.file_writing import file_sha256
+from ...core.io.frame_images import write_frame_images
 from ...core.io.growing_file import GrowingFile
-from ...core.io.tactile_exr import describe, write_exrs
 from ...core.model.recording import Frame
 from ...core.model.sensor import Sensor
 from .background_writer import BackgroundWriter
@@ -72,8 +72,9 @@ class BakeImages:
         """
         if not all(one.restore(*states[name]) for name, one in self._lists.items()):
             return False
-        files = [frame_file(frame) for frame in frames]
-        return all([file for file, _ in read_checksums(one.path)] == files for one in self._lists.values())
+        return all(
+            [file for file, _ in read_checksums(one.path)] == self._names(name, frames) for name, one in self._lists.items()
+        )
 
     def states(self) -> dict[str, ListState]:
         """Return the state of each list, by the name of the folder. All images are written (:meth:`finish`)."""
@@ -112,7 +113,7 @@ class BakeImages:
             is_renewed = False
             for i, (file, sha256) in enumerate(read_checksums(own.path)):
                 if _sha256_or_none(self._folders[name] / file) != sha256:
-                    self._write(name, [frame_at(i)])
+                    self._write(name, [frame_at(i // len(self._names(name, [0])))])
                     is_renewed |= file_sha256(self._folders[name] / file) != sha256
             if is_renewed:  # another library has written them: the list of the earlier one no longer holds
                 files = [file for file, _ in read_checksums(own.path)]
@@ -121,13 +122,13 @@ class BakeImages:
 
     def _write_and_list(self, name: str, frames: list[Frame]) -> None:
         self._write(name, frames)
-        self._list(name, [frame_file(frame.frame) for frame in frames])
+        self._list(name, self._names(name, [frame.frame for frame in frames]))
 
     def _write(self, name: str, frames: list[Frame]) -> None:
-        sensor, paths = self._sensors[name], [self._folders[name] / frame_file(frame.frame) for frame in frames]
-        headers = [describe(sensor, frame, self._digest) for frame in frames]
-        write_exrs(paths, sensor.texels.layout, [frame.sensors[sensor.name] for frame in frames], headers)
-        self._new_files += paths
+        self._new_files += write_frame_images(self._folders[name], self._sensors[name], frames, self._digest)
+
+    def _names(self, name: str, frames: Sequence[int]) -> list[str]:
+        return image_files(frames, self._sensors[name].channels is not None)
 
     def _list(self, name: str, files: list[str]) -> None:
         """Note the SHA-256 of images that have just been written."""

@@ -50,7 +50,7 @@ class IndentedSurface:
         return (self.mesh.even @ self._on_vertices(values))[self.used]
 
     def displaced(self, displacement: np.ndarray, touched: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the surface that gives way.
+        """Return the indented surface.
 
         Parameters
         ----------
@@ -90,7 +90,7 @@ _surfaces: dict[int, tuple[weakref.ref, IndentedSurface | None]] = {}
 
 
 def surface_of(scene, obj, texels: Texels) -> IndentedSurface | None:
-    """Return the surface of a sensor; None for a sensor whose surface does not give way (see :func:`.indentation.show`).
+    """Return the surface of a sensor; None for a sensor without indentation (see :func:`.indentation.show`).
 
     Parameters
     ----------

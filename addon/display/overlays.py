@@ -14,6 +14,7 @@ import numpy as np
 
 from ...core.figures import color_maps
 from ...core.io.bake_reader import frame_index
+from ..scene import baked_names
 from ..session import redraw, transforms, units, view_shading
 from . import bake_display, indentation, indented_surface, inset
 from .indented_surface import IndentedSurface
@@ -38,7 +39,7 @@ class SensorOverlay:
     triangles : (t, 3) int32 or None
         Corners of each triangle; None where they stand one after another.
     at_rest : (c, 3) float32 or None
-        Where the corners would be on a surface that does not give way, as the one that Blender draws while playing. What hides
+        Where the corners would be on a surface without indentation, as the one that Blender draws while playing. What hides
         that surface hides the indentation, and that surface itself does not.
     normals : (c, 3) float32 or None
         Of that surface.
@@ -117,15 +118,15 @@ def baked_overlays(scene, bake, number: int, maximum: float) -> list[SensorOverl
     """Return the heat maps of one frame of a bake; see :func:`show_bake`."""
     recording, overlays = bake.recording, []
     sensors, poses = recording.at(number).sensors, recording.poses[frame_index(recording, number)]
+    objects = baked_names.objects_of_bake(scene, bake.texels)
     for name, texels in bake.texels.items():
         body = bake.manifests[name].body or name
         if body in recording.body_names:
             pose = poses[recording.body_names.index(body)]
-            readings = sensors[name]
-            obj = scene.objects.get(name)
+            readings, obj = sensors[name], objects.get(name)
             surface = _indented_surface(scene, obj, texels, indentation.factor_of(obj) * readings.depth)
             overlay = _heat_map(scene, texels, readings.normal_force, pose, maximum, units.metres_per_unit(scene), surface)
-            overlay.plain_only, overlay.at_rest = True, None  # the surface that Blender draws gives way, too
+            overlay.plain_only, overlay.at_rest = True, None  # the surface that Blender draws is indented, too
             overlays.append(overlay)
     return overlays
 
@@ -162,7 +163,7 @@ def _scale(scene, run, frame) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class _Indented:
-    """A surface, how far its texels give way, (n,) metres, and which of them may, (n,) bool."""
+    """A surface, the displacement of its texels, (n,) metres, and which of them may, (n,) bool."""
 
     surface: IndentedSurface
     displacement: np.ndarray
@@ -170,7 +171,7 @@ class _Indented:
 
 
 def _indented_surface(scene, obj, texels, displacement: np.ndarray) -> _Indented | None:
-    """Return the surface of a sensor that gives way; None where nothing does."""
+    """Return the indented surface of a sensor; None if nothing is indented."""
     if not (displacement > 0.0).any():
         return None
     surface = indented_surface.surface_of(scene, obj, texels)

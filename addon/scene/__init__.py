@@ -9,7 +9,9 @@ and :meth:`.SceneReading.sample` one more frame at a time. Fingerprints tell whe
 __all__ = [
     "animation_fingerprint",
     "attached_objects",
+    "baked_names",
     "body_poses",
+    "channel_reader",
     "deforming_objects",
     "display_names",
     "drives",

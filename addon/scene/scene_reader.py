@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A scene becomes a :class:`.Scenario`: the only way by which meshes and poses leave Blender.
 
-Each object that takes part is a body, unless it is part of its parent's body (:mod:`.attached_objects`). A body's frame has the
+Each participant is a body, unless it is part of its parent's body (:mod:`.attached_objects`). A body's frame has the
 location and rotation of its object; scale and shear are applied to the vertices. Keyframed bodies, and surfaces that deform,
 are sampled at every frame.
 """
@@ -29,6 +29,7 @@ from ..session import animation_time, identity, session_state, units
 from . import (
     attached_objects,
     body_poses,
+    channel_reader,
     deforming_objects,
     drives,
     moved_bodies,
@@ -167,6 +168,7 @@ class _StartReader:
             self._add(self.targets, Target(obj.name, index, mesh, smooth=is_smooth), obj, mesh, to_body)
             return
         sensor = sensor_reader.read_sensor(obj, index, mesh)
+        sensor = channel_reader.with_channels(obj, sensor, to_body, self.depsgraph)
         self.warnings += uv_layouts.layout_warnings(obj, sensor.texels)
         self.sensor_objects.append(obj)
         self._add(self.sensors, sensor, obj, mesh, to_body)

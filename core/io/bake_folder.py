@@ -32,7 +32,7 @@ RECORDING_NAME = "recording.npz"
 IMAGE_LIST_NAME = "images.sha256"
 
 _SINGLE_FILES = (RECORDING_NAME, SENSOR_NAME, MANIFEST_NAME, IMAGE_LIST_NAME)
-BAKE_FILE_NAMES = re.compile(rf"tactile_-?\d+\.exr|{'|'.join(map(re.escape, _SINGLE_FILES))}")
+BAKE_FILE_NAMES = re.compile(rf"(tactile|channels)_-?\d+\.exr|{'|'.join(map(re.escape, _SINGLE_FILES))}")
 """Names of the files in a sensor's folder that a bake writes and replaces."""
 
 _RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{i}" for port in ("com", "lpt") for i in range(1, 10))}
@@ -75,6 +75,17 @@ def file_stems(names: Iterable[str]) -> dict[str, str]:
 def frame_file(frame: int) -> str:
     """Return the name of a frame's tactile image; Blender plays files named like this as a sequence."""
     return f"tactile_{frame:04d}.exr"
+
+
+def channel_file(frame: int) -> str:
+    """Return the name of the image of a frame's channels, of a sensor that has several."""
+    return f"channels_{frame:04d}.exr"
+
+
+def image_files(frames: Iterable[int], has_channels: bool) -> list[str]:
+    """Return the names of the images of some frames, in the order in which the list of a bake has them."""
+    kinds = (frame_file, channel_file) if has_channels else (frame_file,)
+    return [name(frame) for frame in frames for name in kinds]
 
 
 @dataclass(frozen=True)
@@ -120,6 +131,11 @@ class Manifest:
         SHA-256 of each file in the folder except the manifest itself and the images, by name. Those of the images are in
         ``images.sha256``, which is one of these files; manifests of some older versions have them here, and in still older ones
         the dict is empty.
+    effects : list of dict, or None
+        Of the sensor, each as :func:`.registry.to_dict` writes it; None when the manifest is older.
+    channels : dict
+        Of a sensor with several channels: their `unit` and `names`, and the `place` of each group of them
+        (:func:`.recording_npz.described`), and the rows and columns of their `image`. Others have none, and no such word.
     """
 
     sensor: str
@@ -142,6 +158,8 @@ class Manifest:
     scene_path: str = ""
     sensors: tuple[str, ...] = ()
     files: dict[str, str] = field(default_factory=dict)
+    effects: list[dict[str, Any]] | None = None
+    channels: dict[str, Any] = field(default_factory=dict)
 
     @property
     def has_images(self) -> bool:
@@ -204,6 +222,10 @@ def write_manifest(folder: str | os.PathLike, manifest: Manifest, atomic: bool =
 def manifest_bytes(manifest: Manifest) -> bytes:
     """Return the content of ``manifest.json``; raises ValueError as :func:`write_manifest`."""
     content = {"format": MANIFEST_FORMAT, **{item.name: getattr(manifest, item.name) for item in fields(manifest)}}
+    if manifest.effects is None:
+        del content["effects"]
+    if not manifest.channels:
+        del content["channels"]
     try:
         content[OWN_DIGEST] = _own_digest(content)
         text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
@@ -229,6 +251,8 @@ def read_manifest(folder: str | os.PathLike) -> Manifest:
     fault = ""
     if content.get(OWN_DIGEST, own) != own:
         fault = "its content is not what was baked"
+    elif "effects" in content and manifest.effects is None:
+        fault = "effects is None"
     elif "\0" in manifest.sensor + manifest.body:
         fault = "a name has a NUL"
     elif not (math.isfinite(manifest.fps) and math.isfinite(manifest.dt)):

@@ -5,12 +5,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict
+from typing import Any
 
+from ..effects.engine.registry import to_dict
 from ..model.recording import Recording
 from ..model.scenario import Scenario
 from ..model.sensor import Sensor
 from ..version import VERSION
 from .bake_folder import Manifest
+from .recording_npz import described
+from .tactile_exr import channel_layout
 
 
 def manifest_of(scenario: Scenario, sensor: Sensor, recording: Recording, files: Mapping[str, str]) -> Manifest:
@@ -44,4 +48,13 @@ def manifest_of(scenario: Scenario, sensor: Sensor, recording: Recording, files:
         step_reason=recording.step_reason,
         sensors=tuple(recording.sensors),
         files=dict(sorted(files.items())),
+        effects=[to_dict(effect) for effect in sensor.effects],
+        channels=_channels_of(sensor, recording),
     )
+
+
+def _channels_of(sensor: Sensor, recording: Recording) -> dict[str, Any]:
+    channels = recording.sensors[sensor.name].channels
+    if channels is None:
+        return {}
+    return {**described(channels), "image": [int(side) for side in channel_layout(sensor.texels, channels).shape]}

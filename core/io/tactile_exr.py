@@ -18,16 +18,23 @@ import numpy as np
 
 from ..errors import FileError, os_error_reason
 from ..geometry.layout.grid_layout import GridLayout
+from ..geometry.layout.place_grid import grid_of_places
 from ..geometry.layout.texture_maps import UVLayout
+from ..geometry.texels import Texels
 from ..model.recording import Frame, SensorFrame
 from ..model.sensor import Sensor
+from ..model.vector_readings import VectorReadings
 from . import exr_codec
 from .exr_backend import backend
 from .exr_codec import FormatError, in_order
 from .file_writing import atomic_write, write_file
+from .vector_layer import vector_images
 
 CHANNELS = ("R", "G", "B", "reading", "depth", "slip", "contact")
 """Names of the channels, in the order in which :func:`read_exr` returns them."""
+
+CHANNEL_LAYER = "channels"
+"""Name of the layer of images of a sensor's channels."""
 
 UNITS = {"R": "N", "G": "N", "B": "N", "depth": "m", "slip": "m/s", "contact": "1"}
 """Units of the channels; that of ``reading`` is the sensor's."""
@@ -148,6 +155,46 @@ def _write(
 ) -> None:
     attributes = [{_PREFIX + key: str(value) for key, value in about.items()} for about in metadata]
     exr_codec.write_all(paths, _IN_FILE, _pictures(layout, frames, _IN_FILE), attributes)
+
+
+def channel_layout(texels: Texels, channels: VectorReadings) -> GridLayout:
+    """Return rows and columns of the places where a sensor's channels are measured, seen onto the middle of its texels."""
+    count = channels.values.shape[-2]
+    if channels.place is None:
+        return GridLayout(1, count, np.zeros(count, int), np.arange(count))
+    middle = np.argmin(np.sum((texels.position - texels.position.mean(axis=0)) ** 2, axis=1))
+    along, normal = texels.tangent[middle], texels.normal[middle]
+    return grid_of_places(channels.place, along, np.cross(normal, along))
+
+
+def write_channel_exrs(
+    paths: Sequence[str | os.PathLike],
+    layout: GridLayout,
+    frames: Sequence[VectorReadings],
+    metadata: Sequence[Mapping[str, str]],
+) -> None:
+    """Write the channels of frames of one sensor as images with one vector layer, as :func:`write_exrs` writes the others.
+
+    Parameters
+    ----------
+    paths : (f,) sequence of path
+    layout : GridLayout
+        Of their places.
+    frames : (f,) sequence of VectorReadings
+        Each of one frame.
+    metadata : sequence of mapping of str to str
+        As :func:`describe`; the unit and the names of the channels are added.
+    """
+    first = frames[0]
+    values = np.stack([frame.values for frame in frames])
+    names, table = vector_images(values, layout, CHANNEL_LAYER, [name.upper() for name in first.names])
+    own = {"unit": first.unit, "channels": " ".join(first.names)}
+    attributes = [
+        {_PREFIX + key: str(value) for key, value in {**about, **own}.items() if not key.startswith("unit.")}
+        for about in metadata
+    ]
+    with write_file(paths[0], atomic=False):
+        exr_codec.write_all(paths, names, table, attributes)
 
 
 def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]]:

@@ -4,11 +4,16 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import fields, is_dataclass
+from dataclasses import Field, fields, is_dataclass
+from typing import Any
 
 import numpy as np
 
 from .recording import row_blocks
+
+IF_GIVEN = "if given"
+"""Key of the metadata of a field that counts only if it is not None. What lacks it has the hash from before there was such a
+field."""
 
 
 def digest_of(value: object) -> str:
@@ -27,10 +32,15 @@ def digest_of(value: object) -> str:
     return digest.hexdigest()
 
 
+def stated_fields(value: Any) -> list[Field[Any]]:
+    """Return the fields of a dataclass that count for its hash and stand in its file."""
+    return [item for item in fields(value) if IF_GIVEN not in item.metadata or getattr(value, item.name) is not None]
+
+
 def _feed(digest: hashlib._Hash, value: object) -> None:
     """Hash dataclasses field by field, arrays with type and shape, and everything else by its representation."""
     if is_dataclass(value) and not isinstance(value, type):
-        for item in fields(value):
+        for item in stated_fields(value):
             digest.update(item.name.encode())
             _feed(digest, getattr(value, item.name))
     elif isinstance(value, tuple | list):

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from ..geometry.texels import Texels
+from .channel_readout import ChannelReadout
 from .deformation import Deformation
-from .digest import digest_of
+from .digest import IF_GIVEN, digest_of
 from .effect import Effect
 from .sensor_parameters import Painted, SensorParameters
 
@@ -26,13 +27,15 @@ class Sensor:
         In the frame of the body. :func:`.sensor_effects.mounted_texels` returns where the effects put them.
     parameters : SensorParameters
     readout : bool
-        False for a pad, which takes part in contact and reports nothing.
+        False for a pad, which exerts contact forces and reports nothing.
     painted : Painted
     deformation : Deformation or None
         How the texels move in the frame of the body.
     effects : tuple of Effect
         What real sensors do and the base model leaves out. Each kind has its place in the chain, so the order matters only
         between two effects of the same kind.
+    channels : ChannelReadout or None
+        What computes further, signed channels from forces and displacements of the texels.
     """
 
     name: str
@@ -43,6 +46,7 @@ class Sensor:
     painted: Painted = field(default_factory=Painted)
     deformation: Deformation | None = None
     effects: tuple[Effect, ...] = ()
+    channels: ChannelReadout | None = field(default=None, metadata={IF_GIVEN: True})
 
     @cached_property
     def settings_digest(self) -> str:

@@ -33,7 +33,7 @@ SHORTEST_SETTLE = 1e-3
 SETTLING_SHARE = 1 / 3
 """Time constant of the drive's integral, per time in which the force is reached."""
 RELAXATION_SHARE = 1 / 16
-"""Time in which the drive's damper gives way to one texel, per time in which the force is reached. With these two, and no less
+"""Time in which the drive's damper yields to one texel, per time in which the force is reached. With these two, and no less
 damping than is critical on one texel, forces of 0.05 to 5 N on texels of 58.5 to 10,000 N/m are within 5 % after `settle` and a
 hold of 0.2 s; the default damping of a drive would take seconds on soft foam."""
 

@@ -6,10 +6,10 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from ..io.bake_folder import IMAGE_LIST_NAME, frame_file
+from ..io.bake_folder import IMAGE_LIST_NAME, image_files
 from ..io.checksum_list import checksum_line
 from ..io.file_writing import file_sha256
-from ..io.tactile_exr import describe, write_exrs
+from ..io.frame_images import write_frame_images
 from ..model.recording import Recording
 from ..model.sensor import Sensor
 
@@ -30,10 +30,9 @@ def write_run_images(folder: Path, sensor: Sensor, recording: Recording) -> list
     numbers = [int(frame) for frame in recording.frames]
     for start in range(0, len(numbers), at_once):
         frames = [recording.at(number) for number in numbers[start : start + at_once]]
-        paths = [folder / frame_file(frame.frame) for frame in frames]
-        headers = [describe(sensor, frame, recording.digest) for frame in frames]
-        write_exrs(paths, sensor.texels.layout, [frame.sensors[sensor.name] for frame in frames], headers)
-        names += [path.name for path in paths]
-        lines += [checksum_line(path.name, file_sha256(path)) for path in paths]
+        write_frame_images(folder, sensor, frames, recording.digest)
+        own = image_files([frame.frame for frame in frames], sensor.channels is not None)
+        names += own
+        lines += [checksum_line(name, file_sha256(folder / name)) for name in own]
     (folder / IMAGE_LIST_NAME).write_bytes(b"".join(lines))
     return [*names, IMAGE_LIST_NAME]

@@ -386,7 +386,7 @@ class TexelMotion(NamedTuple):
 
 @by_reference
 class TexelContacts(NamedTuple):
-    """What presses on texels, and what follows from it; arrays in blocks of n points.
+    """Penetration of texels and the results of it; arrays in blocks of n points.
 
     Attributes
     ----------

@@ -65,7 +65,7 @@ def _models(result: Diagnosis) -> list[tuple[str, Model, str]]:
 
 
 def curves(result: Diagnosis) -> Figure:
-    """Measured, base and amended over time, for the two texels (or force components) where the base model errs most."""
+    """Measured, base and amended over time, for the two texels (or force components) with the largest base error."""
     trials = [*result.of("fit")[:2], *result.of("check")[:1]]
     figure = new_figure(WIDTHS["double"], 1.75 * len(trials) + 0.5)
     grid = figure.subplots(len(trials), 1, squeeze=False)[:, 0]
@@ -301,7 +301,7 @@ def _base_squared_error(predictor: Predictor, result: Diagnosis) -> np.ndarray:
 
 
 CAPTIONS = {
-    "overview": "Where the error is, if there are several texels, on the fitted trials; and the error without and with each "
+    "overview": "Where there are several texels, the error of each on the fitted trials; the error without and with each "
     "effect that was found.",
     "gap": "The gap before and after. Check trials were never fitted: an effect that makes them worse is dropped, and they "
     "decide the verdict.",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The surface of a baked sensor gives way by its penetration; what reads the scene, and the user's mesh, know nothing of it."""
+"""The surface of a baked sensor is displaced by its penetration; what reads the scene, and the user's mesh, are unaffected."""
 
 import dataclasses
 
@@ -137,7 +137,7 @@ def test_factor_and_checkbox_are_applied_and_nothing_is_left(tmp_path):
 
 
 def test_two_sensors_share_a_mesh(tmp_path):
-    """Each gives way by its own penetration."""
+    """Each is displaced by its own penetration."""
     scene, pad, _ = press()
     other = pad.copy()
     scene.collection.objects.link(other)
