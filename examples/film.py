@@ -233,7 +233,7 @@ def paint(film: Film, scene) -> Any:
             for face in finger.data.polygons:
                 face.material_index = len(finger.data.materials) - 1 if done[list(face.vertices)].all() else 0
             render_to(path, scene.frame_start)
-            words = "Paint the part of a mesh that should feel. Any mesh will do: here, the tip of a finger."
+            words = "Paint the part of a mesh that measures contact. Any mesh will do: here, the tip of a finger."
             film.show(2.0 if number == 0 else seconds, title, words, counted(path, int(done.sum())))
     group.add([int(i) for i in np.flatnonzero(region)], 1.0, "REPLACE")
     for face in finger.data.polygons:
@@ -281,7 +281,7 @@ def press(film: Film, scene) -> None:
     with studio(film, BROAD, scene, HAND_VIEW, hand_corners(scene)) as render_to:
         for seconds, number, path in film.play("press", range(6, hand.FRAME_END + 1)):
             render_to(path, number)
-            words = "The fingers close until the index finger feels 2 N. Palpate computes force and friction in every texel."
+            words = "The fingers close until the index finger measures 2 N. Palpate computes force and friction in every texel."
             film.show(seconds, title, words, drawing(number, path))
     words = f"The bake has tactile images for all {len(recording.frames)} frames, and a heat map that plays in any Blender."
     film.show(3.0, title, words, drawing(number, path))
