@@ -34,20 +34,22 @@ def digest_of(value: object) -> str:
 
 
 @cache
-def _fields_of(kind: type) -> tuple[Field[Any], ...] | None:
+def _fields_of(kind: Any) -> tuple[Field[Any], ...] | None:
     """Return the fields of a dataclass, None for another type."""
     return fields(kind) if is_dataclass(kind) else None
 
 
 def stated_fields(value: Any) -> list[Field[Any]]:
     """Return the fields of a dataclass that count for its hash and stand in its file."""
-    own = _fields_of(type(value)) or ()
+    kind: Any = type(value)
+    own = _fields_of(kind) or ()
     return [item for item in own if IF_GIVEN not in item.metadata or getattr(value, item.name) is not None]
 
 
 def _feed(digest: hashlib._Hash, value: object) -> None:
     """Hash dataclasses field by field, arrays with type and shape, and everything else by its representation."""
-    if _fields_of(type(value)) is not None:
+    kind: Any = type(value)
+    if _fields_of(kind) is not None:
         for item in stated_fields(value):
             digest.update(item.name.encode())
             _feed(digest, getattr(value, item.name))
