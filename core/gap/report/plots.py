@@ -146,7 +146,7 @@ def _error_line(maps: list[tuple[str, np.ndarray]]) -> Figure:
     figure = new_figure(WIDTHS["single"], 2.5)
     axes = figure.add_axes((0.15, 0.2, 0.82, 0.62))
     for (label, values), colour in zip(maps, (BEFORE, AFTER), strict=False):
-        axes.step(np.arange(len(values)), values, where="mid", color=colour, lw=0.9, label=label)
+        axes.stairs(values, np.arange(len(values) + 1) - 0.5, baseline=None, color=colour, lw=0.9, label=label)
     axes.set_xlabel("texel")
     axes.set_ylabel("error (% of range)")
     axes.margins(x=0)
@@ -204,6 +204,7 @@ def loops(result: Diagnosis) -> Figure:
             color=colour,
             ls="--" if text == "base model" else "-",
             label=text,
+            zorder=4,  # above the samples, which hide a line that describes them well
         )
     axes.set_xlabel(label)
     axes.set_ylabel(_quantity(result, name))
