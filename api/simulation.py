@@ -44,7 +44,7 @@ def simulate(
         A sensor stays where it is, unless it is on a body. A scenario, as of :func:`scenario_of`, is simulated as it is: it has
         bodies, duration and all else already.
     bodies : Body or list of Body
-        What presses. A body that carries a sensor need not be listed.
+        The objects in contact. A body that carries a sensor need not be listed.
     duration : float, seconds, optional
         Rounded to whole frames. Default: that of the longest motion.
     fps : float, frames per second

@@ -6,7 +6,7 @@ at any moment leaves the names of some earlier moment, but none from before the 
 what was synchronised or anything else: nothing, half of it, zeros, or all. This is what file systems with a journal promise,
 and less than ext4 keeps.
 
-As root on Linux, a bake also runs on an ext4 of its own, whose block device is copied meanwhile and mounted anew.
+As root on Linux, a bake also runs on an ext4 of its own, whose block device is copied meanwhile and mounted again.
 
 After each cut the present bake is the old one or the new one, as a whole; the same command again ends with the bytes of an
 undisturbed run; and the user's files are there.

@@ -105,7 +105,7 @@ _diagnosis: dict[str, object] = {}
 
 
 def remember_diagnosis() -> None:
-    """Let ``palpate gap`` diagnose once and only write its report anew: its fits read no files and write none."""
+    """Let ``palpate gap`` diagnose once and only write its report again: its fits read no files and write none."""
     from palpate.core.gap.selection import diagnosis
 
     if "original" in _diagnosis:

@@ -151,7 +151,7 @@ class Sweep(Area):
             if cluster is not None and victim in ("scheduler", "worker"):
                 time.sleep(0.2)
                 cluster.replace_dead()
-            if victim in ("driver", "scheduler"):  # a driver may find its scheduler again, where that was started anew
+            if victim in ("driver", "scheduler"):  # a driver may find its scheduler again, where that was started again
                 with suppress(subprocess.TimeoutExpired):
                     driver.wait(timeout=5)
             if driver.poll():
@@ -370,7 +370,7 @@ class Cluster:
         return self._start([sys.executable, "-m", "dask", *words, "--local-directory", str(self._folder / "dask")])
 
     def replace_dead(self) -> None:
-        """Start anew what has ended, as whoever looks after a cluster does."""
+        """Start again what has ended, as whoever looks after a cluster does."""
         if self.scheduler.poll() is not None:
             self.scheduler = self._start_scheduler()
         self.workers = [worker if worker.poll() is None else self._start_worker() for worker in self.workers]

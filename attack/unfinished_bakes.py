@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a killed bake leaves, damaged with its structure in mind, and the bake that finds it.
 
-Damage that the checksums tell makes the bake begin anew, and it ends with the bytes of one that was never killed. Where the
+Damage that the checksums tell restarts the bake, and it ends with the bytes of one that was never killed. Where the
 checksums were made to fit, as a hostile file's would, the bake ends as a whole or in one sentence: kernels follow no number
 that leads out, and no number that is not finite reaches a file.
 """

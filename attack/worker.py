@@ -2,7 +2,7 @@
 """A process with Blender that runs commands for the attack, and the parent's end of it.
 
 Starting Blender takes seconds, a small bake a fraction of one. So one process runs thousands of commands one after the other.
-It is ended and started anew when a command does not come back or takes the process down, which is a finding.
+It is ended and started again when a command does not come back or takes the process down, which is a finding.
 """
 
 from __future__ import annotations

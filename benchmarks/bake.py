@@ -88,7 +88,7 @@ def cached_frame(texels: int) -> float:
             overlays.inset_content(scene, run, run.frames[frame])
             times.append(time.perf_counter() - start - plain)
             if live_cache.get(scene) is not run or not pictures or frame_status.status_of(scene).frame is None:
-                raise RuntimeError("the frame was computed anew or not shown: this would not be the same work")
+                raise RuntimeError("the frame was computed again or not shown: this would not be the same work")
         return statistics.median(times) * 1e3
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A sensor in another program's loop: microseconds of a step, calls included, and milliseconds of a step of 4,096 environments.
 
-The object moves to and fro on the pad, a millimetre deep, so that texels slide and neighbour lists are made anew. The peer
+The object moves to and fro on the pad, a millimetre deep, so that texels slide and neighbour lists are rebuilt. The peer
 is a step of MuJoCo with its `tactile` sensor of as many texels, under a cube of 3,072 faces that rests on it; it computes the
 cube's dynamics too. Times are those of the threads that compute, the least of several rounds, as other work on the machine
 only adds to them.
@@ -45,7 +45,7 @@ def item(texels: int) -> SensorOnMesh:
 
 
 def objects() -> dict[str, tuple[TriangleMesh | Shape, float, np.ndarray]]:
-    """Return what presses, how high its origin is when it touches, and its orientation.
+    """Return the indenter, the height of its origin at first contact, and its orientation.
 
     A cube that covers all texels and a ball of 5k faces as meshes, and such a box, sphere, capsule and plane in closed form.
     """

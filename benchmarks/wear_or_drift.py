@@ -2,7 +2,7 @@
 """Gains that fall from recording to recording, with use or with the clock, where no session is named.
 
 A plate presses four texels in recordings that each begin at time zero, so all texels carry the same load. In `used` recordings
-the gain falls with what is pressed, in `aged` ones with the time, and use is unequal in both. In `alike` ones every recording
+the gain falls with the accumulated load, in `aged` ones with time, and use is unequal in both. In `alike` ones every recording
 is the same programme, so nobody can tell. Cases numbered below 1000 have formulas of their own.
 
 Environment:

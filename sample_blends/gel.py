@@ -28,7 +28,7 @@ TEXT = """\
 A gel before a camera
 
 A nut is pressed on a soft gel, turned and drawn aside. 'palpate render --only gel', or the figure Gel under Physics > Palpate >
-Figures, shows what a camera behind the gel would see: its surface in the light of a red, a green and a blue lamp, with printed
+Figures, shows the camera image behind the gel: its surface in the light of a red, a green and a blue lamp, with printed
 markers that the shear carries along. It is a picture of baked penetration, not a calibrated model of a camera and its lamps.
 
 Press Space to play, or Bake for tactile images and keyframes.

@@ -82,7 +82,7 @@ class Scenes:
         return self._layouts.setdefault(found.digest, found)
 
     def scenario(self, scene: str, values: Mapping[str, Any]) -> Scenario:
-        """Return the scenario of a scene with the values of a run; it is read anew where they have properties of the scene."""
+        """Return the scenario of a scene with the values of a run; it is read again where they have properties of the scene."""
         plan, read_with = self.plan(scene), scene_values(values)
         assert plan.scenario is not None  # but for a program
         scenario = at_rate(self._reader.read(scene, read_with), self.study.fps) if read_with else plan.scenario

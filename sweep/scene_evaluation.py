@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads a scene anew with other values of its properties, in a Blender of its own that ends with it.
+"""Reads a scene again with other values of its properties, in a Blender of its own that ends with it.
 
 A process that computes runs never loads Blender: what a scene leaves in its memory, or what ends it, concerns one run.
 """

@@ -28,7 +28,7 @@ from .study_scenes import FROZEN_MESHES, frozen_meshes, plan_of
 BLEND, SCENARIO = ".blend", ".npz"
 ReadBlend = Callable[[Path, Path], None]
 """``read_blend(blend, scenario)`` writes what a .blend says to the solver into a file, and beside it what is
-needed to read the scene anew where the study asks for that (:mod:`.study_scenes`)."""
+needed to read the scene again where the study asks for that (:mod:`.study_scenes`)."""
 _OWN = {RUNS, FAILED, SCENES, STUDY_NAME, ".palpate"}
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random poses of a pad and of what presses on it, for sensors in a loop, and the comparison of many with one."""
+"""Random poses of a pad and of an indenter, for sensors in a loop, and the comparison of many with one."""
 
 from __future__ import annotations
 

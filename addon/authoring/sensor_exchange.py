@@ -18,7 +18,7 @@ def sensors_on_meshes(scene, names=()) -> list[SensorOnMesh]:
     Parameters
     ----------
     names : sequence of str
-        Of sensors or pads. Without names: all sensors that take part.
+        Of sensors or pads. Without names: all sensors of the simulation.
 
     Raises
     ------

@@ -67,7 +67,7 @@ def bake(scene, into_scene: bool = True, images: bool = True, blend: bake_files.
     ------
     PalpateError
         Before anything changes, if the scene or the bake folder is unsuitable; later, if the folder fills up or if the user
-        deletes an object that takes part.
+        deletes an object that is part of the simulation.
     """
     if into_scene and not images:
         raise ValueError("a scene shows a bake by its images")

@@ -6,7 +6,8 @@ them. The state is written after everything it vouches for is on the disk: the f
 lines of the lists of images, each by its length and SHA-256. What a killed bake has written after them is cut off, and what a
 power cut has damaged is found. A checkpoint writes what is new and the state, so it costs the same at any length of a bake.
 
-A checkpoint may come from anywhere, as a bake folder does. What is damaged or does not fit is not used: the bake begins anew.
+A checkpoint may come from anywhere, as a bake folder does. What is damaged or does not fit is not used: the bake
+starts from its first frame.
 """
 
 from __future__ import annotations

@@ -18,6 +18,7 @@ from ...core.figures.figure_style import FigureStyle
 from ...core.io.bake_folder import frame_file
 from ...core.io.bake_reader import Bake, read_sensors
 from ...core.response import metrics
+from ..scene import baked_names
 from ..session import units
 from . import bake_identity, heat_map, indentation, markers, materials, texel_arrows
 from .baked_sensor import BakedSensor
@@ -179,7 +180,7 @@ def refresh(scene, places: dict) -> None:
     for obj, place in places.items():
         name = names[place]
         body_name = bake.manifests[name].body or obj.name
-        body = scene.objects.get(body_name)
+        body = baked_names.objects_of_bake(scene, [body_name]).get(body_name)
         if body is None or body_name not in recording.body_names:
             raise SceneError(f"'{body_name}', which moves sensor '{obj.name}', is not in the bake any more: bake again.")
         if len(obj.data.vertices) <= bake.texels[name].vertex.max():

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Does a folder hold the bake that a scene shows? The .blend stores the digest and the id of its bake, the manifest both too.
 
-They differ when the folder was baked anew by another .blend, by a script or by `palpate bake` without --save, or when an older
+They differ when the folder was baked again by another .blend, by a script or by `palpate bake` without --save, or when an older
 copy of the .blend is opened. Keyframes in the scene then belong to other forces than the files. This is asked at every frame,
 so manifests are kept in memory until their files change.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The surface of a baked sensor gives way by its baked penetration, so that what presses on it does not cut into it.
+"""The surface of a baked sensor is displaced by its baked penetration, so that the object in contact does not cut into it.
 
 Geometry nodes subdivide the sensor's faces and move their vertices inwards. They read the penetration from an image that is
 packed into the .blend, with a row for each frame, so that the surface plays in any Blender and without the files of the bake.
@@ -75,7 +75,7 @@ def show(sensors: Sequence[BakedSensor], factor: float | None) -> None:
     if factor is None:
         return
     touched = [_touched(sensor) for sensor in sensors]
-    # asked for all of them before the first is changed: Blender evaluates the scene anew after a change
+    # asked for all of them before the first is changed: Blender evaluates the scene again after a change
     depsgraph = bpy.context.evaluated_depsgraph_get()
     follows = [own.any() and may_indent(sensor.obj, depsgraph) for sensor, own in zip(sensors, touched, strict=True)]
     for sensor, own, is_indented in zip(sensors, touched, follows, strict=True):

@@ -14,6 +14,7 @@ import numpy as np
 
 from ...core.figures import color_maps
 from ...core.io.bake_reader import frame_index
+from ..scene import baked_names
 from ..session import redraw, transforms, units, view_shading
 from . import bake_display, indentation, indented_surface, inset
 from .indented_surface import IndentedSurface
@@ -38,7 +39,7 @@ class SensorOverlay:
     triangles : (t, 3) int32 or None
         Corners of each triangle; None where they stand one after another.
     at_rest : (c, 3) float32 or None
-        Where the corners would be on a surface that does not give way, as the one that Blender draws while playing. What hides
+        Where the corners would be on a surface without indentation, as the one that Blender draws while playing. What hides
         that surface hides the indentation, and that surface itself does not.
     normals : (c, 3) float32 or None
         Of that surface.
@@ -117,15 +118,15 @@ def baked_overlays(scene, bake, number: int, maximum: float) -> list[SensorOverl
     """Return the heat maps of one frame of a bake; see :func:`show_bake`."""
     recording, overlays = bake.recording, []
     sensors, poses = recording.at(number).sensors, recording.poses[frame_index(recording, number)]
+    objects = baked_names.objects_of_bake(scene, bake.texels)
     for name, texels in bake.texels.items():
         body = bake.manifests[name].body or name
         if body in recording.body_names:
             pose = poses[recording.body_names.index(body)]
-            readings = sensors[name]
-            obj = scene.objects.get(name)
+            readings, obj = sensors[name], objects.get(name)
             surface = _indented_surface(scene, obj, texels, indentation.factor_of(obj) * readings.depth)
             overlay = _heat_map(scene, texels, readings.normal_force, pose, maximum, units.metres_per_unit(scene), surface)
-            overlay.plain_only, overlay.at_rest = True, None  # the surface that Blender draws gives way, too
+            overlay.plain_only, overlay.at_rest = True, None  # the surface that Blender draws is indented, too
             overlays.append(overlay)
     return overlays
 
@@ -162,7 +163,7 @@ def _scale(scene, run, frame) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class _Indented:
-    """A surface, how far its texels give way, (n,) metres, and which of them may, (n,) bool."""
+    """A surface, the displacement of its texels, (n,) metres, and which of them may, (n,) bool."""
 
     surface: IndentedSurface
     displacement: np.ndarray
@@ -170,7 +171,7 @@ class _Indented:
 
 
 def _indented_surface(scene, obj, texels, displacement: np.ndarray) -> _Indented | None:
-    """Return the surface of a sensor that gives way; None where nothing does."""
+    """Return the indented surface of a sensor; None if nothing is indented."""
     if not (displacement > 0.0).any():
         return None
     surface = indented_surface.surface_of(scene, obj, texels)
@@ -191,8 +192,9 @@ def _heat_map(
     rotation = transforms.rotation(pose[3:])
     rgb = color_maps.colors(scene.palpate.color_map, bake_display.displayed_values(scene.palpate, force, texels) / maximum)
 
-    def on_both_sides(position: np.ndarray, normal: np.ndarray) -> np.ndarray:
-        sides = [(pose[:3] + (position + side * lift * normal) @ rotation.T) / scale for side in (1.0, -1.0)]
+    def on_both_sides(position: np.ndarray, normal: np.ndarray, rise: np.ndarray | float = 0.0) -> np.ndarray:
+        lifted = normal * np.reshape(lift + rise, (-1, 1))
+        sides = [(pose[:3] + (position + side * lifted) @ rotation.T) / scale for side in (1.0, -1.0)]
         return np.concatenate(sides).astype(np.float32)
 
     if indented is None:
@@ -208,7 +210,7 @@ def _heat_map(
         np.tile(colors, (2, 1)),
         None,
         triangles=np.ascontiguousarray(np.concatenate([halves, halves + len(position)]), dtype=np.int32),
-        at_rest=on_both_sides(surface.position, surface.normal),
+        at_rest=on_both_sides(surface.position, surface.normal, surface.rise),
         normals=np.tile(surface.normal @ rotation.T, (2, 1)).astype(np.float32),
     )
 

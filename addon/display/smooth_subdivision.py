@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Geometry nodes that subdivide faces and spread a value smoothly over them, as :mod:`....core.geometry.smooth_mesh` does.
 
-Blender's own node for smooth subdivision builds its tables anew at every frame: 55 ms for 436 vertices and two levels (Blender
+Blender's own node for smooth subdivision rebuilds its tables at every frame: 55 ms for 436 vertices and two levels (Blender
 4.5, one core). Catmull and Clark's subdivision is also an even one followed by averages over the faces at each vertex (Warren
 and Weimer, Subdivision Methods for Geometric Design, 2001, chapter 7), and geometry nodes average what goes from one domain to
 another. That gives the same surface in a sixth of the time.

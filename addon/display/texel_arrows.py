@@ -30,7 +30,7 @@ MODIFIER = "Palpate Arrows"
 
 
 def build_arrows(scene, sensor: BakedSensor, image, kinds, lengths: dict, longest: dict) -> None:
-    """Make the arrows of one sensor anew: remove those of an earlier bake and build the kinds that are wanted.
+    """Make the arrows of one sensor again: remove those of an earlier bake and build the kinds that are wanted.
 
     Parameters
     ----------

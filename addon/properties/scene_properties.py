@@ -193,10 +193,13 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
     scene_id: StringProperty(options={"HIDDEN"})
     # What the latest bake has left: the digest of its scenario (empty without a bake) and its id, by which the bake in the
     # folder is recognised, the fingerprints of settings and of the shapes of deforming objects, by which changes are noticed,
-    # and its first and last frame.
+    # the names of its objects at that time, and its first and last frame.
     baked_digest: StringProperty(options={"HIDDEN"})
     baked_id: StringProperty(options={"HIDDEN"})
     baked_fingerprint: StringProperty(options={"HIDDEN"})
     baked_shapes: StringProperty(options={"HIDDEN"})
+    baked_names: StringProperty(options={"HIDDEN"})
     baked_start: IntProperty(options={"HIDDEN"})
     baked_end: IntProperty(options={"HIDDEN"})
+    # Says that the saved .blend has not changed since its bake (core/io/saved_bake.py).
+    unchanged_note: StringProperty(options={"HIDDEN"})

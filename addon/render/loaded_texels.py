@@ -9,6 +9,7 @@ import numpy as np
 
 from ...core.io.bake_reader import Bake, frame_index
 from ..display import indentation
+from ..scene import baked_names
 from ..session import transforms, units
 
 LOADED_SHARE = 0.05
@@ -46,6 +47,7 @@ def loaded_texels(scene, bake: Bake, frame: int) -> LoadedTexels:
     recording, metres = bake.recording, units.metres_per_unit(scene)
     sensors, poses = recording.at(frame).sensors, recording.poses[frame_index(recording, frame)]
     largest = max((float(sensors[name].normal_force.max(initial=0.0)) for name in bake.texels), default=0.0)
+    objects = baked_names.objects_of_bake(scene, bake.texels)
     parts = [(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0, dtype=int))]
     for number, (name, texels) in enumerate(bake.texels.items()):
         body, readings = bake.manifests[name].body or name, sensors[name]
@@ -54,7 +56,7 @@ def loaded_texels(scene, bake: Bake, frame: int) -> LoadedTexels:
         chosen = readings.normal_force >= LOADED_SHARE * largest
         pose = poses[recording.body_names.index(body)]
         rotation = transforms.rotation(pose[3:])
-        depth = indentation.factor_of(scene.objects.get(name)) * readings.depth[chosen]
+        depth = indentation.factor_of(objects.get(name)) * readings.depth[chosen]
         local = texels.position[chosen] - depth[:, None] * texels.normal[chosen]
         points = (pose[:3] + local @ rotation.T) / metres
         radii = np.sqrt(texels.area[chosen] / np.pi) / metres

@@ -254,7 +254,7 @@ def _set_workbench(scene, changes: _TemporaryChanges) -> None:
 
 
 def _in_picture(scene) -> list:
-    """Return the subjects and what touches them without being much larger, as the housing of a gripper or a stand."""
+    """Return the subjects and objects in contact with them, such as the housing of a gripper, unless they are much larger."""
     seen = subjects(scene)
     if not seen:
         return seen

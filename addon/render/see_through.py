@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures in which what presses does not hide what it presses on.
+"""Pictures in which an indenter does not hide the texels below it.
 
 Where targets cover loaded texels, a second render without them is blended over the first. Opaque, metal and glass objects so
 become a faint image of themselves around the contact and stay what they are elsewhere, in every engine. No material is touched.

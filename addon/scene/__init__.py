@@ -9,6 +9,7 @@ and :meth:`.SceneReading.sample` one more frame at a time. Fingerprints tell whe
 __all__ = [
     "animation_fingerprint",
     "attached_objects",
+    "baked_names",
     "body_poses",
     "channel_reader",
     "deforming_objects",

@@ -18,7 +18,7 @@ SAME_MATRIX = 1e-4
 
 
 def body_objects(objects) -> dict:
-    """Return, for each of the objects that take part, the object whose body it belongs to.
+    """Return, for each of the participating objects, the object whose body it belongs to.
 
     An attached object whose parent is not simulated is a body of its own, which its parents move like any other object.
     """

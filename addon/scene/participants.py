@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which objects of a scene take part, and the dependency graph from which they are read.
+"""The participants of a simulation, and the dependency graph from which they are read.
 
-Every object with a role that the view layer shows takes part. Hidden and disabled objects are left out, with a warning.
-Instances of collections never take part.
+Every object with a role that the view layer shows is a participant. Hidden and disabled objects are left out, with a warning.
+Instances of collections never are.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ OBJECT_TYPES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 
 
 def view_layer_of(scene):
-    """Return the view layer that decides what takes part: the window's, else the scene's first."""
+    """Return the view layer that decides which objects participate: the window's, else the scene's first."""
     import bpy
 
     context = bpy.context
@@ -27,7 +27,7 @@ def depsgraph_of(scene):
 
 
 def find_participants(scene) -> tuple[list, list[str]]:
-    """Return the objects that take part, in the scene's order, and a warning for each object that is hidden."""
+    """Return the participants, in the scene's order, and a warning for each object that is hidden."""
     layer = view_layer_of(scene)
     found, warnings = [], []
     for obj in scene.objects:

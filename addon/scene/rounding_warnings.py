@@ -48,7 +48,7 @@ def keyframe_warnings(objects, scenario: Scenario, metres_per_unit: float) -> tu
     Parameters
     ----------
     objects : iterable of Object
-        Those that take part; what they depend on is looked at too.
+        The participants; what they depend on is looked at too.
     scenario : Scenario
     metres_per_unit : float
     """

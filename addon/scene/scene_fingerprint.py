@@ -5,12 +5,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-from functools import lru_cache
+from functools import lru_cache, partial
+from operator import attrgetter
 
 from ...core.model.sensor_parameters import SENSOR_PARAMETERS
 from ..properties import effect_stack, magnetic_properties, painted_maps
 from ..session import session_state, units
-from . import animation_fingerprint, deforming_objects, drives, mesh_fingerprint, participants, uv_layouts
+from . import animation_fingerprint, baked_names, deforming_objects, drives, mesh_fingerprint, participants, uv_layouts
 
 OBJECT_PROPERTIES = (
     *SENSOR_PARAMETERS,
@@ -26,8 +27,8 @@ OBJECT_PROPERTIES = (
 )
 """Properties of `Object.palpate` on which a run depends, besides velocities and effects."""
 
-_mesh_fingerprints: dict[int, str] = {}
-"""Last fingerprint of the meshes, by scene."""
+_mesh_fingerprints: dict[int, tuple[tuple[int, ...], str]] = {}
+"""By scene: the objects whose meshes were read last, and the fingerprint of these meshes."""
 
 
 def forget() -> None:
@@ -35,7 +36,7 @@ def forget() -> None:
     _mesh_fingerprints.clear()
 
 
-def settings_of(scene, objects) -> tuple:
+def settings_of(scene, objects, name_of=attrgetter("name")) -> tuple:
     """Return all settings of a scene and of some of its objects on which a run depends, in a form that can be compared."""
     own = scene.palpate
     taking_part, hidden = participants.find_participants(scene)
@@ -48,11 +49,11 @@ def settings_of(scene, objects) -> tuple:
         own.interpolation,
         own.subframes,
         tuple(hidden),
-        tuple(obj.name for obj in taking_part),
+        tuple(map(name_of, taking_part)),
     )
     return of_scene + tuple(
         (
-            obj.name,
+            name_of(obj),
             *(getattr(obj.palpate, key) for key in OBJECT_PROPERTIES),
             *obj.palpate.velocity,
             *obj.palpate.angular_velocity,
@@ -66,17 +67,19 @@ def settings_of(scene, objects) -> tuple:
 def fingerprint(scene) -> str:
     """Return a short text that changes with settings, participants, their meshes and regions, scales, drives and animation.
 
-    Meshes are read again only when Blender has reported a change of geometry.
+    A new name alone changes no number, so objects are called as in the scene's bake. Meshes are read again only when Blender
+    has reported a change of geometry, or when other objects are part of the simulation.
     """
     objects, _ = participants.find_participants(scene)
-    names = {obj.name for obj in objects}
-    key, changed = scene.session_uid, session_state.session.changed_geometry & names
-    if key not in _mesh_fingerprints or changed:
-        _mesh_fingerprints[key] = _digest(*(mesh_fingerprint.own_fingerprint(obj) for obj in objects))
+    uids = tuple(obj.session_uid for obj in objects)
+    key, changed = scene.session_uid, session_state.session.changed_geometry & {obj.name for obj in objects}
+    if changed or _mesh_fingerprints.get(key, ((), ""))[0] != uids:
+        _mesh_fingerprints[key] = uids, _digest(*(mesh_fingerprint.own_fingerprint(obj) for obj in objects))
         session_state.session.changed_geometry -= changed
-    settings, animation = repr(settings_of(scene, objects)), animation_fingerprint.fingerprint(objects)
+    name_of = partial(baked_names.name_in_bake, scene)
+    settings, animation = repr(settings_of(scene, objects, name_of)), animation_fingerprint.fingerprint(objects)
     constants = (constant(obj) for obj in objects for constant in (_constant_scales, _constant_drive_target))
-    return _digest(settings, _mesh_fingerprints[key], *constants, animation)
+    return _digest(settings, _mesh_fingerprints[key][1], *constants, animation)
 
 
 def _constant_scales(obj) -> str:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A scene becomes a :class:`.Scenario`: the only way by which meshes and poses leave Blender.
 
-Each object that takes part is a body, unless it is part of its parent's body (:mod:`.attached_objects`). A body's frame has the
+Each participant is a body, unless it is part of its parent's body (:mod:`.attached_objects`). A body's frame has the
 location and rotation of its object; scale and shear are applied to the vertices. Keyframed bodies, and surfaces that deform,
 are sampled at every frame.
 """

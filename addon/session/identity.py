@@ -2,7 +2,7 @@
 """Identify objects and scenes by a unique id that lasts.
 
 Blender's pointers become invalid after undo, deletion and loading; names change when the user renames an object.
-Scenes have ids as well, by which bakes are told apart.
+Scenes have ids as well, by which bakes are distinguished.
 """
 
 from __future__ import annotations

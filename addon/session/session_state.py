@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""State of the Blender session that no file stores: who takes part, what is running, what changed since the last look."""
+"""State of the Blender session that no file stores: participants, what is running, what changed since the last look."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Session:
     """Names of objects that the user, a script or an edited animation moved since a live run started."""
     has_roles: dict[int, bool] = field(default_factory=dict)
     object_counts: dict[int, int] = field(default_factory=dict)
-    """By scene: whether any object takes part, and the number of objects when this was found out."""
+    """By scene: whether any object participates, and the number of objects when this was found out."""
     suspension_depth: int = 0
     """Above zero while a bake reads the scene: the timeline must not simulate then."""
     rendering: bool = False

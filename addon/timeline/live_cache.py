@@ -35,7 +35,7 @@ class LiveRun:
     settings : tuple
         :func:`.scene_fingerprint.settings_of` when the run started.
     mesh_fingerprints : dict of str to str
-        By name of each object that takes part.
+        By name of each participant.
     frames : dict of int to Frame
         What was computed.
     samples : dict of int to FrameSample

@@ -156,7 +156,7 @@ def compute_to_present_frame(scene) -> Generator[Progress, None, None]:
                     break  # the panel says why
                 yield Progress("Computing forces", done, len(frames), number)
     finally:
-        try:  # still catching up, so that what was stopped does not begin anew
+        try:  # still catching up, so that what was stopped does not start again
             with suppress(ReferenceError):  # the scene was deleted meanwhile
                 scene.frame_set(wanted[0], subframe=wanted[1])
         finally:

@@ -10,9 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.errors import PalpateError
+from ...core.io import saved_bake
 from ...core.model.recording import Recording
 from ..properties import start_transforms
-from ..scene import body_poses, mesh_fingerprint, participants, scene_fingerprint
+from ..scene import baked_names, body_poses, mesh_fingerprint, participants, scene_fingerprint
 from ..session import animation_time, units
 
 SAME_POSE = 1e-6
@@ -36,14 +37,25 @@ def is_stale(scene, depsgraph, recording: Recording | None) -> bool:
     return recording is not None and _has_moved(scene, depsgraph, recording)
 
 
+def note_unchanged(scene) -> None:
+    """Note in a scene that is about to be saved whether it is as it was baked, for readers without Blender."""
+    settings, note = scene.palpate, ""
+    if settings.baked_id and scene_fingerprint.fingerprint(scene) == settings.baked_fingerprint:
+        note = saved_bake.note_of(settings.baked_id)
+    if settings.unchanged_note != note:
+        settings.unchanged_note = note
+
+
 def _has_deformed(scene, depsgraph) -> bool:
     """Return True when a mesh that may deform differs from the mesh that was baked at this frame."""
     number, part = animation_time.current_frame(scene)
     index = number - scene.palpate.baked_start
     if part or not 0 <= index <= scene.palpate.baked_end - scene.palpate.baked_start:
         return False
-    for name, baked in scene_fingerprint.fingerprints_at(scene.palpate.baked_shapes, index).items():
-        obj = scene.objects.get(name)
+    fingerprints = scene_fingerprint.fingerprints_at(scene.palpate.baked_shapes, index)
+    objects = baked_names.objects_of_bake(scene, fingerprints)
+    for name, baked in fingerprints.items():
+        obj = objects.get(name)
         if obj is None or obj.type not in participants.OBJECT_TYPES:
             return True
         try:
@@ -61,8 +73,9 @@ def _has_moved(scene, depsgraph, recording: Recording) -> bool:
         return False
     poses = recording.poses[int(np.searchsorted(recording.frames, number))]
     extent = float(np.abs(poses[:, :3]).max(initial=0.0))
+    objects = baked_names.objects_of_bake(scene, recording.body_names)
     for name, pose in zip(recording.body_names, poses, strict=True):
-        obj = scene.objects.get(name)
+        obj = objects.get(name)
         if obj is None:
             return True
         if obj.palpate.body in start_transforms.MOVED_BY_FORCES:

@@ -16,10 +16,10 @@ KERNEL_MARKS = (
     b"from numba",
     b"= specified(",
 )
-"""A file that holds one of these takes part in what is compiled.
+"""A file that holds one of these influences the compiled code.
 
 The laws of effects are compiled as well, and the specified parameters of a sensor are the fields of the contact law. Of the
-packages laws and compiled every file takes part.
+packages laws and compiled every file counts.
 """
 
 

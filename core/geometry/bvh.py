@@ -2,7 +2,7 @@
 """Bounding-volume tree over triangles, which answers one query: where does a texel's segment enter an object?
 
 The tree is a list in depth-first order: child follows parent, and `skip` says where to go on when a box is missed, so that a
-query needs no stack and allocates nothing. Boxes are tested against the box of what is left of the segment, which is
+query needs no stack and allocates nothing. Boxes are tested against the box of the remaining segment, which is
 conservative whatever the rounding; triangles are tested with edge functions that two neighbours evaluate to the same number
 with opposite sign, so that a segment through a shared edge or vertex always meets one of them (watertight, as in Woop, Benthin
 and Wald, JCGT 2013).

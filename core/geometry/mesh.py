@@ -80,7 +80,7 @@ def checked_mesh(
     if flipped:
         warnings.append(
             f"{flipped} edges of '{name}' join faces that point to opposite sides: recalculate the normals, "
-            "faces that point away are not felt."
+            "faces that point away make no contact."
         )
     return mesh, warnings
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict
 
+from ..effects.engine.registry import to_dict
 from ..model.recording import Recording
 from ..model.scenario import Scenario
 from ..model.sensor import Sensor
@@ -46,5 +47,6 @@ def manifest_of(scenario: Scenario, sensor: Sensor, recording: Recording, files:
         step_reason=recording.step_reason,
         sensors=tuple(recording.sensors),
         files=dict(sorted(files.items())),
+        effects=[to_dict(effect) for effect in sensor.effects],
         channels={} if channels is None else described(channels),
     )

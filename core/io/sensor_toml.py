@@ -40,7 +40,7 @@ FORMAT = "palpate-sensor-toml/1"
 MOST_TEXELS = 65536
 """Texels of a grid in a file."""
 SHORTEST_LENGTH, LONGEST_LENGTH = 1e-9, 1e6
-"""Metres; a length of a sensor or of what presses on it is between them, whatever its unit was taken for."""
+"""Metres; a length of a sensor or of an indenter is between them, whatever its unit was taken for."""
 SHAPE_WORDS = ("grid", "mesh", "thickness")
 """Keys of a rig's [sensor] that say where its texels are. They are kept as they are."""
 

@@ -27,7 +27,7 @@ class Sensor:
         In the frame of the body. :func:`.sensor_effects.mounted_texels` returns where the effects put them.
     parameters : SensorParameters
     readout : bool
-        False for a pad, which takes part in contact and reports nothing.
+        False for a pad, which exerts contact forces and reports nothing.
     painted : Painted
     deformation : Deformation or None
         How the texels move in the frame of the body.

@@ -160,8 +160,9 @@ class MagneticSkin:
         return found
 
     def _seen(self, place: np.ndarray, refuses_near: bool = True) -> tuple[np.ndarray, np.ndarray]:
-        """Return fields of magnets at some places (T, m, 3) along the magnetometers' axes, (T, k, 3), and where one is inside
-        of a chip, (T, k) bool.
+        """Return fields of magnets at some places (T, m, 3) along the magnetometers' axes, (T, k, 3).
+
+        Also return where one is inside of a chip, (T, k) bool.
         """
         size = self.magnetometers.size
         field, square = self._fields.field(place, TOUCHING if refuses_near else size)

@@ -2,7 +2,7 @@
 """Warns of targets that are too fast for the time step: that go through a good part of a sensor's skin within one step.
 
 Contacts are looked for at the end of each step. A plate that moves by more than the skin's depth in a step is before it at one
-look and behind it at the next, and is not felt. The numbers are left as they are; a sentence names frame and object.
+look and behind it at the next, and no contact is found. The numbers are left as they are; a sentence names frame and object.
 """
 
 from __future__ import annotations

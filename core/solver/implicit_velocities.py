@@ -23,7 +23,7 @@ from .solver_model import SolverModel, State
 from .workspace import Workspace
 
 MAX_ITERATIONS = 40
-"""Most iterations, in which contacts are linearised anew, within a substep; four or five are usual, one at rest."""
+"""Most iterations, in which contacts are linearised again, within a substep; four or five are usual, one at rest."""
 
 CONVERGED = 1e-9
 """The iterations end when one changes less than this share of the velocity that contacts give in the step."""

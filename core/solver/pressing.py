@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Single steps of sensors and targets that another program moves, in any number of environments (kernels).
 
-An environment is one sensor with what presses on it. All environments share the model and the targets' tree; each has its own
-state and neighbour lists, and each thread its own working memory, of which nothing lasts from one environment to the next.
+An environment is one sensor with the object in contact with it. All environments share the model and the targets' tree; each
+has its own state and neighbour lists, and each thread its own working memory, of which nothing lasts from one environment to
+the next.
 """
 
 from __future__ import annotations
@@ -74,7 +75,7 @@ class PressedTexels(NamedTuple):
     begins : (E,) bool
         The environment begins with this step, at rest at these poses.
     valid : (E,) bool
-        Its poses are poses. Of others everything is zero, and they begin anew with their next valid poses.
+        Its poses are poses. Of others everything is zero, and they are reset with their next valid poses.
     texels : (E, n, 3) float, N
         Normal force, and shear along the texel's x and y axis.
     readings : (E, n) float
@@ -346,9 +347,19 @@ def _read(number: int, pressing: Pressing, readout: np.ndarray, state: State) ->
     """Write down what the sensor measures, from contacts that were just found."""
     t, out, model, workspace = pressing.memory, pressing.pressed, pressing.model, pressing.workspace
     for texel in range(len(t.force)):
-        t.force[texel] = t.friction[texel] = t.depth[texel] = t.slip[texel] = 0.0
+        t.force[texel] = 0.0
+    for texel in range(len(t.force)):  # one loop for each array, which is then one block of memory
+        t.friction[texel] = 0.0
+    for texel in range(len(t.force)):
+        t.depth[texel] = 0.0
+    for texel in range(len(t.force)):
+        t.slip[texel] = 0.0
+    for texel in range(len(t.force)):
+        t.strongest[texel] = -1.0
+    for texel in range(len(t.force)):
+        t.contact[texel] = False
+    for texel in range(len(t.force)):
         t.shear[texel, 0] = t.shear[texel, 1] = 0.0
-        t.contact[texel], t.strongest[texel] = False, -1.0
     for i in range(4):
         t.moment[0, i] = 0.0
     for i in range(6):
@@ -373,12 +384,15 @@ def _read(number: int, pressing: Pressing, readout: np.ndarray, state: State) ->
                         out.wrench[number, target])  # fmt: skip
     for i in range(3):
         t.centre[i] = t.moment[0, i] / t.moment[0, 3] if t.moment[0, 3] > 0.0 else 0.0
+    zero, gain = readout[0], readout[1]
     for texel in range(len(t.force)):
         out.texels[number, texel, 0] = t.force[texel]
         out.texels[number, texel, 1] = t.shear[texel, 0]
         out.texels[number, texel, 2] = t.shear[texel, 1]
+    for texel in range(len(t.force)):
         out.contact[number, texel] = t.contact[texel]
-        out.readings[number, texel] = readout[0] + readout[1] * pressing.painted[texel] * t.force[texel]
+    for texel in range(len(t.force)):
+        out.readings[number, texel] = zero + gain * pressing.painted[texel] * t.force[texel]
 
 
 @kernel

@@ -111,7 +111,7 @@ class Pairs(NamedTuple):
     overlap_share : (q,) float
         Share of the overlap that the sensor's own skin takes.
     max_tube_radius, max_list_radius : (q,) float, metres
-        Largest distance that a contact point may move before its neighbour list is made anew: for tubes that hold one sheet
+        Largest distance that a contact point may move before its neighbour list is rebuilt: for tubes that hold one sheet
         or nothing, and for lists of triangles.
     """
 

@@ -169,7 +169,7 @@ class EffectWork(NamedTuple):
     contacts : TexelContacts, (blocks, LANES)
         What effects make of each contact; without blocks when none acts on forces.
     points : TexelContacts, (1, N)
-        What presses on each contact point at the step's end; without points when no effect acts on forces.
+        The contact of each contact point at the step's end; without points when no effect acts on forces.
     point_numbers : (N,) int
         0, 1, 2 …
     """

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Properties of a Blender scene that a study varies by their path, as ``bpy.data.objects["Ball"].location[2]``.
 
-Blender alone knows them and what they do, so each run with other values is read from the scene anew. What a property is (a
+Blender alone knows them and what they do, so each run with other values is read from the scene again. What a property is (a
 number with bounds, a switch, one of some words) is asked once and kept beside the scene in the study's folder, so that values
 are also checked where there is no Blender.
 """

@@ -70,7 +70,7 @@ def blender():
 
 @pytest.fixture(autouse=True)
 def scene(blender, request):
-    """Return the scene of an empty file with the add-on enabled; anew for a test that is marked as one about enabling."""
+    """Return the scene of an empty file with the add-on enabled; again for a test that is marked `enabling`."""
     if request.node.get_closest_marker("enabling") or not is_enabled():
         factory_settings()
     else:

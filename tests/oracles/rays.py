@@ -118,7 +118,7 @@ def leaks(mesh: TriangleMesh, scale: float, place: np.ndarray, seed: int = 5) ->
     """Count the segments that get through a closed solid's skin at a vertex or an edge, and all that were tried.
 
     Each starts outside, goes exactly through a vertex, an edge's middle or a random point of an edge, and ends inside. It
-    is turned, scaled and moved first, so that every coordinate is rounded anew.
+    is turned, scaled and moved first, so that every coordinate is rounded again.
     """
     rng = np.random.default_rng(seed)
     turn = trimesh.transformations.random_rotation_matrix(rng.random(3))[:3, :3]

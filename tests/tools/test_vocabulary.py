@@ -65,20 +65,47 @@ INSTEAD = {
     r"\b(may|only) makes? up for\b": "compensates for",
 }
 """Each expression, and the words to use in its place."""
+EVERYWHERE = {
+    r"\b[Aa]new\b": "again",
+    r"\b(gives?|gave|giving|given) way\b": "is displaced, is indented, yields",
+    r"\b[Ww]hat (presses|is pressed)\b": "the indenter, the object in contact",
+    r"\b[Ww]hat a camera\b": "camera image",
+}
+"""The same for comments and docstrings of the whole repository, tests and tools included."""
+WRITTEN = {".py", ".md", ".toml"}
+NOT_OURS = {"build", "dist", "demo-output"}
+"""Folders of products, which git ignores."""
 
 
-def findings(text: str) -> list[str]:
+def findings(text: str, instead: dict[str, str] = INSTEAD) -> list[str]:
     """Return one line for each expression in a text that has a plainer one."""
-    return [f"{found.group()!r}: write {term!r}" for old, term in INSTEAD.items() for found in re.finditer(old, text)]
+    return [f"{found.group()!r}: write {term!r}" for old, term in instead.items() for found in re.finditer(old, text)]
 
 
 def files() -> list[Path]:
     return sorted(path for folder in READ_BY_USERS for path in (ROOT / folder).rglob("*") if path.suffix in {".py", ".md"})
 
 
+def all_files() -> list[Path]:
+    """Return what the repository holds of text: its folders but for environments, build products and hidden ones."""
+    folders = [path for path in ROOT.iterdir() if path.is_dir() and path.name[0] not in "._" and path.name not in NOT_OURS]
+    found = [path for folder in folders for path in folder.rglob("*")] + list(ROOT.iterdir())
+    return sorted(path for path in found if path.suffix in WRITTEN and path.is_file() and path != Path(__file__))
+
+
+def found_in(paths: list[Path], instead: dict[str, str]) -> dict[str, list[str]]:
+    """Return the findings of each file that has any."""
+    return {str(path.relative_to(ROOT)): found for path in paths if (found := findings(path.read_text("utf-8"), instead))}
+
+
 def test_no_replaced_expression_is_left():
     assert len(files()) > 100
-    assert {str(path.relative_to(ROOT)): found for path in files() if (found := findings(path.read_text("utf-8")))} == {}
+    assert found_in(files(), INSTEAD) == {}
+
+
+def test_no_expression_is_left_that_is_replaced_everywhere():
+    assert len(all_files()) > len(files())
+    assert found_in(all_files(), EVERYWHERE) == {}
 
 
 @pytest.mark.parametrize(

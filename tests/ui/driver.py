@@ -133,7 +133,7 @@ class UI:
     # --- hands
 
     def redraw(self) -> None:
-        """Ask every area to draw itself anew."""
+        """Ask every area to draw itself again."""
         for area in self.window.screen.areas:
             area.tag_redraw()
 
@@ -242,7 +242,7 @@ class UI:
         yield 0.5
 
     def maximize(self, area: bpy.types.Area) -> Steps:
-        """Give an area the whole window, or the old layout back (Ctrl Space); look the area up anew afterwards."""
+        """Give an area the whole window, or the old layout back (Ctrl Space); look the area up again afterwards."""
         yield from self.move(*self.centre(area))
         yield from self.key("SPACE", ctrl=True)
         yield 0.5

@@ -306,7 +306,7 @@ def _forward_check(data: ReadoutData) -> float | None:
 
 
 def _reasons(data: ReadoutData, best: MethodResult, floor: np.ndarray) -> tuple[str, ...]:
-    """Say where the best read-out errs more than elsewhere on the check recordings."""
+    """Say where the error of the best read-out is larger than elsewhere on the check recordings."""
     said = []
     whole = _samples(data.fit, (), MOST_SAMPLES * 10).targets
     for i, target in enumerate(data.targets):

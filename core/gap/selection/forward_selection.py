@@ -58,7 +58,7 @@ SIMPLER_RATIO, SIMPLER_SIZE = 1.15, 0.5
 """A form with less than `SIMPLER_SIZE` times as many parameters is preferred if it leaves at most `SIMPLER_RATIO` times as
 much."""
 SETTLED_RATIO = 1.35
-"""A form of which a parameter is at a bound gives way to another form of its kind that leaves at most this many times as
+"""A form of which a parameter is at a bound is replaced by another form of its kind that leaves at most this many times as
 much."""
 DEAD_TEXELS_RATIO = 1.5
 """Dead texels are preferred to parameters of single texels if they leave at most this many times as much."""

@@ -168,7 +168,7 @@ def rebuild_list(
     lists: NeighbourLists,
     tree: Tree,
 ) -> None:
-    """Search anew what a segment can meet.
+    """Search again which triangles a segment can meet.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ def commit_effect_memory(dt: float, model: SolverModel, state: State, workspace:
 
 @kernel
 def _record_pair(pair: int, dt: float, model: SolverModel, workspace: Workspace) -> None:
-    """Record what presses on the points of a pair's sensor at the step's end."""
+    """Record the contacts of the points of a pair's sensor at the step's end."""
     contacts, law = workspace.contacts, read_law(model.pairs.law, pair)
     motion = motion_values(workspace.pairs.motion[pair])
     for r in range(contacts.number[pair]):
@@ -51,7 +51,7 @@ def _record_pair(pair: int, dt: float, model: SolverModel, workspace: Workspace)
 def _record_deepest(
     point: int, pair: int, motion: TexelMotion, law: ContactLaw, model: SolverModel, recorded: TexelContacts
 ) -> None:
-    """Record what presses on a point, if nothing presses deeper."""
+    """Record the contact of a point, if no other contact is deeper."""
     if model.pairs.overlap_share[pair] * motion.depth > recorded.depth[0, point]:
         press_texel(recorded, 0, point, pair, motion, law, model)
 

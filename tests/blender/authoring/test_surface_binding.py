@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laid texels on surfaces that change their shape, and what they keep when they are laid anew."""
+"""Laid texels on surfaces that change their shape, and what they keep when they are laid again."""
 
 import bpy
 import numpy as np

@@ -207,7 +207,7 @@ def test_a_bake_with_images_does_not_go_on_from_one_without(tmp_path, monkeypatc
 
 
 def test_a_checkpoint_costs_the_same_at_any_length(killed, tmp_path):
-    """What it writes anew is the state alone: it has no list that grows with the frames."""
+    """It rewrites only the state: it has no list that grows with the frames."""
     scene, _ = killed
     place = growing(tmp_path) / bake_checkpoint.CHECKPOINT_FOLDER
     before = (place / bake_checkpoint.STATE_FILE).stat().st_size

@@ -212,7 +212,7 @@ def test_a_frame_range_that_runs_backwards_on_the_command_line(pressed):
     assert run.returncode == 1 and "backwards" in one_line(run)
 
 
-# --- who takes part
+# --- participants
 
 
 def test_no_sensor(pressed):

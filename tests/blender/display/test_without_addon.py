@@ -52,7 +52,7 @@ def scene_file(tmp_path):
     plate.location.z = 0.032
     plate.keyframe_insert("location", frame=8)
     for obj in (target, *[o for o in scene.objects if o.name == "Cube"]):
-        obj.hide_render = True  # see the pad and not what presses on it
+        obj.hide_render = True  # see the pad and not the indenter
     figure_style_from_above(scene)
     folder = tmp_path / "project"
     folder.mkdir()

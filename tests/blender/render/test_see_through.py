@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What presses does not hide the texels that it presses on, and stays what it is elsewhere; the scene is left as it was."""
+"""An indenter does not hide the texels below it, and stays opaque elsewhere; the scene is left as it was."""
 
 import bpy
 import numpy as np

@@ -215,7 +215,7 @@ def described(scene):
     return found
 
 
-@pytest.mark.slow("builds each sample scene anew")
+@pytest.mark.slow("builds each sample scene again")
 @pytest.mark.parametrize("name", build_samples.SAMPLES)
 def test_samples_are_what_their_scripts_build(name, repository, tmp_path):
     path = repository / "sample_blends" / f"{name}.blend"

@@ -51,7 +51,7 @@ def test_forces_are_the_same_at_every_unit_scale(size):
 
 @pytest.mark.parametrize("size", [1e-6, 1e-3, 1e3])
 def test_forces_are_the_same_at_every_size_in_units(size):
-    """Vertices and keyframes are rounded anew: some 1e-7 of 0.05, where depths are 0.002."""
+    """Vertices and keyframes are rounded again: some 1e-7 of 0.05, where depths are 0.002."""
     expected = reading(interpolation="LINEAR")
     usual = forces(expected)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Studies whose runs read the scene anew: each run is what the scene gives when the property is set by hand."""
+"""Studies whose runs read the scene again: each run is what the scene gives when the property is set by hand."""
 
 import json
 import subprocess

@@ -93,6 +93,28 @@ def test_a_change_is_noticed_at_whatever_frame_is_shown_next(baked, change):
     assert frame_status.status_of(baked).frame is not None  # it is still shown
 
 
+@pytest.mark.parametrize("renamed", ["Pad", "Ball"])
+def test_a_new_name_alone_leaves_a_bake_fresh(baked, renamed, tmp_path):
+    bpy.data.objects[renamed].name = "Renamed"
+    assert texts(baked, [2, 5]) == [FRESH.format(2), FRESH.format(5)]
+    baked = reopen(save(tmp_path))
+    assert texts(baked, [3]) == [FRESH.format(3)]
+    bpy.data.objects["Arm"].scale = (1.01, 1.01, 1.01)
+    bpy.context.view_layer.update()
+    assert texts(baked, [4]) == [STALE]  # the renamed object is still watched
+
+
+def test_a_duplicate_with_the_old_name_makes_a_bake_out_of_date_until_it_is_deleted(baked):
+    target = bpy.data.objects["Ball"]
+    copy = target.copy()
+    baked.collection.objects.link(copy)
+    target.name, copy.name = "Old", "Ball"
+    bpy.context.view_layer.update()
+    assert texts(baked, [3]) == [STALE]
+    bpy.data.objects.remove(copy)
+    assert texts(baked, [4]) == [FRESH.format(4)]
+
+
 def keyed(owner, path, index=-1):
     """Keep a property as it is, by keyframes that say so."""
     for frame in (1, 3, 4, 5):

@@ -184,7 +184,7 @@ def test_a_name_is_seen(source, names):
 
 @pytest.fixture(scope="module")
 def copy(tmp_path_factory):
-    """The package in another place, with one effect more and its page written anew, and the environment to run it in."""
+    """The package in another place, with one effect more and its page rewritten, and the environment to run it in."""
     folder = tmp_path_factory.mktemp("one_file") / "palpate"
     for name in COPIED:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)

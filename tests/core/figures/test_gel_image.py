@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a camera behind a gel sees: its three colours tell the normals of the surface, its markers the shear."""
+"""The camera image behind a gel: its three colours tell the normals of the surface, its markers the shear."""
 
 import math
 from dataclasses import replace

@@ -302,6 +302,7 @@ def manifest(**changes):
             step_reason="Steps of 1 ms.",
             complete=False,
             scene_file="Hände.blend",
+            effects=[{"name": "creep", "amount": 0.2}],
         ),
         **changes,
     )
@@ -321,9 +322,12 @@ def test_manifest_round_trip(tmp_path):
 def test_a_manifest_from_before_scene_files_were_named(tmp_path):
     path = write_manifest(tmp_path, manifest())
     content = json.loads(path.read_bytes())
-    del content["scene_file"], content[OWN_DIGEST]
+    del content["scene_file"], content["effects"], content[OWN_DIGEST]
     path.write_text(json.dumps({**content, "done": [[1, 40]]}), encoding="utf-8")
-    assert read_manifest(tmp_path) == manifest(scene_file="")
+    older = manifest(scene_file="", effects=None)
+    assert read_manifest(tmp_path) == older
+    write_manifest(tmp_path, older)
+    assert read_manifest(tmp_path) == older and "effects" not in json.loads(path.read_bytes())
 
 
 @pytest.mark.parametrize("change", [{"fps": 25.0}, {"unit": "N"}, {"parameters": {"k": 58.6}}, {"warnings": []}, {"new": 1}])
@@ -360,6 +364,7 @@ def test_damaged_manifest(tmp_path):
             "scene_path",
             "sensors",
             "files",
+            "effects",
         ):  # which older ones lack
             broken.append(json.dumps({k: v for k, v in good.items() if k != key}).encode())
         for wrong in (None, {"a": []}, [[1]], "text", True):

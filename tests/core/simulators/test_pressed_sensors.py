@@ -139,7 +139,7 @@ def test_environments_without_poses_are_flagged_and_the_others_go_on():
         if step == 1:
             bad[1, 1, 4] = np.nan
         if step == 2:
-            clean.reset(np.array([False, True, False]))  # environment 1 begins anew
+            clean.reset(np.array([False, True, False]))  # environment 1 starts again
         found, expected = many.step(bad[:, 0], bad[:, 1]), clean.step(now[:, 0], now[:, 1])
         others = np.array([0, 2]) if step == 1 else np.arange(3)
         for name in ("texels", "readings", "contact", "wrench"):
@@ -195,6 +195,6 @@ def test_what_makes_no_environments_is_one_sentence(monkeypatch):
     found = many.step(LEVEL, np.stack([LEVEL] * 2))
     with pytest.raises(ParameterError, match=r"'readings' of out is float32 of shape \(2, 16\): give float64 of shape"):
         many.step(LEVEL, np.stack([LEVEL] * 2), replace(found, readings=found.readings.astype(np.float32)))
-    monkeypatch.setattr(pressed_sensors, "_available_memory", lambda: 1e6)
+    monkeypatch.setattr(pressed_sensors, "available_memory", lambda: 1e6)
     with pytest.raises(ParameterError, match=r"100000 environments take .* GiB of memory, .* ask for \d+ at most\.$"):
         PressedSensors(item, mesh, DT, 100_000)

@@ -14,7 +14,7 @@ compiled = pytest.mark.skipif(not kernels.COMPILED, reason="plain Python compute
 
 
 def rolling(threads):
-    """A ball rolls over a pad of four parts: lists are made anew, texels come and go."""
+    """A ball rolls over a pad of four parts: lists are rebuilt, texels come and go."""
     ball = shape(trimesh.creation.icosphere(3, 0.02))
     path = [[0.0008 * i - 0.006, 0.0004 * i, 0.0192 - 0.00005 * i] for i in range(8)]
     turns = [about((1, 2, 0), 7.0 * i) for i in range(8)]

@@ -30,7 +30,7 @@ def road(ui):
     yield from ui.becomes(lambda: scene.frame_current == 10 and frame_status().status_of(scene).frame, "frame 10 has numbers")
     before = frame_status().status_of(scene).frame
     press.obj("Pad").palpate.k *= 2
-    yield from ui.becomes(lambda: frame_status().status_of(scene).frame is not before, "a stiffer skin takes them away or anew")
+    yield from ui.becomes(lambda: frame_status().status_of(scene).frame is not before, "a stiffer skin removes or renews them")
     ui.check(scene.frame_current == 10, "at the same frame")
 
     scene.frame_end = 20
@@ -71,7 +71,7 @@ def road(ui):
 
 
 def open_again(ui):
-    """Open the baked file anew."""
+    """Open the baked file again."""
     frame_status().forget_all()
     bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
     scene = bpy.context.scene

@@ -57,7 +57,7 @@ def road(ui):
     ui.check(obj("Pad").palpate.role == "SENSOR", "Make Sensor makes the pad a sensor")
 
     yield from solver.wait(ui)
-    scene.frame_end = 100_000  # however slow or fast the machine is, playing does not begin anew, nor ends a bake before ESC
+    scene.frame_end = 100_000  # however slow or fast the machine is, playing does not start again, nor ends a bake before ESC
     yield from ui.move(*ui.centre(view))
     yield from ui.key("SPACE")
     yield from ui.wait_until(lambda: scene.frame_current >= 25, "the timeline played to frame 25", timeout=120.0)

@@ -127,7 +127,7 @@ def road(ui):
     yield from ui.wait_until(lambda: bpy.context.scene.frame_current >= 40, "frame 40 plays", timeout=120)
     yield from ui.screenshot("5b-playing")
     yield from ui.wait_until(lambda: bpy.context.scene.frame_current >= 58, "frame 58 plays", timeout=120)
-    yield from ui.wait_until(lambda: bpy.context.scene.frame_current < 30, "it plays anew", timeout=120)
+    yield from ui.wait_until(lambda: bpy.context.scene.frame_current < 30, "it plays again from its start", timeout=120)
     yield from ui.move(*ui.centre(view))
     yield from ui.key("SPACE")
     ui.check(not ui.window.screen.is_animation_playing, "Space stops")

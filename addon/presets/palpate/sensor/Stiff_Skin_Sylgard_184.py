@@ -4,7 +4,7 @@
 # k = E · A / h = 1.32 MPa · 4 mm² / 2 mm = 2640 N/m per texel, cn numerically 1 % of k.
 # Bristles as stiff as the layer. No friction is given there: measure yours, it stays as it is.
 # max_penetration is the thickness: the skin cannot be pressed deeper than down to what carries it.
-# E is that of a bar that can give way sideways. A thin skin that is bonded to its carrier cannot, and is stiffer.
+# E is that of a bar that can expand sideways. A thin skin that is bonded to its carrier cannot, and is stiffer.
 import bpy
 
 settings = bpy.context.object.palpate

@@ -144,7 +144,7 @@ def test_the_solver_feels_what_the_law_says_over_time(name, form):
     felt = run(with_effects(scenario, item)).sensors["pad"].normal_force
     time = np.arange((frames - 1) * steps + 1) / (fps * steps)
     depth = np.maximum(np.interp(time, np.arange(frames) / fps, 0.01 - path[:, 2]), 0.0)[:, None]
-    # The run begins with nothing done: what presses at its first frame counts from its first step on.
+    # The run begins without history: an indenter in contact at its first frame counts from its first step on.
     whole = normal_forces((item,), scenario.sensors[0].parameters, time, depth)[::steps, 0]
     scale = np.abs(whole).max()
     np.testing.assert_allclose(felt.min(axis=1)[1:], whole[1:], atol=5e-3 * scale)
