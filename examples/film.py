@@ -199,7 +199,7 @@ def draw_curves(figure, place: Place, time, curves: Mapping[str, tuple[np.ndarra
 
 UPPER, LOWER = (0.65, 0.45, 0.33, 0.46), (0.715, 0.26, 0.255, 0.17)
 """Places of tactile images and curve beside a broad 3D view."""
-MIDDLE, RIGHT = (0.46, 0.18, 0.22, 0.74), (0.765, 0.32, 0.21, 0.5)
+MIDDLE, RIGHT = (0.46, 0.18, 0.22, 0.74), (0.815, 0.32, 0.165, 0.5)
 """The same beside a narrow one."""
 HAND_VIEW = (-138.0, 22.0)
 STROKES, BRUSH = 24, 6.0
@@ -233,7 +233,7 @@ def paint(film: Film, scene) -> Any:
             for face in finger.data.polygons:
                 face.material_index = len(finger.data.materials) - 1 if done[list(face.vertices)].all() else 0
             render_to(path, scene.frame_start)
-            words = "Paint the part of a mesh that should feel. Any mesh will do: here, the tip of a finger."
+            words = "Paint the part of a mesh that measures contact. Any mesh will do: here, the tip of a finger."
             film.show(2.0 if number == 0 else seconds, title, words, counted(path, int(done.sum())))
     group.add([int(i) for i in np.flatnonzero(region)], 1.0, "REPLACE")
     for face in finger.data.polygons:
@@ -281,7 +281,7 @@ def press(film: Film, scene) -> None:
     with studio(film, BROAD, scene, HAND_VIEW, hand_corners(scene)) as render_to:
         for seconds, number, path in film.play("press", range(6, hand.FRAME_END + 1)):
             render_to(path, number)
-            words = "The fingers close until the index finger feels 2 N. Palpate computes force and friction in every texel."
+            words = "The fingers close until the index finger measures 2 N. Palpate computes force and friction in every texel."
             film.show(seconds, title, words, drawing(number, path))
     words = f"The bake has tactile images for all {len(recording.frames)} frames, and a heat map that plays in any Blender."
     film.show(3.0, title, words, drawing(number, path))
@@ -296,7 +296,7 @@ def slip(film: Film) -> None:
     shear = np.linalg.norm(metrics.net_shear(seen, sensor.texels), axis=1)
     limit = mu.mus * seen.normal_force.sum(axis=1)
     sliding, title = metrics.slipping(seen, mu).sum(axis=1), "3  Shear and slip"
-    curves = {"shear": (shear, SHEAR_COLOUR, "-"), "friction limit": (limit, INK, "--")}
+    curves = {"shear": (shear, SHEAR_COLOUR, "-"), "static limit": (limit, INK, "--")}
     scene.frame_set(demo.PICTURE_FRAME)
     shown = render.bounding_box_corners([scene.objects[name] for name in (demo.PAD_A, f"{demo.PAD_A} base", demo.BALL)])
 
@@ -317,7 +317,7 @@ def slip(film: Film) -> None:
             words = "A ball is pressed on a finger pad and drawn along it. Arrows in the image show the shear of each texel."
             film.show(seconds, title, words, drawing(number, path))
     i = int(np.searchsorted(recording.frames, number))
-    words = f"Shear grows up to the friction limit, then the ball slips: {sliding[i]} of {np.count_nonzero(seen.contact[i])} "
+    words = f"Near the limit of static friction the ball slips: {sliding[i]} of {np.count_nonzero(seen.contact[i])} "
     words += f"texels in contact slip, with {shear[i]:.2f} N of shear under {seen.normal_force[i].sum():.2f} N."
     film.show(3.5, title, words, drawing(number, path))
 
@@ -390,6 +390,8 @@ class Moment(NamedTuple):
 
 WEIGHT = 9.81
 """Of the cube of 1 kg, N."""
+HEAT = "film_heat"
+"""Name of the colour attribute of the pad."""
 PUSH, PUSHED = 3.0, (0.3, 0.5)
 """Force that pushes the cube along the pad, N, and from when to when, s."""
 
@@ -425,10 +427,10 @@ def heat_material():
     """Return a material that shows the colours of the vertices as they are."""
     made = scene_builder.material("Heat map", (0.0, 0.0, 0.0), roughness=0.6)
     nodes, links = made.node_tree.nodes, made.node_tree.links
-    color, shader = nodes.new("ShaderNodeVertexColor"), nodes["Principled BSDF"]
-    color.layer_name = "heat"
-    links.new(color.outputs["Color"], shader.inputs["Emission Color"])
-    shader.inputs["Emission Strength"].default_value = 1.0
+    color, light = nodes.new("ShaderNodeAttribute"), nodes.new("ShaderNodeEmission")
+    color.attribute_name = HEAT
+    links.new(color.outputs["Color"], light.inputs["Color"])
+    links.new(light.outputs["Emission"], nodes["Material Output"].inputs["Surface"])
     return made
 
 
@@ -443,7 +445,7 @@ def simulator(film: Film) -> None:
     time, lift = np.array([one.time for one in moments]), np.array([one.lift for one in moments])
     curves = {"on the cube": (lift, NORMAL_COLOUR, "-"), "weight": (np.full(len(time), WEIGHT), INK, "--")}
     obj.data.materials.append(heat_material())
-    obj.data.color_attributes.new("heat", "FLOAT_COLOR", "POINT")
+    obj.data.color_attributes.new(HEAT, "FLOAT_COLOR", "POINT")
     vertex = np.asarray(pad.texels.vertex)
     for face in obj.data.polygons:
         face.material_index = int(np.isin(list(face.vertices), vertex).all())
@@ -469,7 +471,7 @@ def simulator(film: Film) -> None:
         for seconds, number, path in film.play("mujoco", range(len(moments))):
             one, colors = moments[number], np.ones((len(obj.data.vertices), 4), np.float32)
             colors[vertex, :3] = color_maps.linear(color_maps.colors(STYLE.colour_map, one.force / top))
-            obj.data.color_attributes["heat"].data.foreach_set("color", colors.ravel())
+            obj.data.color_attributes[HEAT].data.foreach_set("color", colors.ravel())
             obj.data.update()
             cube.location, cube.rotation_quaternion = 1e3 * one.position, one.quaternion
             render_to(path, scene.frame_start)
