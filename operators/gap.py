@@ -87,8 +87,8 @@ class PALPATE_OT_gap_find(modal_job.ModalJob, bpy.types.Operator):
 
 
 class PALPATE_OT_gap_plan(modal_job.ModalJob, bpy.types.Operator):
-    """Plan the recording that tells apart what the measurements leave open, and put it on a probe as keyframes: on the selected
-    target, else on a new one with the shape of the rig's. ESC stops it"""
+    """Plan the recording that separates the effects that the recordings leave ambiguous, and put it on a probe as keyframes: on
+    the selected target, else on a new one with the shape of the rig's. ESC stops it"""
 
     bl_idname = "palpate.gap_plan"
     bl_label = "Plan Experiment"
@@ -127,9 +127,8 @@ class PALPATE_OT_gap_plan(modal_job.ModalJob, bpy.types.Operator):
             self.report({"INFO"}, "The recordings distinguish all effects: nothing is planned")
             return
         sensor = bpy.data.objects[self._sensor]
-        probe = planned_probe.put_on_probe(bpy.context, sensor, experiment, rig)
-        sure = f"confidence {experiment.sure_after:.0%} with it, {experiment.sure_before:.0%} without"
-        self.report({"INFO"}, f"'{probe.name}' separates {' from '.join(experiment.kinds)}: {sure}")
+        planned_probe.put_on_probe(bpy.context, sensor, experiment, rig)
+        self.report({"INFO"}, planned_probe.sentence_of(sensor))
 
 
 class PALPATE_OT_gap_add(support.ErrorReporting, bpy.types.Operator):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measured data of the real sensor: what the model misses against them."""
 
-from ..addon.measured import gap_results
+from ..addon.measured import gap_results, planned_probe
 from .subpanels import Subpanel, draw_sentences
 
 
@@ -20,6 +20,9 @@ class Measured(Subpanel):
         column = layout.column(align=True)  # beside one another their names are cut off in a narrow editor
         column.operator("palpate.gap_find", icon="VIEWZOOM")
         column.operator("palpate.gap_plan", icon="CON_FOLLOWPATH")
+        plan = planned_probe.sentence_of(context.object)
+        if plan:
+            draw_sentences(column, plan, "CON_FOLLOWPATH", context)
         result = gap_results.of(context.object)
         if result is None:
             return

@@ -133,8 +133,8 @@ class SensorTouch:
 def pressure_law(model: Any, contact: NewtonContact, sensing_shapes: Labels) -> tuple[Any, Any]:
     """Return ``pressure_func`` and ``pressure_data`` for ``newton.geometry.HydroelasticSDF.Config``.
 
-    Newton's own contact then carries the shape in contact, with the pressure of a sensor. Other shapes keep their `kh`, and should be
-    much stiffer.
+    Newton's own contact then carries the object with the pressure of a sensor. Other shapes keep their `kh`, and should be much
+    stiffer.
 
     Parameters
     ----------

@@ -93,10 +93,14 @@ def check_space(folder: Path, scenario: Scenario, images: bool = True) -> None:
     if not any((folder / PRIVATE_FOLDER).glob("growing-*")):
         read_out = [sensor for sensor in scenario.sensors if sensor.readout]
         texels = [len(sensor.texels) for sensor in read_out]
-        pixels = [math.prod(sensor.texels.layout.shape) for sensor in read_out] if images else []
-        own = [sensor.channels.no_frames().values.shape for sensor in read_out if sensor.channels is not None]
-        channels = [count * each for _, count, each in own]
-        require_space(folder, bake_bytes(len(scenario.frames), len(scenario.bodies), texels, pixels, channels), "The bake")
+        shapes = [(0, 0, 0) if one.channels is None else one.channels.no_frames().values.shape for one in read_out]
+        pixels = [math.prod(one.texels.layout.shape) * (7 + own[2]) // 7 for one, own in zip(read_out, shapes, strict=True)]
+        channels = [count * each for _, count, each in shapes]
+        require_space(
+            folder,
+            bake_bytes(len(scenario.frames), len(scenario.bodies), texels, pixels if images else [], channels),
+            "The bake",
+        )
 
 
 @dataclass(frozen=True)

@@ -13,11 +13,11 @@ from functools import partial
 from pathlib import Path
 
 from ...core.errors import FileError
-from ...core.io.bake_folder import IMAGE_LIST_NAME, image_files
+from ...core.io.bake_folder import IMAGE_LIST_NAME, frame_file
 from ...core.io.checksum_list import checksum_line, read_checksums
 from ...core.io.file_writing import file_sha256
-from ...core.io.frame_images import write_frame_images
 from ...core.io.growing_file import GrowingFile
+from ...core.io.tactile_exr import describe, nearest_places, write_exrs
 from ...core.model.recording import Frame
 from ...core.model.sensor import Sensor
 from .background_writer import BackgroundWriter
@@ -47,6 +47,10 @@ class BakeImages:
         self._sensors, self._folders = dict(sensors), dict(folders)
         self._digest, self._writer = digest, writer
         self._lists = {name: GrowingFile(folder / IMAGE_LIST_NAME) for name, folder in folders.items()}
+        self._nearest = {
+            name: nearest_places(sensor.texels, sensor.channels and sensor.channels.no_frames())
+            for name, sensor in self._sensors.items()
+        }
         self._unwritten: list[Frame] = []
         self._new_files: list[Path] = []
         pixels = max((math.prod(sensor.texels.layout.shape) for sensor in self._sensors.values()), default=1)
@@ -72,9 +76,8 @@ class BakeImages:
         """
         if not all(one.restore(*states[name]) for name, one in self._lists.items()):
             return False
-        return all(
-            [file for file, _ in read_checksums(one.path)] == self._names(name, frames) for name, one in self._lists.items()
-        )
+        files = [frame_file(frame) for frame in frames]
+        return all([file for file, _ in read_checksums(one.path)] == files for one in self._lists.values())
 
     def states(self) -> dict[str, ListState]:
         """Return the state of each list, by the name of the folder. All images are written (:meth:`finish`)."""
@@ -113,7 +116,7 @@ class BakeImages:
             is_renewed = False
             for i, (file, sha256) in enumerate(read_checksums(own.path)):
                 if _sha256_or_none(self._folders[name] / file) != sha256:
-                    self._write(name, [frame_at(i // len(self._names(name, [0])))])
+                    self._write(name, [frame_at(i)])
                     is_renewed |= file_sha256(self._folders[name] / file) != sha256
             if is_renewed:  # another library has written them: the list of the earlier one no longer holds
                 files = [file for file, _ in read_checksums(own.path)]
@@ -122,13 +125,14 @@ class BakeImages:
 
     def _write_and_list(self, name: str, frames: list[Frame]) -> None:
         self._write(name, frames)
-        self._list(name, self._names(name, [frame.frame for frame in frames]))
+        self._list(name, [frame_file(frame.frame) for frame in frames])
 
     def _write(self, name: str, frames: list[Frame]) -> None:
-        self._new_files += write_frame_images(self._folders[name], self._sensors[name], frames, self._digest)
-
-    def _names(self, name: str, frames: Sequence[int]) -> list[str]:
-        return image_files(frames, self._sensors[name].channels is not None)
+        sensor, paths = self._sensors[name], [self._folders[name] / frame_file(frame.frame) for frame in frames]
+        headers = [describe(sensor, frame, self._digest) for frame in frames]
+        own = [frame.sensors[sensor.name] for frame in frames]
+        write_exrs(paths, sensor.texels.layout, own, headers, self._nearest[name])
+        self._new_files += paths
 
     def _list(self, name: str, files: list[str]) -> None:
         """Note the SHA-256 of images that have just been written."""

@@ -30,6 +30,9 @@ class IndentedSurface:
         Finer vertices of the mesh that `quads` name, in their order.
     position, normal, tangent : (v, 3) float
         Between the texels as between the corners of a face; position in metres, in the frame of the sensor's body.
+    rise : (v,) float, metres
+        By how much at most the coarse faces, as Blender draws them in triangles, lie above `position`: that of a quad that is
+        not plane is a bilinear patch.
     vertex : (n,) int
         Vertex of each texel.
     texel_normal : (n, 3) float
@@ -42,6 +45,7 @@ class IndentedSurface:
     position: np.ndarray
     normal: np.ndarray
     tangent: np.ndarray
+    rise: np.ndarray
     vertex: np.ndarray
     texel_normal: np.ndarray
 
@@ -131,6 +135,38 @@ def _surface(mesh, texels: Texels) -> IndentedSurface | None:
     used, quads = np.unique(fine.quads[felt[fine.face]], return_inverse=True)
     if not len(used):
         return None
-    surface = IndentedSurface(fine, quads.reshape(-1, 4), used, *(np.zeros((0, 3)),) * 3, texels.vertex, texels.normal)
+    missing = *(np.zeros((0, 3)),) * 3, np.zeros(0)
+    surface = IndentedSurface(fine, quads.reshape(-1, 4), used, *missing, texels.vertex, texels.normal)
     position, normal, tangent = (surface.between(column) for column in (texels.position, texels.normal, texels.tangent))
-    return replace(surface, position=position, normal=normal, tangent=tangent)
+    corner_positions = np.zeros((len(mesh.vertices), 3))
+    corner_positions[texels.vertex] = texels.position
+    rise = _rise(corner_positions, starts, corners)[texels.vertex]
+    return replace(surface, position=position, normal=normal, tangent=tangent, rise=surface.between(rise))
+
+
+def _rise(position: np.ndarray, starts: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Return for each vertex by how much the triangles of its faces may lie above the patch of each face.
+
+    Corners lie at most `out` above or below the mean plane of their face, and so do triangles and patch. Those of a quad are
+    farthest apart in its middle, by `out`.
+
+    Parameters
+    ----------
+    position : (nv, 3) float, metres
+    starts : (nf,) int
+        First corner of each face.
+    corners : (nc,) int
+        Vertices of the faces, one face after another.
+    """
+    counts = np.diff(np.append(starts, len(corners)))
+    face = np.repeat(np.arange(len(starts)), counts)
+    following = np.arange(1, len(corners) + 1)
+    following[starts + counts - 1] = starts
+    place = position[corners]
+    away = place - (np.add.reduceat(place, starts) / counts[:, None])[face]
+    normal = np.add.reduceat(np.cross(away, away[following]), starts)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    out = np.maximum.reduceat(np.abs(np.einsum("ij,ij->i", away, normal[face])), starts)
+    rise = np.zeros(len(position))
+    np.maximum.at(rise, corners, (out * np.where(counts > 4, 2.0, 1.0))[face])
+    return rise

@@ -192,8 +192,9 @@ def _heat_map(
     rotation = transforms.rotation(pose[3:])
     rgb = color_maps.colors(scene.palpate.color_map, bake_display.displayed_values(scene.palpate, force, texels) / maximum)
 
-    def on_both_sides(position: np.ndarray, normal: np.ndarray) -> np.ndarray:
-        sides = [(pose[:3] + (position + side * lift * normal) @ rotation.T) / scale for side in (1.0, -1.0)]
+    def on_both_sides(position: np.ndarray, normal: np.ndarray, rise: np.ndarray | float = 0.0) -> np.ndarray:
+        lifted = normal * np.reshape(lift + rise, (-1, 1))
+        sides = [(pose[:3] + (position + side * lifted) @ rotation.T) / scale for side in (1.0, -1.0)]
         return np.concatenate(sides).astype(np.float32)
 
     if indented is None:
@@ -209,7 +210,7 @@ def _heat_map(
         np.tile(colors, (2, 1)),
         None,
         triangles=np.ascontiguousarray(np.concatenate([halves, halves + len(position)]), dtype=np.int32),
-        at_rest=on_both_sides(surface.position, surface.normal),
+        at_rest=on_both_sides(surface.position, surface.normal, surface.rise),
         normals=np.tile(surface.normal @ rotation.T, (2, 1)).astype(np.float32),
     )
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import bpy
@@ -12,7 +12,7 @@ import numpy as np
 from ...core.errors import SceneError
 from ...core.jobs.job_runner import part_of_job
 from ...core.jobs.progress import Progress
-from ..session import fcurves, first_use, transforms, units
+from ..session import fcurves, first_use, identity, transforms, units
 from . import gap_results
 
 if TYPE_CHECKING:
@@ -21,6 +21,26 @@ if TYPE_CHECKING:
 
 MARK = "palpate_planned_probe"
 """Custom property of probes that were made for a plan."""
+
+
+@dataclass(frozen=True)
+class _Planned:
+    """What the last plan of a sensor says: for which rig, on which probe."""
+
+    rig: str
+    probe: str
+    sentence: str
+
+
+_planned: dict[str, _Planned] = {}
+"""By key of the sensor, in this session."""
+
+
+def sentence_of(obj) -> str:
+    """Return what the last plan of a sensor's rig separates; empty without a plan, and once its probe is gone."""
+    planned = _planned.get(identity.key(obj))
+    is_shown = planned is not None and planned.rig == obj.palpate.measured and planned.probe in bpy.data.objects
+    return planned.sentence if is_shown else ""
 
 
 def plan(obj, wishes: Wishes):
@@ -33,7 +53,7 @@ def plan(obj, wishes: Wishes):
     Returns
     -------
     (PlannedExperiment or None, Rig)
-        None if the recordings tell all kinds apart.
+        None if the recordings distinguish all kinds.
     """
     from ...core.gap.dataset.rig import read_rig
     from ...core.gap.planning.experiment_plan import plan_after, plan_experiment
@@ -74,6 +94,8 @@ def put_on_probe(context, obj, experiment: PlannedExperiment, rig):
     -------
     Object
     """
+    from ...core.gap.report.plan_files import experiment_words, planned_sentence
+
     scene, trajectory = context.scene, experiment.design.trajectory
     metres = units.metres_per_unit(scene)
     probe = _probe(context, obj, rig, metres)
@@ -87,6 +109,9 @@ def put_on_probe(context, obj, experiment: PlannedExperiment, rig):
     fcurves.write(curves, "location", frames, places)
     scene.frame_end = max(scene.frame_end, int(np.ceil(frames[-1])))
     scene.frame_set(scene.frame_start)
+    identity.ensure_uid(obj)
+    sentence = planned_sentence(experiment_words(experiment, f"'{probe.name}'"))
+    _planned[identity.key(obj)] = _Planned(obj.palpate.measured, probe.name, sentence)
     return probe
 
 

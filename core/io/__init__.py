@@ -19,7 +19,6 @@ __all__ = [
     "file_list",
     "file_writing",
     "folder_lock",
-    "frame_images",
     "frame_rows",
     "growing_file",
     "growing_table",

@@ -284,8 +284,7 @@ def _check_frames(recording: Recording, manifest: Manifest) -> None:
 def _check_vectors(channels: VectorReadings | None, files: SensorFiles) -> None:
     """Require the readings of several channels that the manifest promises, or none."""
     said = {} if channels is None else described(channels)
-    wanted = {key: value for key, value in files.manifest.channels.items() if key != "image"}
-    _require(said == wanted, "its channels and those of the manifest differ")
+    _require(said == files.manifest.channels, "its channels and those of the manifest differ")
     if channels is None:
         return
     _check_array("channels/values", channels.values, _NUMBER, (len(files.recording.frames), None, len(channels.names)))

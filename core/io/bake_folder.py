@@ -32,7 +32,7 @@ RECORDING_NAME = "recording.npz"
 IMAGE_LIST_NAME = "images.sha256"
 
 _SINGLE_FILES = (RECORDING_NAME, SENSOR_NAME, MANIFEST_NAME, IMAGE_LIST_NAME)
-BAKE_FILE_NAMES = re.compile(rf"(tactile|channels)_-?\d+\.exr|{'|'.join(map(re.escape, _SINGLE_FILES))}")
+BAKE_FILE_NAMES = re.compile(rf"tactile_-?\d+\.exr|{'|'.join(map(re.escape, _SINGLE_FILES))}")
 """Names of the files in a sensor's folder that a bake writes and replaces."""
 
 _RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{i}" for port in ("com", "lpt") for i in range(1, 10))}
@@ -75,17 +75,6 @@ def file_stems(names: Iterable[str]) -> dict[str, str]:
 def frame_file(frame: int) -> str:
     """Return the name of a frame's tactile image; Blender plays files named like this as a sequence."""
     return f"tactile_{frame:04d}.exr"
-
-
-def channel_file(frame: int) -> str:
-    """Return the name of the image of a frame's channels, of a sensor that has several."""
-    return f"channels_{frame:04d}.exr"
-
-
-def image_files(frames: Iterable[int], has_channels: bool) -> list[str]:
-    """Return the names of the images of some frames, in the order in which the list of a bake has them."""
-    kinds = (frame_file, channel_file) if has_channels else (frame_file,)
-    return [name(frame) for frame in frames for name in kinds]
 
 
 @dataclass(frozen=True)
@@ -135,7 +124,7 @@ class Manifest:
         Of the sensor, each as :func:`.registry.to_dict` writes it; None when the manifest is older.
     channels : dict
         Of a sensor with several channels: their `unit` and `names`, and the `place` of each group of them
-        (:func:`.recording_npz.described`), and the rows and columns of their `image`. Others have none, and no such word.
+        (:func:`.recording_npz.described`). Others have none, and no such word.
     """
 
     sensor: str

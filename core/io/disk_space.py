@@ -9,7 +9,6 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from ..errors import FileError
-from ..geometry.layout.place_grid import MOST_EMPTY
 
 BLOCK = 4096
 """Bytes that even the smallest file occupies on most file systems."""
@@ -38,7 +37,7 @@ def bake_bytes(frames: int, bodies: int, texels: Sequence[int], pixels: Sequence
     texels : sequence of int
         Of each sensor.
     pixels : sequence of int
-        Of the images of each sensor; empty for a bake without images.
+        Of the images of each sensor, more by a seventh for each further channel; empty for a bake without images.
     channels : sequence of int
         Of each sensor that has several, all places together.
 
@@ -51,8 +50,6 @@ def bake_bytes(frames: int, bodies: int, texels: Sequence[int], pixels: Sequence
     written = sum(recording_bytes(frames, bodies, [count]) for count in texels)
     vectors = 2 * CHANNEL_BYTES * frames * sum(channels)
     size = [IMAGE_HEADER_BYTES + IMAGE_PIXEL_BYTES * count for count in pixels]
-    if pixels:
-        size += [IMAGE_HEADER_BYTES + 4 * MOST_EMPTY * count for count in channels]
     images = sum(BLOCK * -(-one // BLOCK) + LIST_LINE_BYTES for one in size)
     return grown + written + float(vectors + frames * images)
 

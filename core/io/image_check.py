@@ -15,7 +15,7 @@ from ..errors import FileError
 from ..geometry.layout.texture_maps import OverlapError
 from ..model.recording import SensorFrame
 from .bake_check import SensorFiles
-from .bake_folder import IMAGE_LIST_NAME, check_sha256, frame_file, image_files
+from .bake_folder import IMAGE_LIST_NAME, check_sha256, frame_file
 from .sensor_npz import SENSOR_NAME
 from .tactile_exr import CHANNELS, exr_channels, read_exr
 
@@ -50,9 +50,8 @@ def check_images(files: SensorFiles) -> None:
 def _check_listed(files: SensorFiles) -> None:
     """Check the images that the list of the bake names, one for each frame."""
     listed = files.manifest.image_checksums(files.folder)
-    expected = image_files(files.recording.frames.tolist(), bool(files.manifest.channels))
-    for name, found in zip_longest(expected, listed):
-        if name is None or found is None or found[0] != name:
+    for number, found in zip_longest(files.recording.frames, listed):
+        if number is None or found is None or found[0] != frame_file(int(number)):
             raise FileError(f"'{files.folder / IMAGE_LIST_NAME}' does not list an image for each frame: bake again.")
         check_sha256(files.folder / found[0], found[1])
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import Any
 
 from ..effects.engine.registry import to_dict
 from ..model.recording import Recording
@@ -14,7 +13,6 @@ from ..model.sensor import Sensor
 from ..version import VERSION
 from .bake_folder import Manifest
 from .recording_npz import described
-from .tactile_exr import channel_layout
 
 
 def manifest_of(scenario: Scenario, sensor: Sensor, recording: Recording, files: Mapping[str, str]) -> Manifest:
@@ -31,6 +29,7 @@ def manifest_of(scenario: Scenario, sensor: Sensor, recording: Recording, files:
     files : mapping of str to str
         SHA-256 of the files in the sensor's folder, by name.
     """
+    channels = recording.sensors[sensor.name].channels
     return Manifest(
         sensor=sensor.name,
         palpate=VERSION,
@@ -49,12 +48,5 @@ def manifest_of(scenario: Scenario, sensor: Sensor, recording: Recording, files:
         sensors=tuple(recording.sensors),
         files=dict(sorted(files.items())),
         effects=[to_dict(effect) for effect in sensor.effects],
-        channels=_channels_of(sensor, recording),
+        channels={} if channels is None else described(channels),
     )
-
-
-def _channels_of(sensor: Sensor, recording: Recording) -> dict[str, Any]:
-    channels = recording.sensors[sensor.name].channels
-    if channels is None:
-        return {}
-    return {**described(channels), "image": [int(side) for side in channel_layout(sensor.texels, channels).shape]}

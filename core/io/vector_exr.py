@@ -12,11 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import ParameterError
-from ..geometry.layout.grid_layout import GridLayout
-from .exr_codec import write_all
+from .exr_codec import in_order, write_all
 from .file_list import FileList
 from .file_writing import writable_folder, write_file
-from .vector_layer import vector_images
 
 LAYER, AXES = "field", "XYZ"
 """Name of the layer, and of its channels."""
@@ -52,8 +50,10 @@ def write_vector_exrs(folder: Path, values: np.ndarray, shape: tuple[int, int], 
             f"An image of {rows} × {columns} places has {3 * rows * columns} channels and these readings have {channels}: "
             "give the rows and columns of the magnetometers."
         )
-    at = np.arange(rows * columns)
-    names, table = vector_images(values, GridLayout(rows, columns, at // columns, at % columns), LAYER, AXES)
+    names = in_order(f"{LAYER}.{axis}" for axis in AXES)
+    order = [AXES.index(name[-1]) for name in names]
+    images = values.reshape(-1, rows, columns, 3)[:, ::-1, :, order]
+    table = np.ascontiguousarray(np.moveaxis(images, 3, 2), dtype="<f4")
     about = [{"palpate.unit": unit, "palpate.frame": str(frame)} for frame in range(len(table))]
     files = FileList(writable_folder(folder, create=True))
     with files.new_files(LAYER) as new, write_file(new / LAYER, atomic=False):

@@ -106,11 +106,23 @@ def deflection_scale(square: float, limit: float) -> float:
 
 
 @inlined
-def bristle_rate(z: float, velocity: float, speed_squared: float, normal_force: float, law: ContactLaw) -> float:
-    """One component of Eq. 9, m/s."""
+def sliding_decay(speed_squared: float, normal_force: float, law: ContactLaw) -> float:
+    """Rate at which sliding lets bristles go, ``sigma0 |v| / g`` in Eq. 9, 1/s; -1 where nothing holds them."""
     g = normal_force * stribeck_coefficient(speed_squared, law)
     held = g > 0.0
-    return velocity - law.sigma0 * math.sqrt(speed_squared) / (g if held else 1.0) * z if held else 0.0
+    return law.sigma0 * math.sqrt(speed_squared) / (g if held else 1.0) if held else -1.0
+
+
+@inlined
+def rate_under_decay(z: float, velocity: float, decay: float) -> float:
+    """One component of Eq. 9, m/s, given :func:`sliding_decay`, which all three have in common."""
+    return velocity - decay * z if decay >= 0.0 else 0.0
+
+
+@inlined
+def bristle_rate(z: float, velocity: float, speed_squared: float, normal_force: float, law: ContactLaw) -> float:
+    """One component of Eq. 9, m/s."""
+    return rate_under_decay(z, velocity, sliding_decay(speed_squared, normal_force, law))
 
 
 @inlined

@@ -309,4 +309,4 @@ def _fitted_impedance(curve: ForceCurve) -> tuple[float, ...]:
     low, high = (np.array([np.log(IMPEDANCES[i]), MIDPOINTS[i], np.log(POWERS[i])]) for i in (0, 1))
     starts = [np.clip([np.log(first * last), middle, np.log(power)], low, high) for first, middle, power in STARTS]
     found = [least_squares(error, start, bounds=(low, high), xtol=1e-12, ftol=1e-12, gtol=1e-12) for start in starts]
-    return solimp(min(found, key=lambda one: one.cost).x)
+    return tuple(float(f"{value:.9g}") for value in solimp(min(found, key=lambda one: one.cost).x))

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from ..errors import ParameterError, SensorError
 from ..geometry.texels import Texels
 from ..model.vector_readings import VectorReadings
-from .dipoles import dipole_gradient, summed_field
+from .dipoles import TOUCHING, DipoleSum, dipole_gradient
 from .layer import layer_weights
 
 BLOCK_NUMBERS = 1 << 14
@@ -74,6 +75,10 @@ class MagneticSkin:
     magnets: Magnets
     magnetometers: Magnetometers
     weights: np.ndarray
+
+    @cached_property
+    def _fields(self) -> DipoleSum:
+        return DipoleSum(self.magnetometers.place, self.magnets.moment)
 
     def field_at_rest(self) -> np.ndarray:
         """Return what the magnetometers see while nothing moves, without their offsets, (k, 3) float, T."""
@@ -153,7 +158,7 @@ class MagneticSkin:
         Also return where one is inside of a chip, (T, k) bool.
         """
         size = self.magnetometers.size
-        field, square = summed_field(self.magnetometers.place, place, self.magnets.moment, 0.0 if refuses_near else size)
+        field, square = self._fields.field(place, TOUCHING if refuses_near else size)
         inside = square.min(axis=2) <= size**2
         if refuses_near and inside.any():
             _, chip, magnet = np.unravel_index(int(np.argmin(square)), square.shape)

@@ -21,11 +21,12 @@ from ...geometry.rotations import write_backward_step_motion, write_rotation, wr
 from ...geometry.shapes import MESH, Vector, is_in_shape, shape_entry, shape_normal
 from ...laws.contact_law import ContactLaw, read_law, scaled_law, whole_texel_law, with_friction
 from ...laws.friction import (
-    bristle_rate,
     deflection_scale,
     friction_force,
     max_bristle_deflection,
     next_deflection,
+    rate_under_decay,
+    sliding_decay,
     turned_into_plane,
 )
 from ...laws.normal_force import normal_force, normal_tangent
@@ -418,10 +419,10 @@ def _write_force(
     held = deflection_scale(z[0] * z[0] + z[1] * z[1] + z[2] * z[2], max_bristle_deflection(fn, friction))
     fx, fy, fz = 0.0, 0.0, 0.0
     if fn > 0.0:
-        zx, zy, zz = held * z[0], held * z[1], held * z[2]
-        fx = friction_force(zx, bristle_rate(zx, v.x, square, fn, friction), v.x, friction)
-        fy = friction_force(zy, bristle_rate(zy, v.y, square, fn, friction), v.y, friction)
-        fz = friction_force(zz, bristle_rate(zz, v.z, square, fn, friction), v.z, friction)
+        zx, zy, zz, decay = held * z[0], held * z[1], held * z[2], sliding_decay(square, fn, friction)
+        fx = friction_force(zx, rate_under_decay(zx, v.x, decay), v.x, friction)
+        fy = friction_force(zy, rate_under_decay(zy, v.y, decay), v.y, friction)
+        fz = friction_force(zz, rate_under_decay(zz, v.z, decay), v.z, friction)
     f = slots.force[world, target, point]
     f[0], f[1], f[2] = fx + fn * n[0], fy + fn * n[1], fz + fn * n[2]
     return fn

@@ -70,7 +70,8 @@ class Translation:
         self._functions: dict[Any, Any] = {}
         self.structs: dict[type, Any] = {}
         self._kernels: dict[Callable[..., Any], Any] = {}
-        warp.set_module_options({"enable_backward": False, "fuse_fp": False}, module=warp.get_module(self.name))
+        options = {"enable_backward": False, "fuse_fp": False, "optimization_level": 3}
+        warp.set_module_options(options, module=warp.get_module(self.name))
 
     def function(self, function: Callable[..., Any]) -> Any:
         """Return a function of plain Python, or a kernel of numba, as a function of Warp."""

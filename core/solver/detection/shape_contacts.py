@@ -34,7 +34,10 @@ TOUCHED, INSIDE = 1.0, -1.0
 
 
 def blocks_of_points(pairs: Pairs, frame: np.ndarray) -> np.ndarray:
-    """Return place and normal of each pair's contact points, (blocks, 6 · LANES), in blocks as contact rows; frame (N, 12)."""
+    """Return position and normal of each pair's contact points, (blocks, 6 · LANES), in blocks as contact rows.
+
+    `frame` is :attr:`.Points.frame`.
+    """
     blocks = []
     for first, stop in zip(pairs.first_point, pairs.stop_point, strict=True):
         own = np.zeros((-(-(stop - first) // LANES) * LANES, 6))
@@ -112,10 +115,11 @@ def _keep_block(pair: int, block: int, slot: int, count: int, bristle: np.ndarra
 
     The points have the slots from `slot` on. Bristles of points that do not touch become zero.
     """
-    rows, slots, row, touching = contacts.rows, contacts.slots, contacts.number[pair], 0
+    rows, slots, row, touching, too_deep = contacts.rows, contacts.slots, contacts.number[pair], 0, 0
+    first = contacts.first_block[pair]
     for lane in range(LANES):
         touching += 1 if rows[block, FOUND + lane] == TOUCHED else 0
-    if touching == LANES and count == LANES and row == (block - contacts.first_block[pair]) * LANES:
+    if touching == LANES and count == LANES and row == (block - first) * LANES:
         for lane in range(LANES):  # all stay where they are
             rows[block, BRISTLE + lane] = bristle[slot + lane, 0]
             rows[block, BRISTLE + LANES + lane] = bristle[slot + lane, 1]
@@ -126,7 +130,7 @@ def _keep_block(pair: int, block: int, slot: int, count: int, bristle: np.ndarra
     for lane in range(count):
         found = rows[block, FOUND + lane]
         if found == TOUCHED:
-            to, place = contacts.first_block[pair] + row // LANES, row % LANES
+            to, place = first + row // LANES, row % LANES
             for column in range(0, BRISTLE, LANES):
                 rows[to, column + place] = rows[block, column + lane]
             rows[to, DEPTH + place] = rows[block, DEPTH + lane]
@@ -136,8 +140,9 @@ def _keep_block(pair: int, block: int, slot: int, count: int, bristle: np.ndarra
             row += 1
         else:
             _release(slot + lane, bristle)
-            contacts.too_deep[pair] += 1 if found == INSIDE else 0
+            too_deep += 1 if found == INSIDE else 0
     contacts.number[pair] = row
+    contacts.too_deep[pair] += too_deep
 
 
 @inlined

@@ -234,6 +234,29 @@ def test_while_playing_the_surface_gives_way_as_it_will_after_the_bake(tmp_path)
     assert_on_surface(overlay, surface(pad), run.frames[6].sensors["Pad"].depth.max())
 
 
+def test_while_playing_no_face_of_a_coarse_mesh_covers_the_heat_map():
+    """Blender draws a quad of a crumpled pad as two triangles, which lie up to 0.5 mm above the patch between its corners."""
+    from mathutils.bvhtree import BVHTree
+
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 2
+    pad = grid(columns=9, rows=9)
+    for vertex in pad.data.vertices:
+        vertex.co.z = 5e-4 * (-1) ** (vertex.index // 9 + vertex.index % 9)
+    ball(location=(0.0, 0.0, 0.0075)).palpate.role, pad.palpate.role = "TARGET", "SENSOR"
+    overlay, run = playing(scene, 2)
+    assert run.frames[2].sensors[pad.name].contact.any()
+    pad.data.calc_loop_triangles()
+    drawn = BVHTree.FromPolygons(
+        mesh_arrays.vertices(pad.data).tolist(), [tuple(one.vertices) for one in pad.data.loop_triangles]
+    )
+    above, below = np.split(overlay.at_rest.astype(float), 2)
+    assert len(above) > 9 * 81
+    for points, way in ((above, 1.0), (below, -1.0)):
+        hits = [drawn.ray_cast(point, (0.0, 0.0, way)) for point in points.tolist()]
+        assert [hit for hit in hits if hit[0] is not None] == []
+
+
 def flat_colors(scene, overlay, run):
     """Return the largest of red, green and blue of each corner of an overlay without its shade."""
     scene.palpate.show_indentation = False

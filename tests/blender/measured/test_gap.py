@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from blender_scenes import grid
 
-from palpate.addon.measured import gap_results
+from palpate.addon.measured import gap_results, planned_probe
 from palpate.commands import main
 from palpate.core.errors import SceneError
 from palpate.core.gap.dataset.rig import read_rig
@@ -96,6 +96,7 @@ def test_a_planned_experiment_becomes_keyframes_of_a_probe_and_is_undone(scene, 
     assert bpy.ops.palpate.gap_plan("EXEC_DEFAULT", True, duration=8.0, depth=0.001) == {"FINISHED"}
     probe, obj = bpy.data.objects["Planned Probe"], bpy.data.objects["Pad"]
     assert probe.palpate.role == "TARGET" and scene.frame_end == 5 + 8 * scene.render.fps
+    assert "'Planned Probe'" in planned_probe.sentence_of(obj) and "confidence" in planned_probe.sentence_of(obj)
     radii = [vertex.co.length for vertex in probe.data.vertices]
     assert max(radii) == pytest.approx(cases.RADIUS, rel=1e-5)  # the shape that pressed in the recordings
     lowest, speeds, before = [], [], None
@@ -113,6 +114,7 @@ def test_a_planned_experiment_becomes_keyframes_of_a_probe_and_is_undone(scene, 
     assert len([one for one in bpy.data.objects if one.name.startswith("Planned Probe")]) == 1
     bpy.ops.ed.undo()
     assert "Planned Probe" not in bpy.data.objects and bpy.context.scene.frame_end == 20
+    assert planned_probe.sentence_of(bpy.data.objects["Pad"]) == ""
 
 
 def test_recordings_without_poses_are_not_planned_on_a_probe(scene, tmp_path):

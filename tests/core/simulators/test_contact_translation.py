@@ -173,3 +173,19 @@ def test_both_are_written_with_their_errors(tmp_path):
 def test_a_value_out_of_range_is_one_sentence(words, message):
     with pytest.raises(pp.PalpateError, match=message):
         pp.mujoco_contact(pad(), **words)
+
+
+def test_a_fitted_sensor_is_exported_without_blender(tmp_path, capsys):
+    """As palpate gap leaves it: a sensor.toml. A name that it has not is refused."""
+    from palpate.commands import main
+
+    pad(STIFFENING["polynomial"]).save(tmp_path / "sensor.toml")
+    command = ["sensor", "export", str(tmp_path / "sensor.toml"), "--to", "contact", "--out", str(tmp_path / "out")]
+    assert main(command) == 0
+    printed = capsys.readouterr()
+    assert printed.out.strip() == str(tmp_path / "out" / "pad.contact.json")
+    content = json.loads((tmp_path / "out" / "pad.contact.json").read_text(encoding="utf-8"))
+    assert content["mujoco"]["solref"] == list(pp.mujoco_contact(pad(STIFFENING["polynomial"])).solref)
+    assert f"note: 'pad' in Newton: {pp.newton_contact(pad(STIFFENING['polynomial'])).error}." in printed.err
+    assert main([*command, "--sensor", "thumb"]) != 0
+    assert "There is no sensor 'thumb'" in capsys.readouterr().err
