@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from .addon.scripting.scene_objects import scenario_of as scenario_of
     from .addon.scripting.scene_objects import sensor_of as sensor_of
     from .api.bodies import Body as Body
+    from .api.contacts import mujoco_contact as mujoco_contact
+    from .api.contacts import newton_contact as newton_contact
     from .api.experiment import Plan as Plan
     from .api.experiment import plan_experiment as plan_experiment
     from .api.fits import fit_friction as fit_friction
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
     from .api.sensors import Sensor as Sensor
     from .api.sensors import export_sensor as export_sensor
     from .api.sensors import read_sensor as read_sensor
+    from .api.sensors import sensors_from_blend as sensors_from_blend
     from .api.simulation import simulate as simulate
     from .api.skins import draw_channels as draw_channels
     from .api.skins import magnetic_skin as magnetic_skin
@@ -58,6 +61,8 @@ _PUBLIC = {
     "fit_readout": "api.fits",
     "fit_stiffness": "api.fits",
     "magnetic_skin": "api.skins",
+    "mujoco_contact": "api.contacts",
+    "newton_contact": "api.contacts",
     "plan_experiment": "api.experiment",
     "read_bake": "api.recordings",
     "read_recording": "api.recordings",
@@ -67,6 +72,7 @@ _PUBLIC = {
     "save_channels": "api.skins",
     "scenario_of": "addon.scripting.scene_objects",
     "sensor_of": "addon.scripting.scene_objects",
+    "sensors_from_blend": "api.sensors",
     "simulate": "api.simulation",
 }
 """The public names and their modules; what is not here is internal and may change."""

@@ -8,6 +8,7 @@ when one of its names is first used. Arguments are checked here; everything is c
 __all__ = [
     "arguments",
     "bodies",
+    "contacts",
     "experiment",
     "fits",
     "gap",

@@ -144,7 +144,7 @@ class Gap:
         return sentences.headline(self.diagnosis, self.errors)
 
     def plot(self, name: str = "curves") -> Figure:
-        """Return a figure of the report, which a notebook shows: "curves", "gap", "loops", "map" or "phases"."""
+        """Return a figure of the report, which a notebook shows: "curves", "gap", "loops", "map", "overview" or "phases"."""
         from ..core.gap.report.plots import CAPTIONS, picture
         from .drawings import shown_in_notebooks
 

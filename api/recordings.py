@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
     from ..core.export.exporter import Exporter
     from ..core.figures.figure_style import FigureStyle
-    from ..core.response.magnetic_skin import MagneticSkin, VectorReadings
+    from ..core.model.vector_readings import VectorReadings
+    from ..core.skins.magnetic_skin import MagneticSkin
 
 UNITS = {"slip": "m/s", "depth": "m", "contact": "", "net_torque": "N m", "centre_of_pressure": "m"}
 """Units of the arrays that are not in newtons; `reading` has that of the sensor."""
@@ -117,14 +118,14 @@ class Recording:
         return self.bake.recording.dt
 
     def channels(
-        self, skin: MagneticSkin, shear_stiffness: float | None = None, ambient: ArrayLike | None = None
+        self, skin: MagneticSkin | None = None, shear_stiffness: float | None = None, ambient: ArrayLike | None = None
     ) -> VectorReadings:
-        """Return the readings of the magnetometers of a skin: three signed channels each.
+        """Return readings of several signed channels: those that the only sensor has recorded, or of another skin on it.
 
         Parameters
         ----------
-        skin : MagneticSkin
-            On the only sensor, see :func:`palpate.magnetic_skin`.
+        skin : MagneticSkin, optional
+            See :func:`palpate.magnetic_skin`. Default: what the sensor's own read-out has recorded.
         shear_stiffness : float, N/m, optional
             Of one texel; texels are displaced along their surface by their shear divided by it. Default: they are not.
         ambient : (T, 3) float, T, optional
@@ -138,10 +139,15 @@ class Recording:
         Raises
         ------
         PalpateError
-            The skin belongs to another sensor, or a magnet is pressed into a magnetometer.
+            The sensor has no such read-out, the skin belongs to another sensor, or a magnet is pressed into a magnetometer.
         """
-        from ..core.response.layer import texel_displacements
+        from ..core.skins.layer import texel_displacements
 
+        if skin is None:
+            own = self.bake.recording.sensors[self.name].channels
+            if own is None:
+                raise ArgumentError(f"Sensor '{self.name}' has one reading per texel: give a skin, as of magnetic_skin().")
+            return own
         stiffness = np.inf if shear_stiffness is None else arguments.number(shear_stiffness, "shear_stiffness", True)
         field = None if ambient is None else arguments.numbers(ambient, (len(self), 3), "ambient")
         texels = self._described().texels[self.name]
@@ -170,7 +176,11 @@ class Recording:
             axes: tuple[str, ...] = ("time",) if name in NET else ("time", "texel")
             axes += tuple(shared[size] for size in values.shape[len(axes) :])
             data[name] = (axes, values, {"units": self.unit if name == "reading" else UNITS.get(name, "N")})
+        if recorded.channels is not None:
+            data["channels"] = (("time", "place", "channel"), recorded.channels.values, {"units": recorded.channels.unit})
         places = {"time": ("time", self.time, {"units": "s"}), "xyz": list("xyz"), "xy": list("xy")}
+        if recorded.channels is not None:
+            places["channel"] = list(recorded.channels.names)
         if self.bake.texels:
             places |= {axis: ("texel", self.position[:, i], {"units": "m"}) for i, axis in enumerate(("x", "y", "z"))}
         return xarray.Dataset(data, places, {"sensor": self.name, "dt": self.dt})

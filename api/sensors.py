@@ -258,6 +258,36 @@ def read_sensor(path: str | os.PathLike[str]) -> Sensor:
     return Sensor(model, mesh, found.surface, found.frame_position, found.frame_quaternion)
 
 
+def sensors_from_blend(
+    blend: str | os.PathLike[str], *names: str, folder: str | os.PathLike[str] | None = None
+) -> dict[str, Sensor]:
+    """Return the sensors of a baked .blend by name, without Blender: texels, painted factors, parameters and effects.
+
+    Parameters
+    ----------
+    blend : path
+    *names : str
+        Of sensors. Default: all of the bake; pads that are not read out are not in it.
+    folder : path, optional
+        The bake folder. Default: ``palpate-bake`` beside the .blend, which is also the default of scenes.
+
+    Returns
+    -------
+    dict of str to Sensor
+        Texels in the frame of the body that carries them, with the body's pose at the first frame.
+
+    Raises
+    ------
+    PalpateError
+        There is no .blend, bake or sensor of a name, the bake is damaged or not of this .blend, or the .blend was saved later
+        with changes.
+    """
+    from ..core.simulators.baked_sensors import baked_sensors
+
+    found = baked_sensors(blend, names or None, folder)
+    return {item.name: Sensor(item.sensor, item.mesh, item.surface, item.position, item.quaternion) for item in found}
+
+
 def _sensor_of_toml(path: FilePath) -> Sensor:
     from ..core.io.sensor_toml import read_sensor as read_model
 

@@ -18,11 +18,9 @@ from .drawings import shown_in_notebooks
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..core.response.magnetic_skin import MagneticSkin, VectorReadings
+    from ..core.model.vector_readings import VectorReadings
+    from ..core.skins.magnetic_skin import MagneticSkin
     from .sensors import Sensor
-
-FULL_SCALE = 50e-3
-"""T: range of usual three-axis Hall chips."""
 
 
 def magnetic_skin(
@@ -31,7 +29,7 @@ def magnetic_skin(
     moments: ArrayLike | None = None,
     magnetometers: ArrayLike | None = None,
     thickness: float | None = None,
-    full_scale: float = FULL_SCALE,
+    full_scale: float = 50e-3,
     axes: ArrayLike | None = None,
     offset: ArrayLike = 0.0,
 ) -> MagneticSkin:
@@ -65,15 +63,16 @@ def magnetic_skin(
     PalpateError
         Shapes do not agree, a magnet is outside of the layer, or a magnetometer is inside of a magnet's reach.
     """
-    from ..core.response import magnetic_skin as core
-    from ..core.response import skin_presets
+    from ..core.skins import magnetic_skin as core
+    from ..core.skins import skin_presets
 
     if isinstance(magnets, str):
         named = skin_presets.preset_named(magnets)
-        magnets, own_moment, own_chips, frame = skin_presets.placed(named, sensor.texels)
-        axes = np.tile(frame, (len(own_chips), 1, 1)) if axes is None and magnetometers is None else axes
-        moments = own_moment if moments is None else moments
-        magnetometers = own_chips if magnetometers is None else magnetometers
+        own_places = skin_presets.placed(named, sensor.texels)
+        magnets = own_places.magnets
+        axes = own_places.axes if axes is None and magnetometers is None else axes
+        moments = own_places.moments if moments is None else moments
+        magnetometers = own_places.magnetometers if magnetometers is None else magnetometers
         thickness = named.thickness if thickness is None else thickness
     if moments is None or magnetometers is None or thickness is None:
         named_skins = ", ".join(skin_presets.PRESETS)

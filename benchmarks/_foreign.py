@@ -29,6 +29,16 @@ TAPE_SAMPLES = 200
 """Even samples of each recording of the tape, and of the foam in shear."""
 THINNED = 2
 """Samples of eFlesh of which means are taken."""
+OSCILLATOR_PARTS = (("first", "fit", slice(40700, 44796)), ("second", "check", slice(49400, 53496)))
+"""Of the oscillator: samples of two random multisines, each from its beginning."""
+OSCILLATOR_RATE = 1e7 / 2**14
+"""Hz."""
+PRELOAD = 0.2
+"""Volts added to the oscillator's drive, as a known force presses and does not pull."""
+DAMPER_STEP = 2e-3
+"""Seconds between samples of the damper: what its displacements and speeds agree on."""
+TONGS_THINNED = {"train": 20, "test": 3}
+"""Of how many samples of the tongs one is taken; they are in random order."""
 
 
 @dataclass(frozen=True)
@@ -125,6 +135,50 @@ def foam_shear(data: Path) -> Recording:
     return Recording("shoe foam in shear", words, trials)
 
 
+def oscillator(data: Path) -> Recording:
+    """Silverbox: an electronic mass on a spring that stiffens. Drive (V, taken as newtons) and response (V).
+
+    ``examples/statespace/silverbox/SilverboxFiles`` of pytorch-ident in ``silverbox``.
+    """
+    drive, response = np.genfromtxt(data / "silverbox" / "SNLS80mV.csv", delimiter=",", skip_header=1)[:, :2].T
+    trials: list[tuple[str, str, Columns]] = []
+    for name, use, part in OSCILLATOR_PARTS:
+        time = np.arange(part.stop - part.start) / OSCILLATOR_RATE
+        trials.append((name, use, {"time": time, "force": drive[part] + PRELOAD, "texel_0": response[part]}))
+    return Recording("Silverbox", 'grid = { rows = 1, columns = 1, pitch = 0.01 }\nunit = "V"', trials)
+
+
+def damper(data: Path) -> Recording:
+    """Bouc–Wen damper: its force over its travel (cm); the voltage, which sets its yield, is the normal force.
+
+    ``datasets/bouc_wen`` of sysidentpy-data in ``bouc_wen``.
+    """
+    table = np.loadtxt(data / "bouc_wen" / "boucwen_histeretic_system.csv", delimiter=",", skiprows=1)
+    half = len(table) // 2
+    trials: list[tuple[str, str, Columns]] = []
+    for name, use, part in (("first", "fit", table[:half]), ("second", "check", table[half:])):
+        columns = {"time": np.arange(half) * DAMPER_STEP, "force": 1e3 * part[:, 3], "slide_x": 1e-2 * part[:, 0]}
+        trials.append((name, use, columns | {"force_x": part[:, 4]}))
+    return Recording("Bouc–Wen damper", "grid = { rows = 1, columns = 1, pitch = 0.05 }", trials)
+
+
+def tongs(data: Path) -> Recording:
+    """Places (mm) of a marker and four corners behind a soft finger, over the largest of the six loads that bend it.
+
+    ``SupplementaryFile-A-ThreeDataset/baseline`` of SoftRoboticTongs in ``tongs``.
+    """
+    trials: list[tuple[str, str, Columns]] = []
+    for name, use in (("train", "fit"), ("test", "check")):
+        loads, places = (
+            np.loadtxt(data / "tongs" / f"baseline_{kind}_{name}.csv", delimiter=",")[:: TONGS_THINNED[name]]
+            for kind in ("FT", "pose")
+        )
+        pressed = loads[:, 1] < 0.0
+        channels = {f"texel_{i}": column for i, column in enumerate(places[pressed].T)}
+        trials.append((name, use, {"time": np.arange(pressed.sum()) * 1.0, "force": 15.0 * -loads[pressed, 1], **channels}))
+    return Recording("soft robotic tongs", 'grid = { rows = 1, columns = 15, pitch = 0.01 }\nunit = "mm"', trials)
+
+
 def _cubic(p, c, channel):
     """A cubic of the force, and what is there without one."""
     force = c["force"] / 5e2
@@ -175,6 +229,44 @@ def _brake(p, c, channel):
         step = travel[t] - travel[t - 1]
         bristle[t] = (bristle[t - 1] + step) / (1.0 + abs(step) / (1e-3 * p[0]))
     return [np.ones_like(travel), bristle, np.gradient(travel, c["time"])]
+
+
+def _oscillator(p, c, channel):
+    """Duffing's oscillator: a mass on a spring and a damper, with a force that goes with the cube of its place."""
+    steps = 4
+    dt = float(np.diff(c["time"]).mean()) / steps
+    drive = np.interp(np.arange(len(c["time"]) * steps) * dt, c["time"] - c["time"][0], c["force"] - PRELOAD)
+    turn = 2.0 * np.pi * p[0]
+    a, b = expm_of_oscillator(turn, p[1], dt)
+    (a11, a12), (a21, a22), (b1, b2), cube = *a.tolist(), b.tolist(), float(p[2])
+    x = v = 0.0
+    place = []
+    for u in drive.tolist():
+        place.append(x)
+        pull = u - cube * x**3
+        x, v = a11 * x + a12 * v + b1 * pull, a21 * x + a22 * v + b2 * pull
+    return [np.ones_like(c["force"]), np.array(place[::steps])]
+
+
+def expm_of_oscillator(turn: float, damping: float, dt: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return how place and speed of an oscillator of stiffness 1 follow from themselves, and from a force, over a step."""
+    from scipy.linalg import expm
+
+    system = np.zeros((3, 3))
+    system[:2] = [[0.0, 1.0, 0.0], [-(turn**2), -2.0 * damping * turn, turn**2]]
+    step = expm(system * dt)
+    return step[:2, :2], step[:2, 2]
+
+
+def _damper(p, c, channel):
+    """Dahl's bristles and viscous friction, each with a part that goes with the voltage."""
+    travel = c["slide_x"]
+    bristle = np.zeros_like(travel)
+    for t in range(1, len(travel)):
+        step = travel[t] - travel[t - 1]
+        bristle[t] = (bristle[t - 1] + step) / (1.0 + abs(step) / (1e-3 * p[0]))
+    volts, rate = c["force"] * 1e-3, np.gradient(travel, c["time"])
+    return [bristle, volts * bristle, rate, volts * rate]
 
 
 FOREIGN: dict[str, ForeignSet] = {
@@ -235,6 +327,23 @@ FOREIGN: dict[str, ForeignSet] = {
         "0.5 Hz, 1 Hz",
         SETS["brake"],
         HandmadeModel(_brake, (1.0,), (0.01,), (20.0,), "Dahl and viscous friction"),
+    ),
+    "oscillator": ForeignSet(
+        "electronic oscillator",
+        "MIT (pytorch-ident)",
+        "one multisine, another",
+        oscillator,
+        HandmadeModel(_oscillator, (70.0, 0.05, 1.0), (40.0, 0.005, -50.0), (120.0, 0.5, 50.0), "Duffing's oscillator"),
+    ),
+    "damper": ForeignSet(
+        "simulated damper of Bouc and Wen",
+        "MIT (sysidentpy)",
+        "first half, second",
+        damper,
+        HandmadeModel(_damper, (1.0,), (0.01,), (20.0,), "Dahl and viscous friction that go with the voltage"),
+    ),
+    "tongs": ForeignSet(
+        "marker behind a soft finger", "MIT", "the authors'", tongs, HandmadeModel(_cubic, (), (), (), "cubic")
     ),
 }
 """By name. None is left out because it goes badly."""

@@ -128,6 +128,35 @@ def _in_turn(scene, rounds: int) -> tuple[float, float]:
     return tuple(statistics.median(column) for column in zip(*times, strict=True))
 
 
+def bake_with_channels(frames: int) -> tuple[float, float]:
+    """Processor seconds of a bake of 84 texels with a magnet and a magnetometer below each, and of one without."""
+    import bpy
+
+    from palpate.addon.bake.bake import bake
+    from palpate.core.io import bake_switch
+    from palpate.core.jobs.job_runner import run_job
+
+    with tempfile.TemporaryDirectory() as folder:
+        scene = scene_of(84, frames, Path(folder))
+        pad = next(obj for obj in scene.objects if obj.palpate.role == "SENSOR")
+        own = pad.palpate.readout
+        own.collection = bpy.data.collections.new("Magnets")
+        scene.collection.children.link(own.collection)
+        for vertex in pad.data.vertices:
+            for part, depth in (("MAGNET", 3e-3), ("MAGNETOMETER", 7e-3)):
+                obj = bpy.data.objects.new(part.title(), None)
+                own.collection.objects.link(obj)
+                obj.location, obj.palpate.magnetic.part = (vertex.co.x, vertex.co.y, -depth), part
+        times: dict[str, list[float]] = {"PLACED": [], "NONE": []}
+        for _ in range(ROUNDS + 1):  # the first warms up
+            for own.kind, found in times.items():
+                start = time.process_time()
+                run_job(bake(scene))
+                found.append(time.process_time() - start)
+                bake_switch.wait_for_removals()
+        return tuple(statistics.median(found[1:]) for found in times.values())
+
+
 @dataclass
 class Costs:
     """Seconds of a bake, of its checkpoints with their syncing, and of all syncing; and the number of checkpoints."""
@@ -211,5 +240,10 @@ def run() -> Iterator[dict]:
         yield _over_solve(str(texels), *bake_and_solve(texels, frames))
     for texels, frames in CHECKPOINTED.items():
         yield from _checkpoint_figures(texels, frames)
+    channels, plain = bake_with_channels(240)
+    yield {
+        "name": "bake.channels.84", "value": channels, "unit": "s", "goal": 1.3,
+        "peer": "one channel", "peer_value": plain, "ratio": channels / plain,
+    }  # fmt: skip
     for name in ("demo", "grasp"):
         yield _over_solve(name, *sample_bake_and_solve(name))

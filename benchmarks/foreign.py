@@ -68,5 +68,9 @@ def _sets() -> Iterator[tuple[str, Recording, float]]:
         print(f"No recordings in {data}: name their folder in PALPATE_REAL_DATA.", file=sys.stderr)
         return
     for name in os.environ.get("PALPATE_FOREIGN_SETS", ",".join(FOREIGN)).split(","):
-        recording = FOREIGN[name].read(data)
+        try:
+            recording = FOREIGN[name].read(data)
+        except FileNotFoundError as error:
+            print(f"'{name}' is left out: {error.filename} is missing.", file=sys.stderr)
+            continue
         yield name, recording, _check_error(recording, predict_by_hand(FOREIGN[name].by_hand, recording))

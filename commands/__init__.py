@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import errno
 import importlib
+import os
 import sys
 from collections.abc import Sequence
 from contextlib import nullcontext, suppress
@@ -45,6 +46,8 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 def run_process() -> NoReturn:
     """Run the command of this process and end the process with its exit status."""
     status = 1
+    # The matrices are small: threads of BLAS would wait for each other, and round differently with each number of cores.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         status = main()
     except KeyboardInterrupt:

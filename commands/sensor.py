@@ -7,16 +7,18 @@ import argparse
 import sys
 from pathlib import Path
 
+from ..core.errors import FileError
 from ..core.io.file_writing import writable_folder
 from ..core.io.regular_file import require_regular
 from ..core.simulators.registry import written_formats
+from ..core.simulators.sensor_on_mesh import SensorOnMesh
 from . import blender, checks, console
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     kinds = parser.add_subparsers(dest="kind", metavar="export | import", required=True)
     save = kinds.add_parser("export", help="write the sensors of a .blend for another simulator")
-    save.add_argument("scene", metavar="SCENE.blend", help="file with the sensors; it is only read")
+    save.add_argument("scene", metavar="FILE", help="a .blend with the sensors, a sensor.toml or a probe list; it is only read")
     formats = written_formats()
     save.add_argument("--to", metavar="FORMAT", choices=formats, required=True, help=", ".join(formats))
     save.add_argument("--out", metavar="DIR", default="palpate-sensors", help="folder to write to (default: %(default)s)")
@@ -40,18 +42,31 @@ def run(arguments: argparse.Namespace) -> int:
 def _export(arguments: argparse.Namespace) -> None:
     checks.outputs_are_no_inputs((arguments.out,), (arguments.scene,))
     writable_folder(arguments.out, create=True)
-    with console.blender_output_hidden():
-        scene = blender.open_scene(arguments.scene, arguments.scripts)
-        from ..addon.authoring import sensor_exchange
-
-        sensors = sensor_exchange.sensors_on_meshes(scene, arguments.sensor or ())
     from ..api.sensors import export_sensor
 
+    sensors = _sensors_of(arguments)
     written = export_sensor(sensors, arguments.to, arguments.out)
     for note in written.notes:
         print(f"note: {note}", file=sys.stderr)
     for path in written.files:
         print(path)
+
+
+def _sensors_of(arguments: argparse.Namespace) -> list[SensorOnMesh]:
+    """Return the sensors of a .blend, or the one of a file of its own."""
+    if Path(arguments.scene).suffix.lower() in (".toml", ".json"):
+        from ..api.sensors import read_sensor
+
+        found = read_sensor(arguments.scene)
+        for name in arguments.sensor or ():
+            if name != found.name:
+                raise FileError(f"There is no sensor '{name}' in '{arguments.scene}': it has '{found.name}'.")
+        return [found]
+    with console.blender_output_hidden():
+        scene = blender.open_scene(arguments.scene, arguments.scripts)
+        from ..addon.authoring import sensor_exchange
+
+        return sensor_exchange.sensors_on_meshes(scene, arguments.sensor or ())
 
 
 def _import(arguments: argparse.Namespace) -> None:

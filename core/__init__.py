@@ -13,6 +13,7 @@ __all__ = [
     "jobs",
     "geometry",
     "model",
+    "skins",
     "laws",
     "effects",
     "response",

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A plate of 1 kg comes to rest on a sensor in 16 environments of mjlab, carried by Palpate's texels.
 
-pip install mjlab palpate[warp]
-palpate sensor export sample_blends/weighing.blend --to probes --out sensors
+pip install mjlab '.[warp]'    # in a checkout
+palpate sensor export sample_blends/weighing.blend --to probes --out sensors    # in a Python with bpy
 python examples/mjlab_touch.py sensors/Finger.json
 """
 

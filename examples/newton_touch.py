@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A plate of 1 kg comes to rest on a sensor in 16 worlds of Newton, carried by Palpate's texels.
 
-pip install newton palpate[warp]
-palpate sensor export sample_blends/weighing.blend --to probes --out sensors
+pip install newton '.[warp]'    # in a checkout
+palpate sensor export sample_blends/weighing.blend --to probes --out sensors    # in a Python with bpy
 python examples/newton_touch.py sensors/Finger.json
 """
 

@@ -13,6 +13,7 @@ def _classes():
         fix,
         gap,
         laid_sensor,
+        magnetic,
         presets,
         probe,
         sensor,
@@ -20,7 +21,23 @@ def _classes():
         study,
     )
 
-    modules = (sensor, laid_sensor, presets, effects, fix, probe, fits, gap, exchange, simulators, bake, figures, study, debug)
+    modules = (
+        sensor,
+        laid_sensor,
+        magnetic,
+        presets,
+        effects,
+        fix,
+        probe,
+        fits,
+        gap,
+        exchange,
+        simulators,
+        bake,
+        figures,
+        study,
+        debug,
+    )
     return tuple(cls for module in modules for cls in module.CLASSES)
 
 

@@ -26,6 +26,7 @@ class PALPATE_MT_object(bpy.types.Menu):
         presets.menu("PALPATE_MT_presets")
         layout.operator_menu_enum("palpate.fix", "kind")
         layout.operator_menu_enum("palpate.effect_add", "effect")
+        layout.operator_menu_enum("palpate.magnetic_skin_place", "preset")
         layout.operator("palpate.sensor_remove", icon="X")
         layout.separator()
         layout.operator("palpate.stiffness_fit")

@@ -210,13 +210,35 @@ class Readout(Subpanel):
             column.prop_search(settings, "image_map", context.object.data, "uv_layers", text="", icon="UV")
             column.prop(settings, "image_size")
             column.prop(settings, "image_filter", text="")
+        _draw_channels(layout, settings.readout, context)
         status = frame_status.status_of(context.scene)
         readings = status.frame.sensors.get(context.object.name) if status.frame is not None else None
         box = layout.box().column()
         box.label(text=f"Frame {context.scene.frame_current}:" + ("" if readings else " not computed"))
         for name, value in _measured(readings, settings.unit):  # as many lines without numbers: what is below does not jump
             box.label(text=f"{name}: {value}")
+        if readings is not None and readings.channels is not None:
+            box.label(text=_summary(readings.channels))
         draw_sentences(box, NET, "NONE", context)
+
+
+def _draw_channels(layout, own, context) -> None:
+    """Draw what further channels a sensor has."""
+    column = layout.column()
+    draw_named(column, own, "kind", "Channels")
+    if own.kind == "PLACED":
+        draw_named(column, own, "collection", "Magnets")
+        column.prop(own, name_in_units(own, "thickness", context.scene))
+    if own.kind not in {"NONE", "NET_FORCE"}:
+        column.prop(own, "shear_stiffness")
+        column.operator_menu_enum("palpate.magnetic_skin_place", "preset", icon="EMPTY_SINGLE_ARROW")
+
+
+def _summary(channels) -> str:
+    """Return how many channels a sensor has and the largest of their readings at a frame."""
+    clipped = int(channels.clipped.sum())
+    ending = f", {clipped} clipped" if clipped else ""
+    return f"Channels: {channels.values.size}, largest {abs(channels.values).max():.4g} {channels.unit}{ending}"
 
 
 NET = "Net is the vector sum of normals and shear: what points in different directions cancels in part."
@@ -239,4 +261,27 @@ def _measured(readings, unit: str) -> list[tuple[str, str]]:
     return list(zip(names, values, strict=True))
 
 
-SUBPANELS = (Region, Skins, Contact, Friction, Readout)
+class Magnet(Subpanel):
+    """What this empty is in a magnetic skin"""
+
+    name = "magnet"
+    parent = None
+    bl_label = "Palpate Magnet"
+    bl_options = set()
+    split = False
+
+    @classmethod
+    def poll(cls, context):
+        return context.object is not None and context.object.type == "EMPTY"
+
+    def draw_part(self, layout, settings, _context):
+        own = settings.magnetic
+        draw_named(layout, own, "part")
+        if own.part == "MAGNET":
+            layout.prop(own, "moment")
+        elif own.part == "MAGNETOMETER":
+            layout.prop(own, "full_scale")
+            layout.column().prop(own, "offset")
+
+
+SUBPANELS = (Region, Skins, Contact, Friction, Readout, Magnet)

@@ -11,6 +11,7 @@ import numpy as np
 from ..core.errors import ParameterError
 from ..core.geometry.mesh import TriangleMesh
 from ..core.geometry.shapes import Shape, box, capsule, plane, sphere
+from ..core.simulators.environment_parameters import Columns
 from ..core.simulators.sensor_on_mesh import SensorOnMesh
 from ..core.simulators.warp.engine import require_warp
 from ..core.simulators.warp.warp_sensors import WarpSensors
@@ -61,6 +62,8 @@ class TouchSensorCfg(SensorCfg):
         forces of theirs are overwritten.
     single : bool
         Compute in float32. MuJoCo Warp's poses are float32 in any case.
+    parameters : mapping of str to (E,) float, optional
+        In which the sensors of environments differ, as ``{"k": …, "mus": …}``.
     """
 
     sensor: SensorOnMesh | None = None
@@ -68,6 +71,7 @@ class TouchSensorCfg(SensorCfg):
     geoms: tuple[str, ...] = field(default_factory=tuple)
     apply: bool = True
     single: bool = False
+    parameters: Columns | None = None
 
     def build(self) -> TouchSensor:
         """Return the sensor."""
@@ -99,7 +103,8 @@ class TouchSensor(Sensor[TouchData]):
         targets = [_shape(mj_model, geom) for geom in geoms]
         assert self.cfg.sensor is not None
         step, worlds = float(mj_model.opt.timestep), int(data.nworld)
-        self._sensors = WarpSensors(self.cfg.sensor, targets, step, worlds, str(wp.get_device(device)), self.cfg.single)
+        options = str(wp.get_device(device)), self.cfg.single, self.cfg.parameters
+        self._sensors = WarpSensors(self.cfg.sensor, targets, step, worlds, *options)
         self._data, self._body, self._step = getattr(data, "struct", data), body, step
         self._geoms = wp.array(geoms, dtype=int, device=device)
         self._bodies = wp.array([int(mj_model.geom_bodyid[geom]) for geom in geoms], dtype=int, device=device)

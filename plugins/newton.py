@@ -13,6 +13,8 @@ import numpy as np
 from ..core.errors import ParameterError
 from ..core.geometry.mesh import TriangleMesh
 from ..core.geometry.shapes import Shape, box, capsule, plane, sphere
+from ..core.simulators.contact_translation import NewtonContact
+from ..core.simulators.environment_parameters import Columns
 from ..core.simulators.sensor_on_mesh import SensorOnMesh
 from ..core.simulators.warp.warp_sensors import WarpSensors
 from .engines import require_engine
@@ -41,6 +43,8 @@ class SensorTouch:
         Let :meth:`update` add the wrench on the object in contact, and its opposite on the sensor, to ``state.body_f``.
     single : bool
         Compute in float32. Newton's poses are float32 in any case.
+    parameters : mapping of str to (rows,) float, optional
+        In which the sensors of rows differ, as ``{"k": …, "mus": …}``.
 
     Raises
     ------
@@ -68,6 +72,7 @@ class SensorTouch:
         counterpart_shapes: Labels,
         apply: bool = True,
         single: bool = False,
+        parameters: Columns | None = None,
     ):
         newton = require_engine("newton", "newton", (1, 8))
         self._model, self._apply = model, apply
@@ -84,7 +89,7 @@ class SensorTouch:
                     f"The counterparts of shape '{model.shape_label[row]}' differ from those in the first world: "
                     "let counterpart_shapes name as many shapes, of equal sizes, in every world."
                 )
-        self._sensors = WarpSensors(sensor, targets[0], dt, len(targets), str(model.device), single)
+        self._sensors = WarpSensors(sensor, targets[0], dt, len(targets), str(model.device), single, parameters)
         self.texels, self.readings, self.contact = self._sensors.texels, self._sensors.readings, self._sensors.contact
         self.wrench, self.too_deep, self.valid = self._sensors.wrench, self._sensors.too_deep, self._sensors.valid
         import warp
@@ -123,6 +128,39 @@ class SensorTouch:
     def reset(self, mask: Any = None) -> None:
         """Let rows begin again with their next update (see :meth:`.WarpSensors.reset`)."""
         self._sensors.reset(mask)
+
+
+def pressure_law(model: Any, contact: NewtonContact, sensing_shapes: Labels) -> tuple[Any, Any]:
+    """Return ``pressure_func`` and ``pressure_data`` for ``newton.geometry.HydroelasticSDF.Config``.
+
+    Newton's own contact then carries the object with the pressure of a sensor. Other shapes keep their `kh`, and should be much
+    stiffer.
+
+    Parameters
+    ----------
+    model : newton.Model
+    contact : NewtonContact
+        As ``palpate.newton_contact`` returns it.
+    sensing_shapes : str, list of str, re.Pattern or list of int
+        Shapes with this pressure, by label or index.
+
+    Raises
+    ------
+    PalpateError
+        Newton is missing or too old, or a label names no shape.
+    """
+    require_engine("newton", "newton", (1, 8))
+    import warp
+
+    from .newton_pressure import PressureData, sensor_pressure
+
+    is_sensor = np.zeros(len(model.shape_label), np.int32)
+    is_sensor[_matches(model, sensing_shapes, "sensing_shapes")] = 1
+    data = PressureData()
+    data.pressure, data.step = warp.array(contact.pressure, dtype=float, device=model.device), contact.step
+    data.is_sensor = warp.array(is_sensor, dtype=int, device=model.device)
+    data.stiffness = model.shape_material_kh
+    return sensor_pressure, data
 
 
 def _matches(model: Any, wanted: Labels, name: str) -> list[int]:

@@ -15,7 +15,7 @@ from ..core.io.temporary_folder import remove_unfinished, temporary_folder
 from ..core.study.run_files import STUDY_NAME
 from ..core.study.study_file import Run, read_study
 from .exchange import exchange_folder, require_own
-from .finished_runs import StoredRuns, failures, run_order, study_name
+from .finished_runs import RunOrder, StoredRuns, failures, run_order, study_name
 from .lerobot_writer import LeRobotWriter
 from .run_table import write_run_table
 
@@ -72,7 +72,7 @@ def require_pyarrow() -> None:
         ) from error
 
 
-def _write_parts(folder: Path, order: list[tuple[int, str]], hidden: Path) -> Path | None:
+def _write_parts(folder: Path, order: RunOrder, hidden: Path) -> Path | None:
     """Write all runs and return the folder that is to become the dataset; None if there are no runs."""
     task = study_name(folder)
     parts = hidden / "parts"

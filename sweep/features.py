@@ -7,6 +7,7 @@ other gives lists in the order of its texels, whose places are in ``meta/texels.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -242,9 +243,10 @@ def _frames(
     first = next(iter(sensors.values())).recording
     features: list[Feature] = []
     columns = {TIMESTAMP.name: (first.times - first.times[0]).astype(TIMESTAMP.dtype)}
-    for feature, values in _all_features(first, sensors, style):
-        features.append(feature)
-        columns[feature.name] = _narrowed(too_large, feature, values)
+    with np.errstate(over="ignore"):  # what is too large is looked for where all is narrow
+        for feature, values in _all_features(first, sensors, style):
+            features.append(feature)
+            columns[feature.name] = _narrowed(too_large, feature, values)
     features += [_varied_feature(name, value) for name, value in varied.items()]
     fps = _frame_rate(first.times)
     texels = {name: sensor.texels for name, sensor in sensors.items()}
@@ -288,10 +290,11 @@ def _frame_rate(times: np.ndarray) -> float:
 
 def _narrowed(too_large: str, feature: Feature, values: np.ndarray) -> np.ndarray:
     """Return the values in the type that the dataset stores."""
-    if feature.dtype in ("float32", "float16") and not (np.abs(values) <= np.finfo(feature.dtype).max).all():
+    narrow = np.ascontiguousarray(values, dtype=feature.dtype)
+    if feature.dtype != "bool" and narrow.size and not np.isfinite((narrow.min(), narrow.max())).all():
         bits = feature.dtype.removeprefix("float")
         raise FileError(f"A number of '{feature.name}' has no place in {bits} bits, {too_large}")
-    return np.ascontiguousarray(values, dtype=feature.dtype)
+    return narrow
 
 
 def _all_features(
@@ -338,26 +341,33 @@ def _texel_features(name: str, sensor: SensorRun, style: FrameStyle) -> Iterator
     shape: tuple[int, ...] = (len(texels),) if layout is None else layout.shape
     names = ("row", "column") if len(shape) == 2 else ("texel",)
 
-    def placed(values: np.ndarray) -> np.ndarray:
-        if layout is None:
-            return values
-        picture = np.zeros((len(values), *shape, *values.shape[2:]), values.dtype)
-        picture[:, layout.row, layout.column] = values
-        return picture
+    def placed(dtype: str, *channels: np.ndarray) -> np.ndarray:
+        """Return numbers of the texels, (F, n) each, where the dataset has them: one number, or a list of them, per place."""
+        picture = np.zeros((len(channels[0]), math.prod(shape), len(channels)), dtype)
+        places = slice(None) if layout is None else _places(layout)
+        for number, values in enumerate(channels):
+            picture[:, places, number] = values
+        return picture.reshape(-1, *shape, *(len(channels),) * (len(channels) > 1))
 
-    force = np.concatenate([arrays.normal_force[:, :, None], arrays.shear], axis=2)
     error = f" {HALF_ERROR}" if style.dtype == "float16" else ""
     about = f"Forces on the texels: along the normal, and shear along the texel's x and y axes.{error}"
     image = Feature(tactile_name(name), style.dtype, (*shape, 3), (*names, "channel"), "N", about, CHANNELS)
-    yield image, placed(force)
+    yield image, placed(style.dtype, arrays.normal_force, arrays.shear[:, :, 0], arrays.shear[:, :, 1])
     about = f"Readings of the texels, in the sensor's unit.{error}"
-    yield Feature(f"observation.reading.{name}", style.dtype, shape, names, sensor.unit, about), placed(arrays.reading)
-    touch = placed(np.asarray(arrays.contact, bool))
+    readings = placed(style.dtype, arrays.reading)
+    yield Feature(f"observation.reading.{name}", style.dtype, shape, names, sensor.unit, about), readings
+    touch = placed("bool", arrays.contact)
     yield Feature(f"contact.touch.{name}", "bool", shape, names, "1", "Which texels touch something."), touch
     if sensor.parameters is not None:
-        slips = placed(metrics.slipping(arrays, sensor.parameters, sensor.painted))
+        slips = placed("bool", metrics.slipping(arrays, sensor.parameters, sensor.painted))
         about = "Which texels touch, move, and are at the limit of friction."
         yield Feature(f"contact.slip.{name}", "bool", shape, names, "1", about), slips
+
+
+def _places(layout: GridLayout) -> slice | np.ndarray:
+    """Return where the texels are among the pixels, row by row; a slice where each pixel is the texel of its number."""
+    places = layout.row * layout.columns + layout.column
+    return slice(None) if np.array_equal(places, np.arange(layout.rows * layout.columns)) else places
 
 
 def _net_features(name: str, arrays: SensorRecording) -> Iterator[tuple[Feature, np.ndarray]]:

@@ -7,17 +7,22 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from ..core.errors import FileError, os_error_reason
 from ..core.io.regular_file import read_bytes
 from ..core.model.shared_results import SharedResults
-from ..core.study.run_files import FAILED, RUNS, STUDY_NAME, done_runs, failed_runs
+from ..core.study.run_files import FAILED, RUNS, STUDY_NAME, done_runs, failed_runs, run_folders
 from ..core.study.run_record import RunRecord, Value, read_run_record, values_read
-from ..core.study.run_shards import ShardIndex, damaged
+from ..core.study.run_shards import ShardIndex, damaged, names_of
 from ..core.study.study_file import Run, read_study
 from .encoded_run import EncodedRun, encode_run, record_of, unpack_layout, unpack_run
 from .features import FrameStyle, Layout, read_frames
 
+RUNS_AT_ONCE = 10_000
+"""Planned runs that are looked up together."""
 UNNAMED_STUDY = "study of a tactile sensor"
 """Name of a study whose file gives none. The name of its folder does not serve, so that equal studies give equal files."""
 
@@ -47,7 +52,8 @@ class StoredRuns:
         self._layouts: dict[str, Layout] = {}
 
     @cached_property
-    def _shards(self) -> ShardIndex:
+    def shards(self) -> ShardIndex:
+        """Where the runs in shards are."""
         return ShardIndex(self._runs)
 
     @cached_property
@@ -57,7 +63,7 @@ class StoredRuns:
     @property
     def bytes_in_shards(self) -> int:
         """Bytes of the runs in shards."""
-        return self._shards.size
+        return self.shards.size
 
     def record(self, digest: str) -> RunRecord:
         """Return the numbers of a run.
@@ -67,11 +73,11 @@ class StoredRuns:
         FileError
             It is missing or damaged.
         """
-        if digest not in self._shards:
+        if digest not in self.shards:
             return read_run_record(self._runs / digest)
-        path = self._shards.path(digest)
+        path = self.shards.path(digest)
         try:
-            return record_of(lambda most: self._shards.start(digest, most), path)
+            return record_of(lambda most: self.shards.start(digest, most), path)
         except (ValueError, LookupError, TypeError) as error:
             raise damaged(path) from error
 
@@ -83,11 +89,11 @@ class StoredRuns:
         FileError
             It is missing or damaged, or has no sensor.
         """
-        if digest not in self._shards:
+        if digest not in self.shards:
             record = self.record(digest)
             return record, encode_run(read_frames(record, self._shared, self._style))
-        path = self._shards.path(digest)
-        content = self._shards.read(digest)
+        path = self.shards.path(digest)
+        content = self.shards.read(digest)
         try:
             return unpack_run(content, path, self._layout)
         except (ValueError, LookupError, TypeError) as error:
@@ -95,14 +101,33 @@ class StoredRuns:
 
     def _layout(self, name: str) -> Layout:
         if name not in self._layouts:
-            self._layouts[name] = unpack_layout(self._shards.common(name))
+            self._layouts[name] = unpack_layout(self.shards.common(name))
         return self._layouts[name]
 
 
-def run_order(folder: Path, planned: Sequence[Run] = ()) -> list[tuple[int, str]]:
-    """Return index and digest of each finished run, in the order of the design, whatever the order of finishing.
+class RunOrder(Sequence[tuple[int, str]]):
+    """Index and digest of finished runs, in the order of the design: of a study, this is all in memory, in 20 bytes a run.
 
-    This is all of a study that is in memory at once.
+    Parameters
+    ----------
+    indices : (n,) int
+    names : (n, 12) uint8
+        Digests as bytes.
+    """
+
+    def __init__(self, indices: np.ndarray, names: np.ndarray):
+        by_name = np.lexsort((*names.T[::-1], indices))
+        self._indices, self._names = indices[by_name], names[by_name]
+
+    def __len__(self) -> int:
+        return len(self._indices)
+
+    def __getitem__(self, at: Any) -> Any:
+        return int(self._indices[at]), self._names[at].tobytes().hex()
+
+
+def run_order(folder: Path, planned: Sequence[Run] = ()) -> RunOrder:
+    """Return index and digest of each finished run, in the order of the design, whatever the order of finishing.
 
     Parameters
     ----------
@@ -118,21 +143,35 @@ def run_order(folder: Path, planned: Sequence[Run] = ()) -> list[tuple[int, str]
     """
     if not (folder / STUDY_NAME).is_file():
         raise FileError(f"'{folder}' holds no study: give the folder that `palpate sweep` wrote.")
-    done = done_runs(folder)
-    order = [(run.index, run.digest) for run in planned if run.digest in done]
-    known = {digest for _, digest in order}
     runs = StoredRuns(folder)
-    return sorted(order + [(runs.record(digest).index, digest) for digest in done - known])
+    left, unplanned = run_folders(folder), np.ones(len(runs.shards), bool)
+    indices, names = [np.zeros(0, np.int64)], [np.zeros((0, 12), np.uint8)]
+    for at in range(0, len(planned), RUNS_AT_ONCE):
+        some = planned[at : at + RUNS_AT_ONCE]
+        own = names_of([run.digest for run in some])
+        rows = runs.shards.rows(own)
+        unplanned[rows[rows >= 0]] = False
+        in_folder = {run.digest for run in some} & left
+        left -= in_folder
+        done = (rows >= 0) | np.array([run.digest in in_folder for run in some], bool)
+        indices.append(np.array([run.index for run in some], np.int64)[done])
+        names.append(own[done])
+    others = [*sorted(left), *(own.tobytes().hex() for own in runs.shards.names(np.flatnonzero(unplanned)))]
+    if others:
+        others = list(dict.fromkeys(others))  # a run may be in two shards, or have a folder as well
+        indices.append(np.array([runs.record(digest).index for digest in others], np.int64))
+        names.append(names_of(others))
+    return RunOrder(np.concatenate(indices), np.concatenate(names))
 
 
-def finished_runs(folder: Path, order: list[tuple[int, str]] | None = None) -> Iterator[RunRecord]:
+def finished_runs(folder: Path, order: RunOrder | None = None) -> Iterator[RunRecord]:
     """Yield the finished runs in the order of the design.
 
     Parameters
     ----------
     folder : Path
         Of the study.
-    order : list, optional
+    order : RunOrder, optional
         What :func:`run_order` returned, to read the same runs again though more may have finished.
 
     Raises
@@ -160,7 +199,9 @@ def failures(folder: Path, planned: Sequence[Run] = ()) -> list[FailedRun]:
     FileError
         A file cannot be read.
     """
-    digests = failed_runs(folder) - done_runs(folder)
+    digests = failed_runs(folder)
+    if digests:
+        digests -= done_runs(folder)
     known = {run.digest: run for run in planned if run.digest in digests}
     found = []
     for digest in sorted(digests):

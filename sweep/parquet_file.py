@@ -113,7 +113,7 @@ class ParquetFile:
             parquet.ParquetWriter(empty, schema).close()
             self._footer = footer_of(empty.getvalue())
         self._path, self._names = path, schema.names
-        self._groups: list[thrift.Struct] = []
+        self._groups: list[bytes] = []  # what the footer says of them, a tenth of what it takes as dictionaries
         self._rows = 0
         self._file = open(path, "wb")  # noqa: SIM115 -- it stays open until the file is full
         self._file.write(MAGIC)
@@ -137,7 +137,7 @@ class ParquetFile:
             6: (thrift.I64, self.size - start),
             7: (thrift.I16, len(self._groups)),
         }
-        self._groups.append(group)
+        self._groups.append(thrift.write_struct(group))
         self._rows += rows
 
     def close(self) -> None:

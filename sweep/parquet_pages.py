@@ -119,7 +119,11 @@ def _numbers(feature: Feature, values: np.ndarray) -> bytes:
         return np.packbits(values.reshape(-1), bitorder="little").tobytes()
     own = np.ascontiguousarray(values, np.dtype(feature.dtype).newbyteorder("<"))
     if encoding_of(feature) == BYTE_STREAM_SPLIT:
-        return own.reshape(-1).view(np.uint8).reshape(-1, own.itemsize).T.tobytes()
+        words = own.reshape(-1).view("<u4")
+        streams = np.empty((own.itemsize, len(words)), np.uint8)
+        for place in range(own.itemsize):  # in vector registers, unlike the transposition of bytes
+            streams[place] = words >> np.uint32(8 * place)
+        return streams.tobytes()
     return own.tobytes()
 
 
@@ -136,7 +140,10 @@ def _unpacked(feature: Feature, size: int, count: int, body: memoryview) -> np.n
     kind = np.dtype(feature.dtype).newbyteorder("<")
     if encoding_of(feature) == BYTE_STREAM_SPLIT:
         streams = np.frombuffer(content, np.uint8, offset=start).reshape(kind.itemsize, count)
-        return np.ascontiguousarray(streams.T).view(kind).reshape(-1)
+        numbers = np.empty((count, kind.itemsize), np.uint8)
+        for place in range(kind.itemsize):
+            numbers[:, place] = streams[place]
+        return numbers.view(kind).reshape(-1)
     return np.frombuffer(content, kind, offset=start)
 
 
@@ -163,31 +170,30 @@ def _levels(rows: int, shape: tuple[int, ...]) -> bytes:
 
     Every list and every number counts as optional, as Arrow has them.
     """
-    count = rows * math.prod(shape)
     parts = []
     if shape:
-        places = np.arange(count)
-        repetition = np.full(count, len(shape), np.uint8)
-        inner = 1
-        for depth in range(len(shape) - 1, -1, -1):
-            inner *= shape[depth]
-            repetition[places % inner == 0] = depth
-        parts.append(_sized(_bit_packed(repetition, len(shape).bit_length())))
-    parts.append(_sized(_run_length(2 * len(shape) + 1, count)))
+        whole = _repetition_bits(8, shape) * (rows // 8) + _repetition_bits(rows % 8, shape)  # eight rows end with a byte
+        groups = -(-rows * math.prod(shape) // 8)
+        parts.append(_sized(thrift.size_bytes(groups << 1 | 1) + whole.ljust(groups * len(shape).bit_length(), b"\0")))
+    parts.append(_sized(_run_length(2 * len(shape) + 1, rows * math.prod(shape))))
     return b"".join(parts)
+
+
+@lru_cache(maxsize=64)
+def _repetition_bits(rows: int, shape: tuple[int, ...]) -> bytes:
+    """Return how deep the list is that goes on at each number, bit by bit, the lowest first."""
+    places = np.arange(rows * math.prod(shape))
+    repetition = np.full(len(places), len(shape), np.uint8)
+    inner = 1
+    for depth in range(len(shape) - 1, -1, -1):
+        inner *= shape[depth]
+        repetition[places % inner == 0] = depth
+    bits = np.unpackbits(repetition[:, None], axis=1, count=len(shape).bit_length(), bitorder="little")
+    return np.packbits(bits.reshape(-1), bitorder="little").tobytes()
 
 
 def _sized(content: bytes) -> bytes:
     return struct.pack("<I", len(content)) + content
-
-
-def _bit_packed(values: np.ndarray, width: int) -> bytes:
-    """Return small numbers in a run that packs their bits, in groups of eight."""
-    groups = -(-len(values) // 8)
-    padded = np.zeros(8 * groups, np.uint8)
-    padded[: len(values)] = values
-    bits = np.unpackbits(padded[:, None], axis=1, count=width, bitorder="little")
-    return thrift.size_bytes(groups << 1 | 1) + np.packbits(bits.reshape(-1), bitorder="little").tobytes()
 
 
 def _run_length(value: int, count: int) -> bytes:

@@ -20,7 +20,7 @@ from ..core.io.temporary_folder import temporary_folder
 from ..core.study.study_file import Run
 from .dependencies import LEAST_RUNS, RUNS_PER_NAME, Dependency, dependencies
 from .features import by_texel, net_force_name, tactile_name
-from .finished_runs import FailedRun, StoredRuns, failures, finished_runs, run_order, study_name
+from .finished_runs import FailedRun, RunOrder, StoredRuns, failures, finished_runs, run_order, study_name
 from .report_figures import MOST_METRICS, MOST_NAMES, MOST_PARAMETERS, RunImage, draw_image_sheet, draw_small_multiples
 
 REPORT_NAME = "report.html"
@@ -88,7 +88,7 @@ def write_report(folder: Path, planned: Sequence[Run] = ()) -> None:
             temporary.write_text(page, encoding="utf-8")
 
 
-def _columns(folder: Path, order: list[tuple[int, str]]) -> StudyColumns:
+def _columns(folder: Path, order: RunOrder) -> StudyColumns:
     values: dict[str, list[Any]] = {}
     metrics: dict[str, np.ndarray] = {}
     seconds = 0.0
@@ -105,9 +105,7 @@ def _columns(folder: Path, order: list[tuple[int, str]]) -> StudyColumns:
     return StudyColumns(values, metrics, seconds)
 
 
-def _draw(
-    hidden: Path, folder: Path, order: list[tuple[int, str]], columns: StudyColumns, found: list[Dependency]
-) -> list[Path]:
+def _draw(hidden: Path, folder: Path, order: RunOrder, columns: StudyColumns, found: list[Dependency]) -> list[Path]:
     """Draw the pictures that the study has something for, and return their files."""
     drawn = []
     parameters, metrics = _most_dependent(columns, found)
@@ -139,7 +137,7 @@ def _has_few_names(values: list[Any]) -> bool:
     return len(known) <= MOST_NAMES or not any(isinstance(value, str) for value in known)
 
 
-def _images(folder: Path, order: list[tuple[int, str]]) -> list[RunImage]:
+def _images(folder: Path, order: RunOrder) -> list[RunImage]:
     """Return images of the first sensor of runs that are spread evenly over the design."""
     chosen = np.unique(np.linspace(0, len(order) - 1, min(len(order), MOST_IMAGES)).round().astype(int))
     images = []
@@ -242,7 +240,7 @@ def _digits(number: float) -> str:
     return f"{number:.4g}".replace("-", "−")
 
 
-def _failed_rows(folder: Path, order: list[tuple[int, str]], columns: StudyColumns, failed: list[FailedRun]) -> list[list[str]]:
+def _failed_rows(folder: Path, order: RunOrder, columns: StudyColumns, failed: list[FailedRun]) -> list[list[str]]:
     """Return how failing depends on each parameter, as far as it is known which runs failed."""
     known = [run for run in failed if run.values]
     if not known or not columns.values:

@@ -2,7 +2,7 @@
 """The compact protocol of Apache Thrift, in which Parquet writes the headers of its pages and the footer of its files.
 
 A structure is a dictionary from the number of a field to its type and value. A list is the type of its elements and a Python
-list. What is read and written again gives the same bytes.
+list. What is read and written again gives the same bytes. A structure that is written may also be given as its bytes.
 
 Source: ``doc/specs/thrift-compact-protocol.md`` of Apache Thrift.
 """
@@ -95,7 +95,7 @@ def _value(kind: int, value: Any) -> bytes:
         start = bytes((count << 4 | inner,)) if count < 15 else bytes((0xF0 | inner,)) + size_bytes(count)
         return start + b"".join(_value(inner, element) for element in elements)
     if kind == STRUCT:
-        return write_struct(value)
+        return value if isinstance(value, bytes) else write_struct(value)
     raise ValueError(f"the type {kind} is not used by Parquet")
 
 

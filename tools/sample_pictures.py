@@ -21,6 +21,14 @@ COMMAND = [sys.executable, "-m", "palpate.commands"]
 SIZE = (960, 720)
 QUALITY = 88
 """Of JPEG files."""
+FRONT = (
+    ("hand", 45, (-138, 22), (960, 720), (0, 0, 960, 720)),
+    ("grasp_bottle", 43, (-50, 18), (1280, 960), (313, 180, 913, 900)),
+)
+"""Pictures of the front page: sample, frame, azimuth and elevation of the camera in degrees, size of the render, and the part
+that is shown (left, top, right, bottom)."""
+FRONT_RANGE, FRONT_HEIGHT, FRONT_DPI = 0.2, 720, 150
+"""End of their colour scale, N; height of them, pixels; dots per inch of the words below."""
 PICK_FRAMES = (30, 60, 90, 130)
 """Before the touch, held, lifted and about to be let go, in the sample of pick and place."""
 
@@ -30,10 +38,15 @@ def palpate(*words: object) -> None:
     subprocess.run([*COMMAND, *map(str, words)], check=True)
 
 
-def baked(name: str, folder: Path) -> Path:
-    """Bake a sample into a folder; return its .blend."""
-    scene = folder / f"{name}.blend"
-    palpate("bake", ROOT / "sample_blends" / f"{name}.blend", "--save-as", scene, "--out", folder / name)
+def baked(name: str, folder: Path, **settings: object) -> Path:
+    """Bake a sample into a folder, with other settings of Palpate's in its scene; return its .blend."""
+    scene, source = folder / f"{name}.blend", ROOT / "sample_blends" / f"{name}.blend"
+    if settings:
+        code = f"import bpy, palpate; palpate.register(); bpy.ops.wm.open_mainfile(filepath={str(source)!r}); "
+        code += "".join(f"bpy.context.scene.palpate.{key} = {value!r}; " for key, value in settings.items())
+        source = folder / f"{name}-set.blend"
+        subprocess.run([sys.executable, "-c", f"{code}bpy.ops.wm.save_as_mainfile(filepath={str(source)!r})"], check=True)
+    palpate("bake", source, "--save-as", scene, "--out", folder / name)
     return scene
 
 
@@ -58,9 +71,7 @@ def page_of_pictures(sample: str, name: str, overlays: tuple[str, ...] = ()) -> 
     def make(folder: Path) -> None:
         from PIL import Image
 
-        scene = baked(sample, folder)
-        if overlays:
-            add_overlays(scene, overlays)
+        scene = baked(sample, folder, overlays=set(overlays)) if overlays else baked(sample, folder)
         out = rendered(scene, "--size", *SIZE)
         save_jpeg(Image.open(next(out.glob("scene_and_touch_*.png"))), f"overlays-{name}.jpg")
         for kind in ("strip", "curves"):
@@ -68,14 +79,6 @@ def page_of_pictures(sample: str, name: str, overlays: tuple[str, ...] = ()) -> 
         shrink(sorted(out.glob("numbers_*.png"))[0], f"numbers-{name}.png")
 
     return make
-
-
-def add_overlays(scene: Path, overlays: tuple[str, ...]) -> None:
-    """Bake a scene again with other arrows on its sensors."""
-    code = f"import bpy, palpate; palpate.register(); bpy.ops.wm.open_mainfile(filepath={str(scene)!r}); "
-    code += f"bpy.context.scene.palpate.overlays = set({overlays!r}); bpy.ops.wm.save_mainfile()"
-    subprocess.run([sys.executable, "-c", code], check=True)
-    palpate("bake", scene, "--save")
 
 
 def shrink(file: Path, name: str, share: float = 0.5) -> None:
@@ -87,16 +90,45 @@ def shrink(file: Path, name: str, share: float = 0.5) -> None:
         figure.convert("RGB").resize(size, Image.Resampling.LANCZOS).save(IMAGES / name, optimize=True)
 
 
+def front(folder: Path) -> None:
+    """A hand and a gripper that hold something, with one colour bar, at the top of the README."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from PIL import Image
+
+    from palpate.core.figures.figure_canvas import new_figure, save_figure
+    from palpate.core.figures.figure_style import FigureStyle
+    from palpate.core.figures.tactile_image import draw_colour_bar
+
+    style = FigureStyle("VIRIDIS", limit=FRONT_RANGE)
+    scale = {"color_map": style.colour_map, "use_auto_range": False, "range_max": FRONT_RANGE}
+    width = sum(right - left for *_, (left, _, right, _) in FRONT)
+    figure, x = new_figure(width / FRONT_DPI, (FRONT_HEIGHT + 90) / FRONT_DPI), 0.0
+    figure.set_facecolor("#f3f3f3")
+    low = 90 / (FRONT_HEIGHT + 90)
+    for sample, frame, view, size, box in FRONT:
+        scene = baked(sample, folder, **scale)
+        out = rendered(scene, "--only", "scene", "--frame", frame, "--size", *size, "--view", *view)
+        picture = Image.open(out / f"scene_{frame:04d}.png").convert("RGB").crop(box)
+        axes = figure.add_axes((x, low, picture.width / width, 1.0 - low))
+        axes.imshow(picture, aspect="auto", interpolation="antialiased")
+        axes.set_axis_off()
+        x += picture.width / width
+    scale_of = ScalarMappable(Normalize(0.0, FRONT_RANGE), style.matplotlib_colormap())
+    draw_colour_bar(figure, scale_of, figure.add_axes((0.32, 0.72 * low, 0.36, 0.2 * low)), style)
+    save_figure(figure, folder / "front.png", FRONT_DPI)
+    save_jpeg(Image.open(folder / "front.png"), "front.jpg")
+
+
 def demo(folder: Path) -> None:
-    """The picture, the tactile images and the forces of the demo, at the top of the README."""
+    """The picture of the demo in the README, and its forces."""
     from PIL import Image
 
     palpate("demo", "--out", folder / "demo", "--size", 1280, 720)
     save_jpeg(Image.open(folder / "demo" / "scene.png"), "demo.jpg", 1280)
-    for source, name in (("tactile-strip", "tactile-strip"), ("forces", "forces")):
-        with Image.open(folder / "demo" / f"{source}.png") as figure:
-            size = 1440, round(figure.height * 1440 / figure.width)
-            figure.convert("RGB").resize(size, Image.Resampling.LANCZOS).save(IMAGES / f"{name}.png", optimize=True)
+    with Image.open(folder / "demo" / "forces.png") as figure:
+        size = 1440, round(figure.height * 1440 / figure.width)
+        figure.convert("RGB").resize(size, Image.Resampling.LANCZOS).save(IMAGES / "forces.png", optimize=True)
 
 
 def hand(folder: Path) -> None:
@@ -122,6 +154,7 @@ def pick_and_place(folder: Path) -> None:
 
 
 PICTURES: dict[str, Callable[[Path], None]] = {
+    "front": front,
     "demo": demo,
     "pads": page_of_pictures("demo", "pads"),
     "fingertip": page_of_pictures("fingertip", "fingertip", ("FORCE", "SHEARS")),

@@ -8,6 +8,7 @@ Operators call these functions. Texels can be laid onto another object's surface
 __all__ = [
     "exchange",
     "laid_sensors",
+    "magnetic_skins",
     "probes",
     "problems",
     "sensor_exchange",

@@ -15,6 +15,7 @@ from ...core.jobs.job_runner import part_of_job
 from ...core.jobs.progress import Job, Progress
 from ...core.model.recording import Recording
 from ...core.model.scenario import Scenario
+from ...core.skins.channel_readouts import with_clipping_warnings
 from ..display import texel_arrows
 from ..scene import scene_fingerprint, scene_reader
 from ..scene.scene_reading import SceneReading
@@ -175,7 +176,7 @@ def _solve(name: str, simulation, reading: SceneReading, files: bake_files.BakeF
     job = first_use.load_solver().solve_frames(simulation, files.write_frame, done)
     yield from part_of_job(job, save_checkpoint)
     reading.objects(_scene_called(name))
-    return files.recording(simulation, (*reading.warnings, *simulation.warnings))
+    return with_clipping_warnings(files.recording(simulation, (*reading.warnings, *simulation.warnings)))
 
 
 def _owner(scene, into_scene: bool, blend: bake_files.BlendToSave | None) -> BakeOwner:

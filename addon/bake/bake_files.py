@@ -93,8 +93,14 @@ def check_space(folder: Path, scenario: Scenario, images: bool = True) -> None:
     if not any((folder / PRIVATE_FOLDER).glob("growing-*")):
         read_out = [sensor for sensor in scenario.sensors if sensor.readout]
         texels = [len(sensor.texels) for sensor in read_out]
-        pixels = [math.prod(sensor.texels.layout.shape) for sensor in read_out] if images else []
-        require_space(folder, bake_bytes(len(scenario.frames), len(scenario.bodies), texels, pixels), "The bake")
+        shapes = [(0, 0, 0) if one.channels is None else one.channels.no_frames().values.shape for one in read_out]
+        pixels = [math.prod(one.texels.layout.shape) * (7 + own[2]) // 7 for one, own in zip(read_out, shapes, strict=True)]
+        channels = [count * each for _, count, each in shapes]
+        require_space(
+            folder,
+            bake_bytes(len(scenario.frames), len(scenario.bodies), texels, pixels if images else [], channels),
+            "The bake",
+        )
 
 
 @dataclass(frozen=True)
@@ -325,7 +331,8 @@ class BakeFiles:
         self._checkpoint = BakeCheckpoint(growing, self._digest)
         texels = {name: len(sensor.texels) for name, sensor in self._sensors.items()}
         bodies = [body.name for body in self._scenario.bodies]
-        self._rows = FrameRows(growing / CHECKPOINT_FOLDER / FRAMES_FILE, bodies, texels)
+        channels = {name: own.channels.no_frames() for name, own in self._sensors.items() if own.channels is not None}
+        self._rows = FrameRows(growing / CHECKPOINT_FOLDER / FRAMES_FILE, bodies, texels, channels)
         if self._has_images:
             folders = {name: self._new_folder(name) for name in self._sensors}
             self._images = BakeImages(self._sensors, folders, self._digest, self._writer)

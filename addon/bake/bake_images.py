@@ -17,7 +17,7 @@ from ...core.io.bake_folder import IMAGE_LIST_NAME, frame_file
 from ...core.io.checksum_list import checksum_line, read_checksums
 from ...core.io.file_writing import file_sha256
 from ...core.io.growing_file import GrowingFile
-from ...core.io.tactile_exr import describe, write_exrs
+from ...core.io.tactile_exr import describe, nearest_places, write_exrs
 from ...core.model.recording import Frame
 from ...core.model.sensor import Sensor
 from .background_writer import BackgroundWriter
@@ -47,6 +47,10 @@ class BakeImages:
         self._sensors, self._folders = dict(sensors), dict(folders)
         self._digest, self._writer = digest, writer
         self._lists = {name: GrowingFile(folder / IMAGE_LIST_NAME) for name, folder in folders.items()}
+        self._nearest = {
+            name: nearest_places(sensor.texels, sensor.channels and sensor.channels.no_frames())
+            for name, sensor in self._sensors.items()
+        }
         self._unwritten: list[Frame] = []
         self._new_files: list[Path] = []
         pixels = max((math.prod(sensor.texels.layout.shape) for sensor in self._sensors.values()), default=1)
@@ -126,7 +130,8 @@ class BakeImages:
     def _write(self, name: str, frames: list[Frame]) -> None:
         sensor, paths = self._sensors[name], [self._folders[name] / frame_file(frame.frame) for frame in frames]
         headers = [describe(sensor, frame, self._digest) for frame in frames]
-        write_exrs(paths, sensor.texels.layout, [frame.sensors[sensor.name] for frame in frames], headers)
+        own = [frame.sensors[sensor.name] for frame in frames]
+        write_exrs(paths, sensor.texels.layout, own, headers, self._nearest[name])
         self._new_files += paths
 
     def _list(self, name: str, files: list[str]) -> None:

@@ -37,7 +37,8 @@ def clear_scene(scene) -> None:
     for obj in baked_objects(scene):
         clear_object(scene, obj)
     remove_orphans()
-    scene.palpate.baked_digest = scene.palpate.baked_id = scene.palpate.baked_names = ""
+    settings = scene.palpate
+    settings.baked_digest = settings.baked_id = settings.baked_names = settings.unchanged_note = ""
 
 
 def clear_copies(scene) -> None:

@@ -11,7 +11,7 @@ from ..display import overlays
 from ..properties import migrations
 from ..scene import participants
 from ..session import first_use, identity, session_state
-from ..timeline import playback, second_look
+from ..timeline import playback, second_look, staleness
 
 
 def _examine_file() -> None:
@@ -78,6 +78,7 @@ def palpate_undo_post(_scene, _depsgraph=None):
 def palpate_save_pre(_path):
     identity.separate_copied_scenes()
     for scene in bpy.data.scenes:
+        staleness.note_unchanged(scene)
         playback.hide(scene)
 
 

@@ -10,6 +10,7 @@ __all__ = [
     "effect_stack",
     "figure_properties",
     "laid_sensor_properties",
+    "magnetic_properties",
     "migrations",
     "object_properties",
     "painted_maps",

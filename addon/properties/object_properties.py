@@ -15,7 +15,7 @@ from bpy.props import (
 
 from ...core.io.settings_migration import VERSION
 from ..session import first_use, identity, session_state
-from . import effect_stack, laid_sensor_properties, start_transforms
+from . import effect_stack, laid_sensor_properties, magnetic_properties, start_transforms
 from .painted_maps import PaintedProperties
 from .parameter_properties import FIXED, DriveParameterProperties, SensorParameterProperties
 from .scene_units import in_units
@@ -167,6 +167,17 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
         name="Effects",
         description="Effects of real sensors that the base model lacks",
         override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"},
+    )
+
+    readout: PointerProperty(
+        type=magnetic_properties.PALPATE_PG_readout,
+        description="Channels of the sensor besides its texels' readings",
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+    magnetic: PointerProperty(
+        type=magnetic_properties.PALPATE_PG_magnetic,
+        description="What an empty is in a magnetic skin",
+        override={"LIBRARY_OVERRIDABLE"},
     )
 
     measured: StringProperty(name="Rig", description="Measurements of the real sensor: a rig.toml, with its CSV files", **FIXED)

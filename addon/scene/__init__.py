@@ -11,6 +11,7 @@ __all__ = [
     "attached_objects",
     "baked_names",
     "body_poses",
+    "channel_reader",
     "deforming_objects",
     "display_names",
     "drives",

@@ -9,7 +9,7 @@ from functools import lru_cache, partial
 from operator import attrgetter
 
 from ...core.model.sensor_parameters import SENSOR_PARAMETERS
-from ..properties import effect_stack, painted_maps
+from ..properties import effect_stack, magnetic_properties, painted_maps
 from ..session import session_state, units
 from . import animation_fingerprint, baked_names, deforming_objects, drives, mesh_fingerprint, participants, uv_layouts
 
@@ -58,6 +58,7 @@ def settings_of(scene, objects, name_of=attrgetter("name")) -> tuple:
             *obj.palpate.velocity,
             *obj.palpate.angular_velocity,
             *effect_stack.settings(obj),
+            *magnetic_properties.settings(obj),
         )
         for obj in objects
     )

@@ -29,6 +29,7 @@ from ..session import animation_time, identity, session_state, units
 from . import (
     attached_objects,
     body_poses,
+    channel_reader,
     deforming_objects,
     drives,
     moved_bodies,
@@ -167,6 +168,7 @@ class _StartReader:
             self._add(self.targets, Target(obj.name, index, mesh, smooth=is_smooth), obj, mesh, to_body)
             return
         sensor = sensor_reader.read_sensor(obj, index, mesh)
+        sensor = channel_reader.with_channels(obj, sensor, to_body, self.depsgraph)
         self.warnings += uv_layouts.layout_warnings(obj, sensor.texels)
         self.sensor_objects.append(obj)
         self._add(self.sensors, sensor, obj, mesh, to_body)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.errors import PalpateError
+from ...core.io import saved_bake
 from ...core.model.recording import Recording
 from ..properties import start_transforms
 from ..scene import baked_names, body_poses, mesh_fingerprint, participants, scene_fingerprint
@@ -34,6 +35,15 @@ def is_stale(scene, depsgraph, recording: Recording | None) -> bool:
     if scene_fingerprint.fingerprint(scene) != scene.palpate.baked_fingerprint or _has_deformed(scene, depsgraph):
         return True
     return recording is not None and _has_moved(scene, depsgraph, recording)
+
+
+def note_unchanged(scene) -> None:
+    """Note in a scene that is about to be saved whether it is as it was baked, for readers without Blender."""
+    settings, note = scene.palpate, ""
+    if settings.baked_id and scene_fingerprint.fingerprint(scene) == settings.baked_fingerprint:
+        note = saved_bake.note_of(settings.baked_id)
+    if settings.unchanged_note != note:
+        settings.unchanged_note = note
 
 
 def _has_deformed(scene, depsgraph) -> bool:

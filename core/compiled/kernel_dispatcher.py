@@ -127,6 +127,7 @@ if COMPILED:
         def __init__(self, *arguments: Any, **options: Any) -> None:
             super().__init__(*arguments, **options)
             self._linked: dict[tuple[Any, ...], tuple[Any, Any]] = {}
+            self._addresses: dict[tuple[int, ...], tuple[tuple[Any, ...], int]] = {}
 
         @property
         def is_translated(self) -> bool:
@@ -137,13 +138,17 @@ if COMPILED:
             """Compile for arguments of these types and return the address of the function in C's conventions, or zero."""
             if _interpreted:
                 return 0
-            try:
-                self.compile(kinds)
-            except COMPILER_FAULTS as error:
-                _give_up(error)
-                return 0
-            result = self.overloads[kinds]
-            return int(result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name))
+            identities = tuple(map(id, kinds))  # equal types are one object; comparing what is in them takes a tenth of a ms
+            if identities not in self._addresses:
+                try:
+                    self.compile(kinds)
+                except COMPILER_FAULTS as error:
+                    _give_up(error)
+                    return 0
+                result = self.overloads[kinds]
+                address = int(result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name))
+                self._addresses[identities] = kinds, address  # the types are kept, so that no other gets their identity
+            return self._addresses[identities][1]
 
         def _compile_for_args(self, *args: Any, **kws: Any) -> Any:
             """Return compiled code for arguments such as these, for numba, which calls it; where that fails, plain Python."""

@@ -131,16 +131,31 @@ else:
             return [cast(Any, value).address]
         return [operator.index(value)]
 
+    _TYPE_FLAGS = 0x1 | 0x2 | 0x100 | 0x400
+    """Of an array: C order, Fortran order, aligned and writeable. Together with type and dimensions, they make numba's type."""
+
+    def _kind_of(field: Any) -> Any:
+        """Return what is equal for fields of one numba type, without asking numba, which takes longer than a short run."""
+        if type(field) is np.ndarray:
+            return field.dtype, field.ndim, field.flags.num & _TYPE_FLAGS
+        if isinstance(field, tuple):
+            return id(cast(Any, field).numba_type)  # which is kept for good
+        return typeof(field)
+
     def by_reference(cls: Class) -> Class:
         """Make kernels take instances of a NamedTuple as one pointer; its fields are arrays, integers, or such tuples again."""
+        _known: dict[tuple[Any, ...], Reference] = {}
 
         class Referred(cls):  # type: ignore[misc, valid-type]
             """The class with what compiled code needs of it."""
 
             @cached_property
             def numba_type(self) -> Reference:
-                """Numba's type of this instance."""
-                return Reference(Referred, tuple(typeof(field) for field in self))
+                """Numba's type of this instance; instances with fields of equal types share one, which is looked up at once."""
+                kind = tuple(_kind_of(field) for field in self)
+                if kind not in _known:
+                    _known[kind] = Reference(Referred, tuple(typeof(field) for field in self))
+                return _known[kind]
 
             @cached_property
             def _words(self) -> np.ndarray:

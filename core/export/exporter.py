@@ -12,9 +12,10 @@ import numpy as np
 from ..figures.figure_style import FigureStyle
 from ..geometry.layout.grid_layout import GridLayout
 from ..io.bake_reader import Bake
-from ..io.disk_space import recording_bytes
+from ..io.disk_space import CHANNEL_BYTES, recording_bytes
 from ..jobs.progress import Job, Progress
 from ..model.recording import SENSOR_FIELDS
+from ..model.vector_readings import VectorReadings
 
 UNITS = {
     "normal_force": "N",
@@ -25,10 +26,15 @@ UNITS = {
     "net_force": "N",
     "net_torque": "N m",
     "centre_of_pressure": "m",
+    "channels_clipped": "1",
+    "channels_place": "m",
     "texel_position": "m",
     "texel_area": "m2",
 }
 """Units of the arrays of :func:`bake_arrays` that have one; `reading` has the sensor's own."""
+
+CHANNEL_ARRAYS = {"channels": "values", "channels_clipped": "clipped", "channels_place": "place"}
+"""Arrays of a sensor with several channels, and their names in :class:`.VectorReadings`."""
 
 Write = Callable[[Bake, Path, FigureStyle], Job[list[Path]]]
 
@@ -36,7 +42,10 @@ Write = Callable[[Bake, Path, FigureStyle], Job[list[Path]]]
 def uncompressed_bytes(bake: Bake) -> float:
     """Return how many bytes the arrays of a bake have."""
     frames, bodies = len(bake.recording.frames), len(bake.recording.body_names)
-    return sum(recording_bytes(frames, bodies, [len(texels)]) for texels in bake.texels.values())
+    channels = sum(
+        CHANNEL_BYTES * own.channels.values.size for own in bake.recording.sensors.values() if own.channels is not None
+    )
+    return channels + sum(recording_bytes(frames, bodies, [len(texels)]) for texels in bake.texels.values())
 
 
 @dataclass(frozen=True)
@@ -70,11 +79,19 @@ def bake_arrays(bake: Bake, name: str) -> dict[str, np.ndarray]:
     """Return everything about one sensor as arrays: its recording, and its texels under names that begin with ``texel_``."""
     texels, recorded = bake.texels[name], bake.recording.sensors[name]
     arrays = {key: getattr(recorded, key) for key in SENSOR_FIELDS}
+    if recorded.channels is not None:
+        own = {key: getattr(recorded.channels, name) for key, name in CHANNEL_ARRAYS.items()}
+        arrays |= {key: array for key, array in own.items() if array is not None}
     arrays |= {f"texel_{key}": getattr(texels, key) for key in ("position", "normal", "tangent", "area", "vertex")}
     arrays["texel_uv"] = texels.layout.uv()
     if isinstance(texels.layout, GridLayout):
         arrays["texel_row"], arrays["texel_column"] = texels.layout.row, texels.layout.column
     return arrays
+
+
+def channel_labels(channels: VectorReadings) -> list[str]:
+    """Return a name for each channel of a sensor, place by place: the number of its place, its own name and its unit."""
+    return [f"{i}_{name}_{channels.unit}" for i in range(channels.values.shape[-2]) for name in channels.names]
 
 
 def sensor_progress(bake: Bake, name: str) -> Progress:

@@ -23,8 +23,8 @@ def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
 
 def quaternion_product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Hamilton product of (…, 4) quaternions: first rotate by `b`, then by `a`."""
-    parts = [np.moveaxis(np.asarray(one, float), -1, 0) for one in (a, b)]
-    return np.stack(plain(multiply)(*parts[0], *parts[1]), axis=-1)
+    parts = [own[..., i] for own in (np.asarray(a, float), np.asarray(b, float)) for i in range(4)]
+    return np.stack(plain(multiply)(*parts), axis=-1)
 
 
 @kernel
@@ -143,10 +143,11 @@ def write_step_motion(velocity: np.ndarray, dt: float, step_motion: np.ndarray) 
     """
     wx, wy, wz = velocity[3], velocity[4], velocity[5]
     square = wx * wx + wy * wy + wz * wz
-    half = 0.5 * math.sqrt(square) * dt
-    sine = 1.0 if abs(half) < 1e-6 else math.sin(half) / half
-    s, c = sine * math.cos(half), 0.5 * dt * sine * sine
-    out = step_motion
+    s, c, out = 1.0, 0.5 * dt, step_motion
+    if square > 0.0:
+        half = 0.5 * math.sqrt(square) * dt
+        sine = 1.0 if abs(half) < 1e-6 else math.sin(half) / half
+        s, c = sine * math.cos(half), 0.5 * dt * sine * sine
     out[0], out[1], out[2] = velocity[0], velocity[1], velocity[2]
     out[3], out[4], out[5] = c * (wx * wx - square), c * wx * wy - s * wz, c * wx * wz + s * wy
     out[6], out[7], out[8] = c * wx * wy + s * wz, c * (wy * wy - square), c * wy * wz - s * wx

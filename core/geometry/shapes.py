@@ -99,13 +99,10 @@ def is_in_sphere(point: Vector, radius: float) -> bool:
 @inlined
 def _slab_crossing(start: float, way: float, half: float) -> tuple[float, float]:
     """Where a line comes between a pair of planes and leaves them; along them it is between always, or never."""
-    between = abs(start) < half
-    side = half if way > 0.0 else -half
-    across = way if way != 0.0 else 1.0
-    first, last = (-side - start) / across, (side - start) / across
-    first = first if way != 0.0 else (-math.inf if between else math.inf)
-    last = last if way != 0.0 else (math.inf if between else -math.inf)
-    return first, last
+    moves, never = way != 0.0, (-math.inf if abs(start) < half else math.inf)
+    scale = 1.0 / (way if moves else 1.0)
+    middle, far = -start * scale, half * abs(scale)
+    return (middle - far if moves else never), (middle + far if moves else -never)
 
 
 @inlined
@@ -191,13 +188,13 @@ def shape_normal(kind: int, size: Vector, axis: int, point: Vector) -> Vector:
     """Return the outward unit normal at a point of the surface; of a box, on the faces across an axis."""
     x, y, z = point
     if kind == BOX:
-        nx = math.copysign(1.0, x) if axis == 0 else 0.0
-        ny = math.copysign(1.0, y) if axis == 1 else 0.0
-        return nx, ny, (math.copysign(1.0, z) if axis == 2 else 0.0)
+        nx = (1.0 if x > 0.0 else -1.0) if axis < 1 else 0.0
+        nz = (1.0 if z > 0.0 else -1.0) if axis > 1 else 0.0
+        return nx, (1.0 if y > 0.0 else -1.0) * (1.0 - abs(nx)) * (1.0 - abs(nz)), nz
     if kind == PLANE:
         return 0.0, 0.0, 1.0
-    z = beyond_axis(z, size[1])
-    return x / size[0], y / size[0], z / size[0]
+    scale = 1.0 / size[0]
+    return scale * x, scale * y, scale * beyond_axis(z, size[1])
 
 
 @inlined

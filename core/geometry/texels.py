@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -63,7 +64,7 @@ class Texels:
         tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
         return replace(self, position=frames[:, FRAME_POSITION], normal=normal, tangent=tangent)
 
-    @property
+    @cached_property
     def bitangent(self) -> np.ndarray:
         """(n, 3) unit vectors of the texels' y axes."""
         return np.cross(self.normal, self.tangent)

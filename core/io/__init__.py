@@ -31,6 +31,7 @@ __all__ = [
     "recording_file",
     "recording_npz",
     "regular_file",
+    "saved_bake",
     "scenario_npz",
     "schema",
     "sensor_manifest",

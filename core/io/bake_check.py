@@ -19,7 +19,9 @@ from ..geometry.layout.texture_maps import UVLayout
 from ..geometry.texels import Texels
 from ..model.recording import Recording, SensorRecording, row_blocks
 from ..model.sensor_parameters import Painted, SensorParameters
+from ..model.vector_readings import VectorReadings
 from .bake_folder import MANIFEST_NAME, RECORDING_NAME, Manifest
+from .recording_npz import described
 from .sensor_npz import SENSOR_NAME
 from .sensor_toml import stated_parameters
 
@@ -260,6 +262,7 @@ def _check_recording(files: SensorFiles) -> None:
     _check_array("velocities", recording.velocities, _NUMBER, (count, bodies, 6))
     _require(_everywhere(_is_unit, recording.poses[:, :, 3:]), "'poses' has quaternions that are not of length one")
     _check_channels(recording.sensors[manifest.sensor], count, len(files.texels))
+    _check_vectors(recording.sensors[manifest.sensor].channels, files)
 
 
 def _check_frames(recording: Recording, manifest: Manifest) -> None:
@@ -276,6 +279,21 @@ def _check_frames(recording: Recording, manifest: Manifest) -> None:
     _require(good, f"its last frame is {last}, that of the manifest {manifest.frame_end}")
     seconds = np.arange(count) / manifest.fps
     _require(np.allclose(recording.times, seconds, rtol=1e-9, atol=1e-9), "'times' does not follow from the frames and fps")
+
+
+def _check_vectors(channels: VectorReadings | None, files: SensorFiles) -> None:
+    """Require the readings of several channels that the manifest promises, or none."""
+    said = {} if channels is None else described(channels)
+    _require(said == files.manifest.channels, "its channels and those of the manifest differ")
+    if channels is None:
+        return
+    _check_array("channels/values", channels.values, _NUMBER, (len(files.recording.frames), None, len(channels.names)))
+    _require(
+        _everywhere(lambda part: np.abs(part) <= LARGEST, channels.values),
+        "'channels/values' has values that no pixel can hold",
+    )
+    if channels.place is not None:
+        _check_array("channels/place", channels.place, _NUMBER, (channels.values.shape[1], 3))
 
 
 def _check_channels(sensor: SensorRecording, frames: int, texels: int) -> None:

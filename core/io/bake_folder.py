@@ -120,6 +120,11 @@ class Manifest:
         SHA-256 of each file in the folder except the manifest itself and the images, by name. Those of the images are in
         ``images.sha256``, which is one of these files; manifests of some older versions have them here, and in still older ones
         the dict is empty.
+    effects : list of dict, or None
+        Of the sensor, each as :func:`.registry.to_dict` writes it; None when the manifest is older.
+    channels : dict
+        Of a sensor with several channels: their `unit` and `names`, and the `place` of each group of them
+        (:func:`.recording_npz.described`). Others have none, and no such word.
     """
 
     sensor: str
@@ -142,6 +147,8 @@ class Manifest:
     scene_path: str = ""
     sensors: tuple[str, ...] = ()
     files: dict[str, str] = field(default_factory=dict)
+    effects: list[dict[str, Any]] | None = None
+    channels: dict[str, Any] = field(default_factory=dict)
 
     @property
     def has_images(self) -> bool:
@@ -204,6 +211,10 @@ def write_manifest(folder: str | os.PathLike, manifest: Manifest, atomic: bool =
 def manifest_bytes(manifest: Manifest) -> bytes:
     """Return the content of ``manifest.json``; raises ValueError as :func:`write_manifest`."""
     content = {"format": MANIFEST_FORMAT, **{item.name: getattr(manifest, item.name) for item in fields(manifest)}}
+    if manifest.effects is None:
+        del content["effects"]
+    if not manifest.channels:
+        del content["channels"]
     try:
         content[OWN_DIGEST] = _own_digest(content)
         text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
@@ -229,6 +240,8 @@ def read_manifest(folder: str | os.PathLike) -> Manifest:
     fault = ""
     if content.get(OWN_DIGEST, own) != own:
         fault = "its content is not what was baked"
+    elif "effects" in content and manifest.effects is None:
+        fault = "effects is None"
     elif "\0" in manifest.sensor + manifest.body:
         fault = "a name has a NUL"
     elif not (math.isfinite(manifest.fps) and math.isfinite(manifest.dt)):

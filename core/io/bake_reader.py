@@ -57,8 +57,8 @@ class Bake:
         return Bake(recording=replace(self.recording, sensors=sensors), **parts)
 
 
-def read_bake(folder: str | os.PathLike) -> Bake:
-    """Read a bake folder, or the folder of one sensor in it, and check all of its files.
+def read_bake(folder: str | os.PathLike, images: bool = True) -> Bake:
+    """Read a bake folder, or the folder of one sensor in it, and check all of its files; the images only with `images`.
 
     Raises
     ------
@@ -69,12 +69,12 @@ def read_bake(folder: str | os.PathLike) -> Bake:
         raise FileError(f"The folder '{folder}' does not exist: bake first, or choose another.")
     folder = Path(folder)
     if os.path.lexists(folder / MANIFEST_NAME):
-        return read_sensors([folder])
+        return read_sensors([folder], images)
     bake_switch.settle(folder)
     folders = [place for name, place in bake_switch.present_folders(folder) if _is_bake(name, place)]
     if not folders:
         raise FileError(f"'{folder}' holds no bake: bake first, or choose the folder that Physics › Palpate › Bake names.")
-    bake = read_sensors(folders)
+    bake = read_sensors(folders, images)
     expected = dict.fromkeys(name for manifest in bake.manifests.values() for name in manifest.sensors)
     for name in expected:
         if name not in bake.texels:

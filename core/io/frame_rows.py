@@ -9,12 +9,15 @@ from __future__ import annotations
 
 import mmap
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from ..model.recording import SENSOR_FIELDS, Frame, Recording, SensorRecording
+from ..model.vector_readings import CLIPPED, VALUES, VectorReadings
 from .growing_file import GrowingFile
 from .regular_file import open_regular
 
@@ -24,9 +27,10 @@ _BLOCK_BYTES = 1 << 22
 """Size of the rows that are looked at together."""
 _VECTORS = ("net_force", "net_torque", "centre_of_pressure")
 _SHARED = ("frames", "times", "poses", "velocities")
+Channels = Mapping[str, VectorReadings]
 
 
-def row_type(bodies: int, texels: Mapping[str, int]) -> np.dtype:
+def row_type(bodies: int, texels: Mapping[str, int], channels: Channels = MappingProxyType({})) -> np.dtype:
     """Return the type of a row: the arrays of one frame under the names that they have in ``recording.npz``.
 
     Parameters
@@ -34,6 +38,8 @@ def row_type(bodies: int, texels: Mapping[str, int]) -> np.dtype:
     bodies : int
     texels : mapping of str to int
         Number of texels by sensor name.
+    channels : mapping of str to VectorReadings
+        Of sensors that have such readings: some, for their size.
     """
     parts: list[tuple[Any, ...]] = [
         ("frames", "<i8"),
@@ -41,10 +47,13 @@ def row_type(bodies: int, texels: Mapping[str, int]) -> np.dtype:
         ("poses", "<f8", (bodies, 7)),
         ("velocities", "<f8", (bodies, 6)),
     ]
-    for i, count in enumerate(texels.values()):
+    for i, (sensor, count) in enumerate(texels.items()):
         for name in SENSOR_FIELDS:
             shape = (3,) if name in _VECTORS else (count, 2) if name == "shear" else (count,)
             parts.append((f"sensor_{i}/{name}", "?" if name == "contact" else "<f8", shape))
+        if sensor in channels:
+            own = channels[sensor].values.shape[-2:]
+            parts += [(f"sensor_{i}/{VALUES}", "<f8", own), (f"sensor_{i}/{CLIPPED}", "?", own)]
     return np.dtype(parts, align=True)
 
 
@@ -59,12 +68,14 @@ class FrameRows:
         Names of the bodies.
     texels : mapping of str to int
         Number of texels of each sensor that is read out, by its name.
+    channels : mapping of str to VectorReadings
+        As those of the frames, of sensors that have such readings.
     """
 
-    def __init__(self, path: Path, bodies: Sequence[str], texels: Mapping[str, int]):
+    def __init__(self, path: Path, bodies: Sequence[str], texels: Mapping[str, int], channels: Channels = MappingProxyType({})):
         self._file = GrowingFile(path)
-        self._bodies, self._sensors = tuple(bodies), tuple(texels)
-        self._type = row_type(len(bodies), texels)
+        self._bodies, self._sensors, self._channels = tuple(bodies), tuple(texels), channels
+        self._type = row_type(len(bodies), texels, channels)
         self._row = np.zeros(1, self._type)
         self._parts = {name: self._row[name] for name in self._type.names or ()}
         # All of a row but the number of the frame. As floats, the bytes of truth values and of gaps are finite.
@@ -160,22 +171,28 @@ class FrameRows:
     def _values(self, frame: Frame) -> list[tuple[str, Any]]:
         values: list[tuple[str, Any]] = [("times", frame.time), ("poses", frame.poses), ("velocities", frame.velocities)]
         for i, sensor in enumerate(self._sensors):
-            values += [(f"sensor_{i}/{name}", getattr(frame.sensors[sensor], name)) for name in SENSOR_FIELDS]
+            own = frame.sensors[sensor]
+            values += [(f"sensor_{i}/{name}", getattr(own, name)) for name in SENSOR_FIELDS]
+            if own.channels is not None:
+                values += [(f"sensor_{i}/{VALUES}", own.channels.values), (f"sensor_{i}/{CLIPPED}", own.channels.clipped)]
         return values
 
     def _recording(self, rows: np.ndarray, dt: float, digest: str, warnings: Sequence[str], step_reason: str) -> Recording:
         return Recording(
             **{name: rows[name] for name in _SHARED},
-            sensors={
-                sensor: SensorRecording(**{name: rows[f"sensor_{i}/{name}"] for name in SENSOR_FIELDS})
-                for i, sensor in enumerate(self._sensors)
-            },
+            sensors={sensor: self._sensor(rows, i, sensor) for i, sensor in enumerate(self._sensors)},
             body_names=self._bodies,
             dt=dt,
             digest=digest,
             warnings=tuple(warnings),
             step_reason=step_reason,
         )
+
+    def _sensor(self, rows: np.ndarray, i: int, sensor: str) -> SensorRecording:
+        channels = self._channels.get(sensor)
+        if channels is not None:
+            channels = replace(channels, values=rows[f"sensor_{i}/{VALUES}"], clipped=rows[f"sensor_{i}/{CLIPPED}"])
+        return SensorRecording(**{name: rows[f"sensor_{i}/{name}"] for name in SENSOR_FIELDS}, channels=channels)
 
 
 def _in_memory(recording: Recording) -> Recording:
@@ -185,6 +202,9 @@ def _in_memory(recording: Recording) -> Recording:
     for sensor in recording.sensors.values():
         for name in SENSOR_FIELDS:
             setattr(sensor, name, getattr(sensor, name).copy())
+        if sensor.channels is not None:
+            own = sensor.channels
+            sensor.channels = replace(own, values=own.values.copy(), clipped=own.clipped.copy())
     return recording
 
 

@@ -2,7 +2,8 @@
 """Recordings as .npz: numpy reads them without Palpate, bit for bit, and equal recordings are equal files.
 
 Members: ``header.npy`` (JSON text), ``frames``, ``times``, ``poses``, ``velocities`` and, for sensor number i of the
-header's list, ``sensor_<i>/normal_force`` and so on with the names of :class:`.recording.SensorRecording`.
+header's list, ``sensor_<i>/normal_force`` and so on with the names of :class:`.recording.SensorRecording`. A sensor with
+several channels also has ``sensor_<i>/channels/values`` and ``…/clipped``, whose unit, names and places are in the header.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 
 from ..errors import FileError, os_error_reason
 from ..model.recording import SENSOR_FIELDS, Recording, SensorRecording, row_blocks
+from ..model.vector_readings import CLIPPED, VALUES, VectorReadings
 from .npz import DAMAGED, open_archive, read_array, write_arrays
 from .regular_file import open_regular
 
@@ -49,6 +51,9 @@ def recording_arrays(recording: Recording) -> dict[str, np.ndarray]:
     for i, sensor in enumerate(recording.sensors.values()):
         for name in SENSOR_FIELDS:
             arrays[f"sensor_{i}/{name}"] = np.asarray(getattr(sensor, name))
+        if sensor.channels is not None:
+            arrays |= {f"sensor_{i}/{VALUES}": np.asarray(sensor.channels.values)}
+            arrays |= {f"sensor_{i}/{CLIPPED}": np.asarray(sensor.channels.clipped)}
     for name, array in arrays.items():
         if name != "header" and len(array) != len(recording.frames):
             raise ValueError(f"'{name}' has {len(array)} frames, the recording {len(recording.frames)}")
@@ -82,6 +87,7 @@ def load_recording(path: str | os.PathLike) -> Recording:
 
 
 def _header(recording: Recording) -> dict[str, Any]:
+    channels = {name: described(sensor.channels) for name, sensor in recording.sensors.items() if sensor.channels is not None}
     return {
         "format": RECORDING_FORMAT,
         "sensors": list(recording.sensors),
@@ -90,7 +96,26 @@ def _header(recording: Recording) -> dict[str, Any]:
         "digest": recording.digest,
         "warnings": list(recording.warnings),
         "step_reason": recording.step_reason,
+        **({"channels": channels} if channels else {}),
     }
+
+
+def described(channels: VectorReadings) -> dict[str, Any]:
+    """Return what readings of several channels are, besides their values, as JSON."""
+    place = None if channels.place is None else channels.place.tolist()
+    return {"unit": channels.unit, "names": list(channels.names), "place": place}
+
+
+def _channels(members: Any, i: int, about: dict[str, Any] | None) -> VectorReadings | None:
+    if about is None:
+        return None
+    values, clipped = (read_array(members, f"sensor_{i}/{key}") for key in (VALUES, CLIPPED))
+    place = None if about["place"] is None else np.array(about["place"], float)
+    names = tuple(str(name) for name in about["names"])
+    shape = (*values.shape[:1], values.shape[1] if place is None else len(place), len(names))
+    if values.shape != shape or clipped.shape != shape or values.dtype.kind != "f" or clipped.dtype.kind != "b":
+        raise ValueError(f"its channels have the shapes {values.shape} and {clipped.shape}, not {shape}")
+    return VectorReadings(values, clipped, str(about["unit"]), names, place)
 
 
 def _recording(path: str | os.PathLike, members: Any) -> Recording:
@@ -100,12 +125,12 @@ def _recording(path: str | os.PathLike, members: Any) -> Recording:
             f"'{path}' has the format {header['format']!r}, not '{RECORDING_FORMAT}': bake again with this version."
         )
     arrays = {name: read_array(members, name) for name in ("frames", "times", "poses", "velocities")}
-    sensors = {
-        str(name): SensorRecording(**{key: read_array(members, f"sensor_{i}/{key}") for key in SENSOR_FIELDS})
-        for i, name in enumerate(header["sensors"])
-    }
+    sensors = {}
+    for i, name in enumerate(header["sensors"]):
+        own = {key: read_array(members, f"sensor_{i}/{key}") for key in SENSOR_FIELDS}
+        sensors[str(name)] = SensorRecording(**own, channels=_channels(members, i, header.get("channels", {}).get(name)))
     count = len(arrays["frames"])
-    parts = [*arrays.values(), *(getattr(sensor, key) for sensor in sensors.values() for key in SENSOR_FIELDS)]
+    parts = [*arrays.values(), *(array for sensor in sensors.values() for array in sensor.arrays())]
     if any(len(part) != count for part in parts):
         raise ValueError("its arrays have different numbers of frames")
     return Recording(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import fields, is_dataclass
+from dataclasses import is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from ..geometry.mesh import TriangleMesh
 from ..geometry.texels import Texels
 from ..model.body import Body
 from ..model.deformation import Deformation
+from ..model.digest import stated_fields
 from ..model.drive import Drive
 from ..model.effect import Effect
 from ..model.motion import Motion, Signal
@@ -29,6 +30,9 @@ from ..model.scenario import Scenario
 from ..model.sensor import Sensor
 from ..model.sensor_parameters import Painted, SensorParameters
 from ..model.target import Target
+from ..skins.channel_readouts import LinearReadout, MagneticReadout
+from ..skins.magnetic_skin import MagneticSkin, Magnetometers, Magnets
+from ..skins.readout_matrix import ReadoutMatrix
 from .npz import DAMAGED, read_array, write_arrays
 from .regular_file import open_regular
 
@@ -38,6 +42,7 @@ _CLASSES: dict[str, type] = {
     cls.__name__: cls
     for cls in (Body, Deformation, Drive, Effect, GridLayout, Motion, Painted, Scenario, Sensor, SensorParameters)
     + (Signal, Target, Texels, TriangleMesh, UVLayout)
+    + (MagneticReadout, MagneticSkin, Magnetometers, Magnets, LinearReadout, ReadoutMatrix)
 }
 _CLASS, _ARRAY, _TUPLE, _DICT = "class", "array", "tuple", "dict"
 """Keys of JSON objects that stand for what JSON does not have."""
@@ -89,7 +94,7 @@ def load_scenario(path: str | os.PathLike) -> Scenario:
 def _packed(value: Any, arrays: list[np.ndarray]) -> Any:
     """Return a value as JSON knows it; its arrays are appended to `arrays`."""
     if is_dataclass(value) and not isinstance(value, type):
-        stated = {item.name: _packed(getattr(value, item.name), arrays) for item in fields(value)}
+        stated = {item.name: _packed(getattr(value, item.name), arrays) for item in stated_fields(value)}
         return {_CLASS: type(value).__name__, "fields": stated}
     if isinstance(value, np.ndarray | np.generic):
         arrays.append(np.asarray(value))

@@ -6,11 +6,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict
 
+from ..effects.engine.registry import to_dict
 from ..model.recording import Recording
 from ..model.scenario import Scenario
 from ..model.sensor import Sensor
 from ..version import VERSION
 from .bake_folder import Manifest
+from .recording_npz import described
 
 
 def manifest_of(scenario: Scenario, sensor: Sensor, recording: Recording, files: Mapping[str, str]) -> Manifest:
@@ -27,6 +29,7 @@ def manifest_of(scenario: Scenario, sensor: Sensor, recording: Recording, files:
     files : mapping of str to str
         SHA-256 of the files in the sensor's folder, by name.
     """
+    channels = recording.sensors[sensor.name].channels
     return Manifest(
         sensor=sensor.name,
         palpate=VERSION,
@@ -44,4 +47,6 @@ def manifest_of(scenario: Scenario, sensor: Sensor, recording: Recording, files:
         step_reason=recording.step_reason,
         sensors=tuple(recording.sensors),
         files=dict(sorted(files.items())),
+        effects=[to_dict(effect) for effect in sensor.effects],
+        channels={} if channels is None else described(channels),
     )

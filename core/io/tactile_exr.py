@@ -3,7 +3,8 @@
 
 ``R`` is the normal force and ``G``, ``B`` the shear along the texel's x and y axes, all in newtons; ``reading`` is in
 the sensor's unit, ``depth`` in metres, ``slip`` in metres per second, ``contact`` 0 or 1. All are 32-bit floats; pixels
-that show no texel are 0. Row 0 of the layout is the bottom of the picture.
+that show no texel are 0. Row 0 of the layout is the bottom of the picture. A sensor with several channels has the vector layer
+``channels`` besides, which shows at each texel the channels of the nearest place where such are measured.
 
 Palpate's own codec writes all images, so that a scene gives the same bytes in every Blender.
 """
@@ -18,9 +19,12 @@ import numpy as np
 
 from ..errors import FileError, os_error_reason
 from ..geometry.layout.grid_layout import GridLayout
+from ..geometry.layout.place_grid import grid_of_places
 from ..geometry.layout.texture_maps import UVLayout
+from ..geometry.texels import Texels
 from ..model.recording import Frame, SensorFrame
 from ..model.sensor import Sensor
+from ..model.vector_readings import VectorReadings
 from . import exr_codec
 from .exr_backend import backend
 from .exr_codec import FormatError, in_order
@@ -28,6 +32,9 @@ from .file_writing import atomic_write, write_file
 
 CHANNELS = ("R", "G", "B", "reading", "depth", "slip", "contact")
 """Names of the channels, in the order in which :func:`read_exr` returns them."""
+
+CHANNEL_LAYER = "channels"
+"""Name of the vector layer that images of a sensor with several channels have besides."""
 
 UNITS = {"R": "N", "G": "N", "B": "N", "depth": "m", "slip": "m/s", "contact": "1"}
 """Units of the channels; that of ``reading`` is the sensor's."""
@@ -48,7 +55,9 @@ def exr_channels(layout: GridLayout | UVLayout, frame: SensorFrame) -> dict[str,
     return {name: np.ascontiguousarray(pictures[::-1, i]) for i, name in enumerate(CHANNELS)}
 
 
-def _pictures(layout: GridLayout | UVLayout, frames: Sequence[SensorFrame], names: Sequence[str]) -> np.ndarray:
+def _pictures(
+    layout: GridLayout | UVLayout, frames: Sequence[SensorFrame], names: Sequence[str], nearest: np.ndarray | None = None
+) -> np.ndarray:
     """(f, height, channels, width) float32 of frames and channels in order, from the top."""
     columns = {
         "R": [frame.normal_force for frame in frames],
@@ -56,6 +65,10 @@ def _pictures(layout: GridLayout | UVLayout, frames: Sequence[SensorFrame], name
         "B": [frame.shear[:, 1] for frame in frames],
         **{name: [getattr(frame, name) for frame in frames] for name in ("reading", "depth", "slip", "contact")},
     }
+    if nearest is not None:
+        vectors = np.array([_channels_of(frame).values[nearest] for frame in frames])  # (frames, texels, c)
+        layers = layer_names(_channels_of(frames[0]))
+        columns |= {name: list(vectors[:, :, i]) for i, name in enumerate(layers)}
     table = np.array([columns[name] for name in names], dtype=float)  # (channels, frames, texels)
     bad = ~(np.abs(table) <= np.finfo(np.float32).max)  # NaN compares false
     if bad.any():
@@ -84,6 +97,9 @@ def describe(sensor: Sensor, frame: Frame, digest: str) -> dict[str, str]:
         "parameters": sensor.settings_digest,
     }
     about |= {f"unit.{channel}": UNITS.get(channel, sensor.parameters.unit) for channel in CHANNELS}
+    channels = frame.sensors[sensor.name].channels
+    if channels is not None:
+        about |= dict.fromkeys((f"unit.{name}" for name in layer_names(channels)), channels.unit)
     if isinstance(sensor.texels.layout, UVLayout) and sensor.texels.layout.map_name:
         about["map"] = sensor.texels.layout.map_name
     return about
@@ -122,6 +138,7 @@ def write_exrs(
     layout: GridLayout | UVLayout,
     frames: Sequence[SensorFrame],
     metadata: Sequence[Mapping[str, str]],
+    nearest: np.ndarray | None = None,
 ) -> None:
     """Write frames of one sensor directly to their files: an interruption leaves an incomplete file, see :func:`.write_file`.
 
@@ -130,6 +147,8 @@ def write_exrs(
     paths : (f,) sequence of path
     layout, frames, metadata
         As for :func:`write_exr`, one for each path.
+    nearest : (n,) int, optional
+        Of a sensor with several channels: the place whose channels the layer shows at each texel (:func:`nearest_places`).
 
     Raises
     ------
@@ -137,7 +156,7 @@ def write_exrs(
         As :func:`write_exr`.
     """
     with write_file(paths[0], atomic=False):
-        _write(paths, layout, frames, metadata)
+        _write(paths, layout, frames, metadata, nearest)
 
 
 def _write(
@@ -145,9 +164,41 @@ def _write(
     layout: GridLayout | UVLayout,
     frames: Sequence[SensorFrame],
     metadata: Sequence[Mapping[str, str]],
+    nearest: np.ndarray | None = None,
 ) -> None:
+    names = _IN_FILE if nearest is None else in_order((*_IN_FILE, *layer_names(_channels_of(frames[0]))))
     attributes = [{_PREFIX + key: str(value) for key, value in about.items()} for about in metadata]
-    exr_codec.write_all(paths, _IN_FILE, _pictures(layout, frames, _IN_FILE), attributes)
+    exr_codec.write_all(paths, names, _pictures(layout, frames, names, nearest), attributes)
+
+
+def layer_names(channels: VectorReadings) -> list[str]:
+    """Return the names that the channels of a sensor have in images."""
+    return [f"{CHANNEL_LAYER}.{name.upper()}" for name in channels.names]
+
+
+def nearest_places(texels: Texels, channels: VectorReadings | None) -> np.ndarray | None:
+    """Return for each texel the place, of those where channels are measured, that is nearest to it, (n,) int; None without."""
+    if channels is None:
+        return None
+    if channels.place is None:
+        return np.zeros(len(texels), int)
+    apart = [np.sum((texels.position - place) ** 2, axis=1) for place in channels.place]
+    return np.argmin(apart, axis=0)
+
+
+def _channels_of(frame: SensorFrame) -> VectorReadings:
+    assert frame.channels is not None  # of a sensor that has them in all frames
+    return frame.channels
+
+
+def channel_layout(texels: Texels, channels: VectorReadings) -> GridLayout:
+    """Return rows and columns of the places where a sensor's channels are measured, seen onto the middle of its texels."""
+    count = channels.values.shape[-2]
+    if channels.place is None:
+        return GridLayout(1, count, np.zeros(count, int), np.arange(count))
+    middle = np.argmin(np.sum((texels.position - texels.position.mean(axis=0)) ** 2, axis=1))
+    along, normal = texels.tangent[middle], texels.normal[middle]
+    return grid_of_places(channels.place, along, np.cross(normal, along))
 
 
 def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]]:

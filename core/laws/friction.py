@@ -24,10 +24,8 @@ from ..compiled.kernels import inlined, kernel
 from ..model.sensor_parameters import SensorParameters
 from .contact_law import ContactLaw, contact_law
 
-TAYLOR_COEFFICIENTS = tuple(1.0 / math.factorial(n + 1) for n in range(13, -1, -1))
-"""Taylor coefficients of (1 - exp(-y)) / y without their signs, from y¹³ down to y⁰."""
-LEADING_COEFFICIENT = 1.0 / math.factorial(15)
-"""The Taylor coefficient of y¹⁴."""
+TAYLOR = tuple(1.0 / math.factorial(n + 1) for n in range(15))
+"""Taylor coefficients of (1 - exp(-y)) / y without their signs, from y⁰ to y¹⁴."""
 
 
 @inlined
@@ -35,15 +33,20 @@ def decay_and_mean(x: float) -> tuple[float, float]:
     """Return exp(-x) and (1 - exp(-x)) / x for x ≥ 0, both to 1e-15 of one, zero included.
 
     It is written out so that it runs in vector registers, which a call of the library's exp prevents, and gives the same bits
-    on every machine. The series is exact to rounding up to y = 5/8. Doubling y six times uses
+    on every machine. The series is exact to rounding up to y = 5/8; its terms are added in pairs (Estrin 1960), whose sums need
+    not wait for each other. Doubling y six times uses
     ``(1 - exp(-2y)) / 2y = (1 - exp(-y)) / y · (1 + exp(-y)) / 2``, whose factors are positive, so that errors do not grow.
     """
     within = min(x, 40.0)  # exp(-40) is below the rounding of one
     half = within * 0.0078125
     y = 2.0 * half
-    mean = LEADING_COEFFICIENT
-    for coefficient in TAYLOR_COEFFICIENTS:
-        mean = coefficient - y * mean
+    y2 = y * y
+    y4 = y2 * y2
+    low = TAYLOR[0] - y * TAYLOR[1] + y2 * (TAYLOR[2] - y * TAYLOR[3])
+    low += y4 * (TAYLOR[4] - y * TAYLOR[5] + y2 * (TAYLOR[6] - y * TAYLOR[7]))
+    high = TAYLOR[8] - y * TAYLOR[9] + y2 * (TAYLOR[10] - y * TAYLOR[11])
+    high += y4 * (TAYLOR[12] - y * TAYLOR[13] + y2 * TAYLOR[14])
+    mean = low + y4 * y4 * high
     for _ in range(6):
         mean *= 1.0 - half * mean
         half += half
@@ -103,11 +106,23 @@ def deflection_scale(square: float, limit: float) -> float:
 
 
 @inlined
-def bristle_rate(z: float, velocity: float, speed_squared: float, normal_force: float, law: ContactLaw) -> float:
-    """One component of Eq. 9, m/s."""
+def sliding_decay(speed_squared: float, normal_force: float, law: ContactLaw) -> float:
+    """Rate at which sliding lets bristles go, ``sigma0 |v| / g`` in Eq. 9, 1/s; -1 where nothing holds them."""
     g = normal_force * stribeck_coefficient(speed_squared, law)
     held = g > 0.0
-    return velocity - law.sigma0 * math.sqrt(speed_squared) / (g if held else 1.0) * z if held else 0.0
+    return law.sigma0 * math.sqrt(speed_squared) / (g if held else 1.0) if held else -1.0
+
+
+@inlined
+def rate_under_decay(z: float, velocity: float, decay: float) -> float:
+    """One component of Eq. 9, m/s, given :func:`sliding_decay`, which all three have in common."""
+    return velocity - decay * z if decay >= 0.0 else 0.0
+
+
+@inlined
+def bristle_rate(z: float, velocity: float, speed_squared: float, normal_force: float, law: ContactLaw) -> float:
+    """One component of Eq. 9, m/s."""
+    return rate_under_decay(z, velocity, sliding_decay(speed_squared, normal_force, law))
 
 
 @inlined

@@ -9,6 +9,7 @@ specifications. A :class:`.recording.Recording` holds the results.
 
 __all__ = [
     "body",
+    "channel_readout",
     "deformation",
     "digest",
     "drive",
@@ -23,4 +24,5 @@ __all__ = [
     "sensor_parameters",
     "shared_results",
     "target",
+    "vector_readings",
 ]

@@ -4,11 +4,17 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import fields, is_dataclass
+from dataclasses import Field, fields, is_dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
 
-from .recording import row_blocks
+from .recording import BLOCK_BYTES, row_blocks
+
+IF_GIVEN = "if given"
+"""Key of the metadata of a field that counts only if it is not None. What lacks it has the hash from before there was such a
+field."""
 
 
 def digest_of(value: object) -> str:
@@ -27,10 +33,22 @@ def digest_of(value: object) -> str:
     return digest.hexdigest()
 
 
+@cache
+def _fields_of(kind: type) -> tuple[Field[Any], ...] | None:
+    """Return the fields of a dataclass, None for another type."""
+    return fields(kind) if is_dataclass(kind) else None
+
+
+def stated_fields(value: Any) -> list[Field[Any]]:
+    """Return the fields of a dataclass that count for its hash and stand in its file."""
+    own = _fields_of(type(value)) or ()
+    return [item for item in own if IF_GIVEN not in item.metadata or getattr(value, item.name) is not None]
+
+
 def _feed(digest: hashlib._Hash, value: object) -> None:
     """Hash dataclasses field by field, arrays with type and shape, and everything else by its representation."""
-    if is_dataclass(value) and not isinstance(value, type):
-        for item in fields(value):
+    if _fields_of(type(value)) is not None:
+        for item in stated_fields(value):
             digest.update(item.name.encode())
             _feed(digest, getattr(value, item.name))
     elif isinstance(value, tuple | list):
@@ -42,7 +60,7 @@ def _feed(digest: hashlib._Hash, value: object) -> None:
     elif isinstance(value, np.ndarray):
         array = np.ascontiguousarray(value)
         digest.update(f"{array.dtype.str}{array.shape}".encode())
-        for rows in row_blocks(array):
+        for rows in row_blocks(array) if array.nbytes > BLOCK_BYTES else (...,):
             digest.update(array[rows].tobytes())
     else:
         digest.update(repr(value).encode())

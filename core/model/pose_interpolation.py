@@ -44,7 +44,9 @@ def poses_at(motion: Motion, times: np.ndarray, interpolation: str = "linear") -
 
 
 def _linear(motion: Motion, left: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    start, end, turn = motion.positions[left], motion.positions[left + 1], _turns(motion, left)
+    first = left.min(initial=len(motion.times))  # the times may be many between few samples
+    turn = _turns(motion, np.arange(first, left.max(initial=-1) + 1))[left - first]
+    start, end = motion.positions[left], motion.positions[left + 1]
     turned = quaternion_product(quaternions_from_vectors(share * turn), motion.quaternions[left])
     return start + share * (end - start), turned
 

@@ -8,10 +8,12 @@ all frames therefore goes block by block (:meth:`Recording.blocks`), and memory 
 from __future__ import annotations
 
 import mmap
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
+
+from .vector_readings import VectorReadings
 
 BLOCK_BYTES = 1 << 22
 """Bytes of a recording that are worked on at once: large enough for numpy, small beside everything else in memory."""
@@ -47,6 +49,8 @@ class SensorArrays:
         About the origin of the sensor's body.
     centre_of_pressure : (3,) float, m
         Force-weighted mean of the contact points; zero without contact.
+    channels : VectorReadings or None
+        Readings of several channels, of a sensor that has such a read-out.
     """
 
     normal_force: np.ndarray
@@ -59,10 +63,11 @@ class SensorArrays:
     net_force: np.ndarray
     net_torque: np.ndarray
     centre_of_pressure: np.ndarray
+    channels: VectorReadings | None = None
 
 
-SENSOR_FIELDS = tuple(item.name for item in fields(SensorArrays))
-"""Names of the arrays of a sensor, in the order in which files hold them."""
+SENSOR_FIELDS = tuple(item.name for item in fields(SensorArrays) if item.name != "channels")
+"""Names of the arrays that every sensor has, in the order in which files hold them."""
 
 
 @dataclass
@@ -99,11 +104,28 @@ class SensorRecording(SensorArrays):
 
     def at(self, i: int) -> SensorFrame:
         """Return the recorded frame with index `i`."""
-        return SensorFrame(**{name: getattr(self, name)[i] for name in SENSOR_FIELDS})
+        return SensorFrame(**{name: getattr(self, name)[i] for name in SENSOR_FIELDS}, channels=self._channels(i))
 
     def part(self, frames: slice) -> SensorRecording:
         """Return some of the frames, by their indices; the arrays are views."""
-        return SensorRecording(**{name: getattr(self, name)[frames] for name in SENSOR_FIELDS})
+        arrays = {name: getattr(self, name)[frames] for name in SENSOR_FIELDS}
+        return SensorRecording(**arrays, channels=self._channels(frames))
+
+    def arrays(self) -> list[np.ndarray]:
+        """Return all arrays with an axis of length F."""
+        own = [] if self.channels is None else [self.channels.values, self.channels.clipped]
+        return [getattr(self, name) for name in SENSOR_FIELDS] + own
+
+    def _channels(self, frames: int | slice) -> VectorReadings | None:
+        return None if self.channels is None else self.channels.part(frames)
+
+
+def _all_frames(parts: Sequence[SensorArrays], put: Callable[[list[np.ndarray]], np.ndarray]) -> SensorRecording:
+    """Return the recording of frames, or of recordings, of one sensor that are put together."""
+    arrays = {name: put([getattr(part, name) for part in parts]) for name in SENSOR_FIELDS}
+    own = [part.channels for part in parts if part.channels is not None]
+    channels = replace(own[0], values=put([o.values for o in own]), clipped=put([o.clipped for o in own])) if own else None
+    return SensorRecording(**arrays, channels=channels)
 
 
 @dataclass
@@ -150,12 +172,7 @@ class Recording:
         step_reason: str = "",
     ) -> Recording:
         """Return the recording of frames that are given in order."""
-        sensors = {
-            name: SensorRecording(
-                **{key: np.stack([getattr(frame.sensors[name], key) for frame in frames]) for key in SENSOR_FIELDS}
-            )
-            for name in frames[0].sensors
-        }
+        sensors = {name: _all_frames([frame.sensors[name] for frame in frames], np.stack) for name in frames[0].sensors}
         return cls(
             frames=np.array([frame.frame for frame in frames]),
             times=np.array([frame.time for frame in frames]),
@@ -172,12 +189,7 @@ class Recording:
     @classmethod
     def joined(cls, parts: Sequence[Recording]) -> Recording:
         """Return the recording of parts that follow each other; what concerns the whole run is that of the first part."""
-        sensors = {
-            name: SensorRecording(
-                **{key: np.concatenate([getattr(part.sensors[name], key) for part in parts]) for key in SENSOR_FIELDS}
-            )
-            for name in parts[0].sensors
-        }
+        sensors = {name: _all_frames([part.sensors[name] for part in parts], np.concatenate) for name in parts[0].sensors}
         own = {
             key: np.concatenate([getattr(part, key) for part in parts]) for key in ("frames", "times", "poses", "velocities")
         }
@@ -210,7 +222,7 @@ class Recording:
 
     def blocks(self) -> Iterator[Recording]:
         """Yield the recording in parts of :data:`BLOCK_BYTES` or less, in order; each has a frame at least."""
-        arrays = [getattr(sensor, name) for sensor in self.sensors.values() for name in SENSOR_FIELDS]
+        arrays = [array for sensor in self.sensors.values() for array in sensor.arrays()]
         arrays += [self.poses, self.velocities]
         row = max(sum(array.nbytes for array in arrays) // max(1, len(self.frames)), *(array.strides[0] for array in arrays))
         count = max(1, BLOCK_BYTES // max(1, row))

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from ..geometry.texels import Texels
+from .channel_readout import ChannelReadout
 from .deformation import Deformation
-from .digest import digest_of
+from .digest import IF_GIVEN, digest_of
 from .effect import Effect
 from .sensor_parameters import Painted, SensorParameters
 
@@ -33,6 +34,8 @@ class Sensor:
     effects : tuple of Effect
         What real sensors do and the base model leaves out. Each kind has its place in the chain, so the order matters only
         between two effects of the same kind.
+    channels : ChannelReadout or None
+        What computes further, signed channels from forces and displacements of the texels.
     """
 
     name: str
@@ -43,6 +46,7 @@ class Sensor:
     painted: Painted = field(default_factory=Painted)
     deformation: Deformation | None = None
     effects: tuple[Effect, ...] = ()
+    channels: ChannelReadout | None = field(default=None, metadata={IF_GIVEN: True})
 
     @cached_property
     def settings_digest(self) -> str:

@@ -8,6 +8,8 @@ those of many environments. :mod:`.warp` does the same as :mod:`.pressed_sensors
 """
 
 __all__ = [
+    "baked_sensors",
+    "contact_translation",
     "environment_parameters",
     "pressed_sensor",
     "pressed_sensors",

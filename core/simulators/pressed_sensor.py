@@ -10,13 +10,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..effects.engine.sensor_effects import mounted_texels
 from ..errors import ParameterError
 from ..geometry.mesh import TriangleMesh
 from ..geometry.shapes import Shape
 from ..model.recording import SENSOR_FIELDS, SensorFrame
+from ..solver.jumps import JumpFinder
 from ..solver.pressed_model import PressedModel
 from ..solver.pressing import PressedTexels, StepMemory, begin_at
 from .load_balance import LoadBalance
+from .pressed_sensors import REMEDY
 from .sensor_on_mesh import SensorOnMesh
 
 Pose = tuple[ArrayLike, ArrayLike]
@@ -103,6 +106,7 @@ class PressedSensor:
         wrench = out.wrench[0, 0] if self._one_target else out.wrench[0]
         self._force, self._torque = wrench[..., :3], wrench[..., 3:]
         self._balance: LoadBalance | None = None
+        self._jumps = JumpFinder(mounted_texels(item.sensor), targets, out)
         self.residual = np.zeros(0)
         self.reset(sensor_pose, target_pose)
 
@@ -136,6 +140,7 @@ class PressedSensor:
         begin_at(self._out.poses[0], self._environments[0])
         self._out.begins[0] = False
         self._forget_load()
+        self._jumps.find()
 
     def step(
         self,
@@ -161,7 +166,8 @@ class PressedSensor:
         Raises
         ------
         ParameterError
-            A pose is not finite, or a quaternion is zero; or the load is none. The sensor stays at the step before.
+            A pose is not finite, or a quaternion is zero; or the load is none. The sensor stays at the step before. Or a target
+            went through the sensor within this step; the sensor is behind it now, and goes on.
         """
         self._read_poses(sensor_pose, target_pose)
         if wrench is None:
@@ -176,8 +182,12 @@ class PressedSensor:
         self._steps += 1
         if self._chain is not None:
             self._out.readings[0] = self._chain.step(self._steps / self._model.rate, self._memory.force)
+        self._jumps.find()
+        if self._jumps.jumped[0]:
+            raise ParameterError(f"A target went through the sensor within one step: {REMEDY}")
         if out is None:
-            texels = SensorFrame(*[values.copy() for values in self._texels])
+            arrays = zip(SENSOR_FIELDS, self._texels, strict=True)
+            texels = SensorFrame(**{name: values.copy() for name, values in arrays}, channels=None)
             return Contact(texels, self._force.copy(), self._torque.copy())
         for name, values in zip(SENSOR_FIELDS, self._texels, strict=True):
             np.copyto(getattr(out.texels, name), values)

@@ -11,15 +11,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..effects.engine.sensor_effects import mounted_texels
 from ..errors import ParameterError
 from ..geometry.mesh import TriangleMesh
 from ..geometry.shapes import Shape
+from ..solver.jumps import JumpFinder
 from ..solver.pressed_model import PressedModel
 from ..solver.pressing import PressedTexels, Presser, StepMemory
 from .environment_parameters import Columns, sensors_of
 from .load_balance import LoadBalance
 from .sensor_on_mesh import SensorOnMesh
 
+REMEDY = "take shorter steps, or reset where a target is put elsewhere."
 CHUNK_POINTS = 16384
 """Texels of the environments that a thread takes at once, about a millisecond."""
 
@@ -43,6 +46,9 @@ class Contacts:
     valid : (E,) bool
         False where a pose is not finite or a quaternion is zero: everything is zero there, and the environment is reset with
         its next valid poses.
+    jumped : (E,) bool
+        True where a target went through the sensor within the step, as one that is too fast for it, so that nothing was
+        measured. The environment goes on.
     """
 
     texels: np.ndarray
@@ -51,17 +57,34 @@ class Contacts:
     wrench: np.ndarray
     too_deep: np.ndarray
     valid: np.ndarray
+    jumped: np.ndarray
 
     def fault(self) -> str:
-        """Return one sentence on the environments whose poses are none; empty where there are no such."""
-        bad = np.flatnonzero(~self.valid)
-        if not len(bad):
-            return ""
-        which = ", ".join(map(str, bad[:8])) + (" …" if len(bad) > 8 else "")
-        return (
-            f"{len(bad)} of {len(self.valid)} environments have a pose that is not a position and quaternion of finite numbers "
-            f"({which}): reset them in the simulation."
+        """Return one sentence on environments whose poses are none, and one on those with a jump; empty without such."""
+        return fault_of(self.valid, self.jumped)
+
+
+def fault_of(valid: np.ndarray, jumped: np.ndarray) -> str:
+    """Return what :meth:`Contacts.fault` says of environments (E,)."""
+    sentences = []
+    if not valid.all():
+        which = _numbers(~valid)
+        sentences.append(
+            f"{np.sum(~valid)} of {len(valid)} environments have a pose that is not a position and quaternion of finite "
+            f"numbers ({which}): reset them in the simulation."
         )
+    if jumped.any():
+        sentences.append(
+            f"In {jumped.sum()} of {len(valid)} environments a target went through the sensor within one step "
+            f"({_numbers(jumped)}): {REMEDY}"
+        )
+    return " ".join(sentences)
+
+
+def _numbers(which: np.ndarray) -> str:
+    """Return the first environments of a mask."""
+    found = np.flatnonzero(which)
+    return ", ".join(map(str, found[:8])) + (" …" if len(found) > 8 else "")
 
 
 class PressedSensors:
@@ -117,7 +140,7 @@ class PressedSensors:
         targets = [target] if isinstance(target, TriangleMesh | Shape) else list(target)
         model = self._model = PressedModel(item.sensor, targets, dt, 1)
         n = model.texels
-        _check_memory(environments, model.bytes_of_environment() + n * BYTES_OF_TEXEL)
+        check_memory(environments, model.bytes_of_environment() + n * BYTES_OF_TEXEL, available_memory())
         self._out = PressedTexels.zero(environments, n, len(targets))
         sensors = sensors_of(item.sensor, parameters, environments) if parameters else []
         self._environments, self._sensors = model.environments(environments, sensors), sensors
@@ -125,6 +148,7 @@ class PressedSensors:
             model.presser(StepMemory.zero(n, len(targets)), self._out, self._environments, model.workspace())
             for _ in range(model.threads(environments, threads))
         ]
+        self._jumps = JumpFinder(mounted_texels(item.sensor), targets, self._out)
         self._chunk = max(1, min(CHUNK_POINTS // n, -(-environments // (4 * len(self._threads)))))
         self._chains = [model.readout_chain()] * environments  # each gets its own with its first step
         self._steps = np.zeros(environments, np.int64)
@@ -185,7 +209,8 @@ class PressedSensors:
             Poses or loads have another shape. Those that are not finite are no error (see :attr:`Contacts.valid`).
         """
         e, t, o = len(self), self._out.wrench.shape[1], self._out
-        found = Contacts(o.texels, o.readings, o.contact, o.wrench[:, 0] if self._one_target else o.wrench, o.too_deep, o.valid)
+        wrenches = o.wrench[:, 0] if self._one_target else o.wrench
+        found = Contacts(o.texels, o.readings, o.contact, wrenches, o.too_deep, o.valid, self._jumps.jumped)
         if out is not None:
             _check_room(out, found)
         self._take("sensor", sensor_poses, [(e, 7), (7,)], self._out.poses[:, 0])
@@ -194,6 +219,7 @@ class PressedSensors:
         else:
             self._take("targets", target_poses, [(e, t, 7)], self._out.poses[:, 1:])
         fresh = self._out.begins.copy()
+        self._jumps.forget(fresh)
         if wrench is None:
             self.residual = np.zeros((e, 0))
             if self._balance is not None:
@@ -201,6 +227,7 @@ class PressedSensors:
             self._press()
         else:
             self._press_under(wrench)
+        self._jumps.find()
         self._read(fresh)
         if out is None:
             return found
@@ -278,9 +305,8 @@ def _check_room(out: Contacts, found: Contacts) -> None:
             )
 
 
-def _check_memory(environments: int, size: int) -> None:
+def check_memory(environments: int, size: int, there: float) -> None:
     """Raise :class:`.ParameterError` where so many environments of a size, bytes, are more than memory that is there."""
-    there = _available_memory()
     if environments * size > there:
         raise ParameterError(
             f"{environments} environments take {environments * size / 2**30:.1f} GiB of memory, and {there / 2**30:.1f} GiB "
@@ -288,7 +314,7 @@ def _check_memory(environments: int, size: int) -> None:
         )
 
 
-def _available_memory() -> float:
+def available_memory() -> float:
     """Return the bytes of memory that are free; infinite where the system does not say."""
     try:
         for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():

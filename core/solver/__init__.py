@@ -12,6 +12,7 @@ __all__ = [
     "checkpoint",
     "detection",
     "dynamics",
+    "jumps",
     "precompile",
     "precompile_process",
     "pressed_model",

@@ -27,8 +27,9 @@ LIMIT = 12 * LANES  # largest |z|, m
 # multiplier of the friction coefficients, and what is added to ct (N·s/m).
 NORMAL_BIAS, NORMAL_SLOPE = 13 * LANES, 14 * LANES
 FRICTION_SCALE, EXTRA_VISCOSITY = 15 * LANES, 16 * LANES
-# What the readout writes over columns that only a step reads: friction (N), normal force (N) and sliding speed (m/s).
-FRICTION, PUSH, SPEED = KEEP, NORMAL_BIAS, NORMAL_SLOPE
+# What the readout writes over columns that only a step reads: friction (N), normal force (N), sliding speed (m/s), and the
+# size of friction (N), when the whole force stands in the place of friction.
+FRICTION, PUSH, SPEED, SIZE = KEEP, NORMAL_BIAS, NORMAL_SLOPE, FRICTION_SCALE
 ROW = 17 * LANES
 """Numbers in a block."""
 

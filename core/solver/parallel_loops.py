@@ -25,8 +25,7 @@ from ..compiled.thread_team import (
 from ..effects.engine.compiled_program import prepare_laws
 from ..geometry.rotations import write_rotation
 from .detection.detection_data import DetectionData
-from .detection.narrow_phase import find_contacts
-from .detection.shape_contacts import write_last_contacts
+from .detection.narrow_phase import find_contacts, write_last_contacts
 from .detection.surface_kinematics import finish_contacts
 from .dynamics.contact_assembly import sum_pair_contacts
 from .dynamics.friction_state import update_pair_friction

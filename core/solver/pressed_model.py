@@ -22,6 +22,7 @@ from ..model.sensor import Sensor
 from ..model.target import Target
 from ..response.readings import ReadoutChain
 from .detection.detection_data import TargetShapes
+from .detection.shape_contacts import blocks_of_points
 from .model_builder import step_program
 from .parallel_loops import help_with_loops, prepare_pair_loops
 from .pressing import (
@@ -96,8 +97,9 @@ class PressedModel:
         self.texels = len(sensor.texels)
         self._dt = simulation.dt
         self._model, detection, self._state, workspace = simulation.arrays
-        shapes = TargetShapes.of([target if isinstance(target, Shape) else None for target in targets])
-        self._detection = detection._replace(shapes=shapes)
+        shapes = [target if isinstance(target, Shape) else None for target in targets]
+        points = blocks_of_points(self._model.pairs, self._model.points.frame)
+        self._detection = detection._replace(shapes=TargetShapes.of(shapes, points))
         self._queue = workspace.queue
         self.helpers = simulation.helpers
         transducers = transducers_of(sensor)

@@ -347,9 +347,19 @@ def _read(number: int, pressing: Pressing, readout: np.ndarray, state: State) ->
     """Write down what the sensor measures, from contacts that were just found."""
     t, out, model, workspace = pressing.memory, pressing.pressed, pressing.model, pressing.workspace
     for texel in range(len(t.force)):
-        t.force[texel] = t.friction[texel] = t.depth[texel] = t.slip[texel] = 0.0
+        t.force[texel] = 0.0
+    for texel in range(len(t.force)):  # one loop for each array, which is then one block of memory
+        t.friction[texel] = 0.0
+    for texel in range(len(t.force)):
+        t.depth[texel] = 0.0
+    for texel in range(len(t.force)):
+        t.slip[texel] = 0.0
+    for texel in range(len(t.force)):
+        t.strongest[texel] = -1.0
+    for texel in range(len(t.force)):
+        t.contact[texel] = False
+    for texel in range(len(t.force)):
         t.shear[texel, 0] = t.shear[texel, 1] = 0.0
-        t.contact[texel], t.strongest[texel] = False, -1.0
     for i in range(4):
         t.moment[0, i] = 0.0
     for i in range(6):
@@ -374,12 +384,15 @@ def _read(number: int, pressing: Pressing, readout: np.ndarray, state: State) ->
                         out.wrench[number, target])  # fmt: skip
     for i in range(3):
         t.centre[i] = t.moment[0, i] / t.moment[0, 3] if t.moment[0, 3] > 0.0 else 0.0
+    zero, gain = readout[0], readout[1]
     for texel in range(len(t.force)):
         out.texels[number, texel, 0] = t.force[texel]
         out.texels[number, texel, 1] = t.shear[texel, 0]
         out.texels[number, texel, 2] = t.shear[texel, 1]
+    for texel in range(len(t.force)):
         out.contact[number, texel] = t.contact[texel]
-        out.readings[number, texel] = readout[0] + readout[1] * pressing.painted[texel] * t.force[texel]
+    for texel in range(len(t.force)):
+        out.readings[number, texel] = zero + gain * pressing.painted[texel] * t.force[texel]
 
 
 @kernel

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from ..model.recording import BLOCK_BYTES, Frame, Recording, SensorRecording
 from ..model.scenario import Scenario
 from ..model.shared_results import SharedResults
 from ..response.readings import ReadoutChain
+from ..skins.channel_readouts import with_clipping_warnings
 from .detection.deformation import refit_boxes, set_moment
 from .detection.deforming_surfaces import DeformingSurfaces
 from .detection.detection_data import DetectionData, TargetShapes
@@ -48,6 +50,8 @@ TEXEL_BYTES = 8 * 8
 """What a frame of a texel takes in memory: forces, friction, depth, slip, contact and reading."""
 PATH_ROWS = 4096
 """Poses of bodies in steps that are computed at once: few enough to stay in a processor's cache."""
+PART_BYTES = 1 << 28
+"""What is observed at once goes into one piece of memory, up to this size; joining pieces takes as long as solving."""
 NO_PATH = 0, (np.zeros((0, 0, 0, 3)), np.zeros((0, 0, 0, 4)), np.zeros((0, 0, 0, 6)))
 """The first frame whose path is known, and the paths of it and of those that follow."""
 
@@ -166,11 +170,15 @@ class Simulation:
 
     def observe(self) -> Frame:
         """Return what the sensors measure in the present state."""
-        return self._observed_now().at(self.frame)
+        seen = self._seen(1)
+        self._observe_first(seen)
+        return self._recorded(np.array([self.frame]), seen).at(self.frame)
 
     def advance(self) -> Frame:
         """Bring the state one frame on and return what the sensors measure there."""
-        return self._advance(1).at(self.frame)
+        seen = self._seen(1)
+        self._advance(seen)
+        return self._recorded(np.array([self.frame]), seen).at(self.frame)
 
     def advance_all(self) -> Recording:
         """Go through all frames that are left, and return the recording with the present frame as its first one.
@@ -178,11 +186,27 @@ class Simulation:
         The numbers are those of :meth:`advance`, bit by bit. Where Python has nothing to do in between, many frames are
         computed in one call.
         """
-        parts = [self._observed_now()]
+        parts = [self._advance_far(with_present=True)]
         while self.frame < self.scenario.frame_end:
-            parts.append(self._advance(self._frames_at_once()))
-        found = Recording.joined(parts)
-        return replace(found, digest=self.scenario.digest(), warnings=tuple(self.warnings), step_reason=self.step_reason)
+            parts.append(self._advance_far(with_present=False))
+        found = Recording.joined(parts) if len(parts) > 1 else parts[0]
+        found = replace(found, digest=self.scenario.digest(), warnings=tuple(self.warnings), step_reason=self.step_reason)
+        return with_clipping_warnings(found)
+
+    def _advance_far(self, with_present: bool) -> Recording:
+        """Go through the frames that are left, in a long run :data:`PART_BYTES` of them, and return their recording."""
+        first = self.frame if with_present else self.frame + 1
+        most = max(2, PART_BYTES // (int(self._texel_start[-1]) * TEXEL_BYTES))
+        seen = self._seen(max(1, min(most, self.scenario.frame_end - first + 1)))
+        count, at = len(seen.may_cross), 0
+        if with_present:
+            self._observe_first(seen.part(slice(0, 1)))
+            at = 1
+        while at < count:
+            stop = min(at + self._frames_at_once(), count)
+            self._advance(seen.part(slice(at, stop)))
+            at = stop
+        return self._recorded(first + np.arange(count), seen)
 
     def _frames_at_once(self) -> int:
         """Return how many of the next frames one call of the kernels may compute."""
@@ -191,11 +215,12 @@ class Simulation:
         most = max(1, BLOCK_BYTES // (int(self._texel_start[-1]) * TEXEL_BYTES))
         return min(most, self._path_frames(self.frame))
 
-    def _advance(self, count: int) -> Recording:
-        """Bring the state some frames on and return their recording, without what concerns the whole run."""
-        first, seen = self.frame, self._seen(count)
+    def _advance(self, seen: ObservedFrames) -> None:
+        """Bring the state as many frames on as `seen` has room for, and write what is observed at them there."""
+        first, count = self.frame, len(seen.may_cross)
+        seen.position[0], seen.quaternion[0] = self._state.position, self._state.quaternion
         positions, quaternions, velocities = self._prescribed_motion(first, count)
-        times = [self._step_times(frame) for frame in range(first, first + count)]
+        times = self._step_times(first + np.arange(count))
         self._place_deforming(times[0])
         if first == self.scenario.frame_start:
             find_all_contacts(-self.dt, *self.arrays)
@@ -205,35 +230,32 @@ class Simulation:
             path = FramePath(positions, quaternions, velocities, commands)
             with helper_threads(self._workspace.queue, self._helpers, help_with_loops, *self.arrays):
                 self._run(steps, FRAME if steps[1] == self.substeps else NOTHING, path, seen)
+        too_deep = (seen.too_deep.any(axis=1) | seen.too_deep_between.any(axis=1)).tolist()
         for i in range(count):
             self.frame += 1
             after = seen.position[i], seen.quaternion[i]
             if seen.may_cross[i]:
                 self._warn_of_fast_crossings(positions[i], quaternions[i], before, after)
-            self._warn_of_too_deep(seen.too_deep[i], seen.too_deep_between[i])
+            if too_deep[i]:
+                self._warn_of_too_deep(seen.too_deep[i], seen.too_deep_between[i])
             before = after
-        self._most_too_deep = seen.too_deep_between[-1]
-        return self._recorded(first + 1 + np.arange(count), seen)
+        self._most_too_deep = seen.too_deep_between[-1].copy()
 
-    def _observed_now(self) -> Recording:
-        """Return the recording of the present frame, without what concerns the whole run."""
-        seen = self._observed(FRAME)
+    def _observe_first(self, seen: ObservedFrames) -> None:
+        """Write what is observed at the present frame where there is room for one."""
+        self._observe(FRAME, seen)
         self._warn_of_too_deep(seen.too_deep[0], self._most_too_deep)
-        return self._recorded(np.array([self.frame]), seen)
 
-    def _observed(self, what: int) -> ObservedFrames:
+    def _observe(self, what: int, seen: ObservedFrames) -> None:
         """Observe the present state: TEXELS, without a change of it, or FRAME."""
-        seen, b, d = self._seen(1), len(self._motions), len(self._model.drives.gains)
+        b, d = len(self._motions), len(self._model.drives.gains)
         nowhere = FramePath(np.zeros((1, 1, b, 3)), np.zeros((1, 1, b, 4)), np.zeros((1, 0, b, 6)), np.zeros((1, 0, d, 4)))
         self._run((0, 0), what, nowhere, seen)
-        return seen
 
     def _seen(self, frames: int) -> ObservedFrames:
-        """Return room for what is observed at some frames, with the present poses."""
+        """Return room for what is observed at some frames."""
         sensors, bodies, pairs = len(self.scenario.sensors), len(self._motions), len(self._model.pairs.sensor)
-        seen = ObservedFrames.zero(frames, int(self._texel_start[-1]), sensors, bodies, pairs)
-        seen.position[0], seen.quaternion[0] = self._state.position, self._state.quaternion
-        return seen
+        return ObservedFrames.zero(frames, int(self._texel_start[-1]), sensors, bodies, pairs)
 
     def _run(self, steps: tuple[int, int], observed: int, path: FramePath, seen: ObservedFrames) -> None:
         """Call :func:`.advance_frames`."""
@@ -246,11 +268,16 @@ class Simulation:
             if self._drive_commands.reads_sensors:  # controllers read before the first step
                 self._place_surfaces(0, 1, 0.0)
 
-    def _intervals(self, times: list[np.ndarray]) -> Iterator[tuple[tuple[int, int], np.ndarray]]:
-        """Yield the steps of frames in intervals during which no controller is updated, with (F, steps, d, 4) commands."""
+    def _intervals(self, times: np.ndarray) -> Iterator[tuple[tuple[int, int], np.ndarray]]:
+        """Yield the steps of frames in intervals during which no controller is updated, with (F, steps, d, 4) commands.
+
+        `times` (F, steps + 1), s, are those of steps.
+        """
         if self._drive_commands.reads_sensors:
             for first, last, commands in self._drive_commands.control_intervals(times[0], self.dt, self._normal_forces):
                 yield (first, last), commands[None]
+        elif len(self._model.drives.gains) == 0:
+            yield (0, self.substeps), np.zeros((len(times), self.substeps, 0, 4))
         else:
             yield (0, self.substeps), np.stack([self._commands_at(own) for own in times])
 
@@ -266,7 +293,7 @@ class Simulation:
         return np.stack([self._readers[i].step(time, own) for time, own in zip(times.tolist(), force, strict=True)])
 
     def _recorded(self, frames: np.ndarray, seen: ObservedFrames) -> Recording:
-        """Return the recording of frames that were observed in one call."""
+        """Return the recording of frames that were observed, without what concerns the whole run."""
         times = (frames - self.scenario.frame_start) / self.scenario.fps
         sensors = {
             sensor.name: self._sensor_rows(i, times, seen) for i, sensor in enumerate(self.scenario.sensors) if sensor.readout
@@ -279,14 +306,14 @@ class Simulation:
         return Recording(frames, times, sensors, names, poses, seen.velocity, self.dt)
 
     def _sensor_rows(self, i: int, times: np.ndarray, seen: ObservedFrames) -> SensorRecording:
-        """Return what one sensor measures in frames that were observed in one call."""
+        """Return what one sensor measures in frames that were observed."""
         own = slice(self._texel_start[i], self._texel_start[i + 1])
         center, net, moment = self._center[self.scenario.sensors[i].body], seen.texels.net[:, i], seen.texels.moment[:, i]
         centre_of_pressure = np.zeros((len(times), 3))
         pressed = moment[:, 3] > 0.0
         centre_of_pressure[pressed] = moment[pressed, :3] / moment[pressed, 3:] + center
         force = np.ascontiguousarray(seen.texels.force[:, own])
-        return SensorRecording(
+        recorded = SensorRecording(
             normal_force=force,
             shear=np.ascontiguousarray(seen.texels.shear[:, own]),
             friction=np.ascontiguousarray(seen.texels.friction[:, own]),
@@ -298,6 +325,10 @@ class Simulation:
             net_torque=net[:, 3:] + np.cross(center, net[:, :3]),
             centre_of_pressure=centre_of_pressure,
         )
+        readout = self.scenario.sensors[i].channels
+        if readout is not None:
+            recorded.channels = readout.channels(recorded)
+        return recorded
 
     def follow_state(self) -> None:
         """Bring to the state what follows from it, after the state of a later frame was put into a new simulation."""
@@ -314,10 +345,10 @@ class Simulation:
         refit_boxes(self._surface_motion, self._tree)
         set_moment(now, other, dt, self._model, self._surface_motion)
 
-    def _step_times(self, frame: int) -> np.ndarray:
-        """(substeps + 1,) times at which the steps after a frame begin, and the last one ends, s."""
-        times = self._time_of(frame) + np.arange(self.substeps + 1) * self.dt
-        times[-1] = self._time_of(frame + 1)
+    def _step_times(self, frames: int | np.ndarray) -> np.ndarray:
+        """(…, substeps + 1) times at which the steps after frames (…) begin, and the last one ends, s."""
+        times = self._time_of(np.asarray(frames))[..., None] + np.arange(self.substeps + 1) * self.dt
+        times[..., -1] = self._time_of(np.asarray(frames) + 1)
         return times
 
     def _warn_of_fast_crossings(
@@ -349,8 +380,8 @@ class Simulation:
         """
         start, path = self._known_path
         if not start <= frame <= frame + count <= start + len(path[0]):
-            frames = range(frame, frame + max(count, self._path_frames(frame)))
-            start, path = self._known_path = frame, self._path_along(np.stack([self._step_times(number) for number in frames]))
+            frames = frame + np.arange(max(count, self._path_frames(frame)))
+            start, path = self._known_path = frame, self._path_along(self._step_times(frames))
         own = slice(frame - start, frame - start + count)
         return path[0][own], path[1][own], path[2][own]
 
@@ -362,10 +393,10 @@ class Simulation:
         for body in driven_bodies(self._model.bodies.mode):
             positions[:, :, body] += rotation_matrices(quaternions[:, :, body]) @ self._center[body]
         before, after = quaternions[:, :-1], quaternions[:, 1:]
-        turns = rotation_vectors(quaternion_product(after, before * np.array([1.0, -1.0, -1.0, -1.0])))
-        turns[(after == before).all(axis=3)] = (
-            0.0  # and not rounding: bodies that animation moves bring energy (see :mod:`.passivity`)
-        )
+        turning = (after != before).any(axis=3)
+        turns = np.zeros((*turning.shape, 3))  # and not rounding: bodies that animation moves bring energy (:mod:`.passivity`)
+        conjugate = before[turning] * np.array([1.0, -1.0, -1.0, -1.0])
+        turns[turning] = rotation_vectors(quaternion_product(after[turning], conjugate))
         velocities = np.concatenate([np.diff(positions, axis=1), turns], axis=3) / self.dt
         return positions, quaternions, velocities
 
@@ -412,7 +443,7 @@ class Simulation:
                 point[t, texel] = found.point[deeper] + self._center[sensor.body]
         return depth, normal, point, most
 
-    def _time_of(self, frame: float) -> float:
+    def _time_of(self, frame: Any) -> Any:
         return (frame - self.scenario.frame_start) / self.scenario.fps
 
     def _warn_of_too_deep(self, now: np.ndarray, between: np.ndarray) -> None:
@@ -445,7 +476,9 @@ class Simulation:
 
     def _normal_forces(self, sensor: int) -> np.ndarray:
         """(n,) normal forces of a sensor in the present state, for its controllers."""
-        return self._observed(TEXELS).texels.force[0, self._texel_start[sensor] : self._texel_start[sensor + 1]]
+        seen = self._seen(1)
+        self._observe(TEXELS, seen)
+        return seen.texels.force[0, self._texel_start[sensor] : self._texel_start[sensor + 1]]
 
 
 def _prepared_targets(scenario: Scenario, center: np.ndarray, shared: SharedResults) -> tuple[Tree, list[bool]]:
@@ -522,7 +555,8 @@ def solve(scenario: Scenario, simulation: Simulation | None = None, frames: list
     frames = [] if frames is None else frames
     yield from solve_frames(simulation, frames.append, len(frames))
     names = [body.name for body in scenario.bodies]
-    return Recording.stack(frames, names, simulation.dt, scenario.digest(), simulation.warnings, simulation.step_reason)
+    found = Recording.stack(frames, names, simulation.dt, scenario.digest(), simulation.warnings, simulation.step_reason)
+    return with_clipping_warnings(found)
 
 
 def run(scenario: Scenario, progress: Callable[[Progress], None] | None = None) -> Recording:

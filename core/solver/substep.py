@@ -92,6 +92,11 @@ class ObservedFrames(NamedTuple):
             may_cross=np.zeros(f, np.bool_),
         )
 
+    def part(self, frames: slice) -> ObservedFrames:
+        """Return some of the frames, by their indices; the arrays are views."""
+        texels = TexelReadout(*(values[frames] for values in self.texels))
+        return ObservedFrames(texels, *(values[frames] for values in self[1:]))
+
 
 class Surroundings(NamedTuple):
     """What is asked about the bodies when a frame is observed.

@@ -13,7 +13,7 @@ from ..effects.engine.compiled_program import TexelMotion, has_effects
 from ..laws.contact_law import LINEAR_EXPONENT, ContactLaw, read_law
 from ..laws.friction import bristle_rate, deflection_scale, friction_force, max_bristle_deflection
 from ..laws.normal_force import linear_normal_force, normal_force
-from .contact_rows import BRISTLE, DEPTH, FRICTION, LANES, NORMAL, POINT, PUSH, SPEED, read_vector, write_vector
+from .contact_rows import BRISTLE, DEPTH, FRICTION, LANES, NORMAL, POINT, PUSH, SIZE, SPEED, read_vector, write_vector
 from .dynamics.effect_kernels import NOW, apply_effects, force_and_friction_law, lane_range, press_texel
 from .dynamics.relative_kinematics import motion_values, point_law, row_of, row_velocity, velocity_at, write_pair_motion
 from .solver_model import SolverModel, State
@@ -169,32 +169,65 @@ def _write_forces_one_by_one(pair: int, law: ContactLaw, model: SolverModel, sta
 @kernel
 def _add_forces(pair: int, model: SolverModel, workspace: Workspace, out: TexelReadout) -> None:
     """Add the forces in the rows of a pair to its texels, to the sensor's wrench and to the sums for the centre of pressure."""
-    contacts, sensor, whole = workspace.contacts, model.pairs.sensor[pair], 1.0 / model.pairs.force_weight[pair]
-    rows, frame, net, moment = contacts.rows, model.points.frame, out.net[sensor], out.moment[sensor]
+    _sum_forces(pair, 1.0 / model.pairs.force_weight[pair], workspace)
+    sensor, sums, contacts = model.pairs.sensor[pair], workspace.pairs.sums[pair], workspace.contacts
+    for i in range(6):
+        out.net[sensor, i] += sums[i * LANES]
+    for i in range(4):
+        out.moment[sensor, i] += sums[(6 + i) * LANES]
+    rows, frame, texels, slots = contacts.rows, model.points.frame, model.points.texel, contacts.slots
     first_point = model.pairs.first_point[pair] - model.pairs.first_slot[pair]
-    net_x, net_y, net_z, turn_x, turn_y, turn_z = net[0], net[1], net[2], net[3], net[4], net[5]
-    mean_x, mean_y, mean_z, total = moment[0], moment[1], moment[2], moment[3]
+    force, shear, friction, depth, slip = out.force, out.shear, out.friction, out.depth, out.slip
+    strongest, contact = out.strongest, out.contact
     for r in range(contacts.number[pair]):
         b, lane = row_of(r, pair, contacts)
-        point = first_point + contacts.slots[b, lane]
-        texel, depth = model.points.texel[point], rows[b, DEPTH + lane]
-        nx, ny, nz = read_vector(rows, b, NORMAL, lane)
-        px, py, pz = read_vector(rows, b, POINT, lane)
+        point = first_point + slots[b, lane]
+        texel, fn = texels[point], rows[b, PUSH + lane]
         fx, fy, fz = read_vector(rows, b, FRICTION, lane)
-        fx, fy, fz, fn = whole * fx, whole * fy, whole * fz, whole * rows[b, PUSH + lane]
-        out.friction[texel] += math.sqrt(fx * fx + fy * fy + fz * fz)
+        friction[texel] += rows[b, SIZE + lane]
         # Shear is the part of the whole force in the texel's plane: where the object's surface leans, some is normal force.
-        fx, fy, fz = fx + fn * nx, fy + fn * ny, fz + fn * nz
-        out.shear[texel, 0] += fx * frame[point, 6] + fy * frame[point, 7] + fz * frame[point, 8]
-        out.shear[texel, 1] += fx * frame[point, 9] + fy * frame[point, 10] + fz * frame[point, 11]
-        if fn > out.strongest[texel]:  # the slip is that of the target and the point which press hardest
-            out.strongest[texel] = fn
-            out.slip[texel] = rows[b, SPEED + lane]
-        out.contact[texel] = True
-        out.force[texel] += fn
-        out.depth[texel] = max(out.depth[texel], depth)
-        net_x, net_y, net_z = net_x + fx, net_y + fy, net_z + fz
-        turn_x, turn_y, turn_z = turn_x + (py * fz - pz * fy), turn_y + (pz * fx - px * fz), turn_z + (px * fy - py * fx)
-        mean_x, mean_y, mean_z, total = mean_x + fn * px, mean_y + fn * py, mean_z + fn * pz, total + fn
-    net[0], net[1], net[2], net[3], net[4], net[5] = net_x, net_y, net_z, turn_x, turn_y, turn_z
-    moment[0], moment[1], moment[2], moment[3] = mean_x, mean_y, mean_z, total
+        shear[texel, 0] += fx * frame[point, 6] + fy * frame[point, 7] + fz * frame[point, 8]
+        shear[texel, 1] += fx * frame[point, 9] + fy * frame[point, 10] + fz * frame[point, 11]
+        if fn > strongest[texel]:  # the slip is that of the target and the point which press hardest
+            strongest[texel] = fn
+            slip[texel] = rows[b, SPEED + lane]
+        contact[texel] = True
+        force[texel] += fn
+        depth[texel] = max(depth[texel], rows[b, DEPTH + lane])
+
+
+@kernel
+def _sum_forces(pair: int, whole: float, workspace: Workspace) -> None:
+    """Sum up wrench and moment of a pair's rows; instead of friction, they then have its size and the whole force.
+
+    `whole` is the factor from the forces in the rows to those that texels measure. The sums of the ten numbers, in the order of
+    :attr:`TexelReadout.net` and :attr:`TexelReadout.moment`, stand in the first lanes of the pair's sums.
+    """
+    contacts, rows, sums = workspace.contacts, workspace.contacts.rows, workspace.pairs.sums[pair]
+    for i in range(10 * LANES):
+        sums[i] = 0.0
+    first = contacts.first_block[pair]
+    for b in range(first, first + (contacts.number[pair] + LANES - 1) // LANES):
+        for lane in range(LANES):  # runs in vector registers: no branches, no calls
+            nx, ny, nz = read_vector(rows, b, NORMAL, lane)
+            px, py, pz = read_vector(rows, b, POINT, lane)
+            fx, fy, fz = read_vector(rows, b, FRICTION, lane)
+            fx, fy, fz, fn = whole * fx, whole * fy, whole * fz, whole * rows[b, PUSH + lane]
+            rows[b, SIZE + lane] = math.sqrt(fx * fx + fy * fy + fz * fz)
+            fx, fy, fz = fx + fn * nx, fy + fn * ny, fz + fn * nz
+            write_vector(rows, b, FRICTION, lane, fx, fy, fz)
+            rows[b, PUSH + lane] = fn
+            sums[lane] += fx
+            sums[LANES + lane] += fy
+            sums[2 * LANES + lane] += fz
+            sums[3 * LANES + lane] += py * fz - pz * fy
+            sums[4 * LANES + lane] += pz * fx - px * fz
+            sums[5 * LANES + lane] += px * fy - py * fx
+            sums[6 * LANES + lane] += fn * px
+            sums[7 * LANES + lane] += fn * py
+            sums[8 * LANES + lane] += fn * pz
+            sums[9 * LANES + lane] += fn
+    for half in (8, 4, 2, 1):  # the lanes, in pairs
+        for i in range(0, 10 * LANES, LANES):
+            for lane in range(half):
+                sums[i + lane] += sums[i + lane + half]

@@ -71,7 +71,12 @@ def make_folders(folder: Path) -> None:
 
 def done_runs(folder: Path) -> set[str]:
     """Return the digests of the runs that are done."""
-    return _digests(folder / RUNS, "") | run_shards.digests_in(folder / RUNS)
+    return run_folders(folder) | run_shards.digests_in(folder / RUNS)
+
+
+def run_folders(folder: Path) -> set[str]:
+    """Return the digests of the runs that are done and have folders of their own."""
+    return _digests(folder / RUNS, "")
 
 
 def failed_runs(folder: Path) -> set[str]:

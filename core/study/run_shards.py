@@ -18,7 +18,7 @@ import os
 import secrets
 import struct
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,7 +38,7 @@ RUN, COMMON = 1, 2
 _MAGIC = b"PALPRUN1"
 _HEAD = struct.Struct("<8sII")
 _ROW = np.dtype([("kind", "<u4"), ("name", "u1", 12), ("length", "<u8"), ("crc", "<u4")])
-_PLACE = np.dtype([("high", ">u8"), ("low", ">u4"), ("shard", "<u4"), ("start", "<u8"), ("length", "<u8"), ("crc", "<u4")])
+_PLACE = np.dtype([("shard", "<u4"), ("start", "<u8"), ("length", "<u8"), ("crc", "<u4")])
 _BLOCK = 1 << 20
 
 
@@ -229,7 +229,7 @@ class KnownRuns:
             self._keys.append(np.sort(np.concatenate(fresh)))
         while len(self._keys) > 1 and len(self._keys[-2]) <= 2 * len(self._keys[-1]):  # so that there are few of them
             self._keys[-2:] = [np.sort(np.concatenate(self._keys[-2:]))]
-        asked = _keys_of(np.array([list(bytes.fromhex(digest)) for digest in digests], np.uint8).reshape(-1, 12))
+        asked = _keys_of(names_of(digests))
         likely = [digest for digest, key in zip(digests, asked, strict=True) if any(_holds(own, key) for own in self._keys)]
         return digests_in(self._runs) & set(likely) if likely else set()
 
@@ -239,13 +239,23 @@ def _keys_of(names: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(names[:, :8]).view(">u8").reshape(-1).astype(np.uint64)
 
 
+def _low_of(names: np.ndarray) -> np.ndarray:
+    """Return the last four bytes of (n, 12) names as numbers."""
+    return np.ascontiguousarray(names[:, 8:]).view(">u4").reshape(-1).astype(np.uint32)
+
+
 def _holds(keys: np.ndarray, key: np.uint64) -> bool:
     at = int(np.searchsorted(keys, key))
     return at < len(keys) and bool(keys[at] == key)
 
 
+def names_of(digests: Sequence[str]) -> np.ndarray:
+    """Return digests as the (n, 12) bytes that stand for them in a shard."""
+    return np.frombuffer(bytes.fromhex("".join(digests)), np.uint8).reshape(-1, 12)
+
+
 class ShardIndex:
-    """Where the runs in the shards of a folder are, in 48 bytes each.
+    """Where the runs in the shards of a folder are, in 36 bytes each.
 
     Parameters
     ----------
@@ -260,12 +270,19 @@ class ShardIndex:
     def __init__(self, runs: Path):
         self._paths: list[Path] = []
         self._common: dict[str, tuple[Path, int, int, int]] = {}
-        tables = [self._places(path, start, table) for path, start, table in ShardScan(runs).new_groups()]
-        whole = np.concatenate(tables) if tables else np.zeros(0, _PLACE)
-        self._table = whole[np.lexsort((whole["low"], whole["high"]))]
-        self._high, self._low = self._table["high"].astype(np.uint64), self._table["low"].astype(np.uint32)
+        self._last: tuple[str, np.void | None] = "", None
+        found = [self._places(path, start, table) for path, start, table in ShardScan(runs).new_groups()]
+        names = np.concatenate([np.zeros((0, 12), np.uint8), *(own for own, _ in found)])
+        places = np.concatenate([np.zeros(0, _PLACE), *(own for _, own in found)])
+        found.clear()
+        high, low = _keys_of(names), _low_of(names)
+        order = np.lexsort((low, high))
+        again = (np.diff(high[order]) == 0) & (np.diff(low[order]) == 0)  # two processes have computed the run
+        order = np.delete(order, 1 + np.flatnonzero(again))
+        self._table, self._high, self._low = places[order], high[order], low[order]
 
-    def _places(self, path: Path, start: int, table: np.ndarray) -> np.ndarray:
+    def _places(self, path: Path, start: int, table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return names and places of the runs in a group."""
         if not self._paths or self._paths[-1] != path:
             self._paths.append(path)
         offsets = start + np.cumsum(table["length"]) - table["length"]
@@ -274,13 +291,31 @@ class ShardIndex:
             self._common.setdefault(name, (path, int(offset), int(row["length"]), int(row["crc"])))
         mine = table["kind"] == RUN
         found = np.zeros(int(mine.sum()), _PLACE)
-        names = np.ascontiguousarray(table["name"][mine])
-        found["high"] = np.ascontiguousarray(names[:, :8]).view(">u8").reshape(-1)
-        found["low"] = np.ascontiguousarray(names[:, 8:]).view(">u4").reshape(-1)
         found["shard"] = len(self._paths) - 1
         for name, values in (("start", offsets), ("length", table["length"]), ("crc", table["crc"])):
             found[name] = values[mine]
+        return np.ascontiguousarray(table["name"][mine]), found
+
+    def __len__(self) -> int:
+        return len(self._table)
+
+    def names(self, rows: np.ndarray) -> np.ndarray:
+        """Return the (n, 12) names of runs by their rows, which are in the order of the names."""
+        found = np.empty((len(rows), 12), np.uint8)
+        found[:, :8] = self._high[rows].astype(">u8").view(np.uint8).reshape(-1, 8)
+        found[:, 8:] = self._low[rows].astype(">u4").view(np.uint8).reshape(-1, 4)
         return found
+
+    def rows(self, names: np.ndarray) -> np.ndarray:
+        """Return the first rows of runs by their (n, 12) names; -1 where a run is in no shard."""
+        high, low = _keys_of(names), _low_of(names)
+        found = np.searchsorted(self._high, high)
+        for at in np.flatnonzero(np.searchsorted(self._high, high, "right") - found > 1):  # equal in their first eight bytes
+            own = self._row_at(high[at], low[at])
+            found[at] = len(self) if own is None else own
+        inside = np.minimum(found, max(len(self) - 1, 0))
+        known = (found < len(self)) & (self._high[inside] == high) & (self._low[inside] == low) if len(self) else found < 0
+        return np.where(known, found, -1)
 
     def __contains__(self, digest: str) -> bool:
         return self._row(digest) is not None
@@ -329,13 +364,15 @@ class ShardIndex:
         return found
 
     def _row(self, digest: str) -> np.void | None:
-        high, low = np.uint64(int(digest[:16], 16)), int(digest[16:], 16)
+        if digest != self._last[0]:  # what is asked about a run is asked in turn
+            at = self._row_at(np.uint64(int(digest[:16], 16)), np.uint32(int(digest[16:], 16)))
+            self._last = digest, None if at is None else self._table[at]
+        return self._last[1]
+
+    def _row_at(self, high: np.uint64, low: np.uint32) -> int | None:
         begin, end = (int(np.searchsorted(self._high, high, side)) for side in ("left", "right"))
-        at = begin + int(np.searchsorted(self._low[begin:end], np.uint32(low)))
-        if at == end or self._low[at] != low:
-            return None
-        row: np.void = self._table[at]
-        return row
+        at = begin + int(np.searchsorted(self._low[begin:end], low))
+        return None if at == end or self._low[at] != low else at
 
 
 def _read(path: Path, offset: int, length: int) -> bytes:

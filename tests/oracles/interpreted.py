@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 from solver_scenes import pad, pressed
@@ -18,7 +18,7 @@ from oracles.sweep import random_case, random_turn
 from palpate.core.compiled import kernels
 from palpate.core.effects.engine.registry import effect, library
 from palpate.core.model.deformation import Deformation
-from palpate.core.model.recording import Frame, SensorFrame
+from palpate.core.model.recording import SENSOR_FIELDS, Frame
 from palpate.core.model.scenario import Scenario
 from palpate.core.solver.simulation import Simulation
 
@@ -60,7 +60,7 @@ def random_scene(seed: int) -> Scenario:
 
 def bits(frame: Frame) -> bytes:
     """All that a frame says."""
-    felt = [getattr(sensor, item.name) for sensor in frame.sensors.values() for item in fields(SensorFrame)]
+    felt = [getattr(sensor, name) for sensor in frame.sensors.values() for name in SENSOR_FIELDS]
     return b"".join(np.ascontiguousarray(array).tobytes() for array in (frame.poses, frame.velocities, *felt))
 
 

@@ -13,7 +13,7 @@ compiled into a loop over points with a fixed signature of its own, and the solv
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, lru_cache
 from types import FunctionType
 from typing import Any, NamedTuple
 
@@ -34,11 +34,13 @@ from ...compiled.kernels import (
 from ...compiled.struct_reference import by_reference
 from ...laws.contact_law import ContactLaw
 from ...laws.normal_force import damped_force_derivatives, damping_coefficient, elastic_force, elastic_stiffness
-from ...model.effect import Effect
+from ...model.effect import Effect, Value, Values
 from .registry import complete_values, in_signal_order
 from .specification import Form, TexelInput
 
 Columns = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+CONSTANTS_KEPT = 16
+"""Number of results of :func:`constants_of` that are kept."""
 
 # The loops below are compiled once for each law: `_specialised` copies them with LAW standing for that law.
 LAW: Any = None
@@ -206,6 +208,26 @@ def call_law(
     )  # fmt: skip
 
 
+def constants_of(form: Form, values: Values, lengths: np.ndarray) -> np.ndarray:
+    """Return the constants of a law for steps of some lengths, (m, c) float, which must not be written to."""
+    assert form.constants is not None
+    return _constants_kept(form.constants, tuple(values.items()), np.ascontiguousarray(lengths, float).tobytes())
+
+
+@lru_cache(maxsize=4)
+def _zeros(shape: tuple[int, ...]) -> np.ndarray:
+    """Zeros that nobody writes to: what a law on readings knows of depth and sliding."""
+    return np.zeros(shape)
+
+
+@lru_cache(maxsize=CONSTANTS_KEPT)
+def _constants_kept(
+    constants: Callable[[Values, np.ndarray], np.ndarray], values: tuple[tuple[str, Value], ...], lengths: bytes
+) -> np.ndarray:
+    """Constants of a law. A fit asks for the same ones for each of its recordings."""
+    return constants(dict(values), np.frombuffer(lengths))
+
+
 def law_over_time(
     form: Form,
     force: np.ndarray,
@@ -233,8 +255,8 @@ def law_over_time(
     assert form.law is not None
     # Contiguous arrays of one type, so that the law is compiled only once.
     force = np.ascontiguousarray(force, dtype=float)
-    depth = np.zeros_like(force) if depth is None else np.ascontiguousarray(depth, dtype=float)
-    slide = np.zeros_like(force) if slide is None else np.ascontiguousarray(slide, dtype=float)
+    depth = _zeros(force.shape) if depth is None else np.ascontiguousarray(depth, dtype=float)
+    slide = _zeros(force.shape) if slide is None else np.ascontiguousarray(slide, dtype=float)
     constants = np.ascontiguousarray(constants, dtype=float)
     result = np.empty_like(force)
     _over_time(form.law)(force, depth, slide, step, constants, memory, result)

@@ -20,6 +20,7 @@ from .compiled_program import (
     apply_force_laws,
     apply_friction_laws,
     compile_program,
+    constants_of,
     law_over_time,
     write_base_law,
 )
@@ -64,18 +65,21 @@ def normal_forces(
     force = plain(elastic_force)(inside, law)
     clipped = False
     for item, form in in_signal_order(effects, readout=False):
-        if form.law is None or form.constants is None:
+        if form.law is None:
             continue
         if form.after_clip and not clipped:
             force, clipped = _damped_and_clipped(force, inside, rate, law), True
         memory = np.zeros((depth.shape[1], form.state_size))
-        force = law_over_time(form, force, step, form.constants(complete_values(item), lengths), memory, inside, slide)
+        constants = constants_of(form, complete_values(item), lengths)
+        force = law_over_time(form, force, step, constants, memory, inside, slide)
     return force if clipped else _damped_and_clipped(force, inside, rate, law)
 
 
 def _damped_and_clipped(elastic: np.ndarray, depth: np.ndarray, rate: np.ndarray, law: ContactLaw) -> np.ndarray:
     """Return elastic force and damping together, clipped at zero (Eq. 8, or Hunt and Crossley's law)."""
-    return np.where(depth > 0.0, np.maximum(plain(damped_force)(elastic, rate, law), 0.0), 0.0)
+    force: np.ndarray = np.maximum(plain(damped_force)(elastic, rate, law), 0.0)
+    np.copyto(force, 0.0, where=~(depth > 0.0))
+    return force
 
 
 def friction_factors(effects: Sequence[Effect], speed: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -195,12 +195,9 @@ class Drawing:
         Course of the depth, for a drawing over time or depth: a press that is held, if none is given.
     values : dict of str to dict
         By the name of a form, values that replace its defaults.
-    headroom : float
-        Factor that makes the plot higher, so that the legend has room above the curves.
     """
 
     over: str = "time"
     time: np.ndarray = field(default_factory=_twenty_seconds)
     depth: np.ndarray = field(default_factory=_press_and_hold)
     values: dict[str, dict[str, float]] = field(default_factory=dict)
-    headroom: float = 1.0

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...model.effect import Effect, Values
-from .compiled_program import law_over_time
+from .compiled_program import constants_of, law_over_time
 from .coupling_matrix import CouplingMatrix
 from .registry import complete_values, in_signal_order
 from .specification import Form, TransducerArray
@@ -104,7 +104,9 @@ class _Conversion:
         self.transducers = transducers
 
     def apply(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
-        return self.transducers.zero + self.transducers.gain * self.transducers.painted * signal
+        reading: np.ndarray = self.transducers.gain * self.transducers.painted * signal
+        reading += self.transducers.zero
+        return reading
 
 
 class _Memoryless:
@@ -143,10 +145,9 @@ class _Law:
         self.last: float | None = None
 
     def apply(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
-        assert self.form.constants is not None
         lengths, step = steps_of(time, self.last)
         self.last = float(time[-1])
-        return law_over_time(self.form, signal, step, self.form.constants(self.values, lengths), self.memory)
+        return law_over_time(self.form, signal, step, constants_of(self.form, self.values, lengths), self.memory)
 
 
 class _Delay:

@@ -67,7 +67,7 @@ def names_found_by(way: str) -> tuple[str, ...]:
 
 def form_of(name: str, form: str = "") -> Form:
     """Return a form by its name, or the usual form if no name is given; raise :class:`EffectError` if there is none."""
-    forms = {item.name: item for item in kind_of(name).forms}
+    forms = kind_of(name).forms_by_name
     if not form:
         return next(iter(forms.values()))
     if form not in forms:

@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -186,7 +187,7 @@ class Form:
     same_as: str = ""
     needs: str = ""
 
-    @property
+    @cached_property
     def mechanism(self) -> str:
         """The name of the mechanism that is given."""
         mechanisms = ("law", "memoryless", "coupling", "delay", "friction_law", "placement")
@@ -270,6 +271,11 @@ class Kind:
                 if word and word not in known:
                     raise EffectError(f"{attribute} of effect '{self.name}' is '{word}': choose from {', '.join(known)}.")
         object.__setattr__(self, "variants", tuple(replace(one, kind=self.name) for one in self.variants))
+
+    @cached_property
+    def forms_by_name(self) -> dict[str, Form]:
+        """The forms by their names."""
+        return {form.name: form for form in self.forms}
 
     def site_of(self, form: Form) -> str:
         """Return the site of action of a form of this kind."""

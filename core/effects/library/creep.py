@@ -14,7 +14,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing, Recordings, Run, Variant
+from ..engine.declarations import Recordings, Run, Variant
 from ..engine.specification import Form, Kind, TexelInput, scalar
 
 LOG_RATES = np.arange(-13.75, 2.76, 1.25)
@@ -204,7 +204,6 @@ KIND = Kind(
         ),
     ),
     experiment="hold one depth for at least a minute, then release and wait as long",
-    drawing=Drawing(headroom=2.3),
     known_from=("timing",),
     families=("late", "moving"),
     variants=(Variant(30, relaxing, in_contact=True), Variant(60, rising, 0.0, 2.0, name="rising")),

@@ -145,7 +145,7 @@ KIND = Kind(
         ),
     ),
     experiment="repeat one cycle several hundred times on the same texels",
-    drawing=Drawing("pressings", values={"archard": {"rate": 2e-4}, "work": {"life": 5.0}}, headroom=1.4),
+    drawing=Drawing("pressings", values={"archard": {"rate": 2e-4}, "work": {"life": 5.0}}),
     known_from=("unloading", "cycles"),
     families=("losing",),
     variants=(Variant(60, losses, 0.0, 2.0, in_contact=True),),

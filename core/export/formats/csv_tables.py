@@ -19,7 +19,7 @@ from ...io.file_writing import atomic_write, writable_folder
 from ...jobs.progress import Job
 from ...model.recording import Recording, SensorRecording
 from ...response import metrics
-from ..exporter import Exporter, sensor_progress
+from ..exporter import Exporter, channel_labels, sensor_progress
 
 _QUANTITIES = ("normal_force", "shear_x", "shear_y", "depth", "slip", "contact", "reading")
 """Quantities of a texel; each gets a table of its own."""
@@ -60,7 +60,22 @@ def _write_sensor(bake: Bake, name: str, folder: Path) -> list[Path]:
     header = ["frame", "time", "normal", "shear", "texels touching", "slip share"]
     header += [f"{key}_{axis}" for key in ("force", "torque", "centre") for axis in "xyz"]
     _write_table(folder / "sums.csv", header, (_sums(bake, name, part) for part in recording.blocks()))
-    return [folder / f"{key}.csv" for key in ("texels", *_QUANTITIES, "sums")]
+    return [*(folder / f"{key}.csv" for key in ("texels", *_QUANTITIES, "sums")), *_write_channels(recording, name, folder)]
+
+
+def _write_channels(recording: Recording, name: str, folder: Path) -> list[Path]:
+    """Write the tables of a sensor with several channels: their readings, and where they are measured."""
+    channels = recording.sensors[name].channels
+    if channels is None:
+        return []
+    blocks = ((part, part.sensors[name].channels) for part in recording.blocks())
+    tables = (np.column_stack([_clock(part), own.values.reshape(len(part.frames), -1)]) for part, own in blocks if own)
+    _write_table(folder / "channels.csv", ["frame", "time", *channel_labels(channels)], tables)
+    if channels.place is None:
+        return [folder / "channels.csv"]
+    places = np.column_stack([np.arange(len(channels.place)), channels.place])
+    _write_table(folder / "channel_places.csv", ["place", *"xyz"], [places])
+    return [folder / "channels.csv", folder / "channel_places.csv"]
 
 
 def _clock(part: Recording) -> np.ndarray:
@@ -112,6 +127,8 @@ def _write_table(path: Path, header: Sequence[str], tables: Iterable[np.ndarray]
 def _csv_bytes(bake: Bake) -> float:
     """Return an estimate from above of the bytes of all tables."""
     per_frame = 7 * len(bake.recording.body_names) + sum(len(_QUANTITIES) * len(texels) + 32 for texels in bake.texels.values())
+    channels = [own.channels.values[0].size + 2 for own in bake.recording.sensors.values() if own.channels is not None]
+    per_frame += sum(channels)
     return float(_NUMBER_BYTES * per_frame * len(bake.recording.frames))
 
 

@@ -113,6 +113,9 @@ def write_hdf5(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Path]]
             group = sensors.create_group(_hdf5_name(name, sensors))
             group.attrs["name"], group.attrs["unit"] = name, bake.parameters[name].unit
             group.attrs["parameters"] = json.dumps(asdict(bake.parameters[name]))
+            channels = recording.sensors[name].channels
+            if channels is not None:
+                group.attrs["channels_names"] = list(channels.names)
             for key, array in bake_arrays(bake, name).items():
                 _dataset(group, key, array, _unit(bake, name, key))
                 if output.error is not None:
@@ -156,6 +159,9 @@ def _dataset(group: Any, name: str, array: np.ndarray, unit: str) -> None:
 
 
 def _unit(bake: Bake, name: str, key: str) -> str:
+    channels = bake.recording.sensors[name].channels
+    if channels is not None and key == "channels":
+        return channels.unit
     return bake.parameters[name].unit if key == "reading" else UNITS.get(key, "1")
 
 

@@ -17,8 +17,10 @@ from ...figures.figure_style import FigureStyle
 from ...geometry.layout.grid_layout import GridLayout
 from ...io.bake_reader import Bake
 from ...io.file_writing import write_file
+from ...io.recording_npz import described
 from ...jobs.progress import Job
 from ...model.recording import Recording
+from ...model.vector_readings import VectorReadings
 from .. import ros2_messages
 from ..exporter import Exporter, sensor_progress, uncompressed_bytes
 
@@ -76,6 +78,9 @@ class _Output:
             for name, topic in topics.items()
         }
         self._points = {name: np.zeros(len(texels), _POINT) for name, texels in bake.texels.items()}
+        for name, recorded in recording.sensors.items():
+            if recorded.channels is not None:
+                self._channels[name]["channels"] = self._channel(f"{topics[name]}/channels", ros2_messages.POINT_CLOUD)
         for name, texels in bake.texels.items():
             for axis, values in zip("xyz", texels.position.T):
                 self._points[name][axis] = values
@@ -110,6 +115,8 @@ class _Output:
                     "wrench": ros2_messages.wrench(time, frame, own.net_force, own.net_torque),
                     "centre_of_pressure": ros2_messages.point(time, frame, own.centre_of_pressure),
                 }
+                if own.channels is not None:
+                    content["channels"] = ros2_messages.point_cloud(time, frame, _vector_points(own.channels))
                 for what, message in content.items():
                     self._message(self._channels[name][what], time, int(part.frames[i]), message)
 
@@ -130,8 +137,23 @@ class _Output:
                 **{key: getattr(texels, key).tolist() for key in ("position", "normal", "tangent", "area")},
                 **({} if grid is None else {"row": grid.row.tolist(), "column": grid.column.tolist()}),
             }
+            channels = recording.sensors[name].channels
+            if channels is not None:
+                content["channels"] = described(channels)
             text = json.dumps(content, allow_nan=False).encode()
             self._writer.add_attachment(0, 0, f"{topic_names(self._bake.texels)[name][1:]}.json", "application/json", text)
+
+
+def _vector_points(channels: VectorReadings) -> np.ndarray:
+    """Return the points of a cloud where channels are measured, with a field ``channel_<name>`` for each."""
+    own = [f"channel_{name}" for name in channels.names]
+    points = np.zeros(len(channels.values), [(name, "<f4") for name in (*"xyz", *own)])
+    if channels.place is not None:
+        for axis, values in zip("xyz", channels.place.T, strict=True):
+            points[axis] = values
+    for name, values in zip(own, channels.values.T, strict=True):
+        points[name] = values
+    return points
 
 
 def topic_names(sensors: Iterable[str]) -> dict[str, str]:

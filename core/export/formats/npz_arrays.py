@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from ...figures.figure_style import FigureStyle
 from ...io.bake_folder import folder_names
 from ...io.bake_reader import Bake
@@ -19,7 +21,12 @@ def write_npz(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Path]]:
     for name, stem in folder_names(bake.texels).items():
         yield sensor_progress(bake, name)
         path = folder / f"{stem}.npz"
-        write_arrays(path, {"frame": bake.recording.frames, "time": bake.recording.times, **bake_arrays(bake, name)})
+        channels = bake.recording.sensors[name].channels
+        about = (
+            {} if channels is None else {"channels_names": np.array(channels.names), "channels_unit": np.array(channels.unit)}
+        )
+        clock = {"frame": bake.recording.frames, "time": bake.recording.times}
+        write_arrays(path, {**clock, **bake_arrays(bake, name), **about})
         written.append(path)
     return written
 

@@ -15,7 +15,9 @@ from ...io.bake_folder import folder_names
 from ...io.bake_reader import Bake
 from ...io.disk_space import BLOCK
 from ...io.file_writing import atomic_write, writable_folder
+from ...io.tactile_exr import channel_layout
 from ...jobs.progress import Job
+from ...model.recording import row_blocks
 from ..exporter import Exporter, sensor_progress
 
 _LEAST_PIXELS = 256
@@ -48,15 +50,48 @@ def write_png(bake: Bake, folder: Path, style: FigureStyle) -> Job[list[Path]]:
             "last_colour": top,
             "colour_map": style.colour_map,
         }
+        written += _write_channels(bake, name, own_folder)
         with atomic_write(own_folder / "scale.json") as temporary:
             temporary.write_text(json.dumps(scale, indent=2) + "\n", encoding="utf-8")
         written.append(own_folder / "scale.json")
     return written
 
 
+def _write_channels(bake: Bake, name: str, folder: Path) -> list[Path]:
+    """Write pictures of how the channels of a sensor have changed since the first frame, side by side, in signed colours."""
+    recording = bake.recording
+    channels = recording.sensors[name].channels
+    if channels is None:
+        return []
+    layout = channel_layout(bake.texels[name], channels)
+    mask, rest = layout.mask(), channels.values[0]
+    top = max((float(np.abs(channels.values[rows] - rest).max()) for rows in row_blocks(channels.values)), default=0.0) or 1.0
+    magnified = max(1, -(-_LEAST_PIXELS // max(layout.shape)))
+    written = []
+    for values, frame in zip(channels.values, recording.frames, strict=True):
+        images = np.moveaxis(layout.image((values - rest) / top), 2, 0)
+        color = color_maps.signed_colors(images.ravel()).reshape(*images.shape, 3)
+        tiles = np.concatenate([color, np.broadcast_to(mask[None, ..., None], (*images.shape, 1))], axis=3)
+        pixels = np.concatenate(list(tiles), axis=1)[::-1]
+        pixels = np.repeat(np.repeat(pixels, magnified, axis=0), magnified, axis=1)
+        written.append(folder / f"channels_{frame:04d}.png")
+        save_pixels((pixels * 255 + 0.5).astype(np.uint8), written[-1])
+    scale = {
+        "quantity": f"change of {', '.join(channels.names)} since frame {recording.frames[0]} ({channels.unit}), left to right",
+        "first_colour": -top,
+        "last_colour": top,
+        "colour_map": "blue, white, red",
+    }
+    with atomic_write(folder / "channels_scale.json") as temporary:
+        temporary.write_text(json.dumps(scale, indent=2) + "\n", encoding="utf-8")
+    return [*written, folder / "channels_scale.json"]
+
+
 def _png_bytes(bake: Bake) -> float:
     """Return an estimate from above of the bytes of all pictures; magnified pixels are packed well."""
     pixels = [int(np.prod(texels.layout.shape)) for texels in bake.texels.values()]
+    sensors = bake.recording.sensors
+    pixels += [own.channels.values.shape[2] * _LEAST_PIXELS**2 // 4 for own in sensors.values() if own.channels is not None]
     return float(len(bake.recording.frames) * sum(2 * BLOCK + 4 * count for count in pixels))
 
 

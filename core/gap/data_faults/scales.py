@@ -47,7 +47,30 @@ def _signs(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
             said = f"the {what} of '{wrong[0]}.csv' {'go' if part == 'reading' else 'goes'} the other way"
             said += f" (correlation with the load {value:.2f}), and {against}"
             faults.append(DataFault("sign", wrong, said, dict.fromkeys(wrong, _scaled(part, -1.0))))
-    return faults
+    return [*faults, *_friction_signs(stimuli)]
+
+
+def _friction_signs(stimuli: Sequence[Stimulus]) -> list[DataFault]:
+    """Net forces along the surface that do work on the surface that slides, where friction takes work from it."""
+    found = {s.trial.name: _work_share(s.trial) for s in stimuli if s.trial.force is not None}
+    wrong = tuple(name for name, value in found.items() if value < OPPOSITE)
+    if not wrong:
+        return []
+    said = (
+        f"the net force along the surface of '{wrong[0]}.csv' drives the slide instead of resisting it (its work is "
+        f"{found[wrong[0]]:.2f} of what a force along the travel would do), but forces act on the sensor"
+    )
+    return [DataFault("sign", wrong, said, dict.fromkeys(wrong, _scaled("force", np.array([-1.0, -1.0, 1.0]))))]
+
+
+def _work_share(trial: Trial) -> float:
+    """Work of the net force along the stated travel over what it would be if it always pointed along it; 0 without travel."""
+    assert trial.force is not None
+    step = np.diff(trial.slide, axis=0)
+    known = np.nan_to_num(trial.force[:, :2])
+    force = 0.5 * (known[1:] + known[:-1])
+    most = float(np.linalg.norm(force, axis=1) @ np.linalg.norm(step, axis=1))
+    return float((force * step).sum()) / most if most > 0.0 else 0.0
 
 
 def _pair(s: Stimulus, part: str) -> tuple[np.ndarray, np.ndarray]:
@@ -174,7 +197,7 @@ def _slope(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> float:
     return xy / max(xx, 1e-300)
 
 
-def _scaled(part: str, factor: float) -> Correction:
+def _scaled(part: str, factor: float | np.ndarray) -> Correction:
     def act(trial: Trial) -> Trial:
         return replace(trial, **{part: factor * getattr(trial, part)})
 

@@ -19,7 +19,7 @@ from ...geometry.texels import Texels
 from ...io.schema import known_words
 from ...io.sensor_toml import checked_lengths
 from ...io.toml_file import is_number
-from ...response.layer import pressure_below_point_load
+from ...skins.layer import pressure_below_point_load
 
 COVER_WORDS = {"sensors", "strips", "cover"}
 """Words of a [sensor] that describe such a sensor."""

@@ -133,7 +133,7 @@ class ContactHistory:
         """
         force = np.zeros((len(self.time), self.texel_count))
         found = contact_forces.normal_forces(force_effects, p, self.time, self.depth, self.slide_step, self.rate)
-        force[:, self.touched] = found[:, self.group]
+        force[:, self.touched] = found if found.shape[1] == len(self.group) else found[:, self.group]
         return force
 
     def total_force(self, p: SensorParameters, friction_effects: Sequence[Effect], force: np.ndarray) -> np.ndarray:

@@ -16,6 +16,7 @@ from ...effects.engine import readout_chain
 from ...effects.engine.declarations import SCATTER, STEPS
 from ...effects.engine.registry import actual_placement as placed_texels
 from ...effects.engine.registry import form_of, kind_of, site_of_action
+from ...effects.engine.specification import TransducerArray
 from ...geometry.texels import Texels
 from ...model.effect import Effect
 from ...model.sensor import Sensor
@@ -138,6 +139,7 @@ class ResponseModel:
         self._texel_forces: _Recent[np.ndarray] = _Recent(CACHE_SIZE)
         self._totals: _Recent[np.ndarray] = _Recent(readings_kept)
         self._readings: _Recent[np.ndarray] = _Recent(readings_kept)
+        self._sites: dict[bytes | None, TransducerArray] = {}
 
     @property
     def texel_stimulus(self) -> Stimulus:
@@ -153,18 +155,28 @@ class ResponseModel:
     def _computed_reading(self, model: Model, subset: np.ndarray | None) -> np.ndarray:
         """Return the readings under effects on the readout."""
         effects = model.readout_effects
-        site = readout_chain.transducers_of(Sensor("sensor", 0, self.rig.texels, model.parameters))
-        site = replace(site, temperature=self._temperature())
+        which, p = None if subset is None else subset.tobytes(), model.parameters
+        site = self._sites.get(which) or self._site(model, subset)
+        if (site.gain, site.zero) != (p.gain, p.zero):
+            site = replace(site, gain=p.gain, zero=p.zero)
+        self._sites[which] = site
         if subset is not None:
-            site = replace(
-                site,
-                position=site.position[subset],
-                area=site.area[subset],
-                row=None if site.row is None else site.row[subset],
-                column=None if site.column is None else site.column[subset],
-            )
             effects = tuple(_effect_on_texels(effect, subset) for effect in effects)
         return readout_chain.readings(effects, site, self.stimulus.time, self.normal_force(model, subset))
+
+    def _site(self, model: Model, subset: np.ndarray | None) -> TransducerArray:
+        """The texels, or some, as effects on readings see them."""
+        site = readout_chain.transducers_of(Sensor("sensor", 0, self.rig.texels, model.parameters))
+        site = replace(site, temperature=self._temperature())
+        if subset is None:
+            return site
+        return replace(
+            site,
+            position=site.position[subset],
+            area=site.area[subset],
+            row=None if site.row is None else site.row[subset],
+            column=None if site.column is None else site.column[subset],
+        )
 
     def _temperature(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Times and temperatures that were recorded."""
@@ -183,7 +195,7 @@ class ResponseModel:
         """Return the stimulus of the points of the surface at the places where effects move them."""
         moving = model.placing_effects if self.stimulus.trial.stimulus == "pose" else ()
         heights = self._heights(model)
-        if not moving and heights == self._heights(None):
+        if not moving and heights == self._first_heights:
             return self.stimulus
         key = _effects_key(moving), heights
 
@@ -195,6 +207,11 @@ class ResponseModel:
             return self._stimulus_of(t, heights)
 
         return self._placed.get_or(key, place)
+
+    @cached_property
+    def _first_heights(self) -> tuple[float, ...]:
+        """Contact heights where fits start."""
+        return self._heights(None)
 
     def _heights(self, model: Model | None) -> tuple[float, ...]:
         """Contact height of each of its trials; None: where fits start."""
@@ -220,8 +237,8 @@ class ResponseModel:
         stimulus = self.placed(model)
         if stimulus.force_share is not None:
             return stimulus.force_share if subset is None else stimulus.force_share[:, subset]
-        whole = self._forces.get(self._force_key(model, None))
-        if subset is not None and whole is not None:
+        whole = None if subset is None else self._forces.get(self._force_key(model, None))
+        if whole is not None:
             return whole[:, subset]
         return self._forces.get_or(
             self._force_key(model, subset),
@@ -419,13 +436,13 @@ class _Recent(Generic[Value]):
 
     def get_or(self, key: object, compute: Callable[[], Value]) -> Value:
         """Return the result of a key; compute it if it is not kept."""
-        if key not in self._values:
-            value = compute()
+        kept = self._values.pop(key, None)  # the key is long, and its hash is computed whenever it is looked up
+        if kept is None:
+            kept = compute()
             while len(self._values) >= self._most:
                 self._values.popitem(last=False)
-            self._values[key] = value
-        self._values.move_to_end(key)
-        return self._values[key]
+        self._values[key] = kept
+        return kept
 
     def get(self, key: object) -> Value | None:
         """Return the result of a key, None if it is not kept."""

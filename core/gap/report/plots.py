@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...effects.engine.registry import kind_of
 from ...figures.figure_canvas import new_figure, save_figure, tidy_axes
 from ...figures.figure_style import GREY, INK, NORMAL_COLOUR, SHEAR_COLOUR, WIDTHS
 from ...geometry.layout.grid_layout import GridLayout
@@ -17,14 +18,17 @@ from ..forward.contact_phases import PHASES
 from ..forward.predictor import Model, Predictor
 from ..selection.findings import Diagnosis
 from .comparison import GapErrors, error_location, rms_by_texel
+from .sentences import said_confidence
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 BEFORE, AFTER = SHEAR_COLOUR, NORMAL_COLOUR
 MEASURED = INK
 LONG = 12
 """How many times as long as wide a grid is no picture any more."""
+HEADING: dict[str, Any] = {"fontsize": 8.5, "color": INK, "weight": "bold"}
 
 
 def gap_bars(result: Diagnosis, errors: GapErrors) -> Figure:
@@ -116,16 +120,36 @@ def _worst_channel(result: Diagnosis, predictor: Predictor) -> tuple[str, np.nda
 
 def error_map(result: Diagnosis) -> Figure:
     """Root mean square error of each texel, base and amended, on one scale."""
-    maps = [(label, 100.0 * rms_by_texel(result, model)) for label, model, _ in _models(result)]
-    top = max(float(values.max()) for _, values in maps)
-    position = result.rig.texels.position
+    row = _is_row(result)
+    figure = new_figure(WIDTHS["single"], 2.5 if row else 2.9)
+    if row:
+        _draw_error_line(figure.add_axes((0.15, 0.2, 0.82, 0.62)), result)
+    else:
+        _draw_error_maps(figure, (0.02, 0.04, 0.96, 0.84), result)
+    return figure
+
+
+def _maps(result: Diagnosis) -> list[tuple[str, np.ndarray]]:
+    """Error of each texel, percent of the range, by the name of the model."""
+    return [(label, 100.0 * rms_by_texel(result, model)) for label, model, _ in _models(result)]
+
+
+def _is_row(result: Diagnosis) -> bool:
+    """Return True if the texels form a row that is too long for a map."""
     layout = result.rig.texels.layout
-    if isinstance(layout, GridLayout) and LONG * min(layout.mask().shape) < max(layout.mask().shape):
-        return _error_line(maps)
-    figure = new_figure(WIDTHS["single"], 2.9)
+    return isinstance(layout, GridLayout) and LONG * min(layout.mask().shape) < max(layout.mask().shape)
+
+
+def _draw_error_maps(figure: Figure, place: tuple[float, float, float, float], result: Diagnosis) -> None:
+    """Draw the maps and their colour bar into a part of a figure: left, bottom, width and height, as shares of it."""
+    maps, texels = _maps(result), result.rig.texels
+    layout, position = texels.layout, texels.position
+    top = max(float(values.max()) for _, values in maps)
+    left, bottom, width, height = place
     image: Any = None
     for i, (label, values) in enumerate(maps):
-        axes = figure.add_axes((0.02 + 0.4 * (i + 0.5 * (2 - len(maps))), 0.04, 0.36, 0.84))
+        start = left + width * 0.42 * (i + 0.5 * (2 - len(maps)))
+        axes = figure.add_axes((start, bottom, 0.375 * width, height))
         if isinstance(layout, GridLayout):
             picture: Any = np.ma.masked_array(layout.image(values), ~layout.mask())
             image = axes.imshow(picture, origin="lower", cmap="inferno", vmin=0.0, vmax=top, interpolation="nearest")
@@ -135,24 +159,77 @@ def error_map(result: Diagnosis) -> Figure:
         axes.set_title(label, fontsize=8.5, color=INK)
         axes.set_xticks([])
         axes.set_yticks([])
-    bar = figure.colorbar(image, cax=figure.add_axes((0.82, 0.12, 0.035, 0.68)))
+    bar = figure.colorbar(
+        image, cax=figure.add_axes((left + 0.835 * width, bottom + 0.095 * height, 0.0365 * width, 0.81 * height))
+    )
     bar.ax.tick_params(labelsize=8, colors=INK)
     bar.set_label("error (% of range)", fontsize=8.5, color=INK)
-    return figure
 
 
-def _error_line(maps: list[tuple[str, np.ndarray]]) -> Figure:
-    """The same for texels in a long row."""
-    figure = new_figure(WIDTHS["single"], 2.5)
-    axes = figure.add_axes((0.15, 0.2, 0.82, 0.62))
-    for (label, values), colour in zip(maps, (BEFORE, AFTER), strict=False):
+def _draw_error_line(axes: Axes, result: Diagnosis) -> None:
+    """Draw the errors of texels in a long row."""
+    for (label, values), colour in zip(_maps(result), (BEFORE, AFTER), strict=False):
         axes.step(np.arange(len(values)), values, where="mid", color=colour, lw=0.9, label=label)
     axes.set_xlabel("texel")
     axes.set_ylabel("error (% of range)")
     axes.margins(x=0)
     tidy_axes(axes)
     axes.legend(frameon=False, fontsize=8, loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2)
+
+
+def overview(result: Diagnosis, errors: GapErrors, width: float = WIDTHS["double"]) -> Figure:
+    """Where the error is on the sensor, which effects were found, and the error without and with each of them.
+
+    Parameters
+    ----------
+    result : Diagnosis
+    errors : GapErrors
+    width : float, inches
+    """
+    bars = len(errors.stages) + 2 * bool(result.of("check"))
+    figure = new_figure(width, max(2.7, 0.9 + 0.36 * bars))
+    height = figure.get_figheight()
+    bottom, top = 0.5 / height, 1.0 - 0.55 / height
+    if len(result.rig.texels) > 1:
+        figure.text(0.015, 1.0 - 0.06 / height, "Where: error of each texel", va="top", **HEADING)
+        if _is_row(result):
+            _draw_error_line(figure.add_axes((0.08, bottom, 0.32, top - bottom)), result)
+        else:
+            _draw_error_maps(figure, (0.015, 0.1 / height, 0.4, top - 0.1 / height), result)
+    left = 0.7 if len(result.rig.texels) > 1 else 0.3
+    figure.text(left - 0.2, 1.0 - 0.06 / height, "What: error without and with each effect", va="top", **HEADING)
+    _draw_stages(figure.add_axes((left, bottom, 0.985 - left, 1.0 - 0.3 / height - bottom)), result, errors)
     return figure
+
+
+def _draw_stages(axes: Axes, result: Diagnosis, errors: GapErrors) -> None:
+    """Draw a bar for the base model and one for each effect that is added to it, then those of the check trials."""
+    rows: list[tuple[str, float | None, str]] = [("base model", errors.base["fit"], BEFORE)]
+    if result.alike is not None:
+        rows.append(("+ level and gain\nof each recording", errors.stages[0], AFTER))
+    for one in sorted(result.findings, key=lambda one: one.effect):
+        name = " or ".join(kind_of(kind).title.lower() for kind in (one.name, *one.rivals))
+        left = errors.stages[min(one.effect + 1, len(errors.stages) - 1)]
+        rows.append((f"+ {name}\n(confidence {said_confidence(one.confidence)})", left, AFTER))
+    count = len(rows)
+    if result.of("check"):
+        rows.append(("check trials, base", errors.base["check"], BEFORE))
+        rows += [("check trials, amended", errors.amended["check"], AFTER)] if count > 1 else []
+    places = [-float(i) - 0.5 * (i >= count) for i in range(len(rows))]
+    values = [100.0 * (error or 0.0) for _, error, _ in rows]
+    axes.barh(places, values, 0.72, color=[colour for *_, colour in rows])
+    for place, value in zip(places, values, strict=True):
+        axes.text(value, place, f" {value:.2f}", ha="left", va="center", fontsize=8, color=INK)
+    floor = 100.0 * errors.noise_floor
+    axes.axvline(floor, color=INK, lw=0.9, ls=(0, (4, 3)))
+    axes.text(floor, 0.25 - count, f" noise floor {floor:.2f}", ha="left", va="center", fontsize=8, color=INK)
+    axes.set_ylim(min(places[-1] - 0.5, -float(count)), 0.5)
+    axes.set_xlim(0.0, 1.18 * max(*values, floor))
+    axes.set_yticks(places, [name for name, *_ in rows])
+    axes.set_xlabel("error (% of range)")
+    tidy_axes(axes)
+    axes.grid(False, axis="y")
+    axes.tick_params(axis="y", length=0)
 
 
 def phase_bars(result: Diagnosis, errors: GapErrors) -> Figure:
@@ -224,6 +301,8 @@ def _base_squared_error(predictor: Predictor, result: Diagnosis) -> np.ndarray:
 
 
 CAPTIONS = {
+    "overview": "Where there are several texels, the error of each on the fitted trials; the error without and with each "
+    "effect that was found.",
     "gap": "The gap before and after. Check trials were never fitted: an effect that makes them worse is dropped, and they "
     "decide the verdict.",
     "curves": "Measured and simulated curves where the error of the base model is largest in each trial.",
@@ -239,6 +318,7 @@ FILE_TYPES = ("png", "pdf")
 def picture(name: str, result: Diagnosis, errors: GapErrors) -> Figure:
     """Draw the picture of this name (see :data:`CAPTIONS`)."""
     drawings: dict[str, Callable[[], Figure]] = {
+        "overview": lambda: overview(result, errors),
         "gap": lambda: gap_bars(result, errors),
         "curves": lambda: curves(result),
         "loops": lambda: loops(result),

@@ -193,16 +193,17 @@ def _unexplained(result: Diagnosis, errors: GapErrors, sure: list[Finding]) -> s
 
 
 def _friction(result: Diagnosis, errors: GapErrors) -> str:
-    """A sentence on how much of the error the base model's own friction removes; empty if that is little.
+    """A sentence on how much of the error the base model's own friction removes; empty if that is little, or if an effect on
+    friction was found.
 
-    Nor is it said where an effect on friction was found: then friction is part of what is missing.
+    It does not say that no friction is missing: an open gap of the net forces may be friction of another law.
     """
     frictionless = (errors.frictionless or {}).get("fit") or 0.0
     if any(one.name in friction_kinds() for one in result.findings):
         return ""
     if frictionless < FRICTION_MATTERS * (errors.base["fit"] or 0.0):
         return ""
-    return f" Friction is not missing: the base model has it, and without it the error would be {frictionless:.2%}."
+    return f" The base model has friction; without it the error would be {frictionless:.2%}."
 
 
 def said_confidence(confidence: float) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -206,11 +207,7 @@ class Candidate:
 
     def starting_values(self, scales: Scales, gain: float, count: int = START_COUNT) -> Iterator[dict[str, float]]:
         """Yield starting values, spread evenly over the search ranges (Halton sequence)."""
-        from scipy.stats import qmc
-
-        sequence = qmc.Halton(len(self.form.parameters), scramble=False)
-        sequence.fast_forward(1)  # the first point is the corner of the ranges
-        for point in sequence.random(count):
+        for point in _halton_points(len(self.form.parameters), count):
             values = {}
             for share, raw in zip(point, self.form.parameters, strict=True):
                 p = raw.scaled(gain)
@@ -234,6 +231,17 @@ class Candidate:
             if np.isinf(value):
                 return name
         return None
+
+
+@cache
+def _halton_points(dimensions: int, count: int) -> np.ndarray:
+    """The first points of a Halton sequence but the corner of the unit cube, (count, dimensions) float."""
+    from scipy.stats import qmc
+
+    sequence = qmc.Halton(dimensions, scramble=False)
+    sequence.fast_forward(1)
+    points: np.ndarray = sequence.random(count)
+    return points
 
 
 @dataclass

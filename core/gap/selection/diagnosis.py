@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import TypeVar
 
 import numpy as np
@@ -180,7 +180,7 @@ class _Search:
         """What the amended model leaves (see :func:`_left`)."""
         return _left(self.views, self.result.best)
 
-    @property
+    @cached_property
     def left_of_base(self) -> float:
         """What the base model leaves."""
         return _left(self.views, self.result.base)
@@ -202,12 +202,14 @@ def _search_of(
 def _search_with_own_numbers(plain: _Search) -> _Search:
     """The search with a factor and a zero of each recording. What a zero of all recordings closes does not count."""
     result = plain.result
-    made = []
-    for rig in (with_common_zero(result.rig), with_own_numbers(result.rig)):
-        twins = [one.with_numbers_of(trial) for one, trial in zip(result.predictors, rig.trials, strict=True)]
-        made.append(_search_of(rig, twins, result.noise, result.full, result.faults))
-    common, own = made
-    before, after = min(plain.left_of_base, common.left_of_base), own.left_of_base
+
+    def twins(rig: Rig) -> list[Predictor]:
+        return [one.with_numbers_of(trial) for one, trial in zip(result.predictors, rig.trials, strict=True)]
+
+    common, rig = with_common_zero(result.rig), with_own_numbers(result.rig)
+    with_zero = _fitted_base(common, twins(common), result.noise, result.full)
+    own = _search_of(rig, twins(rig), result.noise, result.full, result.faults)
+    before, after = min(plain.left_of_base, _left(*with_zero)), own.left_of_base
     own.closes = 1.0 - after / before
     own.is_wanted = own.closes >= LEAST_CLOSED and before - after > LEAST_LOWERED
     return own
@@ -290,11 +292,19 @@ def _with_base_model(
 ) -> tuple[Diagnosis, ViewSet]:
     """A diagnosis that has the fitted base model alone, and the views of the fitted trials."""
     fitted = [p for p in predictors if p.trial.use == "fit"]
-    view_set = view_set_of(fitted, (noise[0].deviation, noise[1].deviation))
-    base = base_fit(rig, view_set.whole, full[0])
+    view_set, base = _fitted_base(rig, predictors, noise, full)
     structure = _structure(view_set, base)
     scales = scales_of(fitted, base.model)
     return Diagnosis(rig, predictors, noise, full, coverage(fitted), scales, base, base, structure, structure), view_set
+
+
+def _fitted_base(
+    rig: Rig, predictors: list[Predictor], noise: tuple[ChannelNoise, ChannelNoise], full: tuple[float, float]
+) -> tuple[ViewSet, Fit]:
+    """The views of the fitted trials, and the fit of the base model to them."""
+    fitted = [p for p in predictors if p.trial.use == "fit"]
+    view_set = view_set_of(fitted, (noise[0].deviation, noise[1].deviation))
+    return view_set, base_fit(rig, view_set.whole, full[0])
 
 
 def _relative_error(found: Fit, noise: tuple[ChannelNoise, ChannelNoise], full: tuple[float, float]) -> float:

@@ -19,7 +19,7 @@ from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
 from ..fitting.least_squares import Fit, FreeParameter, TrialView, fit, held_out_squares
 from ..forward.predictor import Model
 from .candidates import DIRECTLY_ESTIMATED, Candidate, FittedCandidate, Scales
-from .direct_estimates import few_levels, moving_readings, quantization_starts, unresponsive_texels
+from .direct_estimates import few_levels, quantization_starts, unresponsive_texels
 from .score_test import ScoreTest
 from .view_set import ViewSet
 
@@ -138,7 +138,7 @@ def screen(
         if id(views) not in score_tests:
             score_tests[id(views)] = ScoreTest(views, found)
         score_test = score_tests[id(views)]
-        starts = starting_points(candidate, score_test, view_set.whole, scales)
+        starts = starting_points(candidate, score_test, view_set, scales)
         if starts and starts[0][0] > 0:
             share = starts[0][0] / max(score_test.total, 1e-300)
             promises.append(Promise(share, candidate, [effect for _, effect in starts]))
@@ -156,7 +156,8 @@ def screen(
         score_test = score_tests[id(view_set.quick(one.candidate, found.model))]
         screened.append(_best_first_fit(one, score_test, scales, effort))
         yield "fitting the best candidates", 0.35 + 0.35 * (number + 1) / len(kept), []
-    last, whole = _finalists(screened, effort), ScoreTest(view_set.whole, found)
+    last = _finalists(screened, effort)
+    whole = score_tests.get(id(view_set.whole)) or ScoreTest(view_set.whole, found)
     if reasons is not None:
         reasons |= _reasons_after_first_fits(screened, last)
     results: list[FittedCandidate] = []
@@ -280,7 +281,7 @@ def free_with(free: Sequence[FreeParameter], model: Model, candidate: Candidate,
 
 
 def starting_points(
-    candidate: Candidate, score_test: ScoreTest, whole: Sequence[TrialView], scales: Scales
+    candidate: Candidate, score_test: ScoreTest, view_set: ViewSet, scales: Scales
 ) -> list[tuple[float, Effect]]:
     """Return starting points of a candidate's fit, best first, each with the decrease of the squares that it promises.
 
@@ -289,15 +290,15 @@ def starting_points(
     candidate : Candidate
     score_test : ScoreTest
         Of the fit to which the candidate is added.
-    whole : sequence of TrialView
-        All texels and samples, for direct estimates.
+    view_set : ViewSet
+        For direct estimates.
     scales : Scales
     """
     if candidate.kind.found_by == SILENT_TEXELS:
-        effect = unresponsive_texels(whole, score_test.model, candidate, scales.texels)
+        effect = unresponsive_texels(view_set.whole, score_test.model, candidate, scales.texels)
         return [] if effect is None else [(score_test.score(score_test.model.with_effect(effect))[0], effect)]
     if candidate.kind.found_by == STEPS:
-        return _quantization_starts(candidate, score_test, whole)
+        return _quantization_starts(candidate, score_test, view_set)
     if candidate.has_texel_parameters:
         return _texel_parameter_starts(candidate, score_test, scales)
     if candidate.form.placement is not None:
@@ -344,12 +345,13 @@ def _scaled_starts(candidate: Candidate, score_test: ScoreTest, scales: Scales) 
     return sorted(tried, key=lambda entry: -entry[0])
 
 
-def _quantization_starts(candidate: Candidate, score_test: ScoreTest, whole: Sequence[TrialView]) -> list[tuple[float, Effect]]:
+def _quantization_starts(candidate: Candidate, score_test: ScoreTest, view_set: ViewSet) -> list[tuple[float, Effect]]:
     """Steps that are estimated from the readings. If they are seen in the readings, they promise enough to be fitted."""
     model = score_test.model
-    visible = few_levels(moving_readings(whole, model)) is not None
+    values = view_set.moving_readings(model)
+    visible = few_levels(values) is not None
     least = VISIBLE_STEPS_PROMISE * score_test.total if visible else 0.0
-    starts = quantization_starts(whole, model, candidate)
+    starts = quantization_starts(values, view_set.whole, candidate)
     decreases = [(score_test.decrease(model.with_effect(effect)), effect) for effect in starts]
     return [(max(decrease, least), effect) for decrease, effect in sorted(decreases, key=lambda entry: -entry[0])]
 

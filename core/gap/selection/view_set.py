@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from ..dataset.trial import Trial
 from ..fitting.least_squares import TrialView
 from ..forward.predictor import Model, Predictor, predictors_of
 from .candidates import DIRECTLY_ESTIMATED, Candidate, is_spatial
+from .direct_estimates import moving_readings
 
 FEW_TEXELS = 16
 """Texels of each trial in the views with few texels."""
@@ -43,14 +45,28 @@ class ViewSet:
         Few texels, all samples. Net forces are included only if some trial has no readings. For effects on single texels.
     few_texels_with_forces : list of TrialView
         The same with net forces. For effects on friction.
-    few_samples : list of TrialView
-        All texels, few samples. For effects that couple texels or displace them.
     """
 
     whole: list[TrialView]
     few_texels: list[TrialView]
     few_texels_with_forces: list[TrialView]
-    few_samples: list[TrialView]
+    _moving: np.ndarray | None = None
+
+    @cached_property
+    def few_samples(self) -> list[TrialView]:
+        """All texels, few samples. For effects that couple texels or displace them."""
+        with_forces = self.few_texels[0].with_forces
+        predictors = _thinned([view.predictor for view in self.whole])
+        return [TrialView(one, noise=self.whole[0].noise, with_forces=with_forces) for one in predictors]
+
+    def moving_readings(self, model: Model) -> np.ndarray:
+        """Return readings that change, (n,) float, in which steps of a converter are looked for.
+
+        The first model, that of the first search, says which these are: effects that join it later move no step.
+        """
+        if self._moving is None:
+            self._moving = moving_readings(self.whole, model)
+        return self._moving
 
     def quick(self, candidate: Candidate, model: Model) -> list[TrialView]:
         """Return the smallest view in which a candidate can be tested on top of a model."""
@@ -77,8 +93,7 @@ def view_set_of(predictors: Sequence[Predictor], noise: tuple[float, float]) -> 
     few_texels_with_forces = [TrialView(p, _texels_of_all_loads(p), noise=noise) for p in predictors]
     all_have_readings = all(p.trial.reading is not None for p in predictors)
     few_texels = [replace(view, with_forces=not all_have_readings) for view in few_texels_with_forces]
-    few_samples = [TrialView(p, noise=noise, with_forces=not all_have_readings) for p in _thinned(predictors)]
-    return ViewSet(whole, few_texels, few_texels_with_forces, few_samples)
+    return ViewSet(whole, few_texels, few_texels_with_forces)
 
 
 def _thinned(predictors: Sequence[Predictor]) -> list[Predictor]:

@@ -17,20 +17,13 @@ import numpy as np
 from ...geometry.mesh import TriangleMesh
 from ...io.bake_folder import folder_names
 from ..mjcf_reading import is_mjcf, read_mjcf
+from ..mujoco_load import CONTACTS, LEAST_DAMPING, REFERENCE_MASS
 from ..sensor_format import SensorFormat, Written
 from ..sensor_on_mesh import SensorOnMesh, unmodelled
 from ..xml_writing import add, comment, numbers, write_xml
 
 IMPEDANCE = 0.9
 """Constant impedance d of the contact (`solimp`), the upper end of MuJoCo's default."""
-REFERENCE_MASS = 1.0
-"""kg. MuJoCo's contact stiffness is an acceleration per depth: a body sinks in by g times a constant, whatever its mass. The
-constant is ours for a body of this mass."""
-CONTACTS = 4
-"""Contacts of a box that stands on the sensor; they share MuJoCo's stiffness, so the depth is (1 - d) g / (4 stiffness). A
-test compares both depths. This holds with elliptic cones; pyramids make contacts stiffer."""
-LEAST_DAMPING = 1e-9
-"""N·s/m. MuJoCo knows the format of `solref` by both numbers being below zero."""
 MOST_HULL_GAP = 1e-4
 """Metres. Where a texel lies deeper under the convex hull, contact is found by a signed distance field instead of the hull: it
 costs 35 times as much, and finds 40 contacts under a ball, whose stiffness is no longer ours."""

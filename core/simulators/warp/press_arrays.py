@@ -3,9 +3,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
+
+from ...geometry.mesh import TriangleMesh
+from ...geometry.shapes import Shape
+from ...geometry.texels import Texels
+from ...solver.jumps import jump_arrays
 
 IntArray: TypeAlias = np.ndarray
 BoolArray: TypeAlias = np.ndarray
@@ -32,8 +38,8 @@ class SensorArrays(NamedTuple):
         Painted multipliers of stiffness and friction.
     law : (1 or E, 10) float
         Contact law of one contact point, the same for all environments or one for each.
-    conversion : (n, 2) float
-        Zero and scale of each texel's reading.
+    conversion : (n or E n, 2) float
+        Zero and scale of each texel's reading, the same for all environments or one after the other.
     force_constants, friction_constants, reading_constants : (laws, 2, c) float
         Constants of the laws of effects, for a step and for no time; for readings, for no time and for a step.
     """
@@ -68,6 +74,21 @@ class TargetArrays(NamedTuple):
     kind: IntArray
     size: np.ndarray
     mesh: IntArray
+
+
+class Jumps(NamedTuple):
+    """What is needed to find targets that go through the sensor within a step; fields as in :class:`.JumpSearch`."""
+
+    frame: np.ndarray
+    bound: np.ndarray
+    sphere: np.ndarray
+    centre: np.ndarray
+    jumped: BoolArray
+
+    @classmethod
+    def of(cls, texels: Texels, targets: Sequence[TriangleMesh | Shape], e: int) -> Jumps:
+        """Return them for E environments that all begin with their first step."""
+        return cls(*jump_arrays(texels, targets), np.zeros((e, len(targets), 3)), np.zeros(e, np.bool_))
 
 
 class Worlds(NamedTuple):

@@ -21,11 +21,12 @@ from ...geometry.rotations import write_backward_step_motion, write_rotation, wr
 from ...geometry.shapes import MESH, Vector, is_in_shape, shape_entry, shape_normal
 from ...laws.contact_law import ContactLaw, read_law, scaled_law, whole_texel_law, with_friction
 from ...laws.friction import (
-    bristle_rate,
     deflection_scale,
     friction_force,
     max_bristle_deflection,
     next_deflection,
+    rate_under_decay,
+    sliding_decay,
     turned_into_plane,
 )
 from ...laws.normal_force import normal_force, normal_tangent
@@ -33,8 +34,9 @@ from ...solver.detection.narrow_phase import NEARLY_TOO_DEEP
 from ...solver.dynamics.contact_assembly import LinearContact, Tangent, linearise_contact
 from ...solver.dynamics.effect_kernels import NOW, STEP
 from ...solver.dynamics.relative_kinematics import relative_motion, velocity_at
+from ...solver.jumps import crosses_texel, meets_sphere
 from .effect_functions import force_with_effects, friction_with_effects, reading_with_effects
-from .press_arrays import BoolArray, Results, SensorArrays, Slots, TargetArrays, Worlds
+from .press_arrays import BoolArray, Jumps, Results, SensorArrays, Slots, TargetArrays, Worlds
 
 NO_CONTACT, TOO_DEEP = -1.0, -2.0
 """Instead of a share in :attr:`.Slots.pressed`."""
@@ -220,7 +222,8 @@ def press_texel(
     out.contact[world, texel] = touched
     reading = 0.0
     if valid:
-        zero, scale = sensor.conversion[texel, 0], sensor.conversion[texel, 1]
+        row = (world * (sensor.first_point.shape[0] - 1) + texel) % sensor.conversion.shape[0]
+        zero, scale = sensor.conversion[row, 0], sensor.conversion[row, 1]
         when = 0 if worlds.fresh[world] else 1
         if worlds.fresh[world]:
             for i in range(slots.reading_memory.shape[2]):
@@ -416,10 +419,10 @@ def _write_force(
     held = deflection_scale(z[0] * z[0] + z[1] * z[1] + z[2] * z[2], max_bristle_deflection(fn, friction))
     fx, fy, fz = 0.0, 0.0, 0.0
     if fn > 0.0:
-        zx, zy, zz = held * z[0], held * z[1], held * z[2]
-        fx = friction_force(zx, bristle_rate(zx, v.x, square, fn, friction), v.x, friction)
-        fy = friction_force(zy, bristle_rate(zy, v.y, square, fn, friction), v.y, friction)
-        fz = friction_force(zz, bristle_rate(zz, v.z, square, fn, friction), v.z, friction)
+        zx, zy, zz, decay = held * z[0], held * z[1], held * z[2], sliding_decay(square, fn, friction)
+        fx = friction_force(zx, rate_under_decay(zx, v.x, decay), v.x, friction)
+        fy = friction_force(zy, rate_under_decay(zy, v.y, decay), v.y, friction)
+        fz = friction_force(zz, rate_under_decay(zz, v.z, decay), v.z, friction)
     f = slots.force[world, target, point]
     f[0], f[1], f[2] = fx + fn * n[0], fy + fn * n[1], fz + fn * n[2]
     return fn
@@ -456,6 +459,28 @@ def sum_world(world: int, worlds: Worlds, slots: Slots, out: Results) -> None:
         w[4] += z * w[0] - x * w[2]
         w[5] += x * w[1] - y * w[0]
     out.too_deep[world] = too_deep
+
+
+def mark_jumps(world: int, worlds: Worlds, jumps: Jumps, out: Results) -> None:
+    """Write down whether a target of an environment went through the sensor, and where targets are now."""
+    crossed, measures = False, out.too_deep[world] > 0
+    for target in range(jumps.sphere.shape[0]):
+        pose, sphere, old = worlds.pose[world, target], jumps.sphere[target], jumps.centre[world, target]
+        dx, dy, dz = sphere[0] - pose[9], sphere[1] - pose[10], sphere[2] - pose[11]
+        x = pose[0] * dx + pose[3] * dy + pose[6] * dz
+        y = pose[1] * dx + pose[4] * dy + pose[7] * dz
+        z = pose[2] * dx + pose[5] * dy + pose[8] * dz
+        if worlds.valid[world] and not worlds.fresh[world]:
+            sx, sy, sz, b = old[0], old[1], old[2], jumps.bound
+            if meets_sphere((sx, sy, sz), (x, y, z), sphere[3] + b[3], (b[0], b[1], b[2])):
+                for texel in range(jumps.frame.shape[0]):
+                    f = jumps.frame[texel]
+                    if crosses_texel((sx, sy, sz), (x, y, z), sphere[3], (f[0], f[1], f[2]), (f[3], f[4], f[5])):
+                        crossed = True
+                    if out.contact[world, texel]:
+                        measures = True
+        old[0], old[1], old[2] = x, y, z
+    jumps.jumped[world] = crossed and not measures
 
 
 def reset_worlds(world: int, mask: BoolArray, worlds: Worlds) -> None:

@@ -6,7 +6,7 @@ language with strict types. The rewriting changes no arithmetic, so that both gi
 
 * literals and constants of a module get the type of the numbers, or become 32-bit integers;
 * ``math.sqrt`` becomes ``wp.sqrt``, and so on; `min` and `max` of several numbers are nested;
-* loops over constant tuples are unrolled, tuples are taken apart, named tuples become structs;
+* loops over constant tuples are unrolled, their entries put in, tuples are taken apart, named tuples become structs;
 * a function that is called is translated too.
 
 An array has as many axes as the source has indices for it.
@@ -70,7 +70,8 @@ class Translation:
         self._functions: dict[Any, Any] = {}
         self.structs: dict[type, Any] = {}
         self._kernels: dict[Callable[..., Any], Any] = {}
-        warp.set_module_options({"enable_backward": False, "fuse_fp": False}, module=warp.get_module(self.name))
+        options = {"enable_backward": False, "fuse_fp": False, "optimization_level": 3}
+        warp.set_module_options(options, module=warp.get_module(self.name))
 
     def function(self, function: Callable[..., Any]) -> Any:
         """Return a function of plain Python, or a kernel of numba, as a function of Warp."""
@@ -247,6 +248,14 @@ class _Rewriter:
         """Return a number that a name stands for outside the function, or None."""
         value = None if name in self._kinds else self._outside.get(name)
         return value if isinstance(value, bool | int | float) else None
+
+    def _constant_entry(self, node: ast.Subscript) -> Any:
+        """Return an entry of a tuple of numbers outside the function, or None."""
+        if isinstance(node.value, ast.Name) and isinstance(node.slice, ast.Constant):
+            values = self._outside.get(node.value.id)
+            if isinstance(values, tuple) and node.value.id not in self._kinds:
+                return values[node.slice.value]  # type: ignore[index]
+        return None
 
     def _kind(self, node: ast.expr) -> str:
         """Return the kind of an expression of the source."""
@@ -492,6 +501,9 @@ class _Rewriter:
         if isinstance(node, ast.Attribute):
             return self._attribute(node)
         if isinstance(node, ast.Subscript):
+            entry = self._constant_entry(node)
+            if entry is not None:
+                return self._expression(ast.Constant(entry))
             return ast.Subscript(self._expression(node.value), self._expression(node.slice), node.ctx)
         if isinstance(node, ast.Tuple):
             return ast.Tuple([self._expression(one) for one in node.elts], node.ctx)

@@ -23,11 +23,13 @@ from ...model.scenario import Scenario
 from ...model.sensor import Sensor
 from ...model.target import Target
 from ...solver.detection.deforming_surfaces import point_rows
+from ..environment_parameters import Columns, sensors_of
+from ..pressed_sensors import available_memory, check_memory, fault_of
 from ..sensor_on_mesh import SensorOnMesh
 from . import press_kernels
 from .effect_functions import EffectFunctions, functions_of
 from .engine import require_warp
-from .press_arrays import Results, SensorArrays, Slots, TargetArrays, Worlds
+from .press_arrays import Jumps, Results, SensorArrays, Slots, TargetArrays, Worlds
 from .translation import Translation
 
 _TRANSLATIONS: dict[Any, Translation] = {}
@@ -52,10 +54,14 @@ class WarpSensors:
     single : bool
         Compute in float32, which is faster on most GPUs. Depths then carry the rounding of the poses, 6e-8 of a coordinate.
 
+    parameters : mapping of str to (E,) float, optional
+        In which the sensors of environments differ, as of :class:`.PressedSensors`; effects are the same in all.
+
     Raises
     ------
     PalpateError
-        The sensor, the targets or the step make no run, an effect has no kernel, or Warp or the device is missing.
+        The sensor, the targets or the step make no run, an effect has no kernel, memory does not suffice, or Warp or the
+        device is missing.
 
     Attributes
     ----------
@@ -71,6 +77,8 @@ class WarpSensors:
     valid : (E,) warp.array of bool
         False where a pose is not finite or a quaternion is zero: everything is zero there, and the environment begins again
         with its next valid poses.
+    jumped : (E,) warp.array of bool
+        True where a target went through the sensor within the last step (see :class:`.Contacts`).
     poses : (E, 1 + T, 7) warp.array
         Of the sensor and of each target: position (m) and quaternion (w, x, y, z). A program on the device may write them
         itself, and then call :meth:`step` without poses.
@@ -84,6 +92,7 @@ class WarpSensors:
         environments: int,
         device: str = "cpu",
         single: bool = False,
+        parameters: Columns | None = None,
     ):
         warp = require_warp()
         targets = [target] if isinstance(target, TriangleMesh | Shape) else list(target)
@@ -94,19 +103,25 @@ class WarpSensors:
         effects = functions_of(sensor, dt)
         e, n, t, p = environments, len(sensor.texels), len(targets), len(points.texel)
         self._size = e, n, t
+        one = Slots.zero(1, t, p, n, effects.laws, effects.reading_laws), Worlds.zero(1, t), Results.zero(1, n, t)
+        check_memory(e, COPIES * sum(array.nbytes for part in one for array in part), self._free_memory())
+        sensors = _varied(sensor, parameters or {}, e)
         tree = build_tree([one for one in targets if isinstance(one, TriangleMesh)] or [_NO_MESH])
         translation = _translation(warp, single, effects, sensor)
         slots = Slots.zero(e, t, p, n, effects.laws, effects.reading_laws)
-        parts = _sensor_arrays(sensor, points, effects, dt), _target_arrays(targets), tree, Worlds.zero(e, t), slots
+        parts = _sensor_arrays(sensors, points, effects, dt), _target_arrays(targets), tree, Worlds.zero(e, t), slots
         values = [translation.value(part, self.device) for part in (*parts, Results.zero(e, n, t))]
         self._sensor, self._targets, self._tree, self._worlds, self._slots, out = values
         self._out = out
         self.texels, self.readings, self.contact = out.texels, out.readings, out.contact
         self.wrench, self.too_deep, self.valid, self.poses = out.wrench, out.too_deep, self._worlds.valid, self._worlds.poses
+        jumps = translation.value(Jumps.of(mounted_texels(sensor), targets, e), self.device)
+        self._jumps, self.jumped = jumps, jumps.jumped
         self._mask = warp.zeros(e, dtype=warp.bool, device=self.device)
         kernels = press_kernels
         self._move, self._sum = translation.kernel(kernels.move_world, 1), translation.kernel(kernels.sum_world, 1)
         self._press, self._reset = translation.kernel(kernels.press_texel, 2), translation.kernel(kernels.reset_worlds, 1)
+        self._mark = translation.kernel(kernels.mark_jumps, 1)
 
     def __len__(self) -> int:
         """Return the number of environments."""
@@ -114,6 +129,11 @@ class WarpSensors:
 
     def __repr__(self) -> str:
         return f"<WarpSensors: {self._size[0]} environments, {self._size[1]} texels, {self._size[2]} targets, on {self.device}>"
+
+    def _free_memory(self) -> float:
+        """Return the bytes that are free on the device."""
+        device = self._warp.get_device(self.device)
+        return float(device.free_memory) if device.is_cuda else available_memory()
 
     def step(self, sensor_poses: Any = None, target_poses: Any = None) -> WarpSensors:
         """Go on by one step, to these poses; the results are in the arrays of this object.
@@ -137,7 +157,12 @@ class WarpSensors:
         arrays = [self._sensor, self._targets, self._tree, self._worlds, self._slots, self._out]
         launch(self._press, dim=(e, n), inputs=arrays, device=device)
         launch(self._sum, dim=e, inputs=[self._worlds, self._slots, self._out], device=device)
+        launch(self._mark, dim=e, inputs=[self._worlds, self._jumps, self._out], device=device)
         return self
+
+    def fault(self) -> str:
+        """Return what :meth:`.Contacts.fault` says; the arrays come to the host for it."""
+        return fault_of(self.valid.numpy(), self.jumped.numpy())
 
     def reset(self, mask: Any = None) -> None:
         """Let environments begin again with their next step: at rest, without bristles and memory of effects.
@@ -182,6 +207,18 @@ class WarpSensors:
 
 _NO_MESH = TriangleMesh(np.eye(3), np.array([[0, 1, 2]]))
 """Stands for the tree where all targets are simple shapes."""
+
+
+COPIES = 2
+"""How often the arrays of an environment are in memory while they are made: of NumPy, and on the device."""
+
+
+def _varied(sensor: Sensor, parameters: Columns, environments: int) -> list[Sensor]:
+    """Return the sensor of each environment, or one for all; raise :class:`.ParameterError` for what has to be the same."""
+    for name in parameters:
+        if name.startswith("effect."):
+            raise ParameterError(f"On Warp effects are the same in all environments, also '{name:.80}': take PressedSensors.")
+    return sensors_of(sensor, parameters, environments) if parameters else [sensor]
 
 
 def _check(sensor: Sensor, targets: Sequence[TriangleMesh | Shape], dt: float, environments: int) -> None:
@@ -232,11 +269,10 @@ def _translation(warp: ModuleType, single: bool, effects: EffectFunctions, senso
     return _TRANSLATIONS[key]
 
 
-def _sensor_arrays(sensor: Sensor, points: ContactPoints, effects: EffectFunctions, dt: float) -> SensorArrays:
-    parameters, transducers = sensor.parameters, transducers_of(sensor)
+def _sensor_arrays(sensors: Sequence[Sensor], points: ContactPoints, effects: EffectFunctions, dt: float) -> SensorArrays:
+    sensor, parameters = sensors[0], sensors[0].parameters
     share, n = 1.0 / parameters.points_per_texel, len(sensor.texels)
     painted = [np.ones(n) if values is None else values for values in (sensor.painted.k, sensor.painted.friction)]
-    scale = np.broadcast_to(transducers.gain * transducers.painted, n)
     return SensorArrays(
         dt=dt,
         reach=float(parameters.max_penetration),
@@ -245,12 +281,18 @@ def _sensor_arrays(sensor: Sensor, points: ContactPoints, effects: EffectFunctio
         frame=point_rows(mounted_texels(sensor), points, np.zeros(3)),
         first_point=np.searchsorted(points.texel, np.arange(n + 1)),
         multipliers=np.column_stack([values[points.texel] for values in painted]),
-        law=np.array([contact_law(parameters, share)], float),
-        conversion=np.column_stack([np.full(n, float(transducers.zero)), scale]),
+        law=np.array([contact_law(one.parameters, share) for one in sensors], float),
+        conversion=np.concatenate([_conversion(one) for one in sensors]),
         force_constants=effects.force_constants,
         friction_constants=effects.friction_constants,
         reading_constants=effects.reading_constants,
     )
+
+
+def _conversion(sensor: Sensor) -> np.ndarray:
+    """Return zero and scale of each texel's reading (n, 2)."""
+    transducers, n = transducers_of(sensor), len(sensor.texels)
+    return np.column_stack([np.full(n, float(transducers.zero)), np.broadcast_to(transducers.gain * transducers.painted, n)])
 
 
 def _target_arrays(targets: Sequence[TriangleMesh | Shape]) -> TargetArrays:

@@ -199,6 +199,52 @@ def find_contacts(pair: int, model: SolverModel, detection: DetectionData, state
 
 
 @kernel
+def _write_known_contacts(pair: int, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace) -> None:
+    """Write the rows of the contacts that are in the state: what each point meets, and the share of its segment inside.
+
+    They are those of the last call of :func:`.find_contacts`, to the bit, where the bodies are where they were then.
+
+    Parameters
+    ----------
+    pair : int
+    model : SolverModel
+    detection : DetectionData
+    state : State
+    workspace : Workspace
+        The pair's pose is read, and the rows and their number are written.
+    """
+    contacts, faces, reach = workspace.contacts, detection.tree.faces, model.sensors.max_penetration[model.pairs.sensor[pair]]
+    rows, pose, first, frame = contacts.rows, workspace.pairs.pose[pair], contacts.first_block[pair], model.points.frame
+    bristle, slot, block, lane = state.bristle, model.pairs.first_slot[pair] - 1, first, 0
+    for point in range(model.pairs.first_point[pair], model.pairs.stop_point[pair]):
+        slot += 1
+        met = state.triangle[slot]
+        if met < 0:
+            continue
+        inside = state.pressed_share[slot]
+        segment, _ = segment_of(point, reach, pose, frame)
+        normal = faces[met, 9], faces[met, 10], faces[met, 11]
+        held = bristle[slot, 0], bristle[slot, 1], bristle[slot, 2]
+        write_row((block, lane), point, (normal, inside, held), segment, pose, (reach, frame), rows)
+        contacts.slots[block, lane] = slot
+        lane += 1
+        if lane == LANES:
+            block, lane = block + 1, 0
+    finish_block(block, lane, rows)
+    contacts.number[pair] = (block - first) * LANES + lane
+
+
+@kernel
+def write_last_contacts(pair: int, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace) -> None:
+    """Write the pose and the contacts of a pair that were found last, when the bodies have not moved since."""
+    write_relative_pose(pair, model, state, workspace)
+    if detection.shapes.kind[model.pairs.target[pair]] == MESH:
+        _write_known_contacts(pair, model, detection, state, workspace)
+    else:  # they follow from the poses alone
+        find_shape_contacts(pair, model, detection, state, workspace)
+
+
+@kernel
 def _is_too_deep(
     segment: Segment,
     tip: tuple[float, float, float],

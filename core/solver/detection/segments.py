@@ -7,6 +7,7 @@ import numpy as np
 
 from ...compiled.kernels import inlined, kernel
 from ...geometry.bvh import Segment
+from ...geometry.shapes import Vector
 from ..contact_rows import BRISTLE, DEPTH, LANES, NORMAL, POINT, ROW, write_vector
 from ..solver_model import SolverModel, State
 from ..workspace import Workspace
@@ -31,15 +32,36 @@ def write_relative_pose(pair: int, model: SolverModel, state: State, workspace: 
 
 
 @inlined
-def segment_of(point: int, reach: float, pose: np.ndarray, frame: np.ndarray) -> tuple[Segment, tuple[float, float, float]]:
-    """Segment of a contact point in the target's frame, from `reach` (m) deep in the sensor to the point, and its tip."""
-    tx = pose[9] + pose[0] * frame[point, 0] + pose[1] * frame[point, 1] + pose[2] * frame[point, 2]
-    ty = pose[10] + pose[3] * frame[point, 0] + pose[4] * frame[point, 1] + pose[5] * frame[point, 2]
-    tz = pose[11] + pose[6] * frame[point, 0] + pose[7] * frame[point, 1] + pose[8] * frame[point, 2]
-    dx = reach * (pose[0] * frame[point, 3] + pose[1] * frame[point, 4] + pose[2] * frame[point, 5])
-    dy = reach * (pose[3] * frame[point, 3] + pose[4] * frame[point, 4] + pose[5] * frame[point, 5])
-    dz = reach * (pose[6] * frame[point, 3] + pose[7] * frame[point, 4] + pose[8] * frame[point, 5])
+def in_target_axes(vector: Vector, pose: np.ndarray) -> Vector:
+    """Return a vector of the sensor in the target's axes; `pose` is the sensor's in the target's frame, also as a tuple."""
+    x, y, z = vector
+    return (
+        pose[0] * x + pose[1] * y + pose[2] * z,
+        pose[3] * x + pose[4] * y + pose[5] * z,
+        pose[6] * x + pose[7] * y + pose[8] * z,
+    )
+
+
+@inlined
+def segment_at(place: Vector, normal: Vector, reach: float, pose: np.ndarray) -> tuple[Segment, Vector]:
+    """Segment in the target's frame from `reach` (m) deep in the sensor to a contact point, and its tip.
+
+    `pose` is the pair's, also as a tuple.
+    """
+    x, y, z = place
+    tx = pose[9] + pose[0] * x + pose[1] * y + pose[2] * z
+    ty = pose[10] + pose[3] * x + pose[4] * y + pose[5] * z
+    tz = pose[11] + pose[6] * x + pose[7] * y + pose[8] * z
+    dx, dy, dz = in_target_axes(normal, pose)
+    dx, dy, dz = reach * dx, reach * dy, reach * dz
     return Segment(tx - dx, ty - dy, tz - dz, dx, dy, dz), (tx, ty, tz)
+
+
+@inlined
+def segment_of(point: int, reach: float, pose: np.ndarray, frame: np.ndarray) -> tuple[Segment, Vector]:
+    """Do as :func:`segment_at` for a contact point by its number."""
+    place, normal = (frame[point, 0], frame[point, 1], frame[point, 2]), (frame[point, 3], frame[point, 4], frame[point, 5])
+    return segment_at(place, normal, reach, pose)
 
 
 @inlined
@@ -52,8 +74,9 @@ def clear_slot(slot: int, triangle: int, state: State) -> None:
 
 
 @inlined
-def _in_sensor_axes(x: float, y: float, z: float, pose: np.ndarray) -> tuple[float, float, float]:
-    """Return a vector of the target in the sensor's axes; `pose` is the sensor's in the target's frame."""
+def in_sensor_axes(vector: Vector, pose: np.ndarray) -> Vector:
+    """Return a vector of the target in the sensor's axes; `pose` is the sensor's in the target's frame, also as a tuple."""
+    x, y, z = vector
     return (
         pose[0] * x + pose[3] * y + pose[6] * z,
         pose[1] * x + pose[4] * y + pose[7] * z,
@@ -62,13 +85,9 @@ def _in_sensor_axes(x: float, y: float, z: float, pose: np.ndarray) -> tuple[flo
 
 
 @inlined
-def _place_behind(point: int, distance: float, frame: np.ndarray) -> tuple[float, float, float]:
+def place_behind(place: Vector, normal: Vector, distance: float) -> Vector:
     """Return the place at a distance (m) behind a contact point, back along its normal."""
-    return (
-        frame[point, 0] - distance * frame[point, 3],
-        frame[point, 1] - distance * frame[point, 4],
-        frame[point, 2] - distance * frame[point, 5],
-    )
+    return place[0] - distance * normal[0], place[1] - distance * normal[1], place[2] - distance * normal[2]
 
 
 @inlined
@@ -99,8 +118,9 @@ def write_row(
     rows : (blocks, ROW) float
     """
     (block, lane), ((fx, fy, fz), inside, bristle), (reach, frame) = place, met, geometry
-    write_vector(rows, block, NORMAL, lane, *_in_sensor_axes(fx, fy, fz, pose))
-    write_vector(rows, block, POINT, lane, *_place_behind(point, inside * reach, frame))
+    origin, normal = (frame[point, 0], frame[point, 1], frame[point, 2]), (frame[point, 3], frame[point, 4], frame[point, 5])
+    write_vector(rows, block, NORMAL, lane, *in_sensor_axes((fx, fy, fz), pose))
+    write_vector(rows, block, POINT, lane, *place_behind(origin, normal, inside * reach))
     write_vector(rows, block, BRISTLE, lane, bristle[0], bristle[1], bristle[2])
     rows[block, DEPTH + lane] = inside * abs(segment.dx * fx + segment.dy * fy + segment.dz * fz)
 
@@ -108,6 +128,6 @@ def write_row(
 @inlined
 def finish_block(block: int, lane: int, rows: np.ndarray) -> None:
     """Write zeros into the lanes that the last block of a pair leaves over."""
-    for unused in range(lane if lane > 0 else LANES, LANES):
-        for column in range(0, ROW, LANES):
+    for column in range(0, ROW, LANES):
+        for unused in range(lane if lane > 0 else LANES, LANES):
             rows[block, column + unused] = 0.0

@@ -1,102 +1,152 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contacts with spheres, boxes, capsules and planes in closed form, and rows of contacts that are known already (kernels).
+"""Contacts with spheres, boxes, capsules and planes in closed form (kernels).
 
 The segment of a contact point and its maximum penetration are those of meshes (see :mod:`.narrow_phase`); only where a segment
-enters is computed otherwise, and a point is too deep whenever its segment begins inside. In the place of a triangle stands the
-axis across the face of a box, else zero.
+enters is computed otherwise, and a point is too deep whenever its segment begins inside. All follows from where the bodies are,
+so nothing is remembered but the bristles. A block of points is computed in vector registers, and what touches is kept.
 """
 
 from __future__ import annotations
 
-from ...compiled.kernels import kernel
-from ...geometry.shapes import MESH, is_in_shape, shape_distance, shape_entry, shape_normal
-from ..contact_rows import LANES
-from ..solver_model import NO_TRIANGLE, TOO_DEEP, SolverModel, State
-from ..workspace import Workspace
+import numpy as np
+
+from ...compiled.kernels import inlined, kernel
+from ...geometry.shapes import (
+    BOX,
+    CAPSULE,
+    PLANE,
+    SPHERE,
+    Vector,
+    is_in_shape,
+    shape_distance,
+    shape_entry,
+    shape_normal,
+)
+from ..contact_rows import BRISTLE, DEPTH, KEEP, LANES, NORMAL, POINT, read_vector, write_vector
+from ..solver_model import Pairs, SolverModel, State
+from ..workspace import ContactWork, Workspace
 from .detection_data import DetectionData
-from .segments import clear_slot, finish_block, segment_of, write_relative_pose, write_row
+from .segments import finish_block, in_sensor_axes, in_target_axes, place_behind, segment_at
+
+FOUND = KEEP
+"""Column of what a segment meets, until the step writes its own numbers there: TOUCHED, INSIDE, or zero for nothing."""
+TOUCHED, INSIDE = 1.0, -1.0
+
+
+def blocks_of_points(pairs: Pairs, frame: np.ndarray) -> np.ndarray:
+    """Return position and normal of each pair's contact points, (blocks, 6 · LANES), in blocks as contact rows.
+
+    `frame` is :attr:`.Points.frame`.
+    """
+    blocks = []
+    for first, stop in zip(pairs.first_point, pairs.stop_point, strict=True):
+        own = np.zeros((-(-(stop - first) // LANES) * LANES, 6))
+        own[: stop - first] = frame[first:stop, :6]
+        blocks.append(own.reshape(-1, LANES, 6).swapaxes(1, 2).reshape(-1, 6 * LANES))
+    return np.concatenate(blocks)
 
 
 @kernel
 def find_shape_contacts(pair: int, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace) -> None:
     """Find the contacts of a pair whose target is a shape; as :func:`.find_contacts`, when the pair's pose is written."""
-    sensor, target = model.pairs.sensor[pair], model.pairs.target[pair]
-    pose, center, frame = workspace.pairs.pose[pair], model.sensors.center[sensor], model.points.frame
-    kind, sizes, reach = detection.shapes.kind[target], detection.shapes.size, model.sensors.max_penetration[sensor]
-    size = (sizes[target, 0], sizes[target, 1], sizes[target, 2])
-    middle = (
-        pose[9] + pose[0] * center[0] + pose[1] * center[1] + pose[2] * center[2],
-        pose[10] + pose[3] * center[0] + pose[4] * center[1] + pose[5] * center[2],
-        pose[11] + pose[6] * center[0] + pose[7] * center[1] + pose[8] * center[2],
-    )
-    near = shape_distance(kind, size, middle) <= model.sensors.radius[sensor]
-    too_deep, slot, met = 0, model.pairs.first_slot[pair] - 1, False
-    for point in range(model.pairs.first_point[pair], model.pairs.stop_point[pair]):
-        slot += 1
-        if not near:
-            if state.triangle[slot] != NO_TRIANGLE:
-                clear_slot(slot, NO_TRIANGLE, state)
-            continue
-        segment, _ = segment_of(point, reach, pose, frame)
-        base, way = (segment.ox, segment.oy, segment.oz), (segment.dx / reach, segment.dy / reach, segment.dz / reach)
-        entry, axis = shape_entry(kind, size, base, way)
-        if is_in_shape(kind, size, base):
-            too_deep += 1
-            clear_slot(slot, TOO_DEEP, state)
-        elif 0.0 <= entry <= reach:
-            state.triangle[slot], state.pressed_share[slot], met = axis, 1.0 - entry / reach, True
-        elif state.triangle[slot] != NO_TRIANGLE:
-            clear_slot(slot, NO_TRIANGLE, state)
-    workspace.contacts.number[pair], workspace.contacts.too_deep[pair] = 0, too_deep
-    if met:
-        write_known_contacts(pair, model, detection, state, workspace)
-
-
-@kernel
-def write_known_contacts(pair: int, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace) -> None:
-    """Write the rows of the contacts that are in the state: what each point meets, and the share of its segment inside.
-
-    They are those of the last call of :func:`.find_contacts`, to the bit, where the bodies are where they were then.
-
-    Parameters
-    ----------
-    pair : int
-    model : SolverModel
-    detection : DetectionData
-    state : State
-    workspace : Workspace
-        The pair's pose is read, and the rows and their number are written.
-    """
-    sensor, target = model.pairs.sensor[pair], model.pairs.target[pair]
-    contacts, faces, sizes = workspace.contacts, detection.tree.faces, detection.shapes.size
-    rows, pose, first = contacts.rows, workspace.pairs.pose[pair], contacts.first_block[pair]
-    frame, reach = model.points.frame, model.sensors.max_penetration[sensor]
+    sensor, target, contacts = model.pairs.sensor[pair], model.pairs.target[pair], workspace.contacts
+    pose, center, sizes = workspace.pairs.pose[pair], model.sensors.center[sensor], detection.shapes.size
     kind, size = detection.shapes.kind[target], (sizes[target, 0], sizes[target, 1], sizes[target, 2])
-    bristle, slot, block, lane = state.bristle, model.pairs.first_slot[pair] - 1, first, 0
-    for point in range(model.pairs.first_point[pair], model.pairs.stop_point[pair]):
-        slot += 1
-        met = state.triangle[slot]
-        if met < 0:
-            continue
-        inside = state.pressed_share[slot]
-        segment, (tx, ty, tz) = segment_of(point, reach, pose, frame)
-        if kind == MESH:
-            normal = faces[met, 9], faces[met, 10], faces[met, 11]
+    place = (
+        pose[0], pose[1], pose[2], pose[3], pose[4], pose[5], pose[6], pose[7], pose[8], pose[9], pose[10], pose[11],
+    )  # fmt: skip
+    _, middle = segment_at((center[0], center[1], center[2]), (0.0, 0.0, 0.0), 0.0, place)
+    if kind == SPHERE:
+        x, y, z = in_sensor_axes((pose[9], pose[10], pose[11]), pose)
+        place = 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, x, y, z
+    near = shape_distance(kind, size, middle) <= model.sensors.radius[sensor]
+    first, slot = contacts.first_block[pair], model.pairs.first_slot[pair]
+    stop = slot + model.pairs.stop_point[pair] - model.pairs.first_point[pair]
+    contacts.number[pair], contacts.too_deep[pair], block = 0, 0, first
+    if not near:
+        for other in range(slot, stop):
+            _release(other, state.bristle)
+        return
+    reach, points, rows = model.sensors.max_penetration[sensor], detection.shapes.points, contacts.rows
+    while slot < stop:
+        if kind == SPHERE:
+            _meet_block(SPHERE, size, block, reach, place, points, rows)
+        elif kind == BOX:
+            _meet_block(BOX, size, block, reach, place, points, rows)
+        elif kind == CAPSULE:
+            _meet_block(CAPSULE, size, block, reach, place, points, rows)
         else:
-            surface = tx - inside * segment.dx, ty - inside * segment.dy, tz - inside * segment.dz
-            normal = shape_normal(kind, size, met, surface)
-        held = bristle[slot, 0], bristle[slot, 1], bristle[slot, 2]
-        write_row((block, lane), point, (normal, inside, held), segment, pose, (reach, frame), rows)
-        contacts.slots[block, lane] = slot
-        lane += 1
-        if lane == LANES:
-            block, lane = block + 1, 0
-    finish_block(block, lane, rows)
-    contacts.number[pair] = (block - first) * LANES + lane
+            _meet_block(PLANE, size, block, reach, place, points, rows)
+        _keep_block(pair, block, slot, min(stop - slot, LANES), state.bristle, contacts)
+        block, slot = block + 1, slot + LANES
+    number = contacts.number[pair]
+    finish_block(first + number // LANES, number % LANES, rows)
+
+
+@inlined
+def _meet_block(
+    kind: int, size: Vector, block: int, reach: float, pose: tuple[float, ...], points: np.ndarray, rows: np.ndarray
+) -> None:
+    """Write what the points of a block meet into their own rows, but for the bristles.
+
+    `pose` is the pair's; that of a sphere, which looks the same from everywhere, is in the sensor's axes.
+    """
+    for lane in range(LANES):  # runs in vector registers: no branches, no calls
+        origin, outward = read_vector(points, block, 0, lane), read_vector(points, block, 3 * LANES, lane)
+        way = outward if kind == SPHERE else in_target_axes(outward, pose)
+        tip = origin if kind == SPHERE else in_target_axes(origin, pose)
+        tip = tip[0] + pose[9], tip[1] + pose[10], tip[2] + pose[11]
+        base = tip[0] - reach * way[0], tip[1] - reach * way[1], tip[2] - reach * way[2]
+        entry, axis = shape_entry(kind, size, base, way)
+        inside = 1.0 - entry / reach
+        deep = reach * inside
+        normal = shape_normal(kind, size, axis, place_behind(tip, way, deep))
+        rows[block, DEPTH + lane] = deep * abs(way[0] * normal[0] + way[1] * normal[1] + way[2] * normal[2])
+        normal = normal if kind == SPHERE else in_sensor_axes(normal, pose)
+        write_vector(rows, block, NORMAL, lane, normal[0], normal[1], normal[2])
+        write_vector(rows, block, POINT, lane, *place_behind(origin, outward, deep))
+        touched = TOUCHED if 0.0 <= entry <= reach else 0.0
+        rows[block, FOUND + lane] = INSIDE if is_in_shape(kind, size, base) else touched
 
 
 @kernel
-def write_last_contacts(pair: int, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace) -> None:
-    """Write the pose and the contacts of a pair that were found last, when the bodies have not moved since."""
-    write_relative_pose(pair, model, state, workspace)
-    write_known_contacts(pair, model, detection, state, workspace)
+def _keep_block(pair: int, block: int, slot: int, count: int, bristle: np.ndarray, contacts: ContactWork) -> None:
+    """Move the rows of a block's points that touch behind those of the pair that touch already, and add their bristles.
+
+    The points have the slots from `slot` on. Bristles of points that do not touch become zero.
+    """
+    rows, slots, row, touching, too_deep = contacts.rows, contacts.slots, contacts.number[pair], 0, 0
+    first = contacts.first_block[pair]
+    for lane in range(LANES):
+        touching += 1 if rows[block, FOUND + lane] == TOUCHED else 0
+    if touching == LANES and count == LANES and row == (block - first) * LANES:
+        for lane in range(LANES):  # all stay where they are
+            rows[block, BRISTLE + lane] = bristle[slot + lane, 0]
+            rows[block, BRISTLE + LANES + lane] = bristle[slot + lane, 1]
+            rows[block, BRISTLE + 2 * LANES + lane] = bristle[slot + lane, 2]
+            slots[block, lane] = slot + lane
+        contacts.number[pair] = row + LANES
+        return
+    for lane in range(count):
+        found = rows[block, FOUND + lane]
+        if found == TOUCHED:
+            to, place = first + row // LANES, row % LANES
+            for column in range(0, BRISTLE, LANES):
+                rows[to, column + place] = rows[block, column + lane]
+            rows[to, DEPTH + place] = rows[block, DEPTH + lane]
+            held = bristle[slot + lane, 0], bristle[slot + lane, 1], bristle[slot + lane, 2]
+            write_vector(rows, to, BRISTLE, place, held[0], held[1], held[2])
+            slots[to, place] = slot + lane
+            row += 1
+        else:
+            _release(slot + lane, bristle)
+            too_deep += 1 if found == INSIDE else 0
+    contacts.number[pair] = row
+    contacts.too_deep[pair] += too_deep
+
+
+@inlined
+def _release(slot: int, bristle: np.ndarray) -> None:
+    """Let the bristle of a point that does not touch become zero."""
+    if bristle[slot, 0] != 0.0 or bristle[slot, 1] != 0.0 or bristle[slot, 2] != 0.0:
+        bristle[slot, 0] = bristle[slot, 1] = bristle[slot, 2] = 0.0

@@ -77,15 +77,20 @@ def _write_motion_at_step_end(pair: int, dt: float, model: SolverModel, workspac
     a, step_motion, rotation = model.pairs.sensor_body[pair], workspace.bodies.step_motion, workspace.bodies.rotation
     motion, result = workspace.pairs.motion[pair], workspace.pairs.known_motion[pair]
     turned = workspace.pairs.rotations[pair, 0]
+    turns = False
     for i in range(12):
         result[i] = motion[i]
+        turns = turns or (i > 2 and step_motion[a, i] != 0.0)
     for k in range(3):
+        for m in range(3):
+            turned[k, m] = 1.0 if k == m else 0.0
+    for k in range(3 if turns else 0):
         for m in range(3):
             turn = 0.0  # entry (m, k) of the sensor's W in its own axes
             for i in range(3):
                 for j in range(3):
                     turn += rotation[a, i, m] * step_motion[a, 3 + 3 * i + j] * rotation[a, j, k]
-            turned[k, m] = dt * turn + (1.0 if k == m else 0.0)
+            turned[k, m] += dt * turn
             result[k] += dt * turn * motion[m]
             for j in range(3):
                 result[3 + 3 * k + j] += dt * turn * motion[3 + 3 * m + j]

@@ -29,20 +29,26 @@ def relative_motion(
     motion : (12,) float
         Written: U (m/s), then W (1/s) row by row.
     """
-    for k in range(3):
+    turns = False
+    for i in range(3, 12):
+        turns = turns or step_motion[b, i] != 0.0 or step_motion[a, i] != 0.0
+    for k in range(12):
         motion[k] = 0.0
-        for m in range(3):
-            motion[3 + 3 * k + m] = 0.0
     for i in range(3):
         u = step_motion[b, i] - step_motion[a, i]
         for j in range(3):
             u += step_motion[b, 3 + 3 * i + j] * (position[a, j] - position[b, j])
-            w = step_motion[b, 3 + 3 * i + j] - step_motion[a, 3 + 3 * i + j]
-            for k in range(3):
-                for m in range(3):
-                    motion[3 + 3 * k + m] += rotation[a, i, k] * w * rotation[a, j, m]
         for k in range(3):
             motion[k] += rotation[a, i, k] * u
+    if turns:
+        for k in range(3):
+            for m in range(3):
+                total = 0.0
+                for i in range(3):
+                    for j in range(3):
+                        w = step_motion[b, 3 + 3 * i + j] - step_motion[a, 3 + 3 * i + j]
+                        total += rotation[a, i, k] * w * rotation[a, j, m]
+                motion[3 + 3 * k + m] = total
 
 
 @kernel

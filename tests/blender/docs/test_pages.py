@@ -136,13 +136,13 @@ def bake_folder(tmp_path_factory):
     """Folder in which `palpate-bake` holds the bake of the demo scene's frames 71 and 72, and `rig.toml` the sample rig."""
     folder = tmp_path_factory.mktemp("pages")
     shutil.copytree(ROOT / "docs" / "sample-rig", folder, dirs_exist_ok=True)
-    scene = str(ROOT / "sample_blends" / "demo.blend")
+    scene = shutil.copy(ROOT / "sample_blends" / "demo.blend", folder)
     command = [
         sys.executable,
         "-m",
         "palpate.commands",
         "bake",
-        scene,
+        str(scene),
         "--frames",
         "71",
         "72",

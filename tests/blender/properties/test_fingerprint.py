@@ -15,7 +15,7 @@ OBJECT_WITHOUT_FORCES = {
     *("has_start", "start_matrix", "start_channels"),
 }
 """Properties of an object that change no force: identity, file names, and what laying texels or a bake has left."""
-COMPARED_BY_COMPONENT = {"velocity", "angular_velocity", "effects"}
+COMPARED_BY_COMPONENT = {"velocity", "angular_velocity", "effects", "readout", "magnetic"}
 """Read component by component in `settings_of`."""
 COMPARED_WHEN_DRIVEN = set(drives.TARGET_PROPERTIES.values())
 """Targets of drives: the one that the drive follows is compared, with its keyframes."""
@@ -23,7 +23,7 @@ SCENE_WITHOUT_FORCES = {
     *("schema_version", "folder", "use_live", "figures", "baked_digest", "baked_fingerprint", "baked_shapes", "baked_names"),
     *("baked_start", "baked_end", "show_texels", "show_normals", "show_numbers", "show_reach", "show_overlay", "show_inset"),
     *("color_map", "use_auto_range", "quantity", "range_max_pressure", "range_max", "overlays", "texel_arrow_scale"),
-    *("use_auto_arrow", "arrow_scale", "scene_id", "baked_id", "study"),
+    *("use_auto_arrow", "arrow_scale", "scene_id", "baked_id", "unchanged_note", "study"),
     *("show_indentation", "indentation_factor", "show_through"),
 }
 """Properties of a scene that change no force: how results are shown, where they are written, and what a bake has left."""

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Scripts take sensors and scenarios from objects of Blender, in an installed extension as well."""
 
+import os
 import subprocess
 import sys
 
@@ -12,6 +13,7 @@ from blender_scenes import press, save
 import palpate as pp
 from palpate.addon.timeline import live_cache
 from palpate.core.io.bake_reader import read_bake
+from palpate.core.simulators import baked_sensors
 
 
 def test_a_scene_is_simulated_and_read_back(tmp_path):
@@ -75,3 +77,33 @@ def test_an_extension_opens_the_same_door(tmp_path, repository):
     assert run.returncode == 0, run.stderr
     assert run.stdout.startswith("<Sensor 'pad': 2 × 3 texels, k 58.5 N/m> <Body 'box': 10 × 10 × 10 mm, fixed>")
     assert run.stdout.strip().endswith("bl_ext.user_default.palpate.core.errors")
+
+
+def test_a_painted_blend_gives_its_sensors_without_blender(tmp_path):
+    """From the files of a bake come the same forces as from the probe list that Blender writes."""
+    scene, pad, _ = press()
+    pad.location, pad.rotation_euler, pad.palpate.k = (0.1, 0.02, 0.0), (0.0, 0.0, 0.3), 123.0
+    group = pad.vertex_groups.new(name="soft")
+    for number in range(len(pad.data.vertices)):
+        group.add([number], 0.1 + 0.01 * number, "REPLACE")
+    pad.palpate.k_map, pad.palpate.k_factor = "soft", 3.0
+    pad.palpate.effects.add().kind = "creep"
+    blend = save(tmp_path)
+    assert scene.palpate.folder == f"//{baked_sensors.DEFAULT_FOLDER}"
+    bpy.ops.palpate.bake()
+    bpy.ops.wm.save_mainfile()
+    os.utime(blend, (2e9, 2e9))  # saved long after its bake, and unchanged
+    found, expected = pp.sensors_from_blend(blend)["Pad"], pp.sensor_of(pad)
+    assert found.effects == expected.effects and len(found.effects) == 1
+    assert found.sensor.settings_digest == expected.sensor.settings_digest
+    cube = pp.Body.box(0.2, position=(0.1, 0.02, 0.0995))
+    forces = [
+        pp.PressedSensor(one, cube, 1e-3).step((one.position, one.quaternion), (cube.position, cube.quaternion)).texels
+        for one in (found, expected)
+    ]
+    assert (forces[0].normal_force == forces[1].normal_force).all() and np.ptp(forces[0].normal_force) > 0.01
+    pad.palpate.k = 124.0
+    bpy.ops.wm.save_mainfile()
+    os.utime(blend, (2e9, 2e9))
+    with pytest.raises(pp.PalpateError, match="was saved after its bake in .* and may have changed"):
+        pp.sensors_from_blend(blend)

@@ -8,6 +8,8 @@ import pytest
 
 import palpate as pp
 from palpate.core.gap.calibration.friction import steady_friction
+from palpate.core.gap.report.comparison import rms_by_texel
+from palpate.core.gap.report.plots import CAPTIONS
 from palpate.core.model.sensor_parameters import SensorParameters
 
 
@@ -46,9 +48,28 @@ def test_the_amended_sensor_is_simulated(gap):
 
 def test_a_report_is_written_and_its_sensor_read(gap, tmp_path):
     page = gap.report(tmp_path / "out")
-    assert page.is_file() and (tmp_path / "out" / "gap.json").is_file()
+    assert (tmp_path / "out" / "gap.json").is_file()
+    text = page.read_text(encoding="utf-8")
+    assert text.index(CAPTIONS["overview"]) < text.index("<h2>")
     read = pp.read_sensor(tmp_path / "out" / "sensor.toml")
     assert read.effects == gap.sensor.effects and read.parameters == gap.sensor.parameters
+
+
+def test_the_overview_says_where_what_and_how_much(gap):
+    """The maps are those of the errors, a bar stands for the base model, each effect and both models on check recordings."""
+    figure, errors = gap.plot("overview"), gap.errors
+    *maps, _bar, bars = figure.axes
+    assert [axes.get_title() for axes in maps] == ["base model", "amended"]
+    for axes, model in zip(maps, (gap.diagnosis.base.model, gap.diagnosis.best.model), strict=True):
+        shown = 100.0 * rms_by_texel(gap.diagnosis, model)
+        np.testing.assert_allclose(np.sort(axes.images[0].get_array().compressed()), np.sort(shown))
+    widths = [bar.get_width() for bar in bars.patches]
+    expected = [errors.base["fit"], *errors.stages[1:], errors.base["check"], errors.amended["check"]]
+    np.testing.assert_allclose(widths, 100.0 * np.array(expected))
+    assert widths[len(gap.effects)] == pytest.approx(100.0 * gap.error_after)
+    names = " ".join(label.get_text() for label in bars.get_yticklabels()).replace(" ", "-")
+    assert all(effect.name in names for effect in gap.effects)
+    assert any(f"{100.0 * errors.noise_floor:.2f}" in text.get_text() for text in bars.texts)
 
 
 def test_an_interrupted_report_leaves_no_file(gap, tmp_path):

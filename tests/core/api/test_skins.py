@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import palpate as pp
 from palpate.core.io import exr_codec
-from palpate.core.response.layer import texel_displacements
+from palpate.core.skins.layer import texel_displacements
 
 
 @pytest.fixture(scope="module")

@@ -111,6 +111,26 @@ def test_tuples_that_kernels_take_by_reference_stay_tuples():
     assert total(outer._replace(number=7, inner=Inner(np.array([0.0, 0.0, 0.5])))) == 27.5
 
 
+@pytest.mark.skipif(not kernels.COMPILED, reason="only compiled code has numba's types")
+def test_instances_have_one_type_where_numba_would_tell_none_apart():
+    """The type is looked up by what a field is; it is the one that numba finds for each field."""
+    grid = np.zeros((4, 4))
+    frozen = grid.copy()
+    frozen.flags.writeable = False
+    kinds = [grid, grid.T[:2], grid[:, :2], grid[:2, ::2], frozen]
+    kinds += [np.zeros((4, 4), np.int32), np.zeros((4, 4), bool), np.zeros(4)]
+    kinds.append(np.frombuffer(bytes(129), np.uint8)[1:].view(float).reshape(4, 4))  # not aligned
+    types = []
+    for kind in kinds:
+        outers = [Outer(kind[...], Inner(np.ones(3)), 4), Outer(kind[...], Inner(np.zeros(5)), 5)]
+        assert outers[0].numba_type is outers[1].numba_type
+        assert outers[0].numba_type.fields == tuple(numba.typeof(field) for field in outers[0])
+        types.append(outers[0].numba_type)
+    for i, one in enumerate(kinds):
+        for j, other in enumerate(kinds):
+            assert (types[i] is types[j]) == (numba.typeof(one) == numba.typeof(other)), (i, j)
+
+
 @pytest.mark.skipif(not kernels.COMPILED, reason="only compiled code takes addresses")
 def test_a_field_may_not_hide_what_a_reference_keeps():
     class Wrong(NamedTuple):

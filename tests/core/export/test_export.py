@@ -9,7 +9,7 @@ import re
 import shutil
 import subprocess
 import sys
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +26,6 @@ from palpate.core.io.bake_reader import frame_index, read_bake
 from palpate.core.io.file_list import LIST_FORMAT, LIST_NAME
 from palpate.core.io.sensor_npz import load_sensor, save_sensor
 from palpate.core.jobs.job_runner import run_job
-from palpate.core.model.recording import SensorRecording
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
 
 
@@ -193,10 +192,7 @@ def shortened(bake, count):
     """The first frames of a bake."""
     recording = bake.recording
     parts = {key: getattr(recording, key)[:count] for key in ("frames", "times", "poses", "velocities")}
-    sensors = {
-        name: SensorRecording(**{item.name: getattr(sensor, item.name)[:count] for item in fields(sensor)})
-        for name, sensor in recording.sensors.items()
-    }
+    sensors = {name: sensor.part(slice(count)) for name, sensor in recording.sensors.items()}
     return replace(bake, recording=replace(recording, sensors=sensors, **parts))
 
 

@@ -13,13 +13,23 @@ from palpate.core.gap.logs.column_meaning import GRAVITY
 
 TIME = np.linspace(0.0, 40.0, 500)
 STIMULI = {"force": (0.0, 2000.0), "depth": (0.0, 1e-3), "slide_x": (-5e-3, 5e-3)}
-STIMULUS = {"adhesive": "depth", "tape": "depth", "foam": "depth", "foam-shear": "depth", "brake": "slide_x"}
+STIMULUS = {
+    "adhesive": "depth",
+    "tape": "depth",
+    "foam": "depth",
+    "foam-shear": "depth",
+    "brake": "slide_x",
+    "damper": "slide_x",
+}
+SIZES = {"foam": 5.0, "oscillator": 2e-4}
 
 
 def columns(name, phase):
     low, high = STIMULI[STIMULUS.get(name, "force")]
     wave = 0.5 - 0.5 * np.cos(2 * np.pi * TIME / 7.0 + phase) * np.cos(TIME / 9.0)
-    return {"time": TIME, STIMULUS.get(name, "force"): low + (high - low) * wave * (5.0 if name == "foam" else 1.0)}
+    time = TIME / 50.0 if name == "oscillator" else TIME
+    volts = {"force": 1e3 + 400.0 * np.sin(TIME / 3.0 + phase)} if name == "damper" else {}
+    return {"time": time, STIMULUS.get(name, "force"): low + (high - low) * wave * SIZES.get(name, 1.0)} | volts
 
 
 def test_every_set_says_what_it_is_and_its_model_is_small():

@@ -45,7 +45,11 @@ def test_the_report_says_what_friction_does_and_what_is_left(tmp_path):
     assert not any(named.confidence >= SURE for named in result.findings)
     assert result.structure.strongest == "turning"
     said = sentences.headline(result, errors)
-    assert "distance slid since the last reversal" in said and "Friction is not missing" in said
+    assert (
+        "distance slid since the last reversal" in said
+        and "The base model has friction; without it" in said
+        and "not missing" not in said
+    )
     assert summary.summary(result, errors)["base"]["gap_without_friction"] == errors.frictionless
     *_, _ = summary.write_report(result, tmp_path)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")

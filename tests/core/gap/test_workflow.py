@@ -202,7 +202,7 @@ def test_creep_is_named_and_the_gap_closes(tmp_path):
     pictures = re.findall(r'src="data:image/png;base64,([^"]+)"', page)
     assert len(pictures) == 5 and all(base64.b64decode(one).startswith(b"\x89PNG") for one in pictures)
     assert "http" not in page.replace("http-equiv", "") and "Creep" in page
-    for name in ("gap", "curves", "loops", "map", "phases"):
+    for name in ("overview", "gap", "curves", "loops", "map", "phases"):
         assert (tmp_path / f"{name}.pdf").read_bytes().startswith(b"%PDF")
 
 

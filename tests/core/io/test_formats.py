@@ -44,6 +44,7 @@ from palpate.core.model.effect import Effect
 from palpate.core.model.recording import Frame, Recording, SensorFrame, SensorRecording
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
+from palpate.core.model.vector_readings import VectorReadings
 
 on_linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks at Linux's /proc and /dev")
 
@@ -301,6 +302,7 @@ def manifest(**changes):
             step_reason="Steps of 1 ms.",
             complete=False,
             scene_file="Hände.blend",
+            effects=[{"name": "creep", "amount": 0.2}],
         ),
         **changes,
     )
@@ -320,9 +322,12 @@ def test_manifest_round_trip(tmp_path):
 def test_a_manifest_from_before_scene_files_were_named(tmp_path):
     path = write_manifest(tmp_path, manifest())
     content = json.loads(path.read_bytes())
-    del content["scene_file"], content[OWN_DIGEST]
+    del content["scene_file"], content["effects"], content[OWN_DIGEST]
     path.write_text(json.dumps({**content, "done": [[1, 40]]}), encoding="utf-8")
-    assert read_manifest(tmp_path) == manifest(scene_file="")
+    older = manifest(scene_file="", effects=None)
+    assert read_manifest(tmp_path) == older
+    write_manifest(tmp_path, older)
+    assert read_manifest(tmp_path) == older and "effects" not in json.loads(path.read_bytes())
 
 
 @pytest.mark.parametrize("change", [{"fps": 25.0}, {"unit": "N"}, {"parameters": {"k": 58.6}}, {"warnings": []}, {"new": 1}])
@@ -359,6 +364,7 @@ def test_damaged_manifest(tmp_path):
             "scene_path",
             "sensors",
             "files",
+            "effects",
         ):  # which older ones lack
             broken.append(json.dumps({k: v for k, v in good.items() if k != key}).encode())
         for wrong in (None, {"a": []}, [[1]], "text", True):
@@ -381,7 +387,7 @@ def test_damaged_manifest(tmp_path):
 # --- recordings
 
 
-def recording(seed=0, frames=5, sensors=(("Pad", 6), ("a/b\\..", 3)), bodies=3):
+def recording(seed=0, frames=5, sensors=(("Pad", 6), ("a/b\\..", 3)), bodies=3, channels=False):
     """Return a recording of random numbers, with the awkward ones among them."""
     rng = np.random.default_rng(seed)
     parts = {}
@@ -400,7 +406,11 @@ def recording(seed=0, frames=5, sensors=(("Pad", 6), ("a/b\\..", 3)), bodies=3):
         }
         values["shear"][0, 0] = -0.0, 5e-324
         values["reading"][0, :2] = np.finfo(float).max, -np.finfo(float).tiny
-        parts[name] = SensorRecording(**values)
+        shape = frames, 5, 3
+        vectors = VectorReadings(
+            rng.normal(size=shape), rng.random(shape) < 0.1, "mT", ("x", "y", "∥"), rng.normal(size=(5, 3))
+        )
+        parts[name] = SensorRecording(**values, channels=vectors if channels else None)
     return Recording(
         frames=np.arange(-1, frames - 1),
         times=np.arange(frames) / 24,
@@ -427,13 +437,17 @@ def same(a, b):
         else:
             assert x == y and type(x) is type(y)
     for name, sensor in a.sensors.items():
-        for item in fields(SensorRecording):
-            x, y = getattr(sensor, item.name), getattr(b.sensors[name], item.name)
+        other = b.sensors[name]
+        for x, y in zip(sensor.arrays(), other.arrays(), strict=True):
             assert x.dtype == y.dtype and x.shape == y.shape and x.tobytes() == y.tobytes()
+        if sensor.channels is not None:
+            assert (sensor.channels.unit, sensor.channels.names) == (other.channels.unit, other.channels.names)
+            assert np.array_equal(sensor.channels.place, other.channels.place)
 
 
 def test_recording_round_trip(tmp_path):
-    for case in (recording(), recording(frames=1), recording(sensors=(), bodies=0), recording(sensors=(("x", 84),))):
+    cases = recording(frames=1), recording(sensors=(), bodies=0), recording(sensors=(("x", 84),)), recording(channels=True)
+    for case in (recording(), *cases):
         save_recording(tmp_path / "recording.npz", case)
         same(load_recording(tmp_path / "recording.npz"), case)
         assert os.listdir(tmp_path) == ["recording.npz"]

@@ -22,12 +22,12 @@ SENSORS = (pad(), pad(radius=0.02, name="Bent"), ball())
 
 
 def test_every_format_is_registered_once():
-    assert list(formats()) == ["mjcf", "openrave", "probes", "urdf", "usd"]
+    assert list(formats()) == ["contact", "mjcf", "openrave", "probes", "urdf", "usd"]
     assert all(item.title and item.description and (item.write or item.read) for item in formats().values())
 
 
 def test_an_unknown_format_is_refused(tmp_path):
-    with pytest.raises(PalpateError, match="not written as 'dae': choose from mjcf, probes, urdf, usd"):
+    with pytest.raises(PalpateError, match="not written as 'dae': choose from contact, mjcf, probes, urdf, usd"):
         export_sensors(SENSORS, "dae", tmp_path)
 
 

@@ -195,6 +195,6 @@ def test_what_makes_no_environments_is_one_sentence(monkeypatch):
     found = many.step(LEVEL, np.stack([LEVEL] * 2))
     with pytest.raises(ParameterError, match=r"'readings' of out is float32 of shape \(2, 16\): give float64 of shape"):
         many.step(LEVEL, np.stack([LEVEL] * 2), replace(found, readings=found.readings.astype(np.float32)))
-    monkeypatch.setattr(pressed_sensors, "_available_memory", lambda: 1e6)
+    monkeypatch.setattr(pressed_sensors, "available_memory", lambda: 1e6)
     with pytest.raises(ParameterError, match=r"100000 environments take .* GiB of memory, .* ask for \d+ at most\.$"):
         PressedSensors(item, mesh, DT, 100_000)

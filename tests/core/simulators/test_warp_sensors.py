@@ -271,3 +271,34 @@ def test_poses_and_masks_of_another_shape_are_one_sentence():
 def test_warp_is_imported_only_on_demand():
     code = "import sys, palpate; from palpate.core.simulators.warp import warp_sensors; print('warp' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "False"
+
+
+@pytest.mark.slow("Warp compiles the kernels")
+@pytest.mark.parametrize("normal_law", ["linear", "hunt-crossley"])
+def test_environments_have_parameters_of_their_own(normal_law):
+    """As in PressedSensors; those of which there is no column stay the sensor's."""
+    draw = np.random.default_rng(3)
+    columns = {name: draw.uniform(low, high, 4) for name, low, high in (
+        ("k", 500.0, 2000.0), ("cn", 0.0, 5.0), ("mus", 0.3, 1.2), ("mud", 0.1, 0.3), ("gain", 0.5, 2.0), ("zero", -1.0, 1.0),
+        ("exponent", 1.2, 2.0),
+    )}  # fmt: skip
+    item, poses = pad(5, 4, normal_law=normal_law), random_poses(8, 5, 4)
+    core = PressedSensors(item, SHAPE, DT, 4, parameters=columns)
+    ours, same = WarpSensors(item, SHAPE, DT, 4, parameters=columns), WarpSensors(item, SHAPE, DT, 4)
+    for now in poses:
+        expected = core.step(now[:, 0], now[:, 1])
+        found = ours.step(now[:, 0], now[:, 1])
+        same.step(now[:, 0], now[:, 1])
+        for name in ("texels", "readings", "wrench"):
+            assert np.abs(getattr(found, name).numpy().reshape(-1) - getattr(expected, name).reshape(-1)).max() < AGREE
+    assert np.abs(ours.texels.numpy() - same.texels.numpy()).max() > 1e-3
+    with pytest.raises(ParameterError, match="On Warp effects are the same in all environments, also 'effect.creep.amount'"):
+        WarpSensors(item, SHAPE, DT, 4, parameters={"effect.creep.amount": np.ones(4)})
+
+
+def test_more_environments_than_memory_are_one_sentence(monkeypatch):
+    from palpate.core.simulators.warp import warp_sensors
+
+    monkeypatch.setattr(warp_sensors, "available_memory", lambda: 1e6)
+    with pytest.raises(ParameterError, match=r"100000 environments take .* GiB of memory, .* ask for \d+ at most\.$"):
+        WarpSensors(pad(4, 4), SHAPE, DT, 100_000)

@@ -21,7 +21,7 @@ from palpate.core.io.recording_npz import load_recording
 from palpate.core.io.sensor_npz import load_sensor
 from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.response.metrics import slipping
-from palpate.sweep import lerobot_writer
+from palpate.sweep import lerobot_writer, run_table
 from palpate.sweep.dataset import publish
 
 pyarrow = pytest.importorskip("pyarrow")
@@ -190,6 +190,50 @@ def test_files_and_groups_of_rows_follow_each_other(tmp_path, monkeypatch):
     for episode in episodes:
         path = files[3 * episode["data/chunk_index"] + episode["data/file_index"]]
         assert set(parquet.read_table(path).column("episode_index").to_pylist()) == {episode["episode_index"]}
+
+
+def test_short_runs_share_pages_and_long_ones_keep_theirs(tmp_path, monkeypatch):
+    """Both say the same, and pages that are shared take less than those of each run."""
+    sizes, frames = {}, {}
+    for name, limit in (("shared", lerobot_writer.SHORT_BYTES), ("own", 0)):
+        monkeypatch.setattr(lerobot_writer, "SHORT_BYTES", limit)
+        study = made_up(tmp_path, runs=9, name=name)
+        publish(study)
+        (path,) = (study / "dataset" / "data").glob("*/*.parquet")
+        group = parquet.read_metadata(path).row_group(0)
+        columns = [group.column(number) for number in range(group.num_columns)]
+        sizes[name] = sum(own.total_compressed_size for own in columns if own.path_in_schema.startswith("observation"))
+        frames[name] = rows(study)
+    assert frames["shared"].equals(frames["own"]) and len(frames["own"]) == sum(5 + index for index in range(9))
+    assert sizes["shared"] < 0.8 * sizes["own"]
+
+
+def test_a_table_of_many_rows_has_the_columns_of_all(tmp_path, monkeypatch):
+    """Rows are put down in parts, in which names may be missing, and become groups of rows of their own size."""
+    study = made_up(tmp_path, runs=7)
+    for number, path in enumerate(sorted((study / "runs").glob("*/run.json"))):
+        run = json.loads(path.read_text())
+        path.write_text(json.dumps(run | {"metrics": {f"metric {run['index'] % 3}": float(number)}}))
+    publish(study)
+    expected = parquet.read_table(study / "runs.parquet")
+    assert {name for name in expected.column_names if name.startswith("metric.")} == {f"metric.metric {i}" for i in range(3)}
+    monkeypatch.setattr(run_table, "ROWS_AT_ONCE", 2)
+    monkeypatch.setattr(run_table, "ROWS_OF_GROUP", 4)
+    publish(study)
+    assert parquet.read_metadata(study / "runs.parquet").num_row_groups == 2
+    assert parquet.read_table(study / "runs.parquet").equals(expected)
+    assert not list(study.glob("tmp*"))
+
+
+def test_rows_about_runs_wait_in_tables(tmp_path, monkeypatch):
+    whole, split = made_up(tmp_path, runs=7, name="whole"), made_up(tmp_path, runs=7, name="split")
+    publish(whole)
+    monkeypatch.setattr(lerobot_writer, "EPISODES_AT_ONCE", 2)
+    monkeypatch.setattr(lerobot_writer, "EPISODES_OF_GROUP", 4)
+    publish(split)
+    (path,) = (split / "dataset" / "meta" / "episodes").glob("*/*.parquet")
+    assert [parquet.read_metadata(path).row_group(number).num_rows for number in range(2)] == [4, 3]
+    assert parquet.read_table(path).equals(parquet.read_table(whole / "dataset" / "meta" / "episodes"))
 
 
 def test_texels_without_rows_are_lists(tmp_path):

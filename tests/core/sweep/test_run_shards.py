@@ -7,6 +7,7 @@ import os
 import random
 import shutil
 
+import numpy as np
 import pytest
 
 from palpate.attack.injector import EXIT, Injector
@@ -15,9 +16,10 @@ from palpate.attack.trees import tree
 from palpate.core.errors import FileError
 from palpate.core.study import run_shards
 from palpate.core.study.run_files import RUNS, done_runs, make_folders, run_batch
-from palpate.core.study.run_shards import KnownRuns, ShardIndex, ShardScan, append, digests_in
+from palpate.core.study.run_shards import KnownRuns, ShardIndex, ShardScan, append, digests_in, names_of
 from palpate.sweep.child import Scenes, compute_run
 from palpate.sweep.dataset import MOST_FILES, publish
+from palpate.sweep.finished_runs import run_order
 from palpate.sweep.report import write_report
 from palpate.sweep.study_folder import begin_study
 from palpate.sweep.worker import compute_batch, end_children
@@ -102,7 +104,23 @@ def test_a_run_that_two_processes_computed_is_there_once(runs):
     run_shards._open.clear()
     put(runs, 2, 3)
     assert len(shards(runs)) == 2 and len(digests_in(runs)) == 3
-    assert ShardIndex(runs).read(digest_of(2)) == content_of(2)
+    index = ShardIndex(runs)
+    assert index.read(digest_of(2)) == content_of(2) and len(index) == 3
+    assert index.size == sum(len(content_of(number)) for number in (1, 2, 3))
+
+
+def test_runs_are_looked_up_together(runs):
+    put(runs, *range(5))
+    near = digest_of(9)[:16] + "0000000a", digest_of(9)[:16] + "00000009"  # equal in their first eight bytes
+    append(runs, runs.parent, {digest: b"x" for digest in near}, COMMON)
+    index = ShardIndex(runs)
+    asked = [digest_of(3), digest_of(7), *near, digest_of(9)[:16] + "0000000b", digest_of(0), "f" * 24]
+    rows = index.rows(names_of(asked))
+    assert [row >= 0 for row in rows] == [True, False, True, True, False, True, False]
+    assert [name.tobytes().hex() for name in index.names(rows[rows >= 0])] == [asked[i] for i in (0, 2, 3, 5)]
+    everything = [name.tobytes().hex() for name in index.names(np.arange(len(index)))]
+    assert everything == sorted({*near, *map(digest_of, range(5))})
+    assert len(index.rows(names_of([]))) == 0 and list(ShardIndex(runs / "none").rows(names_of(asked))) == [-1] * len(asked)
 
 
 @pytest.mark.parametrize("operation", ["write", "fsync"])
@@ -216,6 +234,17 @@ def test_runs_with_folders_give_the_same_dataset_and_report(study, tmp_path):
     publish(other.folder, other.runs)
     assert tree(other.folder / "dataset") == tree(study.folder / "dataset")
     assert (other.folder / "runs.parquet").read_bytes() == (study.folder / "runs.parquet").read_bytes()
+
+
+def test_the_order_of_runs_is_that_of_the_design(study):
+    """Of runs that are planned and of those that nobody plans now; where a run is twice on the disk, too."""
+    order = list(run_order(study.folder, study.runs))
+    assert order == [(run.index, run.digest) for run in study.runs]
+    run_shards._open.clear()
+    compute(study, study.runs[1:3])
+    assert len(shards(study.folder / RUNS)) == 2
+    for planned in (study.runs, study.runs[::-1], study.runs[2:4], ()):
+        assert list(run_order(study.folder, planned)) == order
 
 
 def write_until_killed(folder, contents: dict, common: dict, tell: int, dice: random.Random) -> None:

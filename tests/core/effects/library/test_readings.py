@@ -129,6 +129,26 @@ def test_lag_is_the_linear_system_that_it_says(form, denominator):
     np.testing.assert_allclose(found[:, 0], expected, atol=1e-9)
 
 
+@pytest.mark.parametrize("damping", [0.001, 0.05, 0.5, 0.95])
+def test_a_resonance_is_the_oscillator_that_it_says(damping):
+    random = np.random.default_rng(0)
+    signal = np.cumsum(random.normal(size=len(TIME)))
+    signal -= signal[0]
+    turn = 2.0 * np.pi / 0.3
+    _, expected, _ = lsim(TransferFunction([turn**2], [1.0, 2.0 * damping * turn, turn**2]), signal, TIME)
+    found = read(effect("lag", "resonance", period=0.3, damping=damping), signal[:, None])
+    np.testing.assert_allclose(found[:, 0], expected, atol=1e-9 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("step", [1e-9, 1.5e-3, 1.7e-3, 0.3, 50.0])
+def test_a_resonance_has_no_seam_between_its_series_and_its_formula(step):
+    """One step against a thousand small ones, over a ramp."""
+    coarse, fine = np.array([0.0, step]), np.linspace(0.0, step, 1001)
+    item = effect("lag", "resonance", period=1.0, damping=0.3)
+    one, many = (read(item, (time / step)[:, None], time)[-1, 0] for time in (coarse, fine))
+    assert one == pytest.approx(many, rel=1e-6, abs=1e-18)
+
+
 @pytest.mark.parametrize("form", ["first-order", "second-order"])
 @pytest.mark.parametrize("step", [1e-7, 9e-5, 1.1e-4, 9e-3, 1.1e-2, 50.0])
 def test_lag_has_no_seam_between_its_series_and_its_formula(form, step):
@@ -140,6 +160,7 @@ def test_lag_has_no_seam_between_its_series_and_its_formula(form, step):
 
 
 def test_lag_starts_at_rest():
+    assert np.abs(read(effect("lag", "resonance", period=0.5, damping=0.1), np.full((501, 1), 3.0)) - 3.0).max() < 1e-12
     for form in ("first-order", "second-order", "dead-time"):
         np.testing.assert_allclose(read(effect("lag", form, time=0.5), np.full((501, 1), 3.0)), 3.0, rtol=1e-12)
 

@@ -115,6 +115,25 @@ def test_a_press_that_is_felt_late_and_let_go_early_has_lost_no_samples(tmp_path
     assert not find_faults(rig, stimuli_of(rig))
 
 
+@pytest.mark.parametrize(("sign", "kinds"), [(1.0, []), (-1.0, ["sign"])])
+def test_friction_never_drives_a_slide(tmp_path, sign, kinds):
+    """Friction of 2 N takes work from the surface that slides; the cell that measures it has an offset, too."""
+    time = np.arange(0.0, 8.0, 0.01)
+    trials = []
+    for name, use, beat in (("slow", "fit", 0.5), ("fast", "check", 0.8)):
+        slide = 0.02 * np.sin(2 * np.pi * beat * time)
+        force = sign * (2.0 * np.tanh(50.0 * np.cos(2 * np.pi * beat * time)) + 0.2)
+        trials.append((name, use, {"time": time, "depth": np.full(len(time), 1e-3), "slide_x": slide, "force_x": force}))
+    rubbed = Recording("rubbed", "grid = { rows = 1, columns = 1, pitch = 0.01 }\nk = 1e4", trials)
+    path = rubbed.write(tmp_path)
+    rig = read_rig(path)
+    faults = find_faults(rig, stimuli_of(rig))
+    assert [fault.kind for fault in faults] == kinds
+    assert all(fault.trials == ("slow", "fast") and "drives the slide" in fault.sentence for fault in faults)
+    mended, _ = put_right(read_rig(with_correction(path, '["sign"]')), stimuli_of(rig))
+    np.testing.assert_allclose(mended.trials[0].force[:, 0], sign * rig.trials[0].force[:, 0])
+
+
 def test_only_what_is_asked_for_is_put_right(tmp_path):
     rig = read_rig(with_correction(made.draw("gel", "stuck-logger", 0, tmp_path).path, '["sign", "unit"]'))
     assert rig.correct == ("sign", "unit")

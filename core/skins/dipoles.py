@@ -11,6 +11,8 @@ import numpy as np
 
 MU0_4PI = 1e-7
 """T·m/A: the magnetic constant divided by 4 π."""
+TOUCHING = 1e-9
+"""m: a dipole that is nearer is at the place itself."""
 
 
 def dipole_field(offset: np.ndarray, moment: np.ndarray) -> np.ndarray:
@@ -32,31 +34,54 @@ def dipole_field(offset: np.ndarray, moment: np.ndarray) -> np.ndarray:
     return field
 
 
-def summed_field(at: np.ndarray, place: np.ndarray, moment: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the sum of :func:`dipole_field` of dipoles that move, component by component, which takes a third of the time.
+class DipoleSum:
+    """The sum of :func:`dipole_field` of dipoles that move, by products of matrices, at places that do not.
+
+    The square of a distance has an error of some 1e-15 of the square of the skin's size: of 1 mm in a skin of 100 mm, 1e-11.
 
     Parameters
     ----------
     at : (k, 3) float, m
         Where the field is wanted.
-    place : (T, m, 3) float, m
-        Of the dipoles; a field at one of them is not finite.
     moment : (m, 3) float, A·m²
-
-    Returns
-    -------
-    field : (T, k, 3) float, T
-    square : (T, k, m) float, m²
-        Squared distances.
     """
-    away = [at[:, i, None] - place[:, None, :, i] for i in range(3)]
-    square = away[0] * away[0] + away[1] * away[1] + away[2] * away[2]
-    with np.errstate(divide="ignore", invalid="ignore"):
+
+    def __init__(self, at: np.ndarray, moment: np.ndarray):
+        self._middle = at.mean(axis=0)
+        self._at, self._moment = at - self._middle, MU0_4PI * moment
+        self._square = np.sum(self._at**2, axis=1)[:, None]
+        self._along = 3.0 * self._at @ self._moment.T
+
+    def field(self, place: np.ndarray, least: float = TOUCHING) -> tuple[np.ndarray, np.ndarray]:
+        """Return the field of dipoles at some places.
+
+        Parameters
+        ----------
+        place : (T, m, 3) float, m
+        least : float, m
+            A nearer dipole counts as one at this distance.
+
+        Returns
+        -------
+        field : (T, k, 3) float, T
+        square : (T, k, m) float, m²
+            Squared distances, not below the square of the least.
+        """
+        place = place - self._middle
+        square = np.matmul(-2.0 * self._at, np.swapaxes(place, 1, 2))  # |a − p|² = |a|² − 2 a · p + |p|²
+        square += self._square
+        square += np.einsum("tmi,tmi->tm", place, place)[:, None]
+        np.maximum(square, least**2, out=square)
         inverse = 1.0 / square
-        cube = MU0_4PI * inverse * np.sqrt(inverse)
-        along = 3.0 * cube * inverse * (moment[:, 0] * away[0] + moment[:, 1] * away[1] + moment[:, 2] * away[2])
-        parts = [np.einsum("tkm,tkm->tk", along, away[i]) - np.einsum("tkm,m->tk", cube, moment[:, i]) for i in range(3)]
-    return np.stack(parts, axis=2), square
+        cube = np.sqrt(inverse)
+        cube *= inverse
+        weight = self._along - 3.0 * np.einsum("tmi,mi->tm", place, self._moment)[:, None]  # 3 m · (a − p)
+        weight *= cube
+        weight *= inverse
+        field = self._at * weight.sum(axis=2, keepdims=True)
+        field -= np.matmul(weight, place)
+        field -= np.matmul(cube, self._moment)
+        return field, square
 
 
 def dipole_gradient(offset: np.ndarray, moment: np.ndarray) -> np.ndarray:

@@ -47,8 +47,7 @@ def texel_displacements(
     """
     moved = -np.asarray(depth, float)[..., None] * texels.normal
     if shear is not None:
-        across = np.cross(texels.normal, texels.tangent)
-        moved = moved + (shear[..., :1] * texels.tangent + shear[..., 1:] * across) / shear_stiffness
+        moved = moved + (shear[..., :1] * texels.tangent + shear[..., 1:] * texels.bitangent) / shear_stiffness
     return moved
 
 

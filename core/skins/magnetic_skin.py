@@ -4,16 +4,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from ..errors import ParameterError, SensorError, counted
+from ..errors import ParameterError, SensorError
 from ..geometry.texels import Texels
-from .dipoles import dipole_gradient, summed_field
+from ..model.vector_readings import VectorReadings
+from .dipoles import TOUCHING, DipoleSum, dipole_gradient
 from .layer import layer_weights
 
 BLOCK_NUMBERS = 1 << 14
 """Offsets between magnets and magnetometers that are worked on at once: their arrays stay in a processor's cache."""
+FULL_SCALE = 50e-3
+"""T: range of usual three-axis Hall chips."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +45,7 @@ class Magnetometers:
     place : (k, 3) float, m
     axes : (k, 3, 3) float
         Unit vectors of each chip's x, y and z axis in its rows; they need not be perpendicular.
-    full_scale : float, T
+    full_scale : float or (k,) float, T
         Largest field that an axis shows; what is larger is clipped.
     offset : (k, 3) float, T
         What each axis shows more: the field of the surroundings, and its own zero.
@@ -51,36 +55,9 @@ class Magnetometers:
 
     place: np.ndarray
     axes: np.ndarray
-    full_scale: float
+    full_scale: float | np.ndarray
     offset: np.ndarray
     size: float = 5e-4
-
-
-@dataclass(frozen=True)
-class VectorReadings:
-    """Readings of several channels for each place where something is measured.
-
-    Attributes
-    ----------
-    values : (T, k, c) float
-    clipped : (T, k, c) bool
-        Channels beyond their range.
-    unit : str
-    """
-
-    values: np.ndarray
-    clipped: np.ndarray
-    unit: str = "T"
-
-    def said(self) -> str:
-        """Return a sentence about clipped channels, empty if there are none."""
-        places = np.argwhere(self.clipped.any(axis=0))
-        if not len(places):
-            return ""
-        frames = int(self.clipped.any(axis=(1, 2)).sum())
-        first = f"channel {'xyz'[places[0][1]] if self.values.shape[2] == 3 else places[0][1]} of magnetometer {places[0][0]}"
-        more = f" and {counted(len(places) - 1, 'other channel')}" if len(places) > 1 else ""
-        return f"{first}{more}: beyond the range in {counted(frames, 'frame')}, and clipped there."
 
 
 @dataclass(frozen=True)
@@ -99,11 +76,17 @@ class MagneticSkin:
     magnetometers: Magnetometers
     weights: np.ndarray
 
+    @cached_property
+    def _fields(self) -> DipoleSum:
+        return DipoleSum(self.magnetometers.place, self.magnets.moment)
+
     def field_at_rest(self) -> np.ndarray:
         """Return what the magnetometers see while nothing moves, without their offsets, (k, 3) float, T."""
-        return self._seen(self.magnets.place[None])[0]
+        return self._seen(self.magnets.place[None])[0][0]
 
-    def readings(self, displacement: np.ndarray, ambient: np.ndarray | None = None) -> VectorReadings:
+    def readings(
+        self, displacement: np.ndarray, ambient: np.ndarray | None = None, refuses_near: bool = True
+    ) -> VectorReadings:
         """Return what the magnetometers show while the texels move.
 
         Parameters
@@ -112,6 +95,8 @@ class MagneticSkin:
             Of the texels (:func:`.layer.texel_displacements`).
         ambient : (T, 3) float, T, or None
             Field of the surroundings, which all magnetometers share.
+        refuses_near : bool
+            False takes a magnet that moves into a magnetometer's chip as one on its surface, and calls its channels clipped.
 
         Returns
         -------
@@ -134,17 +119,20 @@ class MagneticSkin:
             raise ParameterError("The displacements have values that are not numbers: give metres for each texel and frame.")
         numbers = len(self.magnets.place) * len(self.magnetometers.place)
         step = max(1, BLOCK_NUMBERS // max(numbers, 1))
-        parts = [self._seen(self.places(displacement[i : i + step])) for i in range(0, len(displacement), step)]
-        values = np.concatenate(parts) if parts else np.zeros((0, len(self.magnetometers.place), 3))
+        starts = range(0, max(len(displacement), 1), step)
+        parts = [self._seen(self.places(displacement[i : i + step]), refuses_near) for i in starts]
+        values, inside = parts[0] if len(parts) == 1 else map(np.concatenate, zip(*parts, strict=True))
         if ambient is not None:
             values = values + np.einsum("kij,tj->tki", self.magnetometers.axes, ambient)
         values = values + self.magnetometers.offset
-        limit = self.magnetometers.full_scale
-        return VectorReadings(np.clip(values, -limit, limit), np.abs(values) > limit)
+        limit = np.reshape(self.magnetometers.full_scale, (-1, 1))
+        clipped = (np.abs(values) > limit) | inside[:, :, None]
+        values = np.minimum(np.maximum(values, -limit), limit)
+        return VectorReadings(values, clipped, place=self.magnetometers.place)
 
     def places(self, displacement: np.ndarray) -> np.ndarray:
         """Return where the magnets are, (T, m, 3) float, m, from the texels' displacements (T, n, 3)."""
-        found: np.ndarray = self.magnets.place + np.einsum("mn,tnk->tmk", self.weights, displacement)
+        found: np.ndarray = self.magnets.place + np.matmul(self.weights, displacement)  # each frame by itself: the same bits
         return found
 
     def jacobian(self, displacement: np.ndarray) -> np.ndarray:
@@ -164,18 +152,22 @@ class MagneticSkin:
         found: np.ndarray = np.einsum("kiml,mn->kinl", seen, self.weights)
         return found
 
-    def _seen(self, place: np.ndarray) -> np.ndarray:
-        """Fields of magnets at some places (T, m, 3) along the axes of the magnetometers, (T, k, 3)."""
-        field, square = summed_field(self.magnetometers.place, place, self.magnets.moment)
-        nearest = float(np.sqrt(square.min(initial=np.inf)))
-        if nearest < self.magnetometers.size:
+    def _seen(self, place: np.ndarray, refuses_near: bool = True) -> tuple[np.ndarray, np.ndarray]:
+        """Return fields of magnets at some places (T, m, 3) along the magnetometers' axes, (T, k, 3).
+
+        Also return where one is inside of a chip, (T, k) bool.
+        """
+        size = self.magnetometers.size
+        field, square = self._fields.field(place, TOUCHING if refuses_near else size)
+        inside = square.min(axis=2) <= size**2
+        if refuses_near and inside.any():
             _, chip, magnet = np.unravel_index(int(np.argmin(square)), square.shape)
             raise ParameterError(
-                f"Magnet {magnet} comes within {1e3 * nearest:.3g} mm of magnetometer {chip}, inside its chip: "
+                f"Magnet {magnet} comes within {1e3 * np.sqrt(square.min()):.3g} mm of magnetometer {chip}, inside its chip: "
                 "place it higher, or press less deep."
             )
         found: np.ndarray = np.einsum("kij,tkj->tki", self.magnetometers.axes, field)
-        return found
+        return found, inside
 
 
 def magnetic_skin(texels: Texels, magnets: Magnets, magnetometers: Magnetometers, thickness: float) -> MagneticSkin:
@@ -203,10 +195,10 @@ def magnetic_skin(texels: Texels, magnets: Magnets, magnetometers: Magnetometers
     ):
         if np.shape(values) != shape or not len(values) or not np.isfinite(values).all():
             raise SensorError(f"The {name} have the shape {np.shape(values)}: give finite numbers of the shape {shape}.")
-    if not 0.0 < thickness < 1.0 or not magnetometers.full_scale > 0.0:
+    least = float(np.min(magnetometers.full_scale))
+    if not 0.0 < thickness < 1.0 or not least > 0.0:
         raise SensorError(
-            f"A layer of {thickness:g} m with magnetometers up to {magnetometers.full_scale:g} T cannot be: "
-            "give metres and tesla above zero."
+            f"A layer of {thickness:g} m with magnetometers up to {least:g} T cannot be: give metres and tesla above zero."
         )
     below = np.einsum("mnk,nk->mn", texels.position[None] - magnets.place[:, None], texels.normal)
     nearest = np.argmin(np.sum((texels.position[None] - magnets.place[:, None]) ** 2, axis=2), axis=1)

@@ -6,7 +6,7 @@ import pytest
 from scipy import sparse
 
 from palpate.core.errors import ParameterError
-from palpate.core.response.readout_matrix import ReadoutMatrix, fit_readout_matrix, net_force_readout
+from palpate.core.skins.readout_matrix import ReadoutMatrix, fit_readout_matrix, net_force_readout
 
 
 def test_one_channel_for_each_texel_stays_as_it_is():

@@ -6,9 +6,9 @@ import pytest
 
 from palpate.core.errors import ParameterError, SensorError
 from palpate.core.gap.dataset.rig import grid_texels
-from palpate.core.response.dipoles import MU0_4PI, dipole_field, dipole_gradient, moment_of_magnet, summed_field
-from palpate.core.response.layer import layer_weights, pressure_below_point_load, texel_displacements
-from palpate.core.response.magnetic_skin import Magnetometers, Magnets, magnetic_skin
+from palpate.core.skins.dipoles import MU0_4PI, DipoleSum, dipole_field, dipole_gradient, moment_of_magnet
+from palpate.core.skins.layer import layer_weights, pressure_below_point_load, texel_displacements
+from palpate.core.skins.magnetic_skin import Magnetometers, Magnets, magnetic_skin
 
 THICKNESS = 6e-3
 
@@ -75,7 +75,7 @@ def test_the_gradient_is_that_of_the_field_without_curl_and_divergence():
 
 def test_the_sum_of_fields_is_that_of_single_dipoles():
     at, place, moment = random(6).normal(size=(7, 3)), random(7).normal(size=(5, 4, 3)), random(8).normal(size=(4, 3))
-    field, square = summed_field(at, place, moment)
+    field, square = DipoleSum(at, moment).field(place)
     offset = at[None, :, None] - place[:, None]
     np.testing.assert_allclose(square, np.sum(offset**2, axis=3), rtol=1e-13)
     size = np.linalg.norm(dipole_field(offset, moment), axis=3).sum(axis=2, keepdims=True)
@@ -151,7 +151,7 @@ def test_blocks_of_frames_give_the_same_bytes(monkeypatch):
     _, own = skin()
     displacement = 3e-4 * random(5).normal(size=(40, 16, 3))
     whole = own.readings(displacement).values
-    monkeypatch.setattr("palpate.core.response.magnetic_skin.BLOCK_NUMBERS", 16 * 16 * 7)
+    monkeypatch.setattr("palpate.core.skins.magnetic_skin.BLOCK_NUMBERS", 16 * 16 * 7)
     assert own.readings(displacement).values.tobytes() == whole.tobytes()
 
 

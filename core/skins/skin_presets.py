@@ -14,13 +14,13 @@ import numpy as np
 from ..errors import SensorError, suggestion
 from ..geometry.texels import Texels
 
-LARGEST_TILT = 0.02
-"""Largest sine of the angle between the normals of two texels of a pad that is flat."""
+LEAST_NORMAL = 0.2
+"""Least cosine between the normal of a texel and the mean of all, for a skin to lie below it."""
 
 
 @dataclass(frozen=True)
 class SkinPreset:
-    """A skin on a flat pad.
+    """A skin, as it lies on a flat pad.
 
     Attributes
     ----------
@@ -93,25 +93,67 @@ def preset_named(name: str) -> SkinPreset:
     return PRESETS[name]
 
 
-def placed(preset: SkinPreset, texels: Texels) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return a preset under a flat pad: magnets (m, 3), moment (3,), magnetometers (k, 3) and its axes in rows (3, 3).
+@dataclass(frozen=True)
+class PlacedSkin:
+    """A preset under the texels of a sensor, in the frame of its body.
+
+    Attributes
+    ----------
+    magnets, moments : (m, 3) float, m and A·m²
+    magnetometers : (k, 3) float, m
+    axes : (k, 3, 3) float
+        Of each magnetometer in its rows, the last along the normal above it.
+    """
+
+    magnets: np.ndarray
+    moments: np.ndarray
+    magnetometers: np.ndarray
+    axes: np.ndarray
+
+
+def placed(preset: SkinPreset, texels: Texels) -> PlacedSkin:
+    """Return a preset under the middle of a sensor's texels; on a curved surface it follows the surface.
 
     Raises
     ------
     SensorError
-        The pad is not flat, or does not reach over all magnets.
+        The texels do not reach over all magnets, or look in all directions.
     """
-    normal, tangent = texels.normal[0], texels.tangent[0]
-    tilt = float(np.linalg.norm(np.cross(texels.normal, normal), axis=1).max())
-    if tilt > LARGEST_TILT or (texels.normal @ normal).min() < 0.0:
-        raise SensorError(f"The skin '{preset.name}' is flat and the texels are not: give places instead of the name.")
-    frame = np.stack([tangent, np.cross(normal, tangent), normal])
-    middle = 0.5 * (texels.position.max(axis=0) + texels.position.min(axis=0))
-    within = np.abs((texels.position - middle) @ frame[:2].T).max(axis=0) + 0.5 * np.sqrt(texels.area.max())
+    mean = texels.area @ texels.normal / texels.area.sum()
+    if np.linalg.norm(mean) < LEAST_NORMAL:
+        raise SensorError(
+            f"The texels look in all directions and the skin '{preset.name}' lies on one side: make a region of that side."
+        )
+    up = mean / np.linalg.norm(mean)
+    facing = np.flatnonzero(texels.normal @ up > LEAST_NORMAL)
+    position, normals = texels.position[facing], texels.normal[facing]
+    middle = 0.5 * (position.max(axis=0) + position.min(axis=0))
+    along = texels.tangent[facing[np.argmin(np.sum((position - middle) ** 2, axis=1))]]
+    along = along - up * (up @ along)
+    along = along / np.linalg.norm(along)
+    frame = np.stack([along, np.cross(up, along), up])
+    flat = (position - middle) @ frame.T
+    _check_size(preset, np.abs(flat[:, :2]).max(axis=0) + 0.5 * np.sqrt(texels.area.max()))
+
+    def under(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return places (m, 3) below the surface, and in rows the axes (m, 3, 3) of the surface above them."""
+        above = np.argmin(np.sum((places[:, None, :2] - flat[None, :, :2]) ** 2, axis=2), axis=1)
+        normal = normals[above] @ frame.T
+        rise = -np.sum(normal[:, :2] * (places[:, :2] - flat[above, :2]), axis=1) / normal[:, 2]  # in its tangent plane
+        surface = np.column_stack([places[:, :2], flat[above, 2] + rise])
+        first = np.cross([0.0, 1.0, 0.0], normal)
+        first /= np.linalg.norm(first, axis=1, keepdims=True)
+        axes = np.stack([first, np.cross(normal, first), normal], axis=1)
+        return middle + (surface + places[:, 2:] * normal) @ frame, axes @ frame
+
+    (magnets, turned), (chips, axes) = under(preset.magnets), under(preset.magnetometers)
+    return PlacedSkin(magnets, np.einsum("i,mij->mj", preset.moment, turned), chips, axes)
+
+
+def _check_size(preset: SkinPreset, within: np.ndarray) -> None:
     needed = np.abs(preset.magnets[:, :2]).max(axis=0)
     if (needed > within).any():
         size, wanted = (" × ".join(f"{2e3 * one:.3g}" for one in sizes) for sizes in (within, needed))
         raise SensorError(
             f"The pad covers {size} mm and the magnets of the skin '{preset.name}' lie within {wanted} mm: use a larger pad."
         )
-    return middle + preset.magnets @ frame, preset.moment @ frame, middle + preset.magnetometers @ frame, frame

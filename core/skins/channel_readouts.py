@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a sensor's channels are computed with: the field of magnets that its texels carry, or a linear map of its forces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import SensorError
+from ..geometry.texels import Texels
+from ..model.recording import Recording, SensorArrays
+from ..model.vector_readings import AXES, VectorReadings
+from .layer import texel_displacements
+from .magnetic_skin import MagneticSkin
+from .readout_matrix import ReadoutMatrix
+
+
+@dataclass(frozen=True)
+class MagneticReadout:
+    """Magnetometers below a sensor's texels: three channels each.
+
+    Attributes
+    ----------
+    skin : MagneticSkin
+    texels : Texels
+        Of the sensor.
+    shear_stiffness : float, N/m
+        Of one texel: its surface moves by its shear divided by it.
+    """
+
+    skin: MagneticSkin
+    texels: Texels
+    shear_stiffness: float
+
+    def __post_init__(self) -> None:
+        """Raise SensorError if the skin is one of other texels."""
+        own = self.skin.weights.shape[1]
+        if own != len(self.texels):
+            raise SensorError(f"The skin has {own} texels and its sensor {len(self.texels)}: make the skin for this sensor.")
+
+    def no_frames(self) -> VectorReadings:
+        """Return the channels of a recording without frames."""
+        place = self.skin.magnetometers.place
+        return VectorReadings(np.zeros((0, len(place), 3)), np.zeros((0, len(place), 3), bool), place=place)
+
+    def channels(self, recorded: SensorArrays) -> VectorReadings:
+        """Return what the magnetometers show; a magnet that is pressed into one counts as clipped."""
+        moved = texel_displacements(self.texels, recorded.depth, recorded.shear, self.shear_stiffness)
+        return self.skin.readings(moved, refuses_near=False)
+
+
+@dataclass(frozen=True)
+class LinearReadout:
+    """Channels that are linear in the forces of the texels.
+
+    Attributes
+    ----------
+    readout : ReadoutMatrix
+        Of k·c channels from n·3 loads: each texel's normal force and its shear along x and y, N.
+    place : (k, 3) float, m
+        Of each group of c channels.
+    names : (c,) tuple of str
+    unit : str
+    """
+
+    readout: ReadoutMatrix
+    place: np.ndarray
+    names: tuple[str, ...] = AXES
+    unit: str = "N"
+
+    def no_frames(self) -> VectorReadings:
+        """Return the channels of a recording without frames."""
+        shape = 0, len(self.place), len(self.names)
+        return VectorReadings(np.zeros(shape), np.zeros(shape, bool), self.unit, self.names, self.place)
+
+    def channels(self, recorded: SensorArrays) -> VectorReadings:
+        """Return the channels, which have no range."""
+        loads = np.concatenate([recorded.normal_force[..., None], recorded.shear], axis=2)
+        none = self.no_frames()
+        rows = [self.readout.channels(one[None]).reshape(1, *none.values.shape[1:]) for one in loads]
+        values = np.concatenate([none.values, *rows])
+        return replace(none, values=values, clipped=np.zeros(values.shape, bool))
+
+
+def net_force_of(texels: Texels) -> LinearReadout:
+    """Return the read-out of a pad on a load cell in the middle of its texels: the sum of their forces along x, y and z of its
+    body. A pressed texel is pushed against its normal.
+    """
+    directions = np.stack([-texels.normal, texels.tangent, np.cross(texels.normal, texels.tangent)], axis=1)
+    return LinearReadout(ReadoutMatrix(directions.reshape(-1, 3).T), texels.position.mean(axis=0)[None])
+
+
+def with_clipping_warnings(recording: Recording) -> Recording:
+    """Return a recording with a warning for each sensor whose channels were beyond their range."""
+    found = []
+    for name, sensor in recording.sensors.items():
+        if sensor.channels is not None:
+            parts = (part.sensors[name].channels for part in recording.blocks())
+            clipped = np.concatenate([part.clipped for part in parts if part is not None])
+            said = replace(sensor.channels, values=clipped, clipped=clipped).said()
+            found += [f"Sensor '{name}', {said}"] if said else []
+    return replace(recording, warnings=(*recording.warnings, *found)) if found else recording

@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A painted sensor with several channels, from its placing to the files of its bake, and what a user can do wrong."""
+
+import csv
+import json
+
+import bpy
+import numpy as np
+import pytest
+from blender_scenes import press, reopen, save, visible
+
+from palpate.addon.bake.bake import bake
+from palpate.addon.scene import scene_fingerprint, scene_reader
+from palpate.core.errors import PalpateError
+from palpate.core.export.registry import export
+from palpate.core.io import bake_switch
+from palpate.core.io.bake_folder import read_manifest
+from palpate.core.io.bake_reader import read_bake
+from palpate.core.io.tactile_exr import channel_layout, read_exr
+from palpate.core.jobs.job_runner import run_job
+from palpate.core.skins import skin_presets
+from palpate.panels import sensor as panel
+
+
+def baked(scene):
+    result = run_job(bake(scene))
+    bake_switch.wait_for_removals()
+    return result
+
+
+def pressed_skin(frames=5, preset="uskin"):
+    """A pad of 50 mm under a ball, with a skin that the operator placed."""
+    scene, pad, *_ = press(frames=frames)
+    bpy.context.view_layer.objects.active = pad
+    assert bpy.ops.palpate.magnetic_skin_place(preset=preset) == {"FINISHED"}
+    bpy.context.view_layer.update()
+    return scene, pad
+
+
+def read(scene):
+    return run_job(scene_reader.read_scene(scene)).scenario.sensors[0]
+
+
+def parts(pad, part):
+    return [obj for obj in pad.palpate.readout.collection.objects if obj.palpate.magnetic.part == part]
+
+
+def test_a_placed_skin_is_the_preset(tmp_path):
+    scene, pad = pressed_skin()
+    own = read(scene).channels.skin
+    pad.palpate.readout.kind = "USKIN"
+    preset = read(scene).channels.skin
+    np.testing.assert_allclose(own.magnets.place, preset.magnets.place, atol=1e-8)  # empties have 32 bits
+    np.testing.assert_allclose(own.magnets.moment, preset.magnets.moment, atol=1e-8)
+    np.testing.assert_allclose(own.magnetometers.place, preset.magnetometers.place, atol=1e-8)
+    assert len(own.magnetometers.place) == 16 and (own.magnetometers.full_scale == 0.05).all()
+
+
+def test_a_skin_moves_with_a_sensor_that_is_turned_shifted_and_scaled():
+    scene, pad = pressed_skin()
+    before = read(scene).channels.skin
+    pad.location, pad.rotation_euler, pad.scale = (0.1, -0.2, 0.3), (0.4, 1.1, -0.5), (1.0, 1.0, 1.0)
+    bpy.context.view_layer.update()
+    after = read(scene).channels.skin
+    np.testing.assert_allclose(after.magnets.place, before.magnets.place, atol=1e-7)
+    np.testing.assert_allclose(after.magnetometers.axes, before.magnetometers.axes, atol=1e-6)
+    np.testing.assert_allclose(after.magnets.moment, before.magnets.moment, atol=1e-8)
+
+
+def test_a_bake_holds_the_channels_in_all_of_its_files(tmp_path):
+    scene, pad = pressed_skin()
+    save(tmp_path)
+    result = baked(scene)
+    folder = result.folders["Pad"]
+    images = [f"tactile_{frame:04d}.exr" for frame in range(1, 6)]
+    assert visible(folder) == sorted(["images.sha256", "manifest.json", "recording.npz", "sensor.npz", *images])
+    manifest = read_manifest(folder)
+    assert manifest.channels["unit"] == "T" and manifest.channels["names"] == ["x", "y", "z"]
+    assert len(manifest.channels["place"]) == 16
+    found = read_bake(tmp_path / "palpate-bake")  # checks the images' checksums
+    channels = found.recording.sensors["Pad"].channels
+    assert channels.values.tobytes() == result.recording.sensors["Pad"].channels.values.tobytes()
+    change = channels.values[-1] - channels.values[0]
+    assert channels.values.shape == (5, 16, 3) and np.abs(change).max() > 1e-4 and not channels.clipped.any()
+    pictures, about = read_exr(folder / "tactile_0005.exr")
+    texels = found.texels["Pad"]
+    nearest = np.argmin(np.linalg.norm(texels.position[:, None] - channels.place, axis=2), axis=1)
+    assert len(np.unique(nearest)) == 8  # texels are 10 mm apart in one direction
+    for i, name in enumerate("XYZ"):
+        expected = texels.layout.image(channels.values[-1, nearest, i]).astype(np.float32)
+        np.testing.assert_array_equal(pictures[f"channels.{name}"], expected)
+        assert about[f"unit.channels.{name}"] == "T"
+    assert {"R", "G", "B", "reading", "depth", "slip", "contact"} < set(pictures)
+
+
+def test_exports_hold_the_channels(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    scene, _ = pressed_skin(preset="eflesh")
+    save(tmp_path)
+    baked(scene)
+    found = read_bake(tmp_path / "palpate-bake")
+    channels, out = found.recording.sensors["Pad"].channels, tmp_path / "out"
+    for kind in ("csv", "npz", "hdf5", "png", "mcap"):
+        run_job(export(found, kind, out))
+    with open(out / "Pad" / "channels.csv", newline="") as file:
+        header, *rows = csv.reader(file)
+    assert header[:5] == ["frame", "time", "0_x_T", "0_y_T", "0_z_T"] and len(header) == 2 + 15
+    np.testing.assert_allclose(np.array(rows, float)[:, 2:], channels.values.reshape(5, 15), rtol=1e-8)
+    with np.load(out / "Pad.npz") as members:
+        assert members["channels"].tobytes() == channels.values.tobytes() and str(members["channels_unit"]) == "T"
+    with h5py.File(out / "palpate.h5") as file:
+        group = file["sensors/Pad"]
+        assert group["channels"][()].tobytes() == channels.values.tobytes() and group["channels"].attrs["unit"] == "T"
+        assert list(group.attrs["channels_names"]) == ["x", "y", "z"]
+    scale = json.loads((out / "Pad" / "channels_scale.json").read_text())
+    assert scale["last_colour"] == pytest.approx(np.abs(channels.values - channels.values[0]).max())
+    assert len(list((out / "Pad").glob("channels_*.png"))) == 5
+    reader = pytest.importorskip("mcap.reader")
+    with (out / "palpate.mcap").open("rb") as file:
+        topics = [channel.topic for _, channel, _ in reader.make_reader(file).iter_messages()]
+    assert topics.count("/Pad/channels") == 5
+
+
+def test_a_picture_has_red_where_a_channel_has_risen_and_blue_where_it_has_fallen(tmp_path):
+    from matplotlib.image import imread
+
+    scene, _ = pressed_skin()
+    save(tmp_path)
+    baked(scene)
+    found = read_bake(tmp_path / "palpate-bake")
+    run_job(export(found, "png", tmp_path / "out"))
+    picture = imread(tmp_path / "out" / "Pad" / "channels_0005.png")
+    channels = found.recording.sensors["Pad"].channels
+    size = picture.shape[0] // 4
+    tile = picture[size // 2 :: size, size // 2 :: size][::-1, 8:]  # along z, the third of three
+    change = channel_layout(found.texels["Pad"], channels).image(channels.values[-1, :, 2] - channels.values[0, :, 2])
+    large = np.abs(change) > 0.3 * np.abs(change).max()
+    assert large.any() and (np.sign(tile[..., 0] - tile[..., 2])[large] == np.sign(change)[large]).all()
+
+
+def test_a_load_cell_reads_what_the_texels_bear(tmp_path):
+    scene, pad, *_ = press(frames=4)
+    pad.palpate.readout.kind = "NET_FORCE"
+    save(tmp_path)
+    felt = baked(scene).recording.sensors["Pad"]
+    assert felt.channels.unit == "N" and felt.channels.values[-1, 0, 2] == pytest.approx(-felt.normal_force[-1].sum())
+
+
+def test_without_a_read_out_a_bake_says_nothing_of_channels(tmp_path):
+    scene, *_ = press(frames=3)
+    save(tmp_path)
+    folder = baked(scene).folders["Pad"]
+    assert not any(name.startswith("channels") for name in visible(folder))
+    assert "channels" not in json.loads((folder / "manifest.json").read_text())
+    with np.load(folder / "recording.npz") as members:
+        assert not any("channels" in name for name in members.files)
+        assert "channels" not in json.loads(str(members["header"]))
+
+
+def test_files_reopen_with_their_skin_and_a_moved_magnet_makes_the_bake_stale(tmp_path):
+    scene, pad = pressed_skin()
+    path = save(tmp_path)
+    before = scene_fingerprint.fingerprint(scene)
+    first = read(scene).channels
+    scene = reopen(path)
+    pad = scene.objects["Pad"]
+    assert scene_fingerprint.fingerprint(scene) == before
+    np.testing.assert_array_equal(read(scene).channels.skin.magnets.place, first.skin.magnets.place)
+    parts(pad, "MAGNET")[3].location.z -= 1e-4
+    assert scene_fingerprint.fingerprint(scene) != before
+
+
+def remove(pad, part):
+    for obj in parts(pad, part):
+        obj.palpate.magnetic.part = "NONE"
+
+
+def test_what_a_user_can_do_wrong_is_one_sentence():
+    def move_into_a_chip(pad):
+        magnet, chip = parts(pad, "MAGNET")[0], parts(pad, "MAGNETOMETER")[0]
+        magnet.location = chip.location
+        pad.palpate.readout.thickness = 0.01
+
+    faults = {
+        "has no magnetometer": lambda pad: remove(pad, "MAGNETOMETER"),
+        "has no magnet:": lambda pad: remove(pad, "MAGNET"),
+        "no collection has its magnets": lambda pad: setattr(pad.palpate.readout, "collection", None),
+        "Magnet 0 comes within .* inside its chip": move_into_a_chip,
+        "below the texels and the layer is 1 mm": lambda pad: setattr(pad.palpate.readout, "thickness", 1e-3),
+        "has a scale of zero": lambda pad: setattr(parts(pad, "MAGNET")[2], "scale", (0.0, 0.0, 0.0)),
+        "NaN or infinite": lambda pad: setattr(parts(pad, "MAGNET")[2].location, "x", float("nan")),
+    }
+    for sentence, do in faults.items():
+        scene, pad = pressed_skin(frames=2)
+        do(pad)
+        bpy.context.view_layer.update()
+        with pytest.raises(PalpateError, match=rf"(?s)^Channels of sensor 'Pad'.*{sentence}"):
+            read(scene)
+        bpy.ops.wm.read_homefile(use_empty=True)
+
+
+def test_placing_a_skin_can_be_undone():
+    scene, pad, *_ = press(frames=2)
+    bpy.context.view_layer.objects.active = pad
+    bpy.ops.ed.undo_push(message="before")
+    bpy.ops.palpate.magnetic_skin_place(preset="eflesh")
+    bpy.ops.ed.undo_push(message="after")
+    assert len(bpy.data.objects) == 2 + 10
+    bpy.ops.ed.undo()
+    assert len(bpy.data.objects) == 2 and bpy.data.objects["Pad"].palpate.readout.kind == "NONE"
+
+
+def test_a_pad_that_is_too_small_for_a_preset_is_one_sentence():
+    scene, pad, *_ = press(frames=2)
+    pad.scale = (0.1, 0.1, 1.0)
+    bpy.context.view_layer.objects.active = pad
+    bpy.context.view_layer.update()
+    with pytest.raises(RuntimeError, match="use a larger pad"):
+        bpy.ops.palpate.magnetic_skin_place(preset="uskin")
+    assert pad.palpate.readout.kind == "NONE"
+
+
+def test_what_is_beyond_the_range_is_clipped_and_said(tmp_path):
+    scene, pad = pressed_skin()
+    for chip in parts(pad, "MAGNETOMETER"):
+        chip.palpate.magnetic.full_scale = 12.6e-3
+    save(tmp_path)
+    recording = baked(scene).recording
+    assert any("beyond the range" in warning for warning in recording.warnings)
+    channels = recording.sensors["Pad"].channels
+    assert np.abs(channels.values).max() == 12.6e-3 and channels.clipped.any()
+    assert "clipped" in panel._summary(channels.part(-1))
+
+
+@pytest.mark.parametrize("name", list(skin_presets.PRESETS))
+def test_a_preset_follows_a_curved_surface(name):
+    """On a cylinder each magnet is as deep below the surface as on a flat pad."""
+    preset, radius = skin_presets.PRESETS[name], 60e-3
+    angle, y = np.meshgrid(np.linspace(-0.2, 0.2, 41), np.linspace(-11e-3, 11e-3, 23))
+    normal = np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=-1).reshape(-1, 3)
+    position = radius * normal + np.column_stack([0 * y.ravel(), y.ravel(), 0 * y.ravel()])
+    tangent = np.cross([0.0, 1.0, 0.0], normal)
+    texels = type("", (), {"position": position, "normal": normal, "tangent": tangent, "area": np.full(len(normal), 1e-6)})
+    skin = skin_presets.placed(preset, texels)
+    depth = radius - np.hypot(skin.magnets[:, 0], skin.magnets[:, 2])
+    np.testing.assert_allclose(depth, -preset.magnets[:, 2], atol=1e-5)  # the tangent plane of the nearest texel
+    np.testing.assert_allclose(np.linalg.norm(skin.moments, axis=1), np.linalg.norm(preset.moment))
+    np.testing.assert_allclose(skin.axes @ np.swapaxes(skin.axes, 1, 2), np.tile(np.eye(3), (len(skin.axes), 1, 1)), atol=1e-12)
