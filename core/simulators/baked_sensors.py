@@ -47,7 +47,7 @@ def baked_sensors(
     ------
     FileError
         There is no .blend, no bake, or no sensor of a name; the bake is damaged, incomplete, that of another .blend or of an
-        older version; or the .blend has changed since.
+        older version; a sensor has several channels; or the .blend has changed since.
     """
     blend = Path(blend)
     if not blend.is_file():
@@ -79,6 +79,11 @@ def _checked_sensor(blend: Path, found: Bake, name: str) -> SensorOnMesh:
         raise FileError(
             f"'{folder / MANIFEST_NAME}' is of an older version and does not name the sensor's effects: "
             f"run 'palpate bake {blend}'."
+        )
+    if manifest.channels:
+        raise FileError(
+            f"The sensor '{name}' of '{blend}' has channels, which loops of other programs do not compute: "
+            "read its bake, or name other sensors."
         )
     texels, parameters = found.texels[name], found.parameters[name]
     try:

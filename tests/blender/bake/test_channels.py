@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from blender_scenes import press, reopen, save, visible
 
+from palpate import sensors_from_blend
 from palpate.addon.bake.bake import bake
 from palpate.addon.scene import scene_fingerprint, scene_reader
 from palpate.core.errors import PalpateError
@@ -69,9 +70,11 @@ def test_a_skin_moves_with_a_sensor_that_is_turned_shifted_and_scaled():
 
 def test_a_bake_holds_the_channels_in_all_of_its_files(tmp_path):
     scene, pad = pressed_skin()
-    save(tmp_path)
+    blend = save(tmp_path)
     result = baked(scene)
     folder = result.folders["Pad"]
+    with pytest.raises(PalpateError, match="The sensor 'Pad' of '.*scene.blend' has channels, which loops of other programs"):
+        sensors_from_blend(blend)
     images = [f"tactile_{frame:04d}.exr" for frame in range(1, 6)]
     assert visible(folder) == sorted(["images.sha256", "manifest.json", "recording.npz", "sensor.npz", *images])
     manifest = read_manifest(folder)
