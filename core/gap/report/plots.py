@@ -171,6 +171,7 @@ def _draw_error_line(axes: Axes, result: Diagnosis) -> None:
     for (label, values), colour in zip(_maps(result), (BEFORE, AFTER), strict=False):
         axes.stairs(values, np.arange(len(values) + 1) - 0.5, baseline=None, color=colour, lw=0.9, label=label)
     axes.set_xlabel("texel")
+    axes.locator_params("x", integer=True)
     axes.set_ylabel("error (% of range)")
     axes.margins(x=0)
     tidy_axes(axes)
