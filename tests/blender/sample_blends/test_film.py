@@ -30,7 +30,7 @@ def film(repository, monkeypatch):
         for text in figure.findobj(Text):
             assert text.get_fontsize() / 72.0 >= SMALLEST_TEXT * module.HIGH or not text.get_text().strip(), text
         box, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
-        assert -0.01 <= box.x0 and box.x1 <= width + 0.01 and -0.01 <= box.y0 and box.y1 <= height + 0.01, (
+        assert box.x0 >= -0.01 and box.x1 <= width + 0.01 and box.y0 >= -0.01 and box.y1 <= height + 0.01, (
             "something is cut off"
         )
         if path.name.startswith("frame") and figure.texts[-1].get_text():
