@@ -50,7 +50,10 @@ def build(scene) -> None:
 
     cube = scene_builder.box(scene, CUBE, (EDGE,) * 3, bevel=0.6)
     cube.location = (0.0, 0.0, EDGE / 2)
+    cube.data.materials.append(scene_builder.clear_block("Wood, seen through"))  # else it would hide the heat maps
     cube.data.materials.append(scene_builder.material("Wood", (0.55, 0.36, 0.19), roughness=0.55))
+    cube.modifiers["Bevel"].material = 1
+    cube.data.polygons[4].material_index = 1  # the bottom, which lies in the table's surface: both would be drawn in spots
     cube.palpate.role, cube.palpate.body, cube.palpate.mass = "TARGET", "FREE", MASS
     table = gripper.table(scene, TABLE, 0.0)
     scene.palpate.use_auto_dt, scene.palpate.dt = False, 5e-4

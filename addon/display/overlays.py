@@ -264,7 +264,8 @@ def _draw() -> None:
             continue
         if overlay.batches is None:
             overlay.batches = _batches(overlay)
-        for shader, batch, uniforms in overlay.batches:
+        for number, (shader, batch, uniforms) in enumerate(overlay.batches):
+            gpu.state.depth_mask_set(number > 0 or overlay.at_rest is None)  # the dent is drawn over the surface at rest
             shader.bind()
             for name, value in uniforms.items():
                 shader.uniform_float(name, value)
@@ -289,12 +290,13 @@ def _batches(overlay: SensorOverlay) -> list:
     import gpu
     from gpu_extras.batch import batch_for_shader
 
-    content = {"pos": overlay.corners, "color": overlay.colors}
-    if overlay.at_rest is None:
-        smooth = gpu.shader.from_builtin("SMOOTH_COLOR")
-    else:
-        smooth, content = _indentation_shader(), {**content, "at_rest": overlay.at_rest, "normal": overlay.normals}
-    result = [(smooth, batch_for_shader(smooth, "TRIS", content, indices=overlay.triangles), {})]
+    plain, content = gpu.shader.from_builtin("SMOOTH_COLOR"), {"pos": overlay.corners, "color": overlay.colors}
+    drawn = [(plain, content)]
+    if overlay.at_rest is not None:
+        # Where the dent is seen at a flat angle, the surface that Blender draws reaches beyond it, and would be grey.
+        rest = {"pos": overlay.at_rest, "color": overlay.colors}
+        drawn = [(plain, rest), (_indentation_shader(), {**content, "at_rest": overlay.at_rest, "normal": overlay.normals})]
+    result = [(shader, batch_for_shader(shader, "TRIS", what, indices=overlay.triangles), {}) for shader, what in drawn]
     if overlay.line is not None:
         lines = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
         viewport = gpu.state.viewport_get()[2:]

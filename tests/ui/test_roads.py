@@ -88,11 +88,19 @@ def test_figures(play_road):
 
 def test_gap(play_road, real_blender, repository):
     """docs/gap.md on its sample rig: what was hidden in it is named, and ends up on the sensor."""
-    shutil.copytree(repository / "docs" / "sample-rig", real_blender.work / "sample-rig")
+    shutil.copytree(repository / "docs" / "sample-rig", real_blender.work / "sample-rig", dirs_exist_ok=True)
     values = play_road("gap", timeout=1200)["values"]
     assert sorted(values["named"]) == ["creep", "gain-mismatch"]
     assert sorted(values["effects"]) == ["creep", "gain-mismatch"]
     assert {"gap: loading", "gap: hold", "gap: unloading"} <= set(values["markers"])
+
+
+def test_fresh(play_road, real_blender, repository):
+    """A new user's ways to an effect, a study and a planned experiment, in a file that was never saved."""
+    shutil.copytree(repository / "docs" / "sample-rig", real_blender.work / "sample-rig", dirs_exist_ok=True)
+    values = play_road("fresh", timeout=1200)["values"]
+    assert "'Planned Probe'" in values["planned"] and "confidence" in values["planned"]
+    assert values["role"] == "TARGET"
 
 
 def test_out_of_date(play_road):

@@ -13,6 +13,7 @@ from ..fitting.least_squares import TrialView
 from ..forward.contact_phases import relative_load
 from ..forward.predictor import Model
 from .candidates import Candidate
+from .changing_readings import moving_readings
 from .companded_steps import CHARACTERISTIC_NOISE, LEAST_CHARACTERISTIC, companded_steps
 
 MOST_LEVELS = 48
@@ -32,8 +33,8 @@ noise, its measured reading by less than `LEAST_SPREAD_SHARE` of that, and if it
 predicted."""
 MOST_DEAD_SHARE = 0.4
 """If a larger share of the loaded texels seems dead, the model is wrong and not the texels."""
-LEAST_READINGS, MOST_READINGS = 400, 6000
-"""Number of changing readings from which on steps are looked for, and to which they are thinned."""
+LEAST_READINGS = 400
+"""Number of changing readings from which on steps are looked for."""
 COARSEST_FREQUENCY, FREQUENCY_STEP, STEP_IN_NOISE = 5.0, 0.12, 2.5
 """Frequencies of the search for fine steps, in units of one over the range: from a fifth of the range (coarser steps are seen
 as levels) to steps of 2.5 standard deviations of the noise."""
@@ -211,18 +212,6 @@ def coarsest_step(views: Sequence[TrialView], model: Model) -> float:
     """Return the largest quantization step, in the sensor's unit; 0 if none is seen."""
     levels = few_levels(moving_readings(views, model))
     return 0.0 if levels is None else float(np.diff(levels).max())
-
-
-def moving_readings(views: Sequence[TrialView], model: Model) -> np.ndarray:
-    """Return some thousand readings of samples at which the model changes by more than the noise."""
-    moving = [np.zeros(0)]
-    for view in views:
-        reading = view.predictor.trial.reading
-        if reading is not None:
-            change = np.abs(np.gradient(view.predictor.predict(model).reading, axis=0))
-            moving.append(reading[(change > 0.5 * view.noise[0]) & np.isfinite(reading)])
-    values = np.concatenate(moving)
-    return values[:: max(1, len(values) // MOST_READINGS)]
 
 
 def unloaded_reading(views: Sequence[TrialView]) -> float:

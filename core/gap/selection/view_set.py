@@ -19,7 +19,7 @@ from ..dataset.trial import Trial
 from ..fitting.least_squares import TrialView
 from ..forward.predictor import Model, Predictor, predictors_of
 from .candidates import DIRECTLY_ESTIMATED, Candidate, is_spatial
-from .direct_estimates import moving_readings
+from .changing_readings import moving_readings
 
 FEW_TEXELS = 16
 """Texels of each trial in the views with few texels."""

@@ -90,6 +90,7 @@ def rename_and_duplicate(ui):
     names = [one.name for one in inset._contents[scene.session_uid].insets]
     ui.check("Palm" in names and "Pad" not in names, "and is called so in the HUD")
     ui.check("Palm" in frame_status().status_of(scene).frame.sensors, "and in the panel")
+    yield from ui.becomes(says(scene, "of the bake."), "its bake is not out of date")
     yield from ui.screenshot("renamed")
     for thing in scene.objects:
         thing.select_set(thing.name == "Palm")
