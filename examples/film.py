@@ -234,7 +234,7 @@ def paint(film: Film, scene) -> Any:
                 face.material_index = len(finger.data.materials) - 1 if done[list(face.vertices)].all() else 0
             render_to(path, scene.frame_start)
             words = "Paint the part of a mesh that measures contact. Any mesh will do: here, the tip of a finger."
-            film.show(2.0 if number == 0 else seconds, title, words, counted(path, int(done.sum())))
+            film.show(seconds + 2.0 * (number == 0), title, words, counted(path, int(done.sum())))
     group.add([int(i) for i in np.flatnonzero(region)], 1.0, "REPLACE")
     for face in finger.data.polygons:
         face.material_index = 0
