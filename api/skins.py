@@ -117,7 +117,7 @@ def draw_channels(skin: MagneticSkin, seen: VectorReadings, frames: Sequence[int
             raise ArgumentError(f"frame {arguments.brief(frame)} is none of the {count} of the recording: give a whole number.")
     images = [1e3 * (seen.values[frame] - seen.values[rest]) for frame in frames]
     titles = [f"frame {int(frame) % count}" for frame in frames]
-    return shown_in_notebooks(vector_figure(skin.magnetometers.place[:, :2], images, titles, f"m{seen.unit}"))
+    return shown_in_notebooks(vector_figure(skin.magnetometers.flat, images, titles, f"m{seen.unit}"))
 
 
 def save_channels(seen: VectorReadings, folder: str | os.PathLike[str], rows: int, columns: int) -> list[Path]:

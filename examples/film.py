@@ -467,18 +467,23 @@ def simulator(film: Film) -> None:
 
         return draw
 
+    def colour(force: np.ndarray) -> None:
+        colors = np.ones((len(obj.data.vertices), 4), np.float32)
+        colors[vertex, :3] = color_maps.linear(color_maps.colors(STYLE.colour_map, force / top))
+        obj.data.color_attributes[HEAT].data.foreach_set("color", colors.ravel())
+        obj.data.update()
+
+    colour(moments[0].force)  # the studio's background depends on how bright the scene is
     with studio(film, NARROW, scene, (-50.0, 25.0), shown) as render_to:
         for seconds, number, path in film.play("mujoco", range(len(moments))):
-            one, colors = moments[number], np.ones((len(obj.data.vertices), 4), np.float32)
-            colors[vertex, :3] = color_maps.linear(color_maps.colors(STYLE.colour_map, one.force / top))
-            obj.data.color_attributes[HEAT].data.foreach_set("color", colors.ravel())
-            obj.data.update()
+            one = moments[number]
+            colour(one.force)
             cube.location, cube.rotation_quaternion = 1e3 * one.position, one.quaternion
             render_to(path, scene.frame_start)
             words = "The sensor of a Blender scene in MuJoCo: each step takes the pose of the cube and returns its forces. "
             words += "Shown at a tenth of real speed."
             film.show(seconds, title, words, drawing(number, path))
-    words = f"After a push of {PUSH:g} N the cube rests: the texels carry {lift[-1]:.3f} N, its weight is {WEIGHT:.3f} N."
+    words = f"After a push of {PUSH:g} N the cube rests: the texels carry {lift[number]:.3f} N, its weight is {WEIGHT:.3f} N."
     film.show(3.0, title, words, drawing(number, path))
 
 

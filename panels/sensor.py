@@ -281,7 +281,7 @@ class Magnet(Subpanel):
             layout.prop(own, "moment")
         elif own.part == "MAGNETOMETER":
             layout.prop(own, "full_scale")
-            layout.column().prop(own, "offset")
+            layout.column().prop(own, "zero_field")
 
 
 SUBPANELS = (Region, Skins, Contact, Friction, Readout, Magnet)

@@ -26,6 +26,7 @@ CAPTIONS = {
     "core.jobs": "progress, cancel, long work",
     "core.geometry": "meshes, rays, texels, layouts",
     "core.model": "plain data of a run",
+    "core.skins": "signed channels, magnets",
     "core.laws": "normal force, LuGre friction",
     "core.effects": "what real sensors add",
     "core.response": "forces to readings, metrics",

@@ -79,7 +79,7 @@ class PALPATE_PG_magnetic(bpy.types.PropertyGroup):
         step=0.1,
         **FIXED,
     )
-    offset: FloatVectorProperty(
+    zero_field: FloatVectorProperty(
         name="Offset (T)",
         description="What the axes of a magnetometer show more, T: its own zero and the field of the surroundings",
         size=3,
@@ -109,5 +109,5 @@ def settings(obj) -> tuple:
 def _stated(part) -> tuple:
     own = part.palpate.magnetic
     place = (*part.matrix_basis, *part.matrix_parent_inverse)  # not where a sensor that moves has carried it
-    values = part.name, own.part, own.moment, own.full_scale, tuple(own.offset), part.parent and part.parent.name
+    values = part.name, own.part, own.moment, own.full_scale, tuple(own.zero_field), part.parent and part.parent.name
     return *values, *(tuple(row) for row in place)

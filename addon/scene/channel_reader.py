@@ -90,5 +90,5 @@ def _placed(obj, to_body: tuple[np.ndarray, np.ndarray], depsgraph) -> tuple[Mag
         place=np.array([place for _, place, _ in chips]),
         axes=np.array([axes for _, _, axes in chips]),
         full_scale=np.array([units.as_typed(part.full_scale) for part, _, _ in chips]),
-        offset=np.array([[units.as_typed(value) for value in part.offset] for part, _, _ in chips]),
+        offset=np.array([[units.as_typed(value) for value in part.zero_field] for part, _, _ in chips]),
     )

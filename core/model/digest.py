@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import Field, fields, is_dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -33,21 +32,26 @@ def digest_of(value: object) -> str:
     return digest.hexdigest()
 
 
-@cache
-def _fields_of(kind: type) -> tuple[Field[Any], ...] | None:
-    """Return the fields of a dataclass, None for another type."""
-    return fields(kind) if is_dataclass(kind) else None
+_known_fields: dict[Any, tuple[Field[Any], ...] | None] = {}
+
+
+def _fields_of(value: Any) -> tuple[Field[Any], ...] | None:
+    """Return the fields of a dataclass, None for another value; looked up by its type, as a scenario has hundreds of values."""
+    kind = type(value)
+    if kind not in _known_fields:
+        _known_fields[kind] = fields(kind) if is_dataclass(kind) else None
+    return _known_fields[kind]
 
 
 def stated_fields(value: Any) -> list[Field[Any]]:
     """Return the fields of a dataclass that count for its hash and stand in its file."""
-    own = _fields_of(type(value)) or ()
+    own = _fields_of(value) or ()
     return [item for item in own if IF_GIVEN not in item.metadata or getattr(value, item.name) is not None]
 
 
-def _feed(digest: hashlib._Hash, value: object) -> None:
+def _feed(digest: hashlib._Hash, value: Any) -> None:
     """Hash dataclasses field by field, arrays with type and shape, and everything else by its representation."""
-    if _fields_of(type(value)) is not None:
+    if _fields_of(value) is not None:
         for item in stated_fields(value):
             digest.update(item.name.encode())
             _feed(digest, getattr(value, item.name))

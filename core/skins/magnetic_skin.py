@@ -59,6 +59,13 @@ class Magnetometers:
     offset: np.ndarray
     size: float = 5e-4
 
+    @property
+    def flat(self) -> np.ndarray:
+        """(k, 2) float, m: places along the mean x and y axes of all chips, for images of vectors along these."""
+        mean = self.axes[:, :2].mean(axis=0)
+        found: np.ndarray = self.place @ (mean / np.linalg.norm(mean, axis=1, keepdims=True)).T
+        return found
+
 
 @dataclass(frozen=True)
 class MagneticSkin:

@@ -123,13 +123,14 @@ def find_jumps(first: int, last: int, search: JumpSearch) -> None:
     """Write down in which environments a target went through the sensor, and where targets are now."""
     out = search.pressed
     for number in range(first, last):
-        crossed = False
+        crossed, silent, spheres = False, out.valid[number] and not _measures(number, out), search.sphere
         for target in range(search.sphere.shape[0]):
-            x, y, z = _centre_in_sensor(out.poses[number, 0], out.poses[number, 1 + target], search.sphere[target], search.unit)
+            x, y, z = _centre_in_sensor(out.poses[number, 0], out.poses[number, 1 + target], spheres[target], search.unit)
             old = search.centre[number, target]
-            crossed |= goes_through((old[0], old[1], old[2]), (x, y, z), search.sphere[target, 3], search.bound, search.frame)
+            if silent:
+                crossed |= goes_through((old[0], old[1], old[2]), (x, y, z), spheres[target, 3], search.bound, search.frame)
             old[0], old[1], old[2] = x, y, z
-        search.jumped[number] = crossed and out.valid[number] and not _measures(number, out)
+        search.jumped[number] = crossed
 
 
 @kernel

@@ -169,7 +169,7 @@ def _draw_error_maps(figure: Figure, place: tuple[float, float, float, float], r
 def _draw_error_line(axes: Axes, result: Diagnosis) -> None:
     """Draw the errors of texels in a long row."""
     for (label, values), colour in zip(_maps(result), (BEFORE, AFTER), strict=False):
-        axes.step(np.arange(len(values)), values, where="mid", color=colour, lw=0.9, label=label)
+        axes.stairs(values, np.arange(len(values) + 1) - 0.5, baseline=None, color=colour, lw=0.9, label=label)
     axes.set_xlabel("texel")
     axes.set_ylabel("error (% of range)")
     axes.margins(x=0)
@@ -281,6 +281,7 @@ def loops(result: Diagnosis) -> Figure:
             color=colour,
             ls="--" if text == "base model" else "-",
             label=text,
+            zorder=4,  # above the samples, which hide a line that describes them well
         )
     axes.set_xlabel(label)
     axes.set_ylabel(_quantity(result, name))

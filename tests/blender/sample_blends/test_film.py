@@ -27,15 +27,16 @@ def film(repository, monkeypatch):
 
     def checked(figure, path, dpi):
         write(figure, path, dpi)
-        width, height = figure.bbox.size
         for text in figure.findobj(Text):
-            if not text.get_visible() or not text.get_text().strip():
-                continue
-            assert text.get_fontsize() / 72.0 >= SMALLEST_TEXT * module.HIGH, text
-            box = text.get_window_extent()
-            assert box.x0 >= -1.0 and box.x1 <= width + 1.0 and box.y0 >= -1.0 and box.y1 <= height + 1.0, text
+            assert text.get_fontsize() / 72.0 >= SMALLEST_TEXT * module.HIGH or not text.get_text().strip(), text
+        box, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
+        assert -0.01 <= box.x0 and box.x1 <= width + 0.01 and -0.01 <= box.y0 and box.y1 <= height + 0.01, (
+            "something is cut off"
+        )
         if path.name.startswith("frame") and figure.texts[-1].get_text():
-            assert figure.texts[-1].get_window_extent().y1 <= module.BROAD[1] * height, "the caption covers the picture"
+            assert figure.texts[-1].get_window_extent().y1 <= module.BROAD[1] * figure.bbox.height, (
+                "the caption covers the picture"
+            )
 
     monkeypatch.setattr(module, "save_figure", checked)
     return module

@@ -6,6 +6,8 @@ import pytest
 from rig_files import RIG, table, write
 
 from palpate.benchmarks import _small_pad, temperature
+from palpate.benchmarks._hidden.rig_text import rig_head
+from palpate.core.effects.library.temperature import REFERENCE
 from palpate.core.errors import PalpateError
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.forward.predictor import Model, predictors_of
@@ -75,3 +77,30 @@ def test_what_a_log_calls_a_temperature():
 def test_a_gain_and_a_zero_that_follow_it_are_named():
     sure, result = _small_pad.examined(temperature.write, "both", 2)
     assert sure == {"temperature"} and result.verdict == "explained"
+
+
+def pad_in_rooms(kind, number, folder):
+    """Six recordings, each at a temperature of its own: `kind` says whether gain or zero follows it, by a line."""
+    rng = np.random.default_rng(number)
+    warmth, rate = rng.permutation(np.linspace(16.0, 32.0, 6)), 0.015
+    words = {"k": _small_pad.K, "cn": 0.0, "unit": "N", "gain": 1.0, "zero": 0.0}
+    lines = rig_head("pad", (_small_pad.ROWS, _small_pad.COLUMNS, _small_pad.PITCH), words, _small_pad.RADIUS)
+    for i, warm in enumerate(warmth):
+        path = _small_pad.presses(rng)
+        force, above = _small_pad.loads(path), rate * (warm - REFERENCE)
+        full, noise = force.max(), rng.normal(size=force.shape)
+        reading = (force * (1.0 + above) if kind == "gain" else force + above * full) + 0.005 * full * noise
+        column = warm + 0.02 * rng.normal(size=len(path))
+        parts = np.column_stack([np.arange(len(path)) / _small_pad.RATE, path, reading, column])
+        lines += _small_pad.write_recording(folder / f"t{i}.csv", parts, ("temperature",))
+        lines.append(f'use = "{"check" if i in (2, 4) else "fit"}"')
+    (folder / "rig.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return folder / "rig.toml"
+
+
+@pytest.mark.slow("two whole diagnoses of six recordings")
+@pytest.mark.parametrize("kind", ["gain", "zero"])
+def test_recordings_that_differ_by_their_temperature_do_not_differ_by_levels_and_gains_of_their_own(kind):
+    sure, result = _small_pad.examined(pad_in_rooms, kind, 1)
+    assert sure == {"temperature"} and result.between is None and result.verdict == "explained"
+    assert result.findings[0].confidence > 0.95

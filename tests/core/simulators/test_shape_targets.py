@@ -93,6 +93,22 @@ def test_a_box_gives_the_numbers_of_its_mesh():
     assert lit > 100
 
 
+@pytest.mark.parametrize("shape", [shapes.box((0.1, 0.1, 1.0)), shapes.sphere(0.5)])
+def test_a_pad_in_parts_has_the_same_bits_with_two_threads(shape):
+    """A large pad is divided among threads; each part has blocks of its own, the last one not full."""
+    item, where = pad(41, 37), np.array([1e-3, 0.0, 0.5 - DEPTH])
+    one, two = (PressedSensor(item, shape, DT, pose(LEVEL), (where, LEVEL[3:]), threads) for threads in (1, 2))
+    assert one._model._model.pairs.sensor.size > 1
+    for step in range(1, 4):
+        now = where + [2e-4 * step, 0.0, 0.0], LEVEL[3:]
+        first, second = one.step(pose(LEVEL), now), two.step(pose(LEVEL), now)
+        for field in ("normal_force", "shear", "depth", "slip", "contact"):
+            assert np.array_equal(getattr(first.texels, field), getattr(second.texels, field)), field
+        assert np.array_equal(first.force_on_target, second.force_on_target)
+    assert first.texels.normal_force.sum() == pytest.approx(first.force_on_target[2], rel=0.05)
+    assert 10 < first.texels.contact.sum() < len(first.texels.contact)
+
+
 @pytest.mark.parametrize("name", SHAPES)
 def test_environments_have_the_bits_of_single_sensors(name):
     shape, height = SHAPES[name]
