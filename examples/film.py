@@ -358,7 +358,7 @@ def close_gap(film: Film) -> None:
     errors = gap.errors
     film.show(3.5, title, f"The simulation differs from it by {errors.base['check']:.1%} of the range.", drawing(2, len(time)))
     names = " and ".join(one.name.replace("-", " ") for one in gap.effects)
-    words = f"`palpate gap` finds what the model lacks: {names}. With them the error is {errors.amended['check']:.1%}."
+    words = f"What the model lacks is found: {names}. With them the error is {errors.amended['check']:.1%}."
     film.show(4.0, title, words, drawing(3, len(time)))
     chart = film.folder / "gap.png"
     figure = overview(result, errors, WIDE)
