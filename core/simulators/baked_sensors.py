@@ -75,13 +75,13 @@ def _checked_sensor(blend: Path, found: Bake, name: str) -> SensorOnMesh:
         raise FileError(f"'{folder}' is the bake of {other} and not of '{blend}': give the bake folder of this .blend.")
     if has_changed(blend, folder, manifest):
         raise FileError(
-            f"'{blend}' was saved after its bake in '{folder}' and may have changed (of a compressed file it cannot be told): "
-            f"run 'palpate bake {blend}'."
+            f"'{blend}' was saved after its bake in '{folder}' and may have changed: "
+            f"run 'palpate bake {blend}' (of a compressed file it cannot be told)."
         )
     if manifest.effects is None or not manifest.body:
         raise FileError(
             f"'{folder / MANIFEST_NAME}' is of an older version and does not name the sensor's effects: "
-            f"run 'palpate bake {blend}'."
+            f"run 'palpate bake {blend}' (of a compressed file it cannot be told)."
         )
     if manifest.channels:
         raise FileError(
