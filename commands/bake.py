@@ -118,7 +118,7 @@ def _warn_of_keyframes(scene: Any) -> None:
 
 
 def _write_scenario(scene: Any, path: str, study: str | None) -> int:
-    """Read a scene and write its scenario, and beside it what a study needs to read the scene again."""
+    """Read a scene and write its scenario, and a file with what a study needs to read the scene again."""
     from ..addon.scene import scene_reader
     from ..core.io.file_writing import writable_file
     from ..core.io.scenario_npz import save_scenario

@@ -141,7 +141,7 @@ def draw_view(figure, path: Path, view: Place) -> None:
     axes.set_axis_off()
 
 
-# --- what is beside it
+# --- tactile images and curves next to the 3D view
 
 
 class Touch(NamedTuple):
@@ -263,7 +263,7 @@ def counted(path: Path, vertices: int) -> Callable[[Any], None]:
 
 
 def press(film: Film, scene) -> None:
-    """Bake the grasp of the hand and play it with the tactile images beside it."""
+    """Bake the grasp of the hand and play it next to its tactile images."""
     baked = bake_with_progress(scene)
     texels = {sensor.name: sensor.texels for sensor in baked.scenario.sensors if sensor.readout}
     recording, title = baked.recording, "2  Press and bake"

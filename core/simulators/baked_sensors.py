@@ -36,7 +36,7 @@ def baked_sensors(
     names : sequence of str, optional
         Which sensors; by default all of the bake.
     folder : path, optional
-        Its bake folder, which only Blender can read from the .blend. Default: ``palpate-bake`` beside it.
+        Its bake folder, which only Blender can read from the .blend. Default: ``palpate-bake`` in the folder of the .blend.
 
     Returns
     -------
