@@ -28,12 +28,14 @@ import palpate as pp
 from palpate.addon.render import render, render_setup
 from palpate.addon.render.video import encode_video
 from palpate.commands.bake import bake_with_progress
+from palpate.commands.console import blender_output_hidden
 from palpate.core.figures import color_maps
 from palpate.core.figures.figure_canvas import new_figure, save_figure, tidy_axes
 from palpate.core.figures.figure_style import INK, NORMAL_COLOUR, SHEAR_COLOUR, FigureStyle
 from palpate.core.figures.tactile_image import SensorView, draw_colour_bar
 from palpate.core.gap.report.plots import overview
 from palpate.core.geometry.texels import Texels
+from palpate.core.jobs.progress_bar import progress_bar
 from palpate.core.response import metrics
 from palpate.sample_blends import demo, hand, scene_builder, weighing
 
@@ -67,12 +69,15 @@ class Film:
         Only every so many frames of a scene are rendered; each is shown longer.
     frames : list of Path
         A picture for each frame of the film; pictures that stay are repeated.
+    bar : tqdm
+        Counts the frames on a terminal.
     """
 
     folder: Path
     height: int = 720
     every: int = 1
     frames: list[Path] = field(default_factory=list)
+    bar: Any = field(default_factory=lambda: progress_bar("Film", None))
 
     def show(self, seconds: float, title: str, words: str, draw: Callable[[Any], None]) -> Path:
         """Add a picture with a title above and a caption below it, shown for a number of seconds."""
@@ -83,7 +88,9 @@ class Film:
         figure.text(0.03, 0.09, textwrap.fill(words, 72), fontsize=10.5, color=INK, va="center", linespacing=1.3)
         path = self.folder / f"frame-{len(self.frames):05d}.png"
         save_figure(figure, path, self.height / HIGH)
-        self.frames += [path] * max(1, round(seconds * FPS))
+        count = max(1, round(seconds * FPS))
+        self.frames += [path] * count
+        self.bar.update(count)
         return path
 
     def play(self, name: str, numbers: Iterable[int], seconds: float = 1.0 / FPS) -> Iterator[tuple[float, int, Path]]:
@@ -521,7 +528,9 @@ def main() -> None:
     given = parser.parse_args()
     pp.register()
     given.work.mkdir(parents=True, exist_ok=True)
-    film = make(Film(given.work.absolute(), given.height, given.every))
+    with blender_output_hidden():
+        film = make(Film(given.work.absolute(), given.height, given.every))
+        film.bar.close()
     print(encode_video(film.frames, given.out.absolute(), FPS), f"{len(film.frames) / FPS:.0f} s")
 
 

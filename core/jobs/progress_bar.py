@@ -12,8 +12,8 @@ from typing import Any
 from .progress import Progress
 
 
-def progress_bar(label: str, total: int, unit: str = "frame") -> Any:
-    """Return a bar of tqdm: a widget in a notebook that has widgets, else on stderr where that is a terminal, else none."""
+def progress_bar(label: str, total: int | None, unit: str = "frame") -> Any:
+    """Return a bar of tqdm, a count without a total: a widget in notebooks that have them, else on a terminal, else none."""
     if "ipykernel" in sys.modules:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # without ipywidgets the bar is text, which needs no advice
