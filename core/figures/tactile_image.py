@@ -324,7 +324,6 @@ def draw_scale_key(
     view: SensorView,
     strongest: float,
     inches: float,
-    ink: str = INK,
     room: float | None = None,
 ) -> None:
     """Draw a scale bar for lengths and an arrow for shear below a row of images, at (x, y) inches.
@@ -337,10 +336,10 @@ def draw_scale_key(
 
     width, height = figure.get_size_inches()
     x, y = at
-    words: dict[str, Any] = {"fontsize": SMALL, "color": ink, "va": "center_baseline"}
+    words: dict[str, Any] = {"fontsize": SMALL, "color": INK, "va": "center_baseline"}
     if view.bar > 0:
         stop = x + view.bar * inches
-        figure.add_artist(Line2D([x / width, stop / width], [y / height] * 2, color=ink, lw=2.0, solid_capstyle="butt"))
+        figure.add_artist(Line2D([x / width, stop / width], [y / height] * 2, color=INK, lw=2.0, solid_capstyle="butt"))
         figure.text((stop + 0.07) / width, y / height, f"{view.bar:g} mm", **words)
         x = stop + 0.07 + _LETTER * len(f"{view.bar:g} mm") + 0.2
     if room is not None and view.bar > 0 and scale_key_width(view, strongest, inches) > room:
@@ -354,7 +353,7 @@ def draw_scale_key(
                 (stop / width, y / height),
                 arrowstyle=ARROW,
                 mutation_scale=1,
-                color=ink,
+                color=INK,
                 lw=0,
                 shrinkA=0,
                 shrinkB=0,

@@ -48,7 +48,7 @@ _CLASS, _ARRAY, _TUPLE, _DICT = "class", "array", "tuple", "dict"
 """Keys of JSON objects that stand for what JSON does not have."""
 
 
-def save_scenario(path: str | os.PathLike, scenario: Scenario, atomic: bool = True) -> None:
+def save_scenario(path: str | os.PathLike, scenario: Scenario) -> None:
     """Write a scenario as .npz, as :func:`.write_file` does; equal scenarios give equal bytes.
 
     Raises
@@ -60,7 +60,7 @@ def save_scenario(path: str | os.PathLike, scenario: Scenario, atomic: bool = Tr
     tree = _packed(scenario, arrays)
     header = {"format": SCENARIO_FORMAT, "digest": scenario.digest(), "scenario": tree}
     members = {"header": np.array(json.dumps(header))} | {f"array_{i}": array for i, array in enumerate(arrays)}
-    write_arrays(path, members, atomic)
+    write_arrays(path, members)
 
 
 def load_scenario(path: str | os.PathLike) -> Scenario:

@@ -19,9 +19,10 @@ if TYPE_CHECKING:
 
 COLUMN = 3.5
 """Width of a journal's column, inches."""
+DPI = 200
 
 
-def plot_stiffness(path: str | Path, fit: StiffnessFit, dpi: int = 200) -> None:
+def plot_stiffness(path: str | Path, fit: StiffnessFit) -> None:
     """Plot the measurements with both lines into a file (PNG, PDF or SVG by its suffix)."""
     figure = new_figure(COLUMN, 2.7)
     axes = figure.add_axes((0.165, 0.165, 0.8, 0.8))
@@ -35,10 +36,10 @@ def plot_stiffness(path: str | Path, fit: StiffnessFit, dpi: int = 200) -> None:
     axes.set_xlabel("compression (mm)")
     axes.set_ylabel("pressure (kPa)")
     _finish(axes)
-    save_figure(figure, path, dpi)
+    save_figure(figure, path, DPI)
 
 
-def plot_friction(path: str | Path, fit: FrictionFit, dpi: int = 200) -> None:
+def plot_friction(path: str | Path, fit: FrictionFit) -> None:
     """Plot the measured friction with the fitted law into a file (PNG, PDF or SVG by its suffix)."""
     figure = new_figure(COLUMN, 2.7)
     axes = figure.add_axes((0.165, 0.165, 0.8, 0.8))
@@ -62,10 +63,10 @@ def plot_friction(path: str | Path, fit: FrictionFit, dpi: int = 200) -> None:
     if data.force.min() >= 0.0:
         axes.set_ylim(0.0, None)
     _finish(axes)
-    save_figure(figure, path, dpi)
+    save_figure(figure, path, DPI)
 
 
-def plot_readout(path: str | Path, fit: ReadoutFit, dpi: int = 200) -> None:
+def plot_readout(path: str | Path, fit: ReadoutFit) -> None:
     """Plot what drove the sensor, and what its readings say of it, over a check recording, or else a fitted one."""
     one = (fit.data.check or fit.data.fit)[0]
     found = fit.estimate_of(one)
@@ -80,7 +81,7 @@ def plot_readout(path: str | Path, fit: ReadoutFit, dpi: int = 200) -> None:
         axes.set_ylabel(f"{target} ({fit.data.unit(target)})")
         _finish(axes)
     axes.set_xlabel(f"time in {one.name} (s)")
-    save_figure(figure, path, dpi)
+    save_figure(figure, path, DPI)
 
 
 def _finish(axes: Axes) -> None:

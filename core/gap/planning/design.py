@@ -86,14 +86,13 @@ class DesignSpace:
         return Design(trajectory, programme, before, tuple(self.told(trajectory, question)))
 
 
-def best_design(space: DesignSpace, question: Question, seed: int = 0) -> Generator[float, None, Design]:
+def best_design(space: DesignSpace, question: Question) -> Generator[float, None, Design]:
     """Look for the trajectory that answers a question best: of usual and random programmes, and of changes of the best.
 
     Parameters
     ----------
     space : DesignSpace
     question : Question
-    seed : int
 
     Yields
     ------
@@ -104,7 +103,7 @@ def best_design(space: DesignSpace, question: Question, seed: int = 0) -> Genera
     -------
     Design
     """
-    rng, span = np.random.default_rng(seed), space.ground.span
+    rng, span = np.random.default_rng(0), space.ground.span
     programmes = [*usual_programmes(span), *(random_programme(span, rng) for _ in range(RANDOM_PROGRAMMES))]
     total = len(programmes) + CHANGES
     found: list[Design] = []
