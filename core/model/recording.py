@@ -17,8 +17,6 @@ from .vector_readings import VectorReadings
 
 BLOCK_BYTES = 1 << 22
 """Bytes of a recording that are worked on at once: large enough for numpy, small beside everything else in memory."""
-PER_TEXEL = ("normal_force", "shear", "friction", "depth", "slip", "contact", "reading")
-"""Names of the per-texel channels, in the order in which every exporter writes them."""
 
 
 @dataclass
