@@ -221,11 +221,9 @@ class Graph:
         """Layers of imports among the direct children of a package; a circle counts as one layer per member."""
         return depth(self.children(package))
 
-    def file_circles(self, package: str = "") -> list[list[str]]:
-        """Groups of files of a package that import each other in a circle."""
-        start = f"{package}." if package else ""
-        inside = {m: {t for t in ts if t.startswith(start)} for m, ts in self.edges.items() if m.startswith(start)}
-        return circles(inside)
+    def file_circles(self) -> list[list[str]]:
+        """Groups of files that import each other in a circle."""
+        return circles(self.edges)
 
 
 def circles(graph: Mapping[str, set[str]]) -> list[list[str]]:
