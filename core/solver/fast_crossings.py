@@ -29,9 +29,10 @@ _MOST_TESTS = 1 << 18
 
 
 class BodiesInFrame(NamedTuple):
-    """Motion of the b bodies during one frame; see :meth:`FastCrossings.may_occur`.
+    """Motion of the b bodies during one frame: positions and quaternions at its ends, and the velocities of its steps.
 
-    `moved` tells the bodies that forces move, `radius` (m) is the distance of a body's farthest point from its centre.
+    `velocities` (steps, b, 6), m/s and rad/s, count for the bodies that no force moves. `moved` tells those that forces move,
+    `radius` (m) is the distance of a body's farthest point from its centre.
     """
 
     velocities: np.ndarray
@@ -91,26 +92,6 @@ class FastCrossings:
             moved=np.array([body.moved_by_forces for body in scenario.bodies], np.bool_),
             radius=radius,
         )
-
-    def may_occur(
-        self,
-        velocities: np.ndarray,
-        before: tuple[np.ndarray, np.ndarray],
-        after: tuple[np.ndarray, np.ndarray],
-        dt: float,
-    ) -> bool:
-        """Return whether any body moves fast enough in this frame; if not, :meth:`warnings` would find nothing.
-
-        Parameters
-        ----------
-        velocities : (steps, b, 6) float, m/s and rad/s
-            Of the bodies that no force moves; those of the others do not count.
-        before, after : ((b, 3) float, (b, 4) float)
-            Positions and quaternions at the beginning and the end of the frame.
-        dt : float, seconds
-        """
-        bodies = BodiesInFrame(velocities, *before, *after, self.limits.moved, self.limits.radius)
-        return bool(may_cross(bodies, self.limits.pairs, self.limits.limits, dt))
 
     def warnings(self, frame: int, positions: np.ndarray, quaternions: np.ndarray, dt: float) -> list[str]:
         """Return a sentence for each pair of a sensor and a target that is too fast in this frame and was not before.
