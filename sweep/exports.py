@@ -23,7 +23,6 @@ from ..core.io.temporary_folder import temporary_folder
 from .dataset import DATASET_FOLDER, require_pyarrow
 from .exchange import exchange_folder
 
-HDF5_NAME, ZARR_NAME = "dataset.h5", "dataset.zarr"
 EPISODE_COLUMNS = ("run", "length", "dataset_from_index", "dataset_to_index", "digest")
 ZARR_FILES = re.compile(r"(.+/)?(\.z(group|attrs|array|metadata)|[0-9.]+)")
 """Names of the files of a Zarr store of format 2."""

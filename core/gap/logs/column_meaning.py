@@ -106,9 +106,9 @@ _SINGLE = {
 }
 SINCE_1970 = 1e9
 """Seconds: larger time stamps are times of day."""
-LEAST_SPAN, LARGEST_METRES = 1e-7, 0.3
-"""Metres: the smallest motion that a rig measures, and the largest that is taken for metres where no unit is known. Rigs for
-touch move by millimetres to some decimetres, so larger numbers are millimetres."""
+LARGEST_METRES = 0.3
+"""The largest motion that is taken for metres where no unit is known. Rigs for touch move by millimetres to some decimetres,
+so larger numbers are millimetres."""
 LARGEST_NEWTONS = 500.0
 """Forces of a larger range are grams where no unit is known: probes press a skin with 0.1 to 100 N, and scales show grams."""
 COLDEST_KELVIN = 200.0
