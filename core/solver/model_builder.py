@@ -68,16 +68,22 @@ def texel_starts(scenario: Scenario) -> np.ndarray:
     return np.cumsum([0] + [len(sensor.texels) for sensor in scenario.sensors])
 
 
-def initial_state(scenario: Scenario, model: SolverModel, center: np.ndarray) -> State:
-    """Return the state at the first frame; keyframed bodies count as at rest until they move."""
+def start_poses(scenario: Scenario, center: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return (b, 3) positions, m, of the points of bodies that are followed, and (b, 4) quaternions, at the first frame."""
     quaternion = np.array([body.motion.quaternions[0] for body in scenario.bodies], dtype=float)
     origin = np.array([body.motion.positions[0] for body in scenario.bodies], dtype=float)
+    return origin + np.einsum("bij,bj->bi", rotation_matrices(quaternion), center), quaternion
+
+
+def initial_state(scenario: Scenario, model: SolverModel, center: np.ndarray) -> State:
+    """Return the state at the first frame; keyframed bodies count as at rest until they move."""
+    position, quaternion = start_poses(scenario, center)
     velocity = [
         np.concatenate([body.velocity, body.angular_velocity]) if body.free else np.zeros(6) for body in scenario.bodies
     ]
     slots = int((model.pairs.stop_point - model.pairs.first_point).sum())
     return State(
-        position=origin + np.einsum("bij,bj->bi", rotation_matrices(quaternion), center),
+        position=position,
         quaternion=quaternion,
         velocity=np.array(velocity, dtype=float),
         triangle=np.full(slots, NO_TRIANGLE),

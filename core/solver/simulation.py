@@ -14,11 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from ..compiled.thread_team import helper_threads, make_queue
+from ..compiled.thread_team import helper_threads
 from ..effects.engine.sensor_effects import check_scenario, mounted_texels
-from ..geometry.bvh import Tree, build_tree
-from ..geometry.contact_points import contact_points
-from ..geometry.mesh import TriangleMesh, is_closed
 from ..geometry.rotations import quaternion_product, rotation_matrices, rotation_vectors, write_backward_step_motion
 from ..jobs.job_runner import run_job
 from ..jobs.progress import Job, Progress
@@ -29,22 +26,20 @@ from ..model.shared_results import SharedResults
 from ..response.readings import ReadoutChain
 from ..skins.channel_readouts import with_clipping_warnings
 from .detection.deformation import refit_boxes, set_moment
-from .detection.deforming_surfaces import DeformingSurfaces
-from .detection.detection_data import DetectionData, TargetShapes
+from .detection.detection_data import DetectionData
 from .detection.narrow_phase import count_too_deep
-from .detection.neighbour_lists import neighbour_lists_for
 from .dynamics.drive_commands import DriveCommands
 from .dynamics.modes import driven_bodies
 from .dynamics.passivity import credit_initial_contacts
 from .fast_crossings import FastCrossings, path_of_moved_bodies
 from .found_contacts import contacts_of
-from .model_builder import build_model, initial_state, texel_starts
+from .model_builder import texel_starts
 from .parallel_loops import find_all_contacts, help_with_loops, prepare_pair_loops
 from .solver_model import SolverModel, State
+from .structures import structures_for
 from .substep import FRAME, NOTHING, TEXELS, FramePath, ObservedFrames, Surroundings, advance_frames
 from .time_step_adviser import plan
 from .workspace import Workspace
-from .workspace_builder import workspace_for
 
 TEXEL_BYTES = 8 * 8
 """What a frame of a texel takes in memory: forces, friction, depth, slip, contact and reading."""
@@ -99,31 +94,25 @@ class Simulation:
         self._known_path = NO_PATH
         # Bodies that forces move are followed at their centre of mass, keyframed ones at their origin.
         self._center = np.array([body.center_of_mass if body.moved_by_forces else np.zeros(3) for body in scenario.bodies])
-        self._tree, self._closed = _prepared_targets(scenario, self._center, shared)
-        points = [shared.of(contact_points, s.texels, s.parameters.points_per_texel) for s in scenario.sensors]
-        self._model = build_model(scenario, self._center, points, self.dt, shared)
-        self._deforming_surfaces = DeformingSurfaces(scenario, self._center, points, self._tree, self._model)
-        self._surface_motion = self._deforming_surfaces.at(np.zeros(1))
-        self._state = initial_state(scenario, self._model, self._center)
-        self._neighbour_lists = neighbour_lists_for(len(self._state.triangle), len(self._model.pairs.sensor))
-        queue, self._helpers = make_queue(len(self._state.triangle), threads)
-        self._workspace = workspace_for(self._model, self._state, self._surface_motion, queue)
+        found = structures_for(self, scenario, self._center, self.dt, threads, shared)
+        self._closed, self._model, self._deforming_surfaces = found.closed, found.model, found.deforming_surfaces
+        self._detection, self._state, self._workspace, self._helpers = (
+            found.detection,
+            found.state,
+            found.workspace,
+            found.helpers,
+        )
         # How many contact points of each pair were pressed too deep in the worst step of the last frame.
         self._most_too_deep = np.zeros(len(self._model.pairs.sensor), np.int64)
         self._readers = [ReadoutChain.of(sensor) for sensor in scenario.sensors]
         self._drive_commands = DriveCommands(scenario)
         self._texel_start = texel_starts(scenario)
-        self._shapes = TargetShapes.of([None] * len(scenario.targets))
-        self._detection: DetectionData | None = None
-        self._fast_crossings = FastCrossings(scenario, self._center)
+        self._fast_crossings = FastCrossings(scenario, self._center, shared)
         self._surroundings = Surroundings(np.array(self._closed, np.bool_), self._fast_crossings.limits)
 
     @property
     def arrays(self) -> tuple[SolverModel, DetectionData, State, Workspace]:
         """The structures that the kernels work on."""
-        parts = (self._tree, self._neighbour_lists, self._surface_motion, self._shapes)
-        if self._detection is None or any(now is not then for now, then in zip(parts, self._detection, strict=True)):
-            self._detection = DetectionData(*parts)
         arrays = self._model, self._detection, self._state, self._workspace
         prepare_pair_loops(*arrays)
         return arrays
@@ -264,7 +253,7 @@ class Simulation:
     def _place_deforming(self, times: np.ndarray) -> None:
         """Bring surfaces that deform to the frame whose steps are at these times, (steps + 1,) s."""
         if self._deforming_surfaces.any_deforms:
-            self._surface_motion = self._deforming_surfaces.at(times)
+            self._bring_surfaces(times)
             if self._drive_commands.reads_sensors:  # controllers read before the first step
                 self._place_surfaces(0, 1, 0.0)
 
@@ -337,13 +326,18 @@ class Simulation:
         for velocity, motion in zip(self._state.velocity, self._workspace.bodies.step_motion, strict=True):
             write_backward_step_motion(velocity, self.dt, motion)
         if self._deforming_surfaces.any_deforms:
-            self._surface_motion = self._deforming_surfaces.at(self._step_times(self.frame - 1))
+            self._bring_surfaces(self._step_times(self.frame - 1))
             self._place_surfaces(self.substeps, self.substeps - 1, self.dt)
+
+    def _bring_surfaces(self, times: np.ndarray) -> None:
+        """Get the shapes of deforming surfaces between some times, (steps + 1,) s."""
+        self._detection = self._detection._replace(surfaces=self._deforming_surfaces.at(times))
 
     def _place_surfaces(self, now: int, other: int, dt: float) -> None:
         """Bring deforming surfaces to a moment of their present frame; the arguments are those of :func:`.set_moment`."""
-        refit_boxes(self._surface_motion, self._tree)
-        set_moment(now, other, dt, self._model, self._surface_motion)
+        surfaces = self._detection.surfaces
+        refit_boxes(surfaces, self._detection.tree)
+        set_moment(now, other, dt, self._model, surfaces)
 
     def _step_times(self, frames: int | np.ndarray) -> np.ndarray:
         """(…, substeps + 1) times at which the steps after frames (…) begin, and the last one ends, s."""
@@ -395,8 +389,9 @@ class Simulation:
         before, after = quaternions[:, :-1], quaternions[:, 1:]
         turning = (after != before).any(axis=3)
         turns = np.zeros((*turning.shape, 3))  # and not rounding: bodies that animation moves bring energy (:mod:`.passivity`)
-        conjugate = before[turning] * np.array([1.0, -1.0, -1.0, -1.0])
-        turns[turning] = rotation_vectors(quaternion_product(after[turning], conjugate))
+        if turning.any():
+            conjugate = before[turning] * np.array([1.0, -1.0, -1.0, -1.0])
+            turns[turning] = rotation_vectors(quaternion_product(after[turning], conjugate))
         velocities = np.concatenate([np.diff(positions, axis=1), turns], axis=3) / self.dt
         return positions, quaternions, velocities
 
@@ -479,26 +474,6 @@ class Simulation:
         seen = self._seen(1)
         self._observe(TEXELS, seen)
         return seen.texels.force[0, self._texel_start[sensor] : self._texel_start[sensor + 1]]
-
-
-def _prepared_targets(scenario: Scenario, center: np.ndarray, shared: SharedResults) -> tuple[Tree, list[bool]]:
-    """Return the tree of all targets, and which of them are closed; the tree of what deforms is the simulation's own."""
-    deforms = any(target.deformation is not None for target in scenario.targets)
-    deforms = deforms or any(sensor.deformation is not None for sensor in scenario.sensors)
-    centers = np.array([center[target.body] for target in scenario.targets]).tobytes()
-    meshes = [target.mesh for target in scenario.targets]
-    closed = [shared.of(_is_closed, mesh) for mesh in meshes]
-    return (_tree_about(centers, *meshes) if deforms else shared.of(_tree_about, centers, *meshes)), closed
-
-
-def _tree_about(centers: bytes, *meshes: TriangleMesh) -> Tree:
-    """Return the tree of meshes whose points are seen from others, (m, 3) float as bytes, m."""
-    middles = np.frombuffer(centers).reshape(-1, 3)
-    return build_tree([replace(mesh, vertices=mesh.vertices - middle) for mesh, middle in zip(meshes, middles, strict=True)])
-
-
-def _is_closed(mesh: TriangleMesh) -> bool:
-    return is_closed(mesh.triangles)
 
 
 def solve_frames(simulation: Simulation, keep: Callable[[Frame], object], done: int = 0) -> Job[None]:
