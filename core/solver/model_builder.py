@@ -50,9 +50,9 @@ def build_model(
     first_unknown, drive_unknown, unknowns = number_unknowns(mode, drive_of)
     return SolverModel(
         bodies=_bodies(scenario, mode, first_unknown, unknowns),
-        sensors=_sensors(scenario, rows, first_point),
+        sensors=sensors_of(scenario, rows, first_point),
         points=_points(scenario, rows, points),
-        pairs=_pairs(scenario, first_point, shared),
+        pairs=pairs_of(scenario, first_point, shared),
         drives=_drives(scenario, drive_of, drive_unknown, gains),
         effects=step_program(scenario.sensors, dt),
     )
@@ -109,7 +109,8 @@ def _bodies(scenario: Scenario, mode: np.ndarray, first_unknown: np.ndarray, unk
     )
 
 
-def _sensors(scenario: Scenario, rows: list[np.ndarray], first_point: np.ndarray) -> Sensors:
+def sensors_of(scenario: Scenario, rows: list[np.ndarray], first_point: np.ndarray) -> Sensors:
+    """Return the model's sensors, whose contact points have these rows of :attr:`.Points.frame`."""
     reach = [sensor.parameters.max_penetration for sensor in scenario.sensors]
     spheres = [bounding_sphere(block, length) for block, length in zip(rows, reach, strict=True)]
     return Sensors(
@@ -142,7 +143,8 @@ def _painted_multipliers(sensors: tuple[Sensor, ...], points: list[ContactPoints
     return np.ascontiguousarray(np.column_stack(columns), dtype=float)
 
 
-def _pairs(scenario: Scenario, first_point: np.ndarray, shared: SharedResults) -> Pairs:
+def pairs_of(scenario: Scenario, first_point: np.ndarray, shared: SharedResults) -> Pairs:
+    """Return the model's pairs; `first_point` is that of :class:`.Sensors`."""
     sensors, targets = scenario.sensors, scenario.targets
     parts = [  # sensor, target, first point, and the one after the last
         (i, j, first, min(first + MAX_PAIR_POINTS, first_point[i + 1]))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The arrays of a simulation, which a later one takes over where only the paths of keyframed bodies differ.
+"""The arrays of a simulation, which a later one takes over where only paths of bodies and parameters of sensors differ.
 
 A short run takes less time than making these arrays does, and than telling compiled code where they are.
 """
@@ -19,15 +19,22 @@ from ..geometry.contact_points import contact_points
 from ..geometry.mesh import TriangleMesh, is_closed
 from ..model.body import Body
 from ..model.scenario import Scenario
+from ..model.sensor import Sensor
 from ..model.shared_results import SharedResults
+from ..model.target import Target
 from .detection.deforming_surfaces import DeformingSurfaces
 from .detection.detection_data import DetectionData, TargetShapes
 from .detection.neighbour_lists import neighbour_lists_for
-from .model_builder import build_model, initial_state, start_poses
+from .model_builder import build_model, initial_state, pairs_of, sensors_of, start_poses
 from .parallel_loops import prepare_pair_loops
 from .workspace_builder import workspace_for
 
 _BODY_FIELDS = tuple(item.name for item in fields(Body) if item.name != "motion")
+_TARGET_FIELDS = tuple(item.name for item in fields(Target))
+_SENSOR_FIELDS = tuple(item.name for item in fields(Sensor) if item.name != "parameters")
+
+_ALIGNED = 64
+"""Bytes of a line of a processor's cache."""
 
 
 class Structures:
@@ -68,20 +75,30 @@ class Structures:
         self.detection = DetectionData(tree, lists, surface_motion, TargetShapes.of([None] * len(scenario.targets)))
         queue, self.helpers = make_queue(len(self.state.triangle), threads)
         self.workspace = workspace_for(self.model, self.state, surface_motion, queue)
-        self._center = center
-        self._beginning: list[tuple[np.ndarray, np.ndarray]] = []
+        self._center, self._sensors = center, scenario.sensors
+        self._memory = self._beginning = np.zeros(0, np.uint8)
 
     def keep_beginning(self) -> None:
-        """Remember all numbers that a run changes, so that :meth:`begin_again` can bring them back."""
-        parts = self.detection.neighbours, self.detection.surfaces, self.state, self.workspace
+        """Put all that a run changes into one piece of memory, and remember it for :meth:`begin_again`."""
         prepare_pair_loops(self.model, self.detection, self.state, self.workspace)
-        self._beginning = [(array, array.copy()) for array in _arrays_in(parts)]
+        detection = self.detection
+        parts = (detection.neighbours, detection.surfaces, self.state, self.workspace)
+        self._memory = np.zeros(_in_one_piece(parts, None)[1], np.uint8)
+        (neighbours, surfaces, self.state, self.workspace), _ = _in_one_piece(parts, self._memory)
+        self.detection = detection._replace(neighbours=neighbours, surfaces=surfaces)
+        self._beginning = self._memory.copy()
 
-    def begin_again(self, scenario: Scenario) -> None:
-        """Bring the numbers of :meth:`keep_beginning` back, with the bodies where another scenario has them at first."""
-        for array, before in self._beginning:
-            np.copyto(array, before)
+    def begin_again(self, scenario: Scenario, shared: SharedResults) -> None:
+        """Bring the numbers of :meth:`keep_beginning` back, with another scenario's poses at first and sensors' parameters."""
+        np.copyto(self._memory, self._beginning)
         self.state.position[:], self.state.quaternion[:] = start_poses(scenario, self._center)
+        if any(now is not before for now, before in zip(scenario.sensors, self._sensors, strict=True)):
+            starts = self.model.sensors.first_point
+            sensors = sensors_of(scenario, np.split(self.model.points.frame, starts[1:-1]), starts)
+            pairs = pairs_of(scenario, starts, shared)
+            for array, now in zip((*self.model.sensors, *self.model.pairs), (*sensors, *pairs), strict=True):
+                array[...] = now
+            self._sensors = scenario.sensors
 
 
 class LastStructures:
@@ -91,24 +108,25 @@ class LastStructures:
         self._kept: Structures | None = None
         self._user: weakref.ref[Any] | None = None
 
-    def lend(self, user: object, scenario: Scenario, *how: Any) -> Structures:
+    def lend(
+        self, user: object, scenario: Scenario, center: np.ndarray, dt: float, threads: int | None, shared: SharedResults
+    ) -> Structures:
         """Return structures at the beginning of a scenario: new ones while the last user of the kept ones is there.
 
         Parameters
         ----------
         user : object
             Who works on them; nobody else gets them as long as it lives.
-        scenario : Scenario
-        *how
-            The other arguments of :class:`Structures`.
+        scenario, center, dt, threads, shared
+            See :class:`Structures`.
         """
         if self._user is not None and self._user() is not None:
-            return Structures(scenario, *how)
+            return Structures(scenario, center, dt, threads, shared)
         if self._kept is not None:
-            self._kept.begin_again(scenario)
+            self._kept.begin_again(scenario, shared)
             found = self._kept
         else:
-            found = Structures(scenario, *how)
+            found = Structures(scenario, center, dt, threads, shared)
             if self._user is not None:  # not the first time: there may be many more
                 found.keep_beginning()
                 self._kept = found
@@ -133,10 +151,13 @@ def any_deforms(scenario: Scenario) -> bool:
 
 
 def _what_shapes(scenario: Scenario) -> Iterator[Any]:
-    """Yield all that structures depend on, apart from the poses in which bodies begin."""
+    """Yield all that structures depend on, apart from what :meth:`Structures.begin_again` sets."""
     yield len(scenario.sensors)
-    yield from scenario.sensors
-    yield from scenario.targets
+    for sensor in scenario.sensors:
+        yield sensor.parameters.points_per_texel
+        yield from (getattr(sensor, name) for name in _SENSOR_FIELDS)
+    for target in scenario.targets:
+        yield from (getattr(target, name) for name in _TARGET_FIELDS)
     yield np.asarray(scenario.gravity, float).tobytes()
     for body in scenario.bodies:
         for name in _BODY_FIELDS:
@@ -144,12 +165,25 @@ def _what_shapes(scenario: Scenario) -> Iterator[Any]:
             yield value.tobytes() if isinstance(value, np.ndarray) else value
 
 
-def _arrays_in(parts: tuple[Any, ...]) -> Iterator[np.ndarray]:
-    for part in parts:
-        if isinstance(part, np.ndarray):
-            yield part
-        elif isinstance(part, tuple):
-            yield from _arrays_in(part)
+def _in_one_piece(part: Any, memory: np.ndarray | None, at: int = 0) -> tuple[Any, int]:
+    """Return a tuple of arrays and of such tuples with its arrays in a piece of memory, and the place behind them.
+
+    Without memory, only the place is found.
+    """
+    if isinstance(part, tuple):
+        own = []
+        for field in part:
+            moved, at = _in_one_piece(field, memory, at)
+            own.append(moved)
+        return (type(part)(*own) if hasattr(part, "_fields") else tuple(own)), at
+    if not isinstance(part, np.ndarray) or part.size == 0:
+        return part, at
+    stop = at + part.nbytes
+    if memory is not None:
+        place = memory[at:stop].view(part.dtype).reshape(part.shape)
+        place[...] = part
+        part = place
+    return part, -(-stop // _ALIGNED) * _ALIGNED
 
 
 def _prepared_targets(scenario: Scenario, center: np.ndarray, shared: SharedResults) -> tuple[Tree, list[bool]]:
