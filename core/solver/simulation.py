@@ -384,8 +384,10 @@ class Simulation:
     def _path_along(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Compute :meth:`_prescribed_motion` for F frames; `times` (F, steps + 1), s, are those of steps."""
         path = [poses_at(motion, times.ravel(), self.scenario.interpolation) for motion in self._motions]
-        quaternions = np.stack([quaternion for _, quaternion in path], axis=1).reshape(*times.shape, -1, 4)
-        positions = np.stack([position for position, _ in path], axis=1).reshape(*times.shape, -1, 3)
+        positions, quaternions = np.empty((*times.shape, len(path), 3)), np.empty((*times.shape, len(path), 4))
+        for body, (position, quaternion) in enumerate(path):
+            positions[:, :, body] = position.reshape(*times.shape, 3)
+            quaternions[:, :, body] = quaternion.reshape(*times.shape, 4)
         for body in driven_bodies(self._model.bodies.mode):
             positions[:, :, body] += rotation_matrices(quaternions[:, :, body]) @ self._center[body]
         before, after = quaternions[:, :-1], quaternions[:, 1:]
@@ -394,7 +396,7 @@ class Simulation:
         if turning.any():
             conjugate = before[turning] * np.array([1.0, -1.0, -1.0, -1.0])
             turns[turning] = rotation_vectors(quaternion_product(after[turning], conjugate))
-        velocities = np.concatenate([np.diff(positions, axis=1), turns], axis=3) / self.dt
+        velocities = np.concatenate([positions[:, 1:] - positions[:, :-1], turns], axis=3) / self.dt
         return positions, quaternions, velocities
 
     def contacts_along(
