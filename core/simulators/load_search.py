@@ -10,7 +10,7 @@ is, or that there is none. Who calls them runs the trials: :mod:`.load_balance` 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -18,8 +18,9 @@ from ..compiled.kernels import kernel
 from ..compiled.struct_reference import by_reference
 from ..geometry.rotations import multiply, quaternion_of_vector
 from ..geometry.texels import Texels
-from .warp.press_arrays import IntArray
 
+IntArray: TypeAlias = np.ndarray
+"""An array of integers; the translation for Warp goes by this name."""
 TOLERANCE = 1e-9
 """Difference between load and contact at which the search ends, relative to the load; for torques, over the sensor's radius of
 gyration. A thousandth of what is promised, which two or three trials more reach, as convergence is faster than linear."""
@@ -96,10 +97,11 @@ class LoadSearch(NamedTuple):
         """Return the searches of E environments of a sensor."""
         offset, normal = texels.position - texels.position.mean(axis=0), texels.normal.mean(axis=0)
         radius = max(float(np.sqrt((offset**2).sum(axis=1).mean())), 1e-300)
-        rows = [np.zeros((e, size)) for size in (6, 6, 3, 6, 6, 6, 6, 6)]
+        given, load, at, trial, touched, excess, found = np.zeros((7, e, 6))
         return cls(
-            np.array([max_penetration, radius]), normal / max(float(np.linalg.norm(normal)), 1e-300), *rows,
-            np.zeros((e, 6, 6)), np.zeros((e, 6, 7)), np.zeros((e, 4)), np.zeros((e, 6), np.int64),
+            extent=np.array([max_penetration, radius]), normal=normal / max(float(np.linalg.norm(normal)), 1e-300),
+            given=given, load=load, direction=np.zeros((e, 3)), at=at, trial=trial, touched=touched, excess=excess, found=found,
+            jacobian=np.zeros((e, 6, 6)), system=np.zeros((e, 6, 7)), number=np.zeros((e, 4)), state=np.zeros((e, 6), np.int64),
         )  # fmt: skip
 
 

@@ -12,10 +12,10 @@ from ...geometry.mesh import TriangleMesh
 from ...geometry.shapes import Shape
 from ...geometry.texels import Texels
 from ...solver.jumps import jump_arrays
+from ..load_search import IntArray
 
-IntArray: TypeAlias = np.ndarray
 BoolArray: TypeAlias = np.ndarray
-"""Arrays of integers and of truth values; the translation goes by these names."""
+"""An array of truth values; the translation goes by this name."""
 
 
 class SensorArrays(NamedTuple):
