@@ -315,11 +315,14 @@ def _propose(e: int, search: LoadSearch) -> None:
     """Let the next trial be the next step of Levenberg and Marquardt's method."""
     degrees, trace, a = search.state[e, DEGREES], 0.0, search.system[e]
     for i in range(degrees):
-        for j in range(degrees + 1):
+        right = 0.0
+        for k in range(degrees):
+            right -= search.jacobian[e, k, i] * search.excess[e, k]
+        a[i, degrees] = right
+        for j in range(degrees):
             total = 0.0
             for k in range(degrees):
-                right = search.jacobian[e, k, j] if j < degrees else -search.excess[e, k]
-                total += search.jacobian[e, k, i] * right
+                total += search.jacobian[e, k, i] * search.jacobian[e, k, j]
             a[i, j] = total
         trace += a[i, i]
     for i in range(degrees):
@@ -332,14 +335,14 @@ def _propose(e: int, search: LoadSearch) -> None:
                 a[i, k] -= factor * a[j, k]
     _displace(e, 0, 0.0, search)
     for back in range(degrees):
-        i = degrees - 1 - back
-        total = a[i, degrees]
-        for k in range(i + 1, degrees):
-            total -= a[i, k] * a[k, degrees]
-        step = total / a[i, i] if a[i, i] > 0.0 else 0.0
+        row = degrees - 1 - back
+        rest = a[row, degrees]
+        for k in range(row + 1, degrees):
+            rest -= a[row, k] * a[k, degrees]
+        step = rest / a[row, row] if a[row, row] > 0.0 else 0.0
         step = step if abs(step) < math.inf else 0.0
-        a[i, degrees] = step
-        _add(e, i, step, search)
+        a[row, degrees] = step
+        _add(e, row, step, search)
     _shorten_trial(e, search)
     search.state[e, PHASE] = TRIAL
     search.state[e, STEPS] += 1
