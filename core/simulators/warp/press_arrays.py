@@ -40,7 +40,7 @@ class SensorArrays(NamedTuple):
         Contact law of one contact point, the same for all environments or one for each.
     conversion : (n or E n, 2) float
         Zero and scale of each texel's reading, the same for all environments or one after the other.
-    force_constants, friction_constants, reading_constants : (laws, 2, c) float
+    force_constants, friction_constants, reading_constants : (E, laws, 2, c) float
         Constants of the laws of effects, for a step and for no time; for readings, for no time and for a step.
     """
 

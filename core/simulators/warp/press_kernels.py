@@ -243,7 +243,8 @@ def write_reading(world: int, texel: int, sensor: SensorArrays, worlds: Worlds, 
                 for j in range(slots.reading_memory.shape[3]):
                     slots.reading_memory[world, texel, i, j] = 0.0
         reading = reading_with_effects(
-            out.texels[world, texel, 0], zero, scale, when, sensor.reading_constants, slots.reading_memory[world, texel]
+            out.texels[world, texel, 0], zero, scale, when,
+            sensor.reading_constants[world], slots.reading_memory[world, texel],
         )  # fmt: skip
     out.readings[world, texel] = reading
 
@@ -282,8 +283,8 @@ def _advance_point(world: int, point: int, law: ContactLaw, sensor: SensorArrays
             square = moved.x * moved.x + moved.y * moved.y + moved.z * moved.z
             end = slots.depth[world, target, point] + sensor.dt * moved.rate
             tangent = _tangent(
-                TexelMotion(slots.depth[world, target, point], moved.rate, 0.0, math.sqrt(square)), painted, scale, sensor,
-                slots.memory[world, point],
+                world, TexelMotion(slots.depth[world, target, point], moved.rate, 0.0, math.sqrt(square)), painted, scale,
+                sensor, slots.memory[world, point],
             )  # fmt: skip
             z = slots.bristle[world, target, point]
             zx, zy, zz = z[0], z[1], z[2]
@@ -297,11 +298,13 @@ def _advance_point(world: int, point: int, law: ContactLaw, sensor: SensorArrays
     if HAS_EFFECTS == 1:
         force_with_effects(
             STEP, TexelMotion(deepest, deepest_rate, deepest_slide, 0.0), whole_texel_law(painted, sensor.share, 1.0),
-            sensor.force_constants, slots.memory[world, point], True,
+            sensor.force_constants[world], slots.memory[world, point], True,
         )  # fmt: skip
 
 
-def _tangent(motion: TexelMotion, painted: ContactLaw, scale: float, sensor: SensorArrays, memory: np.ndarray) -> Tangent:
+def _tangent(
+    world: int, motion: TexelMotion, painted: ContactLaw, scale: float, sensor: SensorArrays, memory: np.ndarray
+) -> Tangent:
     """Return the normal law at the step's end, linearised, and what effects and paint make of friction."""
     bias, slope = normal_tangent(motion.depth, motion.rate, sensor.dt, painted)
     viscosity, pulls = 0.0, sensor.pulls == 1
@@ -309,9 +312,9 @@ def _tangent(motion: TexelMotion, painted: ContactLaw, scale: float, sensor: Sen
         end = motion.depth + sensor.dt * motion.rate
         force, by_depth, by_rate = force_with_effects(
             STEP, TexelMotion(end, motion.rate, 0.0, motion.speed), whole_texel_law(painted, sensor.share, 1.0),
-            sensor.force_constants, memory, False,
+            sensor.force_constants[world], memory, False,
         )  # fmt: skip
-        factor, viscosity = friction_with_effects(motion.speed, force, sensor.friction_constants)
+        factor, viscosity = friction_with_effects(motion.speed, force, sensor.friction_constants[world])
         slope = sensor.share * max(by_depth * sensor.dt + by_rate, 0.0) if end > 0.0 else 0.0
         bias = sensor.share * force - slope * motion.rate
         scale, viscosity = scale * factor, sensor.share * viscosity
@@ -424,9 +427,9 @@ def _write_force(
         speed = math.sqrt(square)
         whole, _, _ = force_with_effects(
             NOW, TexelMotion(depth, v.rate, 0.0, speed), whole_texel_law(painted, sensor.share, 1.0),
-            sensor.force_constants, slots.memory[world, point], False,
+            sensor.force_constants[world], slots.memory[world, point], False,
         )  # fmt: skip
-        factor, viscosity = friction_with_effects(speed, whole, sensor.friction_constants)
+        factor, viscosity = friction_with_effects(speed, whole, sensor.friction_constants[world])
         fn = sensor.share * whole
     friction = with_friction(painted, factor, sensor.share * viscosity)
     held = deflection_scale(z[0] * z[0] + z[1] * z[1] + z[2] * z[2], max_bristle_deflection(fn, friction))

@@ -58,7 +58,7 @@ class WarpSensors:
         Compute in float32, which is faster on most GPUs. Depths then carry the rounding of the poses, 6e-8 of a coordinate.
 
     parameters : mapping of str to (E,) float, optional
-        In which the sensors of environments differ, as of :class:`.PressedSensors`; effects are the same in all.
+        In which the sensors of environments differ, as of :class:`.PressedSensors`.
 
     Raises
     ------
@@ -108,15 +108,15 @@ class WarpSensors:
         self._warp, self.device = warp, _device(warp, device)
         self._environments, sensor = environments, item.sensor
         points = contact_points(sensor.texels, sensor.parameters.points_per_texel)
-        effects = functions_of(sensor, dt)
+        sensors = sensors_of(sensor, parameters, environments) if parameters else [sensor]
+        effects = functions_of(sensors, dt)
         e, n, t, p = environments, len(sensor.texels), len(targets), len(points.texel)
         self._size, self._of_slots = (e, n, t), (t, p, n, effects.laws, effects.reading_laws)
         self._check_memory(Slots.zero(1, *self._of_slots), Worlds.zero(1, t), Results.zero(1, n, t))
-        sensors = _varied(sensor, parameters or {}, e)
         tree = build_tree([one for one in targets if isinstance(one, TriangleMesh)] or [_NO_MESH])
         translation = self._translation = _translation(warp, single, effects, sensor)
         slots = Slots.zero(e, *self._of_slots)
-        parts = _sensor_arrays(sensors, points, effects, dt), _target_arrays(targets), tree, Worlds.zero(e, t), slots
+        parts = _sensor_arrays(sensors, points, effects, dt, e), _target_arrays(targets), tree, Worlds.zero(e, t), slots
         values = [translation.value(part, self.device) for part in (*parts, Results.zero(e, n, t))]
         self._sensor, self._targets, self._tree, self._worlds, self._slots, out = values
         self._out = out
@@ -273,14 +273,6 @@ COPIES = 2
 """How often the arrays of an environment are in memory while they are made: of NumPy, and on the device."""
 
 
-def _varied(sensor: Sensor, parameters: Columns, environments: int) -> list[Sensor]:
-    """Return the sensor of each environment, or one for all; raise :class:`.ParameterError` for what has to be the same."""
-    for name in parameters:
-        if name.startswith("effect."):
-            raise ParameterError(f"On Warp effects are the same in all environments, also '{name:.80}': take PressedSensors.")
-    return sensors_of(sensor, parameters, environments) if parameters else [sensor]
-
-
 def _check(sensor: Sensor, targets: Sequence[TriangleMesh | Shape], dt: float, environments: int) -> None:
     """Raise :class:`.PalpateError` for what makes no run."""
     if not (np.isfinite(dt) and dt > 0):
@@ -329,7 +321,14 @@ def _translation(warp: ModuleType, single: bool, effects: EffectFunctions, senso
     return _TRANSLATIONS[key]
 
 
-def _sensor_arrays(sensors: Sequence[Sensor], points: ContactPoints, effects: EffectFunctions, dt: float) -> SensorArrays:
+def _of_each(values: np.ndarray, environments: int) -> np.ndarray:
+    """Return values of all environments (E, …), given those of each or of one."""
+    return np.broadcast_to(values, (environments, *values.shape[1:]))
+
+
+def _sensor_arrays(
+    sensors: Sequence[Sensor], points: ContactPoints, effects: EffectFunctions, dt: float, environments: int
+) -> SensorArrays:
     sensor, parameters = sensors[0], sensors[0].parameters
     share, n = 1.0 / parameters.points_per_texel, len(sensor.texels)
     painted = [np.ones(n) if values is None else values for values in (sensor.painted.k, sensor.painted.friction)]
@@ -343,9 +342,9 @@ def _sensor_arrays(sensors: Sequence[Sensor], points: ContactPoints, effects: Ef
         multipliers=np.column_stack([values[points.texel] for values in painted]),
         law=np.array([contact_law(one.parameters, share) for one in sensors], float),
         conversion=np.concatenate([_conversion(one) for one in sensors]),
-        force_constants=effects.force_constants,
-        friction_constants=effects.friction_constants,
-        reading_constants=effects.reading_constants,
+        force_constants=_of_each(effects.force_constants, environments),
+        friction_constants=_of_each(effects.friction_constants, environments),
+        reading_constants=_of_each(effects.reading_constants, environments),
     )
 
 
