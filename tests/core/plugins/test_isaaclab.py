@@ -151,7 +151,7 @@ def test_what_is_missing_is_one_sentence(plugin, monkeypatch):
     cfg = module.TouchSensorCfg(
         prim_path="/World/envs/env_[^/]+/finger", sensor=pad(4, 4), targets={"{ENV_REGEX_NS}/ball": shapes.sphere(0.01)}
     )
-    with pytest.raises(ParameterError, match=r"'/World/envs/env_\[\^/\]\+/ball' is 0 times in 3 environments"):
+    with pytest.raises(ParameterError, match=r"'/World/envs/env_\[\^/\]\+/ball' is found 0 times in 3 environments"):
         module.TouchSensor(cfg)._initialize_impl()
     with pytest.raises(PalpateError, match="needs Isaac Lab 3.0 or later"):
         plugin(OldSensorBase)
