@@ -100,7 +100,7 @@ class TouchSensorCfg(SensorBaseCfg):
     sensor : Sensor
         As ``palpate.read_sensor`` returns it.
     targets : dict of str to Shape or TriangleMesh
-        What presses, by the path of its prim: ``{"{ENV_REGEX_NS}/Cube": palpate.Body.box(0.05)}``.
+        Objects in contact, by the paths of their prims: ``{"{ENV_REGEX_NS}/Cube": palpate.Body.box(0.05)}``.
     single : bool
         Compute in float32. Isaac Lab's poses are float32 in any case.
     parameters : mapping of str to (E,) float, optional
