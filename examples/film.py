@@ -531,7 +531,8 @@ def main() -> None:
     with blender_output_hidden():
         film = make(Film(given.work.absolute(), given.height, given.every))
         film.bar.close()
-    print(encode_video(film.frames, given.out.absolute(), FPS), f"{len(film.frames) / FPS:.0f} s")
+        path = encode_video(film.frames, given.out.absolute(), FPS)
+    print(path, f"{len(film.frames) / FPS:.0f} s")
 
 
 if __name__ == "__main__":
