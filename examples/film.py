@@ -3,7 +3,7 @@
 
 python examples/film.py [--out palpate.mp4] [--work DIR]
 
-It takes about twenty minutes on two cores. Renders in the work folder are used again, so a run that was stopped continues.
+It takes about twelve minutes on two cores. Renders in the work folder are used again, so a run that was stopped continues.
 The last chapter needs MuJoCo (pip install mujoco) and is left out without it.
 """
 
