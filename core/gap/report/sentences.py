@@ -97,7 +97,7 @@ def _effects(result: Diagnosis, errors: GapErrors) -> str:
         return f"No gap: the base model with its own parameters refitted leaves {before:.2%} of the range, which is noise."
     if result.verdict == "unexplained":
         return _unexplained(result, errors, sure)
-    shrink = f"the error shrinks from {before:.2%} to {after:.2%} of the range"
+    shrink = f"the error shrinks from {before:.2%} to {after:.2%} of the range{_closed_of_forces(result)}"
     stays = _what_stays(result, errors)
     with_rivals = {names[0]: " or ".join(names) for names in result.ambiguous}
     if not sure and findings and all(one.name in with_rivals for one in findings):
@@ -109,6 +109,14 @@ def _effects(result: Diagnosis, errors: GapErrors) -> str:
         return f"Perhaps missing: {unsure}{open_names}; {shrink}.{stays}"
     besides = f", and perhaps {unsure}{open_names}" if len(sure) < len(findings) else ""
     return f"Missing: {_listed([one.name for one in sure])}{besides}; {shrink}.{stays}"
+
+
+def _closed_of_forces(result: Diagnosis) -> str:
+    """The share of the net forces' gap that closes, if friction is among the findings: it changes no reading."""
+    share = result.closed.least(FORCES)
+    if share is None or not any(one.name in friction_kinds() for one in result.findings):
+        return ""
+    return f", and {max(share, 0.0):.0%} of the squared gap of the net forces closes"
 
 
 def by_share_closed(result: Diagnosis) -> list[Finding]:
