@@ -27,9 +27,9 @@ class Estimate:
 
 def student_quantile(freedom: float) -> float:
     """Return the 97.5 % quantile of Student's t; infinite without degrees of freedom, since the scatter is then unknown."""
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
-    return float(t.ppf(0.975, freedom)) if freedom > 0 else float("inf")
+    return float(stdtrit(freedom, 0.975)) if freedom > 0 else float("inf")
 
 
 def linear_estimates(columns: np.ndarray, values: np.ndarray) -> list[Estimate]:

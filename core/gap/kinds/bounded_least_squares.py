@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 RIDGE = 1e-9
 """Added to the diagonal, as a share of it, so that what the equations leave open keeps its starting value."""
@@ -23,6 +22,8 @@ def bounded_minimum(
     start : (p,) float, optional
         Where nothing depends on a direction, x stays there; zero if it is left out.
     """
+    from scipy.optimize import lsq_linear
+
     diagonal = np.diagonal(gram)
     size = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
     scaled = gram / size[:, None] / size[None]

@@ -13,8 +13,6 @@ from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
-import scipy.integrate
-import scipy.stats
 
 from ..forward.stimulus import Stimulus
 
@@ -81,7 +79,7 @@ def _courses(order: Sequence[Stimulus], gains: dict[str, float]) -> tuple[np.nda
     chosen = [i for i, one in enumerate(order) if one.trial.name in gains]
     lengths = [float(np.ptp(one.time)) for one in order]
     rises = [float(np.maximum(np.diff(one.load, axis=0), 0.0).sum()) for one in order]
-    impulses = [float(scipy.integrate.trapezoid(one.load, one.time, axis=0).sum()) for one in order]
+    impulses = [float((np.diff(one.time)[:, None] * (one.load[1:] + one.load[:-1])).sum(axis=0).sum()) / 2.0 for one in order]
     pauses = [1.0] * len(order)
     same = float(np.mean(lengths))
     clocks = [pauses, lengths, [length + same for length in lengths]]
@@ -140,8 +138,10 @@ def change_of_level(gains: np.ndarray, uses: np.ndarray, clocks: np.ndarray) -> 
 
 def _least_ratio(count: int) -> float:
     """Ratio of what two courses leave of so many gains below which it is no chance."""
+    from scipy.special import fdtri
+
     free = count - (2 if count < BENT_FROM else 3)
-    return float(scipy.stats.f.ppf(CHANCE, free, free))
+    return float(fdtri(free, free, CHANCE))
 
 
 def _least_left(gains: np.ndarray, courses: np.ndarray) -> float:
