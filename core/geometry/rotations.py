@@ -75,12 +75,17 @@ def write_rotation(quaternion: np.ndarray, rotation: np.ndarray) -> None:
 
 
 @kernel
+def quaternion_of_vector(wx: float, wy: float, wz: float) -> tuple[float, float, float, float]:
+    """Exponential of a rotation vector (radians)."""
+    angle = math.sqrt(wx * wx + wy * wy + wz * wz)
+    s = 0.5 if angle < 1e-8 else math.sin(0.5 * angle) / angle
+    return math.cos(0.5 * angle), s * wx, s * wy, s * wz
+
+
+@kernel
 def rotate_quaternion(quaternion: np.ndarray, wx: float, wy: float, wz: float) -> None:
     """Turn `quaternion` in place by the rotation vector `w` (radians, world axes) and keep it of unit length."""
-    angle = math.sqrt(wx * wx + wy * wy + wz * wz)
-    c = math.cos(0.5 * angle)
-    s = 0.5 if angle < 1e-8 else math.sin(0.5 * angle) / angle
-    x, y, z = s * wx, s * wy, s * wz
+    c, x, y, z = quaternion_of_vector(wx, wy, wz)
     qw, qx, qy, qz = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     rw, rx, ry, rz = multiply(c, x, y, z, qw, qx, qy, qz)
     scale = 1.0 / math.sqrt(rw * rw + rx * rx + ry * ry + rz * rz)
