@@ -106,8 +106,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
     """Return the arguments; raise SystemExit after help and wrong usage."""
-    parser = _parser()
-    arguments, rest = parser.parse_known_args(argv)
+    words = sys.argv[1:] if argv is None else argv
+    parser = _parser(words)
+    arguments, rest = parser.parse_known_args(words)
     if arguments.command is None:
         parser.print_help(sys.stderr)
         raise SystemExit(2)
@@ -132,8 +133,11 @@ def _reject_unknown(parser: argparse.ArgumentParser, command: str, rest: list[st
     parser.error(f"unrecognized arguments: {' '.join(rest)}: {advice}")
 
 
-def _parser() -> argparse.ArgumentParser:
-    """Return the parser of all commands. Each module has ``add_arguments(parser)`` and ``run(arguments)``."""
+def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
+    """Return the parser of all commands, with the options of those that some words name.
+
+    Each module has ``add_arguments(parser)`` and ``run(arguments)``; loading all of them takes longer than a short command.
+    """
     parser = argparse.ArgumentParser(
         prog="palpate",
         description="Make any mesh a tactile sensor: simulate, bake and render contact forces.",
@@ -143,6 +147,8 @@ def _parser() -> argparse.ArgumentParser:
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
     for name, summary in COMMANDS.items():
         sub = subparsers.add_parser(name, help=summary, description=f"{summary[0].upper()}{summary[1:]}.")
+        if name not in words:
+            continue
         module = importlib.import_module(f".{name.replace('-', '_')}", __package__)
         module.add_arguments(sub)
         if name in limits.COMMANDS:

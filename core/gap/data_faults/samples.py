@@ -11,7 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..dataset.rig import Rig, Trial
+from ..dataset.rig import Rig
+from ..dataset.trial import Trial, runs
 from ..forward.stimulus import Stimulus
 from .data_fault import Correction, DataFault
 
@@ -61,7 +62,7 @@ def find_sample_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]
 
 def _responses(trial: Trial) -> np.ndarray:
     """All responses side by side, (T, c)."""
-    return np.concatenate([part for part in (trial.reading, trial.force) if part is not None], axis=1)
+    return np.concatenate(trial.responses, axis=1)
 
 
 def _equal_rows(stimulus: Stimulus) -> tuple[np.ndarray | None, np.ndarray]:
@@ -101,12 +102,6 @@ def _is_coarse(stimulus: Stimulus, equal: np.ndarray) -> bool:
     step = np.where(change > 0, change, np.inf).min(axis=0, initial=np.inf)
     fresh = np.where(np.isfinite(change), change, 0.0)[~equal[1:]]
     return not bool((np.quantile(fresh, 0.9, axis=0) > MOST_STEPS * step)[np.isfinite(step)].any())
-
-
-def runs(flag: np.ndarray) -> list[tuple[int, int]]:
-    """Return the first sample of each run in which a flag (T,) is set, and the sample after its end."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flag, [False]]).astype(int))).reshape(-1, 2)
-    return [(int(a), int(b)) for a, b in edges]
 
 
 def _rails(stimuli: Sequence[Stimulus]) -> list[DataFault]:

@@ -6,8 +6,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from ..dataset.rig import Rig
 from ..forward.stimulus import Stimulus
 from .channels import find_channel_faults
@@ -26,7 +24,7 @@ def find_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
     stimuli : sequence of Stimulus
         Of the rig's trials.
     """
-    judged = [s for s in stimuli if (s.load > 0).any() and _responses_change(s)]
+    judged = [s for s in stimuli if (s.load > 0).any() and s.trial.changes]
     if not judged:
         return []
     faults = find_scale_faults(rig, judged) + find_channel_faults(rig, judged)
@@ -38,11 +36,6 @@ def find_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
     if any(fault.kind == "repeated-samples" for fault in samples):
         clocks = [fault for fault in clocks if fault.kind != "dropped-samples"]
     return [*faults, *clocks, *samples]
-
-
-def _responses_change(s: Stimulus) -> bool:
-    parts = [part for part in (s.trial.reading, s.trial.force) if part is not None]
-    return any((np.fmax.reduce(part, axis=0) > np.fmin.reduce(part, axis=0)).any() for part in parts)
 
 
 def put_right(rig: Rig, stimuli: Sequence[Stimulus]) -> tuple[Rig, list[DataFault]]:

@@ -659,8 +659,8 @@ def _known_responses(part: np.ndarray | None, unknown: np.ndarray) -> np.ndarray
 
 def _responds(trial: Trial) -> bool:
     """True if a trial has any response that is not zero but for rounding."""
-    parts = [part for part in (trial.reading, trial.force) if part is not None]
-    return any(np.nanmax(np.abs(part), initial=0.0) > SMALLEST_RESPONSE for part in parts if not np.isnan(part).all())
+    known = (part for part in trial.responses if not np.isnan(part).all())
+    return any(np.nanmax(np.abs(part), initial=0.0) > SMALLEST_RESPONSE for part in known)
 
 
 def _channel_warnings(trials: list[Trial]) -> list[str]:

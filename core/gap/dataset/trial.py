@@ -77,3 +77,19 @@ class Trial:
     def step(self) -> float:
         """Median time between samples, seconds."""
         return float(np.median(np.diff(self.time)))
+
+    @property
+    def responses(self) -> list[np.ndarray]:
+        """Readings and net forces, those of both that were recorded."""
+        return [part for part in (self.reading, self.force) if part is not None]
+
+    @property
+    def changes(self) -> bool:
+        """True if any channel of the responses has two different values."""
+        return any((np.fmax.reduce(part, axis=0) > np.fmin.reduce(part, axis=0)).any() for part in self.responses)
+
+
+def runs(flag: np.ndarray) -> list[tuple[int, int]]:
+    """Return the first sample of each run in which a flag (T,) is set, and the sample after its end."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flag, [False]]).astype(int))).reshape(-1, 2)
+    return [(int(a), int(b)) for a, b in edges]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..dataset.trial import runs
 from ..forward.contact_phases import hold_rate_limit
 from ..forward.predictor import Predictor
 
@@ -117,7 +118,7 @@ def _unloaded_stretches(predictor: Predictor) -> list[tuple[int, int]]:
     stimulus = predictor.stimulus
     load = stimulus.load
     free = ~(load > 0).any(axis=1)
-    found = [(a, b) for a, b in _runs(free) if b - a >= SHORTEST_STRETCH]
+    found = [(a, b) for a, b in runs(free) if b - a >= SHORTEST_STRETCH]
     return [*found, (0, len(load))]
 
 
@@ -248,7 +249,7 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
         speeds.append(rate[rate > pace])
         unloading |= bool((np.maximum.accumulate(total) - total).max() > UNLOADING_SHARE * full)
         still = (np.abs(rate) < pace) & (total > PRESSED_SHARE * full)
-        holds = _runs(still)
+        holds = runs(still)
         hold = max([hold, *(float(s.time[min(b, len(total) - 1)] - s.time[a]) for a, b in holds)])
         levels += [float(total[a:b].mean()) for a, b in holds if b - a >= SHORTEST_STRETCH]
         idle = s.time[(load <= UNLOADED_SHARE * max(float(load.max(initial=0.0)), 1e-300)).any(axis=1)]
@@ -326,9 +327,3 @@ def _load_moves(centre: np.ndarray, area: np.ndarray, touched: np.ndarray) -> bo
     if len(centre) == 0 or touched.mean() > MOST_OF_THE_TEXELS:
         return True
     return float(np.ptp(centre, axis=0).max()) > float(np.sqrt(np.median(area)))
-
-
-def _runs(flag: np.ndarray) -> list[tuple[int, int]]:
-    """First sample of each run in which a flag is set, and the sample after its end."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flag, [False]]).astype(int))).reshape(-1, 2)
-    return [(int(a), int(b)) for a, b in edges]

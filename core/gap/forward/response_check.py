@@ -9,7 +9,6 @@ import numpy as np
 
 from ...errors import FileError
 from ..dataset.rig import Rig
-from ..dataset.trial import Trial
 from .stimulus import Stimulus
 
 OPPOSITE = -0.5
@@ -43,19 +42,13 @@ def check_responses(rig: Rig, stimuli: Sequence[Stimulus]) -> None:
         first = fitted[0].trial
         files = ", ".join(f"'{stimulus.trial.name}.csv'" for stimulus in fitted[:3]) + (" …" if len(fitted) > 3 else "")
         raise FileError(f"In {files} of '{rig.name}' {_NO_CONTACT[first.stimulus]}.")
-    if not any(_changes(stimulus.trial) for stimulus in fitted):
+    if not any(stimulus.trial.changes for stimulus in fitted):
         raise FileError(
             f"No response in the recordings of '{rig.name}' that are to be fitted ever changes: "
             "check that the sensor was read out while it was pressed."
         )
     _check_reading_sign(rig, touching)
     _check_force_sign(rig, touching)
-
-
-def _changes(trial: Trial) -> bool:
-    """Return whether any channel of a trial has two different values."""
-    channels = [values for values in (trial.reading, trial.force) if values is not None]
-    return any((np.fmax.reduce(values, axis=0) > np.fmin.reduce(values, axis=0)).any() for values in channels)
 
 
 def _check_reading_sign(rig: Rig, touching: Sequence[Stimulus]) -> None:

@@ -12,6 +12,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ..dataset.trial import runs
+
 COMPONENTS = 4
 """Principal components of the readings that the map takes."""
 SAMPLES_PER_TERM = 8
@@ -95,7 +97,7 @@ def spoiled_samples(
     at = np.flatnonzero(np.isfinite(residual))
     error, value = np.abs(residual[at]), values[at]
     limit = max(DISAGREES * _scale(error), DISAGREES * _scale(residual[at]), LEAST * float(np.ptp(value)))
-    for begin, end in _runs(error > limit):
+    for begin, end in runs(error > limit):
         while begin > 0 and value[begin - 1] == value[begin]:
             begin -= 1
         while end < len(value) and value[end] == value[end - 1]:
@@ -115,12 +117,6 @@ def _is_spike(value: np.ndarray, begin: int, end: int) -> bool:
     before, after = float(value[begin - 1]), float(value[end])
     away = np.abs(value[begin:end] - 0.5 * (before + after))
     return bool(abs(after - before) < float(away.min()))
-
-
-def _runs(is_in: np.ndarray) -> list[tuple[int, int]]:
-    """Beginnings and ends of runs of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], is_in, [False]]).astype(int)))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def readings_of(table: Mapping[str, np.ndarray]) -> np.ndarray | None:

@@ -292,7 +292,7 @@ def _advance_point(world: int, point: int, law: ContactLaw, sensor: SensorArrays
                 (nx, ny, nz), (zx, zy, zz),
                 (moved.x + moved.rate * nx, moved.y + moved.rate * ny, moved.z + moved.rate * nz), tangent, sensor.dt, law,
             )  # fmt: skip
-            _move_bristle(contact, px, py, pz, nx, ny, nz, worlds.end_motion[world, target], z)
+            _move_bristle(contact, _sliding_at(px, py, pz, nx, ny, nz, worlds.end_motion[world, target]), z)
             if end > deepest:
                 deepest, deepest_rate, deepest_slide = end, moved.rate, sensor.dt * math.sqrt(square)
     if HAS_EFFECTS == 1:
@@ -321,11 +321,8 @@ def _tangent(
     return Tangent(bias, slope, scale, viscosity, pulls)
 
 
-def _move_bristle(
-    contact: LinearContact, px: float, py: float, pz: float, nx: float, ny: float, nz: float, motion: np.ndarray, z: np.ndarray
-) -> None:
-    """Bring a bristle (3,) to the step's end, in the sensor's axes at that time."""
-    v = _sliding_at(px, py, pz, nx, ny, nz, motion)
+def _move_bristle(contact: LinearContact, v: Sliding, z: np.ndarray) -> None:
+    """Bring a bristle (3,) to the step's end, given the sliding in the sensor's axes at that time."""
     zx = next_deflection(contact.keep, z[0], contact.gain, v.x)
     zy = next_deflection(contact.keep, z[1], contact.gain, v.y)
     zz = next_deflection(contact.keep, z[2], contact.gain, v.z)

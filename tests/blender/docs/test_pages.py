@@ -101,7 +101,7 @@ def test_commands_are_ones_that_the_command_line_takes(page, capsys):
     for line in command_lines(page.read_text(encoding="utf-8")):
         words = shlex.split(line.replace('$(basename "$f" .blend)', "name").replace("[", "").replace("]", ""))
         try:
-            _parser().parse_args(words)
+            _parser(words).parse_args(words)
         except SystemExit:
             pytest.fail(f"palpate {line}: {capsys.readouterr().err}")
 
