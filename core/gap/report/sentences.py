@@ -23,6 +23,7 @@ MOST_SAID = 0.99
 """Largest confidence stated as a number: a few hundred cases cannot show one wrong name in a thousand."""
 WIDE_INTERVAL = 20.0
 """If an interval reaches this many times below and above its value, the recordings do not identify the value."""
+NOT_IDENTIFIABLE = "not identifiable from these recordings"
 MANY_FLOORS = 3.0
 """Multiple of the noise floor from which the headline states the remaining error of the check recordings."""
 LEAST_SHARE = 0.01
@@ -290,15 +291,16 @@ def warnings(result: Diagnosis) -> list[str]:
 
 
 def interval_text(one: ParameterInterval) -> str:
-    """Return a number with its interval, for the terminal."""
-    return f"{one.value:.4g} ({interval_ends(one)})"
+    """Return a number with its interval, for the terminal; of one that is not identifiable, what the amended sensor has."""
+    ends = interval_ends(one)
+    return f"{ends}; sensor.toml has {one.value:.4g}" if ends == NOT_IDENTIFIABLE else f"{one.value:.4g} ({ends})"
 
 
 def interval_ends(one: ParameterInterval) -> str:
     """Return an interval, or a remark if it fills the bounds of its parameter or leaves the order of magnitude open."""
     on_both_sides = one.low >= 0.0 and one.high > WIDE_INTERVAL * one.value and one.low * WIDE_INTERVAL <= one.value
     if one.fills_bounds or on_both_sides or one.high - one.low > WIDE_INTERVAL**2 * abs(one.value) > 0.0:
-        return "not identifiable from these recordings"
+        return NOT_IDENTIFIABLE
     return f"{one.low:.4g} … {one.high:.4g}"
 
 
