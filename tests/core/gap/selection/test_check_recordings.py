@@ -103,6 +103,16 @@ def test_noise_in_the_fitted_recordings_is_no_gap_only_where_the_check_is_noise_
     assert "without load it reads" in sentences.headline(result, gap_errors(result))
 
 
+@pytest.mark.long("two whole diagnoses")
+def test_check_recordings_choose_no_effect():
+    """The amended model has the same effects, whatever the check recording holds; only what is said of it changes."""
+    rig = cases.rig(contact=lambda f, t: f / (1.0 + 4.0 * f), seed=5, trials=4, seconds=6.0)
+    plain, other = diagnosed(rig), diagnosed(with_check(rig, 0.6))
+    chosen = [[(one.name, one.form) for one in result.best.model.effects] for result in (plain, other)]
+    assert chosen[0] and chosen[0] == chosen[1]
+    assert not plain.check.is_refuted and other.check.is_refuted
+
+
 def test_what_closes_most_stays_sure_beside_little_that_is_ambiguous():
     shares = {"stiffening": Improvement(0.95, 0.95), "hysteresis": Improvement(0.03, 0.6), "creep": Improvement(0.3, 0.9)}
     state = SelectionState(None, None, {}, shares)
