@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Kills of every process of a study, faults at each of its file operations, and disks that are full or read-only.
+"""Kills of every process of a study, faults at its file operations, full and read-only disks, and two drivers at once.
 
 After each, the same command again ends with the bytes of an undisturbed study, and nothing is computed twice but what was
 being computed, or was not yet on the disk, when a process was killed.
@@ -96,6 +96,9 @@ class Sweep(Area):
             yield Case(f"disk {i}", {"kilobytes": dice.randint(*DISKS)})
         if self._disks:
             yield Case("disk: read-only", {"kilobytes": 0})
+        for i in range(max(1, self._kills // 4) if self._with_kills_too else 0):
+            share = random.Random(f"{self.seed} drivers {i}").random() if i else 0.0  # at first both begin at once
+            yield Case(f"two drivers {i}", {"share": share, "by its folder": i % 2 == 1})
         calls = self._count_faults()
         every = [(at, kind) for at in range(1, calls + 1) for kind in KINDS]
         dice.shuffle(every)
@@ -106,6 +109,8 @@ class Sweep(Area):
         try:
             if "at" in case.data:
                 outcome = self._with_fault(case)
+            elif "share" in case.data:
+                outcome = self._with_two_drivers(case)
             elif "kilobytes" in case.data:
                 outcome = self._on_disk(case)
             else:
@@ -223,8 +228,9 @@ class Sweep(Area):
         return self._undisturbed[name]
 
     def _sweep(self, study: Path, options: list[str]) -> subprocess.Popen:
-        words = [sys.executable, "-m", "palpate.commands", "sweep", str(study), "--out", str(study.parent / "out"), *options]
-        return self._start(words)
+        """Start the command with the file of a study, or with the folder in which it goes on."""
+        out = [] if study.is_dir() else ["--out", str(study.parent / "out")]
+        return self._start([sys.executable, "-m", "palpate.commands", "sweep", str(study), *out, *options])
 
     def _start(self, words: list[str]) -> subprocess.Popen:
         process = subprocess.Popen(
@@ -246,6 +252,38 @@ class Sweep(Area):
             with suppress(subprocess.TimeoutExpired, ValueError):
                 process.communicate(timeout=10)
         self._processes.clear()
+
+    # --- two drivers
+
+    def _with_two_drivers(self, case: Case) -> Outcome:
+        """Give the command again while it is at work, after a share of the runs: one of the two says so and changes nothing."""
+        expected = self._expected("kills", self._runs, HOLD)
+        shutil.rmtree(self._place, ignore_errors=True)
+        study, options = write_study(self._place, self._runs, self.seed, hold=HOLD), ["--workers", "2"]
+        (self.folder / "starts").unlink(missing_ok=True)
+        first, share = self._sweep(study, options), case.data["share"]
+        while share and first.poll() is None and len(count_starts(self.folder)) <= share * self._runs:
+            time.sleep(0.01)
+        second = self._sweep(self._place / "out" if case.data["by its folder"] else study, options)
+        said = [second.communicate(timeout=LONGEST)[1]]
+        were_both_at_work = second.returncode == 0 and first.poll() is None
+        said.append(first.communicate(timeout=LONGEST)[1])
+        statuses = second.returncode, first.returncode
+        case.data.update({"said": said, "statuses": statuses})
+        if any("Traceback" in words for words in said):
+            return Outcome(TRACEBACK, str(said)[-3000:])
+        if 0 not in statuses or set(statuses) - {0, 1} or (were_both_at_work and 1 not in statuses):
+            return Outcome(WRONG, f"the two commands end with {statuses}: {said}")
+        for status, words in zip(statuses, said, strict=True):
+            if status and not (words.count("\n") == 1 and "Another sweep is writing to" in words):
+                return Outcome(WRONG, f"not one sentence about another command: {words!r}")
+        changed = differences(expected, results(self._place / "out"))
+        if changed:
+            return Outcome(WRONG, f"the study does not end as one that was alone: {changed}")
+        starts = count_starts(self.folder)
+        if sum(starts.values()) != self._runs:
+            return Outcome(WRONG, f"{sum(starts.values())} runs were begun instead of {self._runs}")
+        return Outcome(CLEAR)
 
     # --- faults
 

@@ -33,7 +33,7 @@ def stepwise(result: Any, most: int = 3) -> tuple[list[str], Any]:
     """Add the form that lowers the BIC on the fitted trials most, until none does."""
     from palpate.core.gap.fitting.least_squares import fit
     from palpate.core.gap.selection.candidates import candidates
-    from palpate.core.gap.selection.score_test import ScoreTest
+    from palpate.core.gap.selection.rao_score import ScoreTest
     from palpate.core.gap.selection.screening import free_with, starting_points
     from palpate.core.gap.selection.view_set import view_set_of
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -72,7 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--begin", action="store_true", help="read the scenes and freeze the study, and compute no run yet")
     what.add_argument(
-        "--dry-run", action="store_true", help="estimate time and size of all runs from five of them, and keep nothing"
+        "--dry-run", action="store_true", help="estimate time and size of all runs from some of them, and keep nothing"
     )
     what.add_argument(
         "--status", action="store_true", help="show the progress of the study in the folder, which may be running"
@@ -86,6 +87,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     from ..api.study import require_studies
 
+    began = time.perf_counter()
     require_studies()
     from ..sweep import studies
 
@@ -119,7 +121,9 @@ def run(arguments: argparse.Namespace) -> int:
             if arguments.begin:
                 print(f"{counted(len(opened.runs), 'run')} begun: {opened.folder}")
                 return 0
-            return _estimate(opened, arguments) if arguments.dry_run else _compute(opened, arguments)
+            if arguments.dry_run:
+                return _estimate(opened, arguments, time.perf_counter() - began)
+            return _compute(opened, arguments)
         finally:
             if arguments.dry_run and not was_begun:
                 study_folder.forget_study(folder)  # so that the study may still be changed
@@ -180,7 +184,8 @@ def _slurm(arguments: argparse.Namespace) -> Callable[[], Any] | None:
     return None if arguments.slurm is None else lambda: slurm.slurm_cluster(options, arguments.slurm)
 
 
-def _estimate(opened: OpenStudy, arguments: argparse.Namespace) -> int:
+def _estimate(opened: OpenStudy, arguments: argparse.Namespace, opening: float) -> int:
+    """Print what a study takes; it took `opening` seconds to read it."""
     from ..sweep.program import require_allowed
     from ..sweep.trial import try_runs
     from ..sweep.worker import Limits
@@ -194,7 +199,7 @@ def _estimate(opened: OpenStudy, arguments: argparse.Namespace) -> int:
     workers = _workers(arguments)
     own = None if arguments.slurm or arguments.scheduler else workers
     found = try_runs(opened.folder, opened.runs, Limits.of(opened.study), arguments.scripts, own)
-    seconds = found.seconds_of(len(opened.runs), workers)
+    seconds = opening + found.seconds_of(len(opened.runs), workers)
     print(f"{counted(len(opened.runs), 'run')}, {found.seconds:.3g} s and {_size(found.size)} each")
     size = _size(found.size * len(opened.runs))
     print(f"about {_duration(seconds)} with {counted(workers, 'worker')}, {size} in '{opened.folder}'")

@@ -3,7 +3,7 @@
 
 python examples/film.py [--out palpate.mp4] [--work DIR]
 
-It takes about twenty minutes on two cores. Renders in the work folder are used again, so a run that was stopped continues.
+It takes about twelve minutes on two cores. Renders in the work folder are used again, so a run that was stopped continues.
 The last chapter needs MuJoCo (pip install mujoco) and is left out without it.
 """
 
@@ -531,7 +531,8 @@ def main() -> None:
     with blender_output_hidden():
         film = make(Film(given.work.absolute(), given.height, given.every))
         film.bar.close()
-    print(encode_video(film.frames, given.out.absolute(), FPS), f"{len(film.frames) / FPS:.0f} s")
+        path = encode_video(film.frames, given.out.absolute(), FPS)
+    print(path, f"{len(film.frames) / FPS:.0f} s")
 
 
 if __name__ == "__main__":

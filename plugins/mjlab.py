@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -13,34 +13,13 @@ from ..core.geometry.mesh import TriangleMesh
 from ..core.geometry.shapes import Shape, box, capsule, plane, sphere
 from ..core.simulators.environment_parameters import Columns
 from ..core.simulators.sensor_on_mesh import SensorOnMesh
-from ..core.simulators.warp.engine import require_warp
-from ..core.simulators.warp.warp_sensors import WarpSensors
 from .engines import require_engine
+from .torch_sensors import TorchSensors, TouchData, sensor_of, wp
 
 require_engine("mjlab", "mjlab", (1, 6))
-wp: Any = require_warp()
 
 import mujoco  # noqa: E402  # the bases below are mjlab's, so it is needed to read this module
 from mjlab.sensor import Sensor, SensorCfg  # noqa: E402
-
-
-class TouchData(NamedTuple):
-    """What a sensor with n texels measures in E environments, as tensors of torch that share the sensor's memory.
-
-    Attributes
-    ----------
-    texels : (E, n, 3) torch.Tensor, N
-        Normal force, and shear along the texel's x and y axis.
-    readings : (E, n) torch.Tensor
-    contact : (E, n) torch.Tensor of bool
-    wrench : (E, T, 6) torch.Tensor, N and N·m
-        On each target in the world, about the origin of its geom.
-    """
-
-    texels: Any
-    readings: Any
-    contact: Any
-    wrench: Any
 
 
 @dataclass
@@ -83,8 +62,7 @@ class TouchSensor(Sensor[TouchData]):
 
     def __init__(self, cfg: TouchSensorCfg):
         super().__init__()
-        if cfg.sensor is None:
-            raise ParameterError(f"The sensor '{cfg.name}' has no texels: give `sensor`, as palpate.read_sensor returns it.")
+        sensor_of(cfg.name, cfg.sensor)
         self.cfg = cfg
 
     def edit_spec(self, scene_spec: Any, entities: dict[str, Any]) -> None:
@@ -101,25 +79,18 @@ class TouchSensor(Sensor[TouchData]):
         body = _index(mj_model, mujoco.mjtObj.mjOBJ_BODY, "body", self.cfg.body)
         geoms = [_index(mj_model, mujoco.mjtObj.mjOBJ_GEOM, "geom", name) for name in self.cfg.geoms]
         targets = [_shape(mj_model, geom) for geom in geoms]
-        assert self.cfg.sensor is not None
-        step, worlds = float(mj_model.opt.timestep), int(data.nworld)
-        options = str(wp.get_device(device)), self.cfg.single, self.cfg.parameters
-        self._sensors = WarpSensors(self.cfg.sensor, targets, step, worlds, *options)
-        self._data, self._body, self._step = getattr(data, "struct", data), body, step
+        cfg, step = self.cfg, float(mj_model.opt.timestep)
+        sensor = sensor_of(cfg.name, cfg.sensor)
+        self._touch = TorchSensors(cfg.name, sensor, targets, step, int(data.nworld), device, cfg.single, cfg.parameters)
+        self._sensors = self._touch.sensors
+        self._data, self._body = getattr(data, "struct", data), body
         self._geoms = wp.array(geoms, dtype=int, device=device)
         self._bodies = wp.array([int(mj_model.geom_bodyid[geom]) for geom in geoms], dtype=int, device=device)
-        arrays = self._sensors.texels, self._sensors.readings, self._sensors.contact, self._sensors.wrench
-        self._tensors = TouchData(*(wp.to_torch(one) for one in arrays))
 
     def reset(self, env_ids: Any = None) -> None:
         """Let environments begin again with their next step."""
         super().reset(env_ids)
-        if env_ids is None:
-            self._sensors.reset()
-            return
-        mask = self._tensors.contact.new_zeros(len(self._sensors))
-        mask[env_ids] = True
-        self._sensors.reset(wp.from_torch(mask, dtype=wp.bool))
+        self._touch.reset(env_ids)
 
     def update(self, dt: float) -> None:
         """Go on by one step of the simulation, to its present poses.
@@ -130,11 +101,7 @@ class TouchSensor(Sensor[TouchData]):
             `dt` is not the timestep of the model.
         """
         super().update(dt)
-        if abs(dt - self._step) > 1e-9 * self._step:
-            raise ParameterError(
-                f"'{self.cfg.name}' is updated after {dt:g} s, and the model's timestep is {self._step:g} s: "
-                "update the scene after each step."
-            )
+        self._touch.check_step(dt)
         from . import mjlab_kernels as kernels
 
         d, e = self._data, len(self._sensors)
@@ -147,7 +114,7 @@ class TouchSensor(Sensor[TouchData]):
             wp.launch(kernels.write_wrenches, dim=e, inputs=inputs, device=self._sensors.device)
 
     def _compute_data(self) -> TouchData:
-        return self._tensors
+        return self._touch.data
 
 
 def _index(mj_model: Any, kind: Any, what: str, name: str) -> int:

@@ -108,7 +108,8 @@ def compute_run(scenes: Scenes, run: Run, place: Path) -> None:
         place_run(place, run, lambda own: found.run(values, own), time.perf_counter)
         return
     scenario = scenes.scenario(run.scene, values)
-    recording = Simulation(scenario, threads=1, shared=scenes.shared).advance_all()
+    # Only the files of a recording say the digest of their scenario.
+    recording = Simulation(scenario, threads=1, shared=scenes.shared).advance_all(with_digest=scenes.study.has_folders)
     made: Press | None = plan.press
     if made is not None:
         start = f"{PRESS}."

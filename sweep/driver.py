@@ -106,7 +106,11 @@ def dask_client(scheduler: str | None, workers: int, make_cluster: Callable[[], 
     own = [name for name in logging.root.manager.loggerDict if name.startswith("distributed.")]  # some have levels of their own
     for name in ("distributed", "asyncio", "tornado", *own):
         logging.getLogger(name).setLevel(logging.CRITICAL)
-    settings = {"distributed.scheduler.allowed-failures": MOST_LOSSES, "distributed.logging.distributed": "critical"}
+    settings = {
+        "distributed.scheduler.allowed-failures": MOST_LOSSES,
+        "distributed.logging.distributed": "critical",
+        "distributed.worker.profile.enabled": False,  # it would look a hundred times a second where a worker waits
+    }
     with dask.config.set(settings), tempfile.TemporaryDirectory(prefix="palpate-dask-") as scratch:
         if scheduler is not None:
             try:

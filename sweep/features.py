@@ -291,7 +291,7 @@ def _frame_rate(times: np.ndarray) -> float:
 def _narrowed(too_large: str, feature: Feature, values: np.ndarray) -> np.ndarray:
     """Return the values in the type that the dataset stores."""
     narrow = np.ascontiguousarray(values, dtype=feature.dtype)
-    if feature.dtype != "bool" and narrow.size and not np.isfinite((narrow.min(), narrow.max())).all():
+    if feature.dtype != "bool" and narrow.size and not math.isfinite(float(narrow.max()) - float(narrow.min())):
         bits = feature.dtype.removeprefix("float")
         raise FileError(f"A number of '{feature.name}' has no place in {bits} bits, {too_large}")
     return narrow

@@ -24,8 +24,8 @@ OPTIONS: dict[str, type] = {
     "python": str,
 }
 """Words of ``--slurm-option``, which are those of dask-jobqueue."""
-DEFAULTS: dict[str, Any] = {"cores": 1, "memory": "2GB", "walltime": "01:00:00"}
-"""Of a job, where neither the command nor Dask's file says otherwise."""
+DEFAULTS: dict[str, Any] = {"cores": 1, "memory": "2GB"}
+"""Of a job, where neither the command nor Dask's file says otherwise; half an hour is dask-jobqueue's own."""
 
 
 def options_of(words: list[str]) -> dict[str, Any]:
@@ -52,9 +52,7 @@ def options_of(words: list[str]) -> dict[str, Any]:
 def job_script(options: Mapping[str, Any]) -> str:
     """Return the script that SLURM would get for each job; ``SCHEDULER`` stands for the driver's address."""
     _require()
-    from dask_jobqueue.slurm import SLURMJob
-
-    return str(SLURMJob(scheduler="SCHEDULER", name="palpate", **_words(options)).job_script())
+    return str(_job()(scheduler="SCHEDULER", name="palpate", **_words(options)).job_script())
 
 
 def slurm_cluster(options: Mapping[str, Any], jobs: int) -> Any:
@@ -72,7 +70,7 @@ def slurm_cluster(options: Mapping[str, Any], jobs: int) -> Any:
         raise PalpateError("This machine has no sbatch: give the command on a login node of the cluster, or leave --slurm out.")
     from dask_jobqueue import SLURMCluster
 
-    cluster = SLURMCluster(scheduler_options={"dashboard_address": None}, **_words(options))
+    cluster = SLURMCluster(job_cls=_job(), scheduler_options={"dashboard_address": None}, **_words(options))
     cluster.scale(jobs=jobs)
     return cluster
 
@@ -84,8 +82,17 @@ def _words(options: Mapping[str, Any]) -> dict[str, Any]:
     known = dask.config.get("jobqueue.slurm", {}) or {}
     merged = {name: value for name, value in DEFAULTS.items() if known.get(name) is None} | dict(options)
     cores = merged.get("cores", known.get("cores"))
-    # The runs are computed in processes of their own, so Dask must not end a worker for its memory; SLURM watches over the job.
-    return {"job_name": "palpate", "processes": cores, **merged, "worker_extra_args": ["--memory-limit", "0"]}
+    return {"job_name": "palpate", "processes": cores, **merged}
+
+
+def _job() -> Any:
+    """Return the class of a job in which Dask ends no worker for its memory.
+
+    The runs are computed in processes of their own, and SLURM watches over the job.
+    """
+    from dask_jobqueue.slurm import SLURMJob
+
+    return type("Job", (SLURMJob,), {"worker_process_memory": 0})
 
 
 def _require() -> None:

@@ -17,7 +17,9 @@ from .driver import dask_client
 from .scene_evaluation import REFUSE
 from .worker import Limits, compute_batch, end_children
 
-RUNS_TRIED = 5
+RUNS_TRIED, QUICK_RUNS, QUICK_SECONDS = 5, 50, 0.5
+"""Runs that are computed, and so many where that takes no longer than half a second: what the dataset takes for each of five
+short ones is lost in the noise."""
 
 
 @dataclass(frozen=True)
@@ -69,9 +71,6 @@ def try_runs(folder: Path, runs: Sequence[Run], limits: Limits, scripts: str = R
     workers : int, optional
         Of this machine, which are started to see how long that takes. None: there are others.
     """
-    step = max(1, len(runs) // RUNS_TRIED)
-    tried = runs[::step][:RUNS_TRIED]
-    chosen = [asdict(run) for run in tried]
     start = 0.0 if workers is None else _seconds_of(lambda: _start_workers(min(workers, len(runs))))
     with tempfile.TemporaryDirectory(prefix="palpate-sweep-") as name:
         trial = Path(name)
@@ -80,15 +79,19 @@ def try_runs(folder: Path, runs: Sequence[Run], limits: Limits, scripts: str = R
         shutil.copytree(folder / SCENES, trial / SCENES, dirs_exist_ok=True)
         try:
             began = time.perf_counter()
-            first = compute_batch(name, chosen[:1], limits, scripts)  # the first run loads what was compiled
-            start += time.perf_counter() - began - first[0]["seconds"]
-            closing, one = _seconds_to_close(trial, tried[:1])
+            (first,) = compute_batch(name, [asdict(runs[0])], limits, scripts)  # the first run loads what was compiled
+            start += time.perf_counter() - began - first["seconds"]
+            closing, one = _seconds_to_close(trial, runs[:1])
             shutil.rmtree(trial / RUNS)
             make_folders(trial)
-            answers = compute_batch(name, chosen, limits, scripts)
+            tried = _spread(runs, RUNS_TRIED)
+            answers = compute_batch(name, [asdict(run) for run in tried], limits, scripts)
+            quick = int(QUICK_SECONDS * len(answers) / max(1e-3, sum(answer["seconds"] for answer in answers)))
+            more = [run for run in _spread(runs, min(quick, QUICK_RUNS)) if run not in tried] if quick > RUNS_TRIED else []
+            answers += compute_batch(name, [asdict(run) for run in more], limits, scripts)
         finally:
             end_children()
-        _, several = _seconds_to_close(trial, tried)
+        _, several = _seconds_to_close(trial, [*tried, *more])
         written = sum(file.stat().st_size for file in (trial / RUNS).rglob("*") if file.is_file())
     failures = [answer["sentence"] for answer in answers if "sentence" in answer]
     done = max(1, len(answers) - len(failures))
@@ -97,10 +100,15 @@ def try_runs(folder: Path, runs: Sequence[Run], limits: Limits, scripts: str = R
     return Estimate(seconds, written / done, failures, len(answers), start, closing, each)
 
 
-def _seconds_of(work: Callable[[], object]) -> float:
-    began = time.perf_counter()
+def _spread(runs: Sequence[Run], count: int) -> Sequence[Run]:
+    """Return so many runs, or all, from the whole study."""
+    return runs[:: max(1, len(runs) // count)][:count]
+
+
+def _seconds_of(work: Callable[[], object], clock: Callable[[], float] = time.perf_counter) -> float:
+    began = clock()
     work()
-    return time.perf_counter() - began
+    return clock() - began
 
 
 def _start_workers(count: int) -> None:
@@ -111,7 +119,8 @@ def _start_workers(count: int) -> None:
 def _seconds_to_close(folder: Path, runs: Sequence[Run]) -> tuple[float, float]:
     """Return the seconds of dataset and report, and those of the dataset when it is written once more; 0 where no run is done.
 
-    The first time includes what Python loads for them, as it does in a study.
+    The first time includes what Python loads for them, as it does in a study. The second one is the processor's, since other
+    programs on the machine would be multiplied by the number of runs.
     """
     from .dataset import publish
     from .report import write_report
@@ -119,7 +128,7 @@ def _seconds_to_close(folder: Path, runs: Sequence[Run]) -> tuple[float, float]:
     if not done_runs(folder):
         return 0.0, 0.0
     whole = _seconds_of(lambda: publish(folder, runs)) + _seconds_of(lambda: write_report(folder, runs))
-    return whole, min(_seconds_of(lambda: publish(folder, runs)) for _ in range(2))
+    return whole, min(_seconds_of(lambda: publish(folder, runs), time.process_time) for _ in range(2))
 
 
 def count_of_cores() -> int:

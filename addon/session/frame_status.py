@@ -35,7 +35,7 @@ _statuses: dict[int, FrameStatus] = {}
 
 def status_of(scene) -> FrameStatus:
     """Return what is known about a scene's present frame; fast enough to be called while drawing."""
-    return _statuses.get(scene.session_uid, FrameStatus("Not computed: go to the first frame and play."))
+    return _statuses.get(scene.session_uid, FrameStatus("Not computed: play from the first frame."))
 
 
 def set_status(scene, text: str, frame: Frame | None = None, step: str = "", warnings: str = "") -> None:

@@ -126,7 +126,7 @@ def _not_computed(scene, run) -> str:
     if run is not None:
         return f"Frame {frame} is not computed: play from frame {run.simulation.frame}, or use Compute to Here."
     reason = _errors.get(scene.session_uid)
-    return reason or f"Frame {frame} is not computed: go to the first frame and play, or use Compute to Here."
+    return reason or f"Frame {frame} is not computed: play from the first frame, or use Compute to Here."
 
 
 def missing_frames(scene) -> range:

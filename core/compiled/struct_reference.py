@@ -12,8 +12,10 @@ registers.
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import operator
+import sys
 from functools import cached_property
 from typing import Any, TypeVar, cast
 
@@ -123,10 +125,24 @@ else:
             c.pyapi.decref(answer)
         return NativeValue(builder.load(pointer), is_error=failed)
 
+    def _has_pointer_behind_head(array: np.ndarray) -> bool:
+        return _pointer_at(id(array) + object.__basicsize__) == array.ctypes.data
+
+    def _pointer_at(address: int) -> int:
+        return ctypes.c_ssize_t.from_address(address).value
+
+    _QUICK = sys.implementation.name == "cpython" and _has_pointer_behind_head(np.zeros(1))
+    """Whether the place of an array's numbers stands behind the head of its object, as numpy's C interface has it: asking for
+    it there takes a fifth of the time, and a run of a study asks for hundreds."""
+
+    def _data(array: np.ndarray) -> int:
+        """Return the address of an array's numbers."""
+        return _pointer_at(id(array) + object.__basicsize__) if _QUICK else array.ctypes.data
+
     def _written(value: Any) -> list[Any]:
         """Return the words that a field takes in compiled code."""
         if isinstance(value, np.ndarray):  # no reference is counted: the instance keeps its arrays
-            return [0, id(value), value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides]
+            return [0, id(value), value.size, value.itemsize, _data(value), *value.shape, *value.strides]
         if isinstance(value, tuple):
             return [cast(Any, value).address]
         return [operator.index(value)]

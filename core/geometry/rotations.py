@@ -12,19 +12,24 @@ from ..compiled.kernels import kernel, plain
 
 def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
     """Return the (…, 3, 3) rotation matrices of (…, 4) unit quaternions (w, x, y, z)."""
-    w, x, y, z = np.moveaxis(np.asarray(quaternions, float), -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+    q = np.asarray(quaternions, float)
+    w, x, y, z = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
+    xx, yy, zz, xy, xz, yz, wx, wy, wz = x * x, y * y, z * z, x * y, x * z, y * z, w * x, w * y, w * z
+    rows = np.empty((3, 3, *np.shape(x)))
+    rows[0, 0], rows[0, 1], rows[0, 2] = 1 - 2 * (yy + zz), 2 * (xy - wz), 2 * (xz + wy)
+    rows[1, 0], rows[1, 1], rows[1, 2] = 2 * (xy + wz), 1 - 2 * (xx + zz), 2 * (yz - wx)
+    rows[2, 0], rows[2, 1], rows[2, 2] = 2 * (xz - wy), 2 * (yz + wx), 1 - 2 * (xx + yy)
+    return rows.transpose(*range(2, rows.ndim), 0, 1)
 
 
 def quaternion_product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Hamilton product of (…, 4) quaternions: first rotate by `b`, then by `a`."""
     parts = [own[..., i] for own in (np.asarray(a, float), np.asarray(b, float)) for i in range(4)]
-    return np.stack(plain(multiply)(*parts), axis=-1)
+    numbers = plain(multiply)(*parts)
+    product = np.empty((*np.shape(numbers[0]), 4))  # which takes half the time of np.stack
+    for i, number in enumerate(numbers):
+        product[..., i] = number
+    return product
 
 
 @kernel
@@ -44,6 +49,8 @@ def rotation_vectors(quaternions: np.ndarray) -> np.ndarray:
     """Logarithm of (…, 4) unit quaternions: the shorter way round, (…, 3) radians."""
     q = np.asarray(quaternions, float)
     q = np.where(q[..., :1] < 0, -q, q)
+    if not q[..., 1:].any():  # most bodies do not turn, and zeros keep their signs
+        return q[..., 1:] * 2.0
     sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
     angle = 2 * np.arctan2(sine, q[..., :1])
     factor = np.divide(angle, sine, out=np.full_like(sine, 2.0), where=sine > 1e-12)
@@ -53,7 +60,9 @@ def rotation_vectors(quaternions: np.ndarray) -> np.ndarray:
 def quaternions_from_vectors(vectors: np.ndarray) -> np.ndarray:
     """Exponential of (…, 3) rotation vectors (radians), (…, 4)."""
     vectors = np.asarray(vectors, float)
-    angle = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    if not vectors.any():
+        return np.concatenate([np.ones((*vectors.shape[:-1], 1)), vectors], axis=-1)
+    angle = np.sqrt(np.add.reduce(vectors * vectors, axis=-1, keepdims=True))
     return np.concatenate([np.cos(angle / 2), 0.5 * np.sinc(angle / (2 * np.pi)) * vectors], axis=-1)
 
 
@@ -75,12 +84,17 @@ def write_rotation(quaternion: np.ndarray, rotation: np.ndarray) -> None:
 
 
 @kernel
+def quaternion_of_vector(wx: float, wy: float, wz: float) -> tuple[float, float, float, float]:
+    """Exponential of a rotation vector (radians)."""
+    angle = math.sqrt(wx * wx + wy * wy + wz * wz)
+    s = 0.5 if angle < 1e-8 else math.sin(0.5 * angle) / angle
+    return math.cos(0.5 * angle), s * wx, s * wy, s * wz
+
+
+@kernel
 def rotate_quaternion(quaternion: np.ndarray, wx: float, wy: float, wz: float) -> None:
     """Turn `quaternion` in place by the rotation vector `w` (radians, world axes) and keep it of unit length."""
-    angle = math.sqrt(wx * wx + wy * wy + wz * wz)
-    c = math.cos(0.5 * angle)
-    s = 0.5 if angle < 1e-8 else math.sin(0.5 * angle) / angle
-    x, y, z = s * wx, s * wy, s * wz
+    c, x, y, z = quaternion_of_vector(wx, wy, wz)
     qw, qx, qy, qz = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     rw, rx, ry, rz = multiply(c, x, y, z, qw, qx, qy, qz)
     scale = 1.0 / math.sqrt(rw * rw + rx * rx + ry * ry + rz * rz)

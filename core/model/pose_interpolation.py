@@ -45,10 +45,15 @@ def poses_at(motion: Motion, times: np.ndarray, interpolation: str = "linear") -
 
 def _linear(motion: Motion, left: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     first = left.min(initial=len(motion.times))  # the times may be many between few samples
-    turn = _turns(motion, np.arange(first, left.max(initial=-1) + 1))[left - first]
+    samples = np.arange(first, left.max(initial=-1) + 1)
+    turn = _turns(motion, samples)
     start, end = motion.positions[left], motion.positions[left + 1]
-    turned = quaternion_product(quaternions_from_vectors(share * turn), motion.quaternions[left])
-    return start + share * (end - start), turned
+    positions = start + share * (end - start)
+    if turn.any():
+        turned = quaternion_product(quaternions_from_vectors(share * turn[left - first]), motion.quaternions[left])
+    else:  # a share of no turn is none
+        turned = quaternion_product(quaternions_from_vectors(turn), motion.quaternions[samples])[left - first]
+    return positions, turned
 
 
 def _smooth(motion: Motion, left: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -193,7 +193,11 @@ def _without_memory(effects: Sequence[Effect]) -> tuple[tuple[Effect, ...], tupl
 
 
 def mujoco_contact(
-    item: SensorOnMesh, depth: float | None = None, mass: float = REFERENCE_MASS, contacts: int = CONTACTS
+    item: SensorOnMesh,
+    depth: float | None = None,
+    mass: float = REFERENCE_MASS,
+    contacts: int = CONTACTS,
+    impedance: float | None = None,
 ) -> MujocoContact:
     """Return ``solref``, ``solimp`` and ``friction`` of a geom whose contact is nearest to that of a sensor.
 
@@ -206,6 +210,9 @@ def mujoco_contact(
         Of the load. MuJoCo's contact is proportional to it.
     contacts : int
         Which the load has with the geom: four for a box on its face, one for a ball.
+    impedance : float, optional
+        The same at all depths, so that the contact is a linear spring. Default: the sigmoid that is nearest, up to
+        LARGEST_IMPEDANCE.
 
     Raises
     ------
@@ -215,7 +222,8 @@ def mujoco_contact(
     if not (0.0 < mass < np.inf and contacts >= 1):
         raise ParameterError(f"The load has {mass:g} kg and {contacts} contacts: give more than 0 kg and one contact at least.")
     curve = force_curve(item, depth)
-    solimp, load = _fitted_impedance(curve), mass * contacts
+    constant = None if impedance is None else (impedance, impedance, float(curve.depth[-1]), 0.5, 2.0)
+    solimp, load = constant or _fitted_impedance(curve), mass * contacts
     spring, damper = load * _spring(curve.depth, solimp), load * _damper(curve.depth, solimp)
     stiffness, damping = _best_factor(spring, curve.force), _best_factor(damper, curve.damping)
     mus = float(item.sensor.parameters.mus)

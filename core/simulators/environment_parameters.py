@@ -50,6 +50,8 @@ def _names(sensor: Sensor) -> list[str]:
     names = [p.name for p in numbers_of(SENSOR_PARAMETERS) if p.name not in SHARED]
     for item in sensor.effects:
         form = registry.form_of(item.name, item.form)
+        if form.placement is not None:  # where texels are is the same everywhere
+            continue
         names += [f"effect.{item.name}.{key}" for key in (*(p.name for p in form.parameters), "seed")]
     return list(dict.fromkeys(names))
 

@@ -2,12 +2,10 @@
 """Steps in which the load is given: how far the target must be displaced for the texels to carry it.
 
 Engines with rigid contact report a wrench and no penetration. The displacement of the target from the engine's pose is found at
-which the contact exerts this wrench, by Levenberg and Marquardt's method (Marquardt 1963) with Broyden's update (Broyden 1965)
-of a Jacobian from differences. A trial is a whole step, from the state at the step's beginning, so that damping, friction and
-effects are those of the motion that is kept. Damping jumps where a texel touches in motion (not with Hunt and Crossley's law).
-A load within such a jump is balanced up to the jump, and the next step goes on from there; where nothing touches yet, from just
-short of touching. All environments go through the
-method together, and none affects another.
+which the contact exerts this wrench (see :mod:`.load_search`). A trial is a whole step, from the state at the step's beginning,
+so that damping, friction and effects are those of the motion that is kept. Damping jumps where a texel touches in motion (not
+with Hunt and Crossley's law). A load within such a jump is balanced up to the jump, and the next step goes on from there; where
+nothing touches yet, from just short of touching. All environments go through the method together, and none affects another.
 """
 
 from __future__ import annotations
@@ -16,26 +14,12 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..compiled.kernels import kernel
 from ..errors import ParameterError
-from ..geometry.rotations import quaternion_product, quaternions_from_vectors, rotation_matrices
+from ..geometry.rotations import rotation_matrices
 from ..solver.pressed_model import PressedModel
 from ..solver.pressing import Environment, PressedTexels, begin_at, stacked_states
-
-TOLERANCE = 1e-9
-"""Difference between load and contact at which the search ends, relative to the load; for torques, over the sensor's radius of
-gyration. A thousandth of what is promised, which two or three trials more reach, as convergence is faster than linear."""
-SMALLEST_LOAD = 1e-3
-"""Newtons: below it the tolerance is absolute, as rounding of the pressed-in depth is."""
-DIFFERENCE = 1e-6
-"""Step of the differences, relative to the maximum penetration: far above rounding, far below a texel's depth."""
-TRIALS, HALVINGS = 60, 12
-"""Most steps of the search, and of the approach where nothing touches. Contacts that are released one by one took up to 30."""
-BISECTIONS = 24
-"""Halvings of the way to where a target touches; they leave less than 1e-9 m of a maximum penetration of some millimetres."""
-ENOUGH, SLOW = 1e-4, 0.3
-"""A trial is accepted if the difference falls by this share. Unless it falls to SLOW, the Jacobian is computed again."""
-LEAST_DAMPING, DAMPING_FACTOR, MOST_DAMPING = 1e-12, 10.0, 1e4
-"""Of Levenberg and Marquardt's method, relative to the mean square of the Jacobian's columns."""
+from .load_search import DONE, PHASE, LoadSearch, advance_search, begin_search, forget_load, place_trial, residual
 
 
 class LoadBalance:
@@ -62,26 +46,19 @@ class LoadBalance:
     """
 
     def __init__(self, model: PressedModel, out: PressedTexels, environments: list[Environment], press: Callable[[], None]):
-        if out.wrench.shape[1] != 1:
-            raise ParameterError(
-                f"A wrench is given for {out.wrench.shape[1]} targets: make a sensor for each target whose load is given."
-            )
-        count, texels = len(environments), model.sensor.texels
-        self._out, self._environments, self._run = out, environments, press
-        offset, normal = texels.position - texels.position.mean(axis=0), texels.normal.mean(axis=0)
-        self._normal = normal / max(float(np.linalg.norm(normal)), 1e-300)
-        self._radius = float(np.sqrt((offset**2).sum(axis=1).mean()))
-        self._limit = model.sensor.parameters.max_penetration
+        check_targets(out.wrench.shape[1])
+        count = len(environments)
+        self._out, self._environments, self._press = out, environments, press
+        self._search = LoadSearch.of(model.sensor.texels, model.sensor.parameters.max_penetration, count)
+        self._engine, self._rotation, self._residual = np.zeros((count, 7)), np.zeros((count, 3, 3)), np.zeros((count, 6))
         self._states = stacked_states(environments)
         self._saved = [np.empty_like(field) for field in self._states]
-        self._jacobian = np.zeros((count, 6, 6))
-        self._known = np.zeros((count, 6), bool)  # by degrees of freedom, less one
-        self.displacement = np.zeros((count, 6))
+        self.displacement = self._search.at
 
     def forget(self, chosen: np.ndarray) -> None:
         """Put the targets of some environments (E,) back to the engine's poses."""
-        self.displacement[chosen] = 0.0
-        self._known[chosen] = False
+        for number in np.flatnonzero(chosen):
+            forget_load(int(number), self._search)
 
     def step(self, wrench: np.ndarray) -> np.ndarray:
         """Run one step under a load, and return the part of it that the contact does not exert.
@@ -97,7 +74,7 @@ class LoadBalance:
         -------
         residual : (E, m) float, N and N·m
         """
-        out = self._out
+        out, degrees = self._out, wrench.shape[1]
         whole = np.isfinite(wrench).all(axis=1) & np.isfinite(out.poses).all(axis=(1, 2))
         whole &= (out.poses[:, :, 3:] != 0.0).any(axis=2).all(axis=1)
         out.poses[~whole] = np.nan
@@ -107,213 +84,58 @@ class LoadBalance:
         out.begins[whole] = False
         for copy, field in zip(self._saved, self._states, strict=True):
             np.copyto(copy, field)
-        search = _Search(self, whole, np.where(whole[:, None], wrench, 0.0))
-        found = search.run()
-        self.displacement[whole] = found[whole]
-        return search.residual()
-
-    def directions(self, degrees: int, poses: np.ndarray) -> np.ndarray:
-        """Return the displacements (E, 6, m) that belong to the components of the load, rotations per radius."""
-        count = len(poses)
-        basis = np.zeros((count, 6, degrees))
-        if degrees == 1:
-            basis[:, :3, 0] = rotation_matrices(poses[:, 0, 3:]) @ self._normal
-            return basis
-        basis[:, np.arange(degrees), np.arange(degrees)] = 1.0
-        basis[:, 3:] /= self._radius
-        return basis
-
-    def press(self, engine: np.ndarray, displacement: np.ndarray) -> np.ndarray:
-        """Run the step with the target displaced from the engine's poses (E, 7), and return the wrench on it (E, 6)."""
-        out = self._out
-        for copy, field in zip(self._saved, self._states, strict=True):
-            np.copyto(field, copy)
-        out.poses[:, 1, :3] = engine[:, :3] + displacement[:, :3]
-        out.poses[:, 1, 3:] = quaternion_product(quaternions_from_vectors(displacement[:, 3:]), engine[:, 3:])
-        self._run()
-        return out.wrench[:, 0].copy()
-
-    @property
-    def limit(self) -> float:
-        """Longest way to the contact, and largest rotation times `radius`, metres.
-
-        A displacement may be longer by two radii, as soft bristles yield by more than they are pressed in.
-        """
-        return self._limit
-
-    @property
-    def radius(self) -> float:
-        """Radius of gyration of the texels, metres."""
-        return self._radius
-
-    def touching(self) -> np.ndarray:
-        """(E,) bool: a texel exerts a force after the step that was run last."""
-        return (self._out.texels[:, :, 0] > 0.0).any(axis=1)
-
-    def poses(self) -> np.ndarray:
-        """(E, 2, 7) float: the engine's poses, a copy."""
-        return self._out.poses.copy()
-
-    def jacobian(self, degrees: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the Jacobians (E, m, m) of the step before, to be overwritten, and which of them are known (E,)."""
-        return self._jacobian[:, :degrees, :degrees], self._known[:, degrees - 1]
-
-    def keep_known(self, degrees: int, known: np.ndarray) -> None:
-        """Note for which environments (E,) the Jacobian was written; it holds for this number of degrees of freedom."""
-        self._known[:] = False
-        self._known[:, degrees - 1] = known
+        np.copyto(self._engine, out.poses[:, 1])
+        quaternion = out.poses[whole, 0, 3:]
+        self._rotation[whole] = rotation_matrices(quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True))
+        self._search.given[:, :degrees] = wrench
+        _begin_searches(degrees, whole, self._rotation, self._engine, out.poses, self._search)
+        going = True
+        while going:
+            for copy, field in zip(self._saved, self._states, strict=True):
+                np.copyto(field, copy)
+            self._press()
+            going = _advance_searches(out.wrench, out.texels, self._engine, out.poses, self._search)
+        _write_residuals(self._residual, self._search)
+        return self._residual[:, :degrees].copy()
 
 
-class _Search:
-    """The search of one step."""
+def check_targets(count: int) -> None:
+    """Raise :class:`.ParameterError` unless there is one target."""
+    if count != 1:
+        raise ParameterError(f"A wrench is given for {count} targets: make a sensor for each target whose load is given.")
 
-    def __init__(self, balance: LoadBalance, whole: np.ndarray, wrench: np.ndarray):
-        self._balance, self._whole, degrees = balance, whole, wrench.shape[1]
-        poses = balance.poses()
-        self._engine = poses[:, 1]
-        poses[~whole] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
-        self._basis = balance.directions(degrees, poses)
-        self._scale = np.ones(degrees)
-        self._scale[3:] = balance.radius
-        self._load = wrench / self._scale
-        self._tolerance = TOLERANCE * np.maximum(np.linalg.norm(self._load, axis=1), SMALLEST_LOAD)
-        self._jacobian, known = balance.jacobian(degrees)
-        self._known = known.copy()
-        self._at = np.where((self._load != 0.0).any(axis=1)[:, None], balance.displacement, 0.0)
-        self._last = self._at
-        self._least_push, self._touching = np.full(len(whole), np.inf), self._at  # where the contact exerts least of the load
-        self._excess = self._evaluate(self._at)
 
-    def run(self) -> np.ndarray:
-        """Return the displacements (E, 6) at which the state and what is measured are now."""
-        searched = self._approach()
-        stuck = ~searched
-        damping = np.full(len(stuck), LEAST_DAMPING)
-        fresh = np.zeros(len(stuck), bool)
-        for _ in range(TRIALS):
-            size = np.linalg.norm(self._excess, axis=1)
-            active = ~stuck & (size > self._tolerance)
-            if not active.any():
-                break
-            fresh |= self._differentiate(active & ~self._known)
-            trial = np.where(active[:, None], self._bounded(self._at + self._step(damping, active)), self._at)
-            excess = self._evaluate(trial)
-            after = np.linalg.norm(excess, axis=1)
-            better = active & (after < (1.0 - ENOUGH) * size)
-            worse = active & ~better
-            self._update(active, trial, excess)
-            self._at = np.where(better[:, None], trial, self._at)
-            self._excess = np.where(better[:, None], excess, self._excess)
-            stuck |= worse & fresh & (damping > MOST_DAMPING)
-            damping = np.where(worse & fresh, np.maximum(1e-6, damping * DAMPING_FACTOR), damping)
-            damping = np.where(better, np.maximum(damping / DAMPING_FACTOR, LEAST_DAMPING), damping)
-            self._known &= ~((worse & ~fresh) | (better & (after > SLOW * size)))
-            fresh &= ~better & self._known
-        self._balance.keep_known(self._load.shape[1], self._known & searched)
-        if not np.array_equal(self._last, self._at):
-            self._excess = self._evaluate(self._at)
-        lost = self._whole & (self._load != 0.0).any(axis=1) & ~self._balance.touching() & (self._at != 0.0).any(axis=1)
-        if lost.any():
-            self._retreat(lost)
-        return self._at
+@kernel
+def _begin_searches(
+    degrees: int, whole: np.ndarray, rotation: np.ndarray, engine: np.ndarray, poses: np.ndarray, search: LoadSearch
+) -> None:
+    """Begin in the environments of a mask (E,), and write the poses of the first trials."""
+    for e in range(whole.shape[0]):
+        if whole[e]:
+            begin_search(e, degrees, rotation[e], search)
+            place_trial(e, engine[e], poses[e, 1], search)
 
-    def residual(self) -> np.ndarray:
-        """Return the load less what the contact exerts, (E, m), N and N·m."""
-        return -self._excess * self._scale
 
-    def _retreat(self, lost: np.ndarray) -> None:
-        """Put targets that found no contact for their load where the next search begins.
+@kernel
+def _advance_searches(
+    wrench: np.ndarray, texels: np.ndarray, engine: np.ndarray, poses: np.ndarray, search: LoadSearch
+) -> bool:
+    """Go on after a trial, write the poses of the next trials, and return whether there is one."""
+    going = False
+    for e in range(engine.shape[0]):
+        if search.state[e, PHASE] != DONE:
+            touching = False
+            for texel in range(texels.shape[1]):
+                touching |= texels[e, texel, 0] > 0.0
+            advance_search(e, wrench[e, 0], touching, search)
+            place_trial(e, engine[e], poses[e, 1], search)
+            going |= search.state[e, PHASE] != DONE
+    return going
 
-        Where the contact would exert more as soon as it touches, as damping jumps there, this is just short of touching: the
-        next step then begins there, at rest, and has no such jump. Elsewhere it is the engine's pose.
-        """
-        jumps = lost & np.isfinite(self._least_push)
-        away, touching = np.where(jumps[:, None], self._at, 0.0), self._touching
-        for _ in range(BISECTIONS if jumps.any() else 0):
-            middle = np.where(jumps[:, None], 0.5 * (away + touching), self._at)
-            self._evaluate(middle)
-            met = (jumps & self._balance.touching())[:, None]
-            away, touching = np.where(met, away, middle), np.where(met, middle, touching)
-        self._at = np.where(lost[:, None], np.where(jumps[:, None], away, 0.0), self._at)
-        self._excess = self._evaluate(self._at)
 
-    def _evaluate(self, displacement: np.ndarray) -> np.ndarray:
-        """Run a trial, and return what the contact exerts more than the load, (E, m), N; torques over the radius."""
-        self._last = displacement
-        wrench = self._balance.press(self._engine, displacement)
-        given = np.matmul(wrench[:, None], self._basis)[:, 0]
-        push = np.sum(given * self._load, axis=1)
-        # The least, not the last: which trials come last depends on the other environments.
-        less = self._balance.touching() & (push > 0.0) & (push < self._least_push)
-        self._touching = np.where(less[:, None], displacement, self._touching)
-        self._least_push = np.where(less, push, self._least_push)
-        return np.where(self._whole[:, None], given - self._load, 0.0)
-
-    def _bounded(self, displacement: np.ndarray) -> np.ndarray:
-        """Shorten displacements, and rotations, to what is allowed."""
-        bounded = displacement.copy()
-        turn, way = self._balance.limit / self._balance.radius, self._balance.limit + 2.0 * self._balance.radius
-        for part, most in ((bounded[:, :3], way), (bounded[:, 3:], turn)):
-            part *= most / np.maximum(np.linalg.norm(part, axis=1, keepdims=True), most)
-        return bounded
-
-    def _approach(self) -> np.ndarray:
-        """Move targets that should be in contact, and are not, against the load until they are.
-
-        Returns
-        -------
-        searched : (E,) bool
-        """
-        loaded = self._whole & (np.linalg.norm(self._excess, axis=1) > self._tolerance)
-        away = loaded & ~self._balance.touching()
-        if not away.any():
-            return loaded
-        size = np.linalg.norm(self._load[:, :3], axis=1, keepdims=True)
-        force = np.matmul(self._basis[:, :3, :3], self._load[:, :3, None])[:, :, 0]
-        against = np.zeros_like(self._at)
-        against[:, :3] = np.where(away[:, None], -force / np.maximum(size, 1e-300), 0.0)
-        open_ = away.copy()
-        for halving in range(HALVINGS, -1, -1):
-            trial = self._bounded(against * (self._balance.limit * 0.5**halving))
-            trial = np.where(open_[:, None], trial, self._at)
-            excess = self._evaluate(trial)
-            met = open_ & self._balance.touching()
-            self._at, self._excess = np.where(met[:, None], trial, self._at), np.where(met[:, None], excess, self._excess)
-            open_ &= ~met
-            self._known &= ~met
-            if not open_.any():
-                break
-        self._at = np.where(open_[:, None], 0.0, self._at)
-        return loaded & ~open_
-
-    def _differentiate(self, chosen: np.ndarray) -> np.ndarray:
-        """Compute the Jacobian of some environments again; return them."""
-        if chosen.any():
-            small = DIFFERENCE * self._balance.limit
-            for column in range(self._jacobian.shape[2]):
-                aside = np.where(chosen[:, None], self._at + small * self._basis[:, :, column], self._at)
-                slope = (self._evaluate(aside) - self._excess) / small
-                self._jacobian[chosen, :, column] = slope[chosen]
-            self._known |= chosen
-        return chosen
-
-    def _step(self, damping: np.ndarray, active: np.ndarray) -> np.ndarray:
-        """Return the next step (E, 6) of Levenberg and Marquardt's method."""
-        jacobian = np.where(active[:, None, None], self._jacobian, np.eye(self._jacobian.shape[1]))
-        transposed = np.swapaxes(jacobian, 1, 2)
-        normal = transposed @ jacobian
-        mean = np.trace(normal, axis1=1, axis2=2) / normal.shape[1]
-        normal += (damping * mean + 1e-300)[:, None, None] * np.eye(normal.shape[1])
-        step = np.linalg.solve(normal, -(transposed @ self._excess[:, :, None]))
-        return np.nan_to_num(self._basis @ step, nan=0.0, posinf=0.0, neginf=0.0)[:, :, 0]
-
-    def _update(self, active: np.ndarray, trial: np.ndarray, excess: np.ndarray) -> None:
-        """Change the Jacobian so that it gives the difference that a trial made (Broyden 1965, his first method)."""
-        moved = trial - self._at
-        moved[:, 3:] *= self._balance.radius**2  # the basis has rotations per radius
-        step = np.matmul(moved[:, None], self._basis)[:, 0]
-        square = np.einsum("ei,ei->e", step, step)
-        usable = active & (square > 0.0)
-        missing = excess - self._excess - (self._jacobian @ step[:, :, None])[:, :, 0]
-        change = missing[:, :, None] * step[:, None, :] / np.where(usable, square, 1.0)[:, None, None]
-        self._jacobian += np.where(usable[:, None, None], change, 0.0)
+@kernel
+def _write_residuals(out: np.ndarray, search: LoadSearch) -> None:
+    """Write the part of each load that the contact does not exert."""
+    for e in range(out.shape[0]):
+        for i in range(6):
+            out[e, i] = residual(e, i, search)

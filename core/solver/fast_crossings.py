@@ -16,6 +16,7 @@ from ..compiled.kernels import kernel
 from ..geometry.rotations import rotation_matrices
 from ..model.scenario import Scenario
 from ..model.sensor import Sensor
+from ..model.shared_results import SharedResults
 from ..model.target import Target
 
 LARGEST_SHARE = 0.5
@@ -72,18 +73,20 @@ class FastCrossings:
     scenario : Scenario
     center : (b, 3) float, metres
         Point of each body, in its frame, whose path is given.
+    shared : SharedResults, optional
+        Of simulations.
     """
 
     CARRIED = ("_warned",)
 
-    def __init__(self, scenario: Scenario, center: np.ndarray):
+    def __init__(self, scenario: Scenario, center: np.ndarray, shared: SharedResults | None = None):
+        shared = shared or SharedResults()
         self._scenario, self._center = scenario, center
         radius = np.zeros(len(scenario.bodies))
         for body, points in [(t.body, t.mesh.vertices) for t in scenario.targets] + [
             (s.body, s.texels.position) for s in scenario.sensors
         ]:
-            reach = float(np.linalg.norm(points - center[body], axis=1).max())
-            radius[body] = max(radius[body], reach)
+            radius[body] = max(radius[body], shared.of(_reach, points, center[body].tobytes()))
         self._pairs = [(s, t) for s in scenario.sensors for t in scenario.targets if s.body != t.body]
         self._warned = np.zeros(len(self._pairs), np.bool_)
         self.limits = CrossingLimits(
@@ -148,6 +151,11 @@ class FastCrossings:
         start, move, along = start[near], move[near], along[near]
         enters = _entering(start, move, vertices[target.mesh.triangles])
         return float(along[enters].max(initial=0.0))
+
+
+def _reach(points: np.ndarray, center: bytes) -> float:
+    """Return the distance, m, of the farthest of (m, 3) points from a point, (3,) float as bytes."""
+    return float(np.linalg.norm(points - np.frombuffer(center), axis=1).max())
 
 
 def _limit_of(sensor: Sensor) -> float:

@@ -50,9 +50,9 @@ def build_model(
     first_unknown, drive_unknown, unknowns = number_unknowns(mode, drive_of)
     return SolverModel(
         bodies=_bodies(scenario, mode, first_unknown, unknowns),
-        sensors=_sensors(scenario, rows, first_point),
+        sensors=sensors_of(scenario, rows, first_point),
         points=_points(scenario, rows, points),
-        pairs=_pairs(scenario, first_point, shared),
+        pairs=pairs_of(scenario, first_point, shared),
         drives=_drives(scenario, drive_of, drive_unknown, gains),
         effects=step_program(scenario.sensors, dt),
     )
@@ -68,16 +68,22 @@ def texel_starts(scenario: Scenario) -> np.ndarray:
     return np.cumsum([0] + [len(sensor.texels) for sensor in scenario.sensors])
 
 
-def initial_state(scenario: Scenario, model: SolverModel, center: np.ndarray) -> State:
-    """Return the state at the first frame; keyframed bodies count as at rest until they move."""
+def start_poses(scenario: Scenario, center: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return (b, 3) positions, m, of the points of bodies that are followed, and (b, 4) quaternions, at the first frame."""
     quaternion = np.array([body.motion.quaternions[0] for body in scenario.bodies], dtype=float)
     origin = np.array([body.motion.positions[0] for body in scenario.bodies], dtype=float)
+    return origin + np.einsum("bij,bj->bi", rotation_matrices(quaternion), center), quaternion
+
+
+def initial_state(scenario: Scenario, model: SolverModel, center: np.ndarray) -> State:
+    """Return the state at the first frame; keyframed bodies count as at rest until they move."""
+    position, quaternion = start_poses(scenario, center)
     velocity = [
         np.concatenate([body.velocity, body.angular_velocity]) if body.free else np.zeros(6) for body in scenario.bodies
     ]
     slots = int((model.pairs.stop_point - model.pairs.first_point).sum())
     return State(
-        position=origin + np.einsum("bij,bj->bi", rotation_matrices(quaternion), center),
+        position=position,
         quaternion=quaternion,
         velocity=np.array(velocity, dtype=float),
         triangle=np.full(slots, NO_TRIANGLE),
@@ -103,7 +109,8 @@ def _bodies(scenario: Scenario, mode: np.ndarray, first_unknown: np.ndarray, unk
     )
 
 
-def _sensors(scenario: Scenario, rows: list[np.ndarray], first_point: np.ndarray) -> Sensors:
+def sensors_of(scenario: Scenario, rows: list[np.ndarray], first_point: np.ndarray) -> Sensors:
+    """Return the model's sensors, whose contact points have these rows of :attr:`.Points.frame`."""
     reach = [sensor.parameters.max_penetration for sensor in scenario.sensors]
     spheres = [bounding_sphere(block, length) for block, length in zip(rows, reach, strict=True)]
     return Sensors(
@@ -136,7 +143,8 @@ def _painted_multipliers(sensors: tuple[Sensor, ...], points: list[ContactPoints
     return np.ascontiguousarray(np.column_stack(columns), dtype=float)
 
 
-def _pairs(scenario: Scenario, first_point: np.ndarray, shared: SharedResults) -> Pairs:
+def pairs_of(scenario: Scenario, first_point: np.ndarray, shared: SharedResults) -> Pairs:
+    """Return the model's pairs; `first_point` is that of :class:`.Sensors`."""
     sensors, targets = scenario.sensors, scenario.targets
     parts = [  # sensor, target, first point, and the one after the last
         (i, j, first, min(first + MAX_PAIR_POINTS, first_point[i + 1]))

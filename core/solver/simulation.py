@@ -14,11 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from ..compiled.thread_team import helper_threads, make_queue
+from ..compiled.thread_team import helper_threads
 from ..effects.engine.sensor_effects import check_scenario, mounted_texels
-from ..geometry.bvh import Tree, build_tree
-from ..geometry.contact_points import contact_points
-from ..geometry.mesh import TriangleMesh, is_closed
 from ..geometry.rotations import quaternion_product, rotation_matrices, rotation_vectors, write_backward_step_motion
 from ..jobs.job_runner import run_job
 from ..jobs.progress import Job, Progress
@@ -29,22 +26,20 @@ from ..model.shared_results import SharedResults
 from ..response.readings import ReadoutChain
 from ..skins.channel_readouts import with_clipping_warnings
 from .detection.deformation import refit_boxes, set_moment
-from .detection.deforming_surfaces import DeformingSurfaces
-from .detection.detection_data import DetectionData, TargetShapes
+from .detection.detection_data import DetectionData
 from .detection.narrow_phase import count_too_deep
-from .detection.neighbour_lists import neighbour_lists_for
 from .dynamics.drive_commands import DriveCommands
 from .dynamics.modes import driven_bodies
 from .dynamics.passivity import credit_initial_contacts
 from .fast_crossings import FastCrossings, path_of_moved_bodies
 from .found_contacts import contacts_of
-from .model_builder import build_model, initial_state, texel_starts
+from .model_builder import texel_starts
 from .parallel_loops import find_all_contacts, help_with_loops, prepare_pair_loops
 from .solver_model import SolverModel, State
+from .structures import structures_for
 from .substep import FRAME, NOTHING, TEXELS, FramePath, ObservedFrames, Surroundings, advance_frames
 from .time_step_adviser import plan
 from .workspace import Workspace
-from .workspace_builder import workspace_for
 
 TEXEL_BYTES = 8 * 8
 """What a frame of a texel takes in memory: forces, friction, depth, slip, contact and reading."""
@@ -88,8 +83,8 @@ class Simulation:
     """What goes from frame to frame (see :mod:`.checkpoint`); all the rest follows from it and from the scenario."""
 
     def __init__(self, scenario: Scenario, threads: int | None = None, shared: SharedResults | None = None):
-        check_scenario(scenario)
         shared = shared or SharedResults()
+        shared.of(check_scenario, scenario)  # which a study has done
         self.scenario = scenario
         self.frame = scenario.frame_start
         chosen = plan(scenario)
@@ -99,31 +94,25 @@ class Simulation:
         self._known_path = NO_PATH
         # Bodies that forces move are followed at their centre of mass, keyframed ones at their origin.
         self._center = np.array([body.center_of_mass if body.moved_by_forces else np.zeros(3) for body in scenario.bodies])
-        self._tree, self._closed = _prepared_targets(scenario, self._center, shared)
-        points = [shared.of(contact_points, s.texels, s.parameters.points_per_texel) for s in scenario.sensors]
-        self._model = build_model(scenario, self._center, points, self.dt, shared)
-        self._deforming_surfaces = DeformingSurfaces(scenario, self._center, points, self._tree, self._model)
-        self._surface_motion = self._deforming_surfaces.at(np.zeros(1))
-        self._state = initial_state(scenario, self._model, self._center)
-        self._neighbour_lists = neighbour_lists_for(len(self._state.triangle), len(self._model.pairs.sensor))
-        queue, self._helpers = make_queue(len(self._state.triangle), threads)
-        self._workspace = workspace_for(self._model, self._state, self._surface_motion, queue)
+        found = structures_for(self, scenario, self._center, self.dt, threads, shared)
+        self._closed, self._model, self._deforming_surfaces = found.closed, found.model, found.deforming_surfaces
+        self._detection, self._state, self._workspace, self._helpers = (
+            found.detection,
+            found.state,
+            found.workspace,
+            found.helpers,
+        )
         # How many contact points of each pair were pressed too deep in the worst step of the last frame.
         self._most_too_deep = np.zeros(len(self._model.pairs.sensor), np.int64)
         self._readers = [ReadoutChain.of(sensor) for sensor in scenario.sensors]
         self._drive_commands = DriveCommands(scenario)
         self._texel_start = texel_starts(scenario)
-        self._shapes = TargetShapes.of([None] * len(scenario.targets))
-        self._detection: DetectionData | None = None
-        self._fast_crossings = FastCrossings(scenario, self._center)
+        self._fast_crossings = FastCrossings(scenario, self._center, shared)
         self._surroundings = Surroundings(np.array(self._closed, np.bool_), self._fast_crossings.limits)
 
     @property
     def arrays(self) -> tuple[SolverModel, DetectionData, State, Workspace]:
         """The structures that the kernels work on."""
-        parts = (self._tree, self._neighbour_lists, self._surface_motion, self._shapes)
-        if self._detection is None or any(now is not then for now, then in zip(parts, self._detection, strict=True)):
-            self._detection = DetectionData(*parts)
         arrays = self._model, self._detection, self._state, self._workspace
         prepare_pair_loops(*arrays)
         return arrays
@@ -180,17 +169,18 @@ class Simulation:
         self._advance(seen)
         return self._recorded(np.array([self.frame]), seen).at(self.frame)
 
-    def advance_all(self) -> Recording:
+    def advance_all(self, with_digest: bool = True) -> Recording:
         """Go through all frames that are left, and return the recording with the present frame as its first one.
 
         The numbers are those of :meth:`advance`, bit by bit. Where Python has nothing to do in between, many frames are
-        computed in one call.
+        computed in one call. The digest of the scenario is left out on request, because it takes a tenth of a short run.
         """
         parts = [self._advance_far(with_present=True)]
         while self.frame < self.scenario.frame_end:
             parts.append(self._advance_far(with_present=False))
         found = Recording.joined(parts) if len(parts) > 1 else parts[0]
-        found = replace(found, digest=self.scenario.digest(), warnings=tuple(self.warnings), step_reason=self.step_reason)
+        digest = self.scenario.digest() if with_digest else ""
+        found = replace(found, digest=digest, warnings=tuple(self.warnings), step_reason=self.step_reason)
         return with_clipping_warnings(found)
 
     def _advance_far(self, with_present: bool) -> Recording:
@@ -230,15 +220,16 @@ class Simulation:
             path = FramePath(positions, quaternions, velocities, commands)
             with helper_threads(self._workspace.queue, self._helpers, help_with_loops, *self.arrays):
                 self._run(steps, FRAME if steps[1] == self.substeps else NOTHING, path, seen)
-        too_deep = (seen.too_deep.any(axis=1) | seen.too_deep_between.any(axis=1)).tolist()
-        for i in range(count):
-            self.frame += 1
-            after = seen.position[i], seen.quaternion[i]
+        too_deep = seen.too_deep.any(axis=1) | seen.too_deep_between.any(axis=1)
+        for i in np.flatnonzero(seen.may_cross | too_deep).tolist():
+            self.frame = first + i + 1
             if seen.may_cross[i]:
-                self._warn_of_fast_crossings(positions[i], quaternions[i], before, after)
+                earlier = (seen.position[i - 1], seen.quaternion[i - 1]) if i else before
+                after = seen.position[i], seen.quaternion[i]
+                self._warn_of_fast_crossings(positions[i], quaternions[i], earlier, after)
             if too_deep[i]:
                 self._warn_of_too_deep(seen.too_deep[i], seen.too_deep_between[i])
-            before = after
+        self.frame = first + count
         self._most_too_deep = seen.too_deep_between[-1].copy()
 
     def _observe_first(self, seen: ObservedFrames) -> None:
@@ -264,7 +255,7 @@ class Simulation:
     def _place_deforming(self, times: np.ndarray) -> None:
         """Bring surfaces that deform to the frame whose steps are at these times, (steps + 1,) s."""
         if self._deforming_surfaces.any_deforms:
-            self._surface_motion = self._deforming_surfaces.at(times)
+            self._bring_surfaces(times)
             if self._drive_commands.reads_sensors:  # controllers read before the first step
                 self._place_surfaces(0, 1, 0.0)
 
@@ -322,7 +313,7 @@ class Simulation:
             contact=np.ascontiguousarray(seen.texels.contact[:, own]),
             reading=self._readings(i, times, force),
             net_force=net[:, :3].copy(),
-            net_torque=net[:, 3:] + np.cross(center, net[:, :3]),
+            net_torque=net[:, 3:] + _cross(center, net[:, :3]),
             centre_of_pressure=centre_of_pressure,
         )
         readout = self.scenario.sensors[i].channels
@@ -337,13 +328,18 @@ class Simulation:
         for velocity, motion in zip(self._state.velocity, self._workspace.bodies.step_motion, strict=True):
             write_backward_step_motion(velocity, self.dt, motion)
         if self._deforming_surfaces.any_deforms:
-            self._surface_motion = self._deforming_surfaces.at(self._step_times(self.frame - 1))
+            self._bring_surfaces(self._step_times(self.frame - 1))
             self._place_surfaces(self.substeps, self.substeps - 1, self.dt)
+
+    def _bring_surfaces(self, times: np.ndarray) -> None:
+        """Get the shapes of deforming surfaces between some times, (steps + 1,) s."""
+        self._detection = self._detection._replace(surfaces=self._deforming_surfaces.at(times))
 
     def _place_surfaces(self, now: int, other: int, dt: float) -> None:
         """Bring deforming surfaces to a moment of their present frame; the arguments are those of :func:`.set_moment`."""
-        refit_boxes(self._surface_motion, self._tree)
-        set_moment(now, other, dt, self._model, self._surface_motion)
+        surfaces = self._detection.surfaces
+        refit_boxes(surfaces, self._detection.tree)
+        set_moment(now, other, dt, self._model, surfaces)
 
     def _step_times(self, frames: int | np.ndarray) -> np.ndarray:
         """(…, substeps + 1) times at which the steps after frames (…) begin, and the last one ends, s."""
@@ -388,16 +384,19 @@ class Simulation:
     def _path_along(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Compute :meth:`_prescribed_motion` for F frames; `times` (F, steps + 1), s, are those of steps."""
         path = [poses_at(motion, times.ravel(), self.scenario.interpolation) for motion in self._motions]
-        quaternions = np.stack([quaternion for _, quaternion in path], axis=1).reshape(*times.shape, -1, 4)
-        positions = np.stack([position for position, _ in path], axis=1).reshape(*times.shape, -1, 3)
+        positions, quaternions = np.empty((*times.shape, len(path), 3)), np.empty((*times.shape, len(path), 4))
+        for body, (position, quaternion) in enumerate(path):
+            positions[:, :, body] = position.reshape(*times.shape, 3)
+            quaternions[:, :, body] = quaternion.reshape(*times.shape, 4)
         for body in driven_bodies(self._model.bodies.mode):
             positions[:, :, body] += rotation_matrices(quaternions[:, :, body]) @ self._center[body]
         before, after = quaternions[:, :-1], quaternions[:, 1:]
         turning = (after != before).any(axis=3)
         turns = np.zeros((*turning.shape, 3))  # and not rounding: bodies that animation moves bring energy (:mod:`.passivity`)
-        conjugate = before[turning] * np.array([1.0, -1.0, -1.0, -1.0])
-        turns[turning] = rotation_vectors(quaternion_product(after[turning], conjugate))
-        velocities = np.concatenate([np.diff(positions, axis=1), turns], axis=3) / self.dt
+        if turning.any():
+            conjugate = before[turning] * np.array([1.0, -1.0, -1.0, -1.0])
+            turns[turning] = rotation_vectors(quaternion_product(after[turning], conjugate))
+        velocities = np.concatenate([positions[:, 1:] - positions[:, :-1], turns], axis=3) / self.dt
         return positions, quaternions, velocities
 
     def contacts_along(
@@ -481,24 +480,10 @@ class Simulation:
         return seen.texels.force[0, self._texel_start[sensor] : self._texel_start[sensor + 1]]
 
 
-def _prepared_targets(scenario: Scenario, center: np.ndarray, shared: SharedResults) -> tuple[Tree, list[bool]]:
-    """Return the tree of all targets, and which of them are closed; the tree of what deforms is the simulation's own."""
-    deforms = any(target.deformation is not None for target in scenario.targets)
-    deforms = deforms or any(sensor.deformation is not None for sensor in scenario.sensors)
-    centers = np.array([center[target.body] for target in scenario.targets]).tobytes()
-    meshes = [target.mesh for target in scenario.targets]
-    closed = [shared.of(_is_closed, mesh) for mesh in meshes]
-    return (_tree_about(centers, *meshes) if deforms else shared.of(_tree_about, centers, *meshes)), closed
-
-
-def _tree_about(centers: bytes, *meshes: TriangleMesh) -> Tree:
-    """Return the tree of meshes whose points are seen from others, (m, 3) float as bytes, m."""
-    middles = np.frombuffer(centers).reshape(-1, 3)
-    return build_tree([replace(mesh, vertices=mesh.vertices - middle) for mesh, middle in zip(meshes, middles, strict=True)])
-
-
-def _is_closed(mesh: TriangleMesh) -> bool:
-    return is_closed(mesh.triangles)
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return the cross products of (3,) and (F, 3) vectors: the bits of np.cross in a fifth of its time."""
+    (ax, ay, az), (bx, by, bz) = a, b.T
+    return np.column_stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
 def solve_frames(simulation: Simulation, keep: Callable[[Frame], object], done: int = 0) -> Job[None]:

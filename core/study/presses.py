@@ -104,14 +104,15 @@ def with_press(scenario: Scenario, press: Press) -> Scenario:
     turn = share * press.twist + press.spin
     own = quaternion_product(frame.upright[None], quaternions_from_vectors(turn[:, None] * np.array([0.0, 0.0, 1.0])))
     base = scenario.bodies[sensor.body].motion
+    to_world = rotation_matrices(base.quaternions[:1])[0]
     motion = Motion(
         times,
-        base.positions[0] + origin @ rotation_matrices(base.quaternions[:1])[0].T,
+        base.positions[0] + origin @ to_world.T,
         quaternion_product(base.quaternions[:1], own),
     )
     pressing = replace(scenario.bodies[body], motion=motion, free=False, drive=None)
     if press.force > 0.0:
-        down = -rotation_matrices(base.quaternions[:1])[0] @ frame.axis
+        down = -to_world @ frame.axis
         pressing = _driven(pressing, scenario, body, press, down)
     bodies = tuple(pressing if index == body else other for index, other in enumerate(scenario.bodies))
     last = scenario.frame_start + max(1, math.ceil(times[-1] * scenario.fps - 1e-9))
@@ -236,10 +237,14 @@ def _sensor_of(scenario: Scenario, press: Press) -> Sensor:
         known = ", ".join(f"'{sensor.name}'" for sensor in scenario.sensors)
         raise SceneError(f"There is no sensor '{press.sensor}' in '{scenario.name}' to press on: choose from {known}.")
     body = scenario.bodies[sensor.body]
-    path = np.hstack([body.motion.positions, body.motion.quaternions])
-    if body.moved_by_forces or np.abs(path - path[0]).max() > 1e-9:
+    if body.moved_by_forces or (len(body.motion.times) > 1 and _moves(body.motion)):
         raise SceneError(f"The body of sensor '{press.sensor}' moves: a press needs a sensor that rests, remove its motion.")
     return sensor
+
+
+def _moves(motion: Motion) -> bool:
+    path = np.hstack([motion.positions, motion.quaternions])
+    return bool(np.abs(path - path[0]).max() > 1e-9)
 
 
 def _body_of(scenario: Scenario, press: Press) -> int:

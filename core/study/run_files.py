@@ -157,9 +157,17 @@ def write_packed_run(place: Path, run: Run, content: bytes, common_name: str, co
         A file cannot be written.
     """
     with _told(run, place):
-        (place / f"{run.digest}{PACKED}").write_bytes(content)
-        if not (place / f"{common_name}{COMMON}").exists():
-            (place / f"{common_name}{COMMON}").write_bytes(common)
+        start = os.fspath(place)
+        _write(f"{start}/{run.digest}{PACKED}", content)
+        if not os.path.exists(f"{start}/{common_name}{COMMON}"):
+            _write(f"{start}/{common_name}{COMMON}", common)
+
+
+def _write(path: str, content: bytes) -> None:
+    with open(path, "wb", buffering=0) as file:
+        rest = memoryview(content)
+        while rest:
+            rest = rest[file.write(rest) :]
 
 
 @contextmanager

@@ -223,7 +223,8 @@ def varied_scenario(
     PalpateError
         A value is not possible, or the scenario does not make a run with it.
     """
-    known = (shared or SharedResults()).of(variables_of, scenario, press is not None)
+    shared = shared or SharedResults()
+    known = shared.of(variables_of, scenario, press is not None)
     grouped: dict[str, list[tuple[tuple[str, ...], Any]]] = {}
     for name, value in values.items():
         found = variable(name, known, scenario)
@@ -243,7 +244,7 @@ def varied_scenario(
     changed = replace(changed, bodies=bodies)
     if press is not None:
         changed = with_press(changed, press)
-    check_scenario(changed)
+    shared.of(check_scenario, changed)
     return changed
 
 

@@ -18,7 +18,7 @@ from ..selection.findings import Diagnosis
 from .comparison import recording_errors
 from .plan_files import planned_sentence
 from .plots import CAPTIONS
-from .sentences import interval_ends, said_confidence
+from .sentences import NOT_IDENTIFIABLE, interval_ends, said_confidence
 
 TEMPLATE = Path(__file__).parent / "templates" / "report.html"
 
@@ -137,7 +137,7 @@ def _parameter_table(result: Diagnosis, found: dict[str, Any]) -> Table:
     ends = {(one.effect, one.name): interval_ends(one) for one in result.intervals}
     rows = []
     for name, value in found["base"]["parameters"].items():
-        rows.append(["base model", name, f"{value:.4g}", ends[BASE, name], unit_of(name, unit)])
+        rows.append(["base model", name, *_value_and_ends(value, ends[BASE, name]), unit_of(name, unit)])
     for index, one in zip((finding.effect for finding in result.findings), found["found"], strict=True):
         for parameter in form_of(one["effect"], one["form"]).parameters:
             value = one["parameters"].get(parameter.name)
@@ -146,8 +146,15 @@ def _parameter_table(result: Diagnosis, found: dict[str, Any]) -> Table:
                 span = f"{len(value)} numbers, {min(value):.3g} … {max(value):.3g}"
                 rows.append([one["effect"], parameter.name, span, "", own])
             elif value is not None:
-                rows.append([one["effect"], parameter.name, f"{value:.4g}", ends.get((index, parameter.name), ""), own])
+                rows.append(
+                    [one["effect"], parameter.name, *_value_and_ends(value, ends.get((index, parameter.name), "")), own]
+                )
     return Table(["", "parameter", "value", "95 % interval", "unit"], rows, {2, 3})
+
+
+def _value_and_ends(value: float, ends: str) -> tuple[str, str]:
+    """A parameter's value and the ends of its interval; no value where the recordings leave it open."""
+    return "–" if ends == NOT_IDENTIFIABLE else f"{value:.4g}", ends
 
 
 def _open_questions(found: dict[str, Any]) -> list[str]:

@@ -23,6 +23,7 @@ MOST_SAID = 0.99
 """Largest confidence stated as a number: a few hundred cases cannot show one wrong name in a thousand."""
 WIDE_INTERVAL = 20.0
 """If an interval reaches this many times below and above its value, the recordings do not identify the value."""
+NOT_IDENTIFIABLE = "not identifiable from these recordings"
 MANY_FLOORS = 3.0
 """Multiple of the noise floor from which the headline states the remaining error of the check recordings."""
 LEAST_SHARE = 0.01
@@ -97,7 +98,7 @@ def _effects(result: Diagnosis, errors: GapErrors) -> str:
         return f"No gap: the base model with its own parameters refitted leaves {before:.2%} of the range, which is noise."
     if result.verdict == "unexplained":
         return _unexplained(result, errors, sure)
-    shrink = f"the error shrinks from {before:.2%} to {after:.2%} of the range"
+    shrink = f"the error shrinks from {before:.2%} to {after:.2%} of the range{_closed_of_forces(result)}"
     stays = _what_stays(result, errors)
     with_rivals = {names[0]: " or ".join(names) for names in result.ambiguous}
     if not sure and findings and all(one.name in with_rivals for one in findings):
@@ -109,6 +110,14 @@ def _effects(result: Diagnosis, errors: GapErrors) -> str:
         return f"Perhaps missing: {unsure}{open_names}; {shrink}.{stays}"
     besides = f", and perhaps {unsure}{open_names}" if len(sure) < len(findings) else ""
     return f"Missing: {_listed([one.name for one in sure])}{besides}; {shrink}.{stays}"
+
+
+def _closed_of_forces(result: Diagnosis) -> str:
+    """The share of the net forces' gap that closes, if friction is among the findings: it changes no reading."""
+    share = result.closed.least(FORCES)
+    if share is None or not any(one.name in friction_kinds() for one in result.findings):
+        return ""
+    return f", and {max(share, 0.0):.0%} of the squared gap of the net forces closes"
 
 
 def by_share_closed(result: Diagnosis) -> list[Finding]:
@@ -282,15 +291,16 @@ def warnings(result: Diagnosis) -> list[str]:
 
 
 def interval_text(one: ParameterInterval) -> str:
-    """Return a number with its interval, for the terminal."""
-    return f"{one.value:.4g} ({interval_ends(one)})"
+    """Return a number with its interval, for the terminal; of one that is not identifiable, what the amended sensor has."""
+    ends = interval_ends(one)
+    return f"{ends}; sensor.toml has {one.value:.4g}" if ends == NOT_IDENTIFIABLE else f"{one.value:.4g} ({ends})"
 
 
 def interval_ends(one: ParameterInterval) -> str:
     """Return an interval, or a remark if it fills the bounds of its parameter or leaves the order of magnitude open."""
     on_both_sides = one.low >= 0.0 and one.high > WIDE_INTERVAL * one.value and one.low * WIDE_INTERVAL <= one.value
     if one.fills_bounds or on_both_sides or one.high - one.low > WIDE_INTERVAL**2 * abs(one.value) > 0.0:
-        return "not identifiable from these recordings"
+        return NOT_IDENTIFIABLE
     return f"{one.low:.4g} … {one.high:.4g}"
 
 

@@ -47,7 +47,6 @@ from .findings import Diagnosis, Finding
 from .forms_at_bounds import without_bounds_of_forms
 from .forward_selection import ForwardSelection, SelectionState
 from .gap_sizes import FORCES, READINGS, UNRESOLVED_SQUARE, GapSizes, friction_kinds
-from .harmful_effects import without_harmful_effects
 from .outlying_channels import outlying_channels, without_channels
 from .screening import screen
 from .verdict import conclude
@@ -345,7 +344,6 @@ def _select_effects(result: Diagnosis, view_set: ViewSet) -> Generator[tuple[str
     check = check_views(result.predictors, deviations)
     result.outlying = outlying_channels(view_set.whole, check, result.base.model, state.fit.model)
     check = without_channels(check, result.outlying)
-    state = without_harmful_effects(view_set.whole, check, state, gap_sizes)
     state = replace(state, fit=_with_base_refitted(result, view_set, state.fit))
     result.best, result.structure = state.fit, _structure(view_set, state.fit)
     result.line = strongest_line(view_set.whole, state.fit.model)

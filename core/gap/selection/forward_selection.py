@@ -132,8 +132,6 @@ class SelectionState:
         What each effect closed when it joined.
     first : SelectionStep
         The search on top of the base model.
-    dropped : tuple of str
-        Effects that had joined and were dropped, because they made the check recordings worse.
     """
 
     fit: Fit
@@ -141,7 +139,6 @@ class SelectionState:
     steps: dict[str, SelectionStep] = field(default_factory=dict)
     improvements: dict[str, Improvement] = field(default_factory=dict)
     first: SelectionStep = field(default_factory=lambda: SelectionStep([], []))
-    dropped: tuple[str, ...] = ()
 
     @property
     def means(self) -> np.ndarray:

@@ -20,7 +20,7 @@ from ..fitting.least_squares import Fit, FreeParameter, TrialView, fit, held_out
 from ..forward.predictor import Model
 from .candidates import DIRECTLY_ESTIMATED, Candidate, FittedCandidate, Scales
 from .direct_estimates import few_levels, quantization_starts, unresponsive_texels
-from .score_test import ScoreTest
+from .rao_score import ScoreTest
 from .view_set import ViewSet
 
 SMALL_RECORDING = 20_000

@@ -241,9 +241,7 @@ def _rule_out(result: Diagnosis, state: SelectionState, gap_sizes: GapSizes) -> 
     for kind in library().values():
         if kind.name in named:
             continue
-        if kind.name in state.dropped:
-            why = "it makes the check recordings worse"
-        elif kind.name in NOT_FITTED:
+        if kind.name in NOT_FITTED:
             why = "the residual noise does not grow with the reading"
         elif kind.name not in possible:
             why = unidentifiable(result.coverage).get(kind.name, "these recordings cannot show it")

@@ -16,14 +16,17 @@ import numpy as np
 
 from ...geometry.mesh import TriangleMesh
 from ...io.bake_folder import folder_names
+from ..contact_translation import MujocoContact, mujoco_contact
 from ..mjcf_reading import is_mjcf, read_mjcf
-from ..mujoco_load import CONTACTS, LEAST_DAMPING, REFERENCE_MASS
+from ..mujoco_load import REFERENCE_MASS
 from ..sensor_format import SensorFormat, Written
 from ..sensor_on_mesh import SensorOnMesh, unmodelled
 from ..xml_writing import add, comment, numbers, write_xml
 
 IMPEDANCE = 0.9
 """Constant impedance d of the contact (`solimp`), the upper end of MuJoCo's default."""
+EXACT = 1e-6
+"""Error of the contact, RMS as share of the largest force, below which it is not told."""
 MOST_HULL_GAP = 1e-4
 """Metres. Where a texel lies deeper under the convex hull, contact is found by a signed distance field instead of the hull: it
 costs 35 times as much, and finds 40 contacts under a ball, whose stiffness is no longer ours."""
@@ -34,16 +37,17 @@ def write_mjcf(sensors: Sequence[SensorOnMesh], folder: Path) -> Written:
     files, notes = [], []
     stems = folder_names(item.name for item in sensors)
     for item in sensors:
-        own = _notes(item)
+        contact = mujoco_contact(item, impedance=IMPEDANCE)
+        own = _notes(item, contact)
         path = folder / f"{stems[item.name]}.xml"
-        write_xml(path, _model(item, own))
+        write_xml(path, _model(item, contact, own))
         files.append(path)
         notes += own
     return Written(files, notes)
 
 
-def _model(item: SensorOnMesh, notes: list[str]) -> ElementTree.Element:
-    name, law = item.name, item.sensor.parameters
+def _model(item: SensorOnMesh, contact: MujocoContact, notes: list[str]) -> ElementTree.Element:
+    name = item.name
     solid, _ = item.solid
     shape_kind = "sdf" if _depth_under_hull(solid, item.sensor.texels.position) > MOST_HULL_GAP else "mesh"
     texels, collision = f"{name} texels", f"{name} collision"
@@ -60,23 +64,18 @@ def _model(item: SensorOnMesh, notes: list[str]) -> ElementTree.Element:
     frames = {"vertex": numbers(item.sensor.texels.position), "normal": numbers(item.frames.transpose(0, 2, 1)[:, [2, 0, 1]])}
     add(asset, "mesh", name=texels, inertia="shell", **frames, face=numbers(item.faces))
     body = add(add(root, "worldbody"), "body", name=name, pos=numbers(item.position), quat=numbers(item.quaternion))
-    share = (1.0 - IMPEDANCE) * len(item.sensor.texels) / (CONTACTS * REFERENCE_MASS)
-    contact = {
-        "solref": numbers([-share * law.k, -share * max(float(law.cn), LEAST_DAMPING)]),
-        "solimp": numbers([IMPEDANCE, IMPEDANCE, 0.001]),
-        "friction": numbers([law.mus, 0.005, 0.0001]),
-    }
-    add(body, "geom", name=collision, type=shape_kind, mesh=collision, priority="1", rgba="0.5 0.5 0.5 0.4", **contact)
+    law = {"solref": numbers(contact.solref), "solimp": numbers(contact.solimp), "friction": numbers(contact.friction)}
+    add(body, "geom", name=collision, type=shape_kind, mesh=collision, priority="1", rgba="0.5 0.5 0.5 0.4", **law)
     unseen = {"contype": "0", "conaffinity": "0", "mass": "0", "group": "3"}
     add(body, "geom", name=texels, type="mesh", mesh=texels, **unseen)
     add(add(root, "sensor"), "tactile", name=name, geom=texels, mesh=texels)
     custom = add(root, "custom")
-    add(custom, "numeric", name=f"{name} k", data=numbers(law.k))
+    add(custom, "numeric", name=f"{name} k", data=numbers(item.sensor.parameters.k))
     add(custom, "numeric", name=f"{name} area", data=numbers(item.sensor.texels.area))
     return root
 
 
-def _notes(item: SensorOnMesh) -> list[str]:
+def _notes(item: SensorOnMesh, contact: MujocoContact) -> list[str]:
     """Return what MuJoCo cannot express, one sentence each."""
     name = item.name
     solid, layered = item.solid
@@ -85,6 +84,8 @@ def _notes(item: SensorOnMesh) -> list[str]:
         f"'{name}': MuJoCo's stiffness is per mass: the penetration of a box of {REFERENCE_MASS:g} kg is that of Palpate, "
         "and a box of another mass has the same; scale solref by 1 / mass for a load of another mass.",
     ]
+    if max(contact.error.rms, contact.damping_error.rms) > EXACT:
+        found.append(f"'{name}' in MuJoCo: {contact.error}; damping: {contact.damping_error}.")
     if layered:
         found.append(f"'{name}' is an open sheet: it was made a layer as thick as its foam, half its maximum penetration.")
     gap = _depth_under_hull(solid, item.sensor.texels.position)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import linecache
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -83,13 +83,13 @@ def reading_with_effects(
 
 
 class EffectFunctions(NamedTuple):
-    """The effects of one sensor.
+    """The effects of a sensor, whose parameters may differ between environments.
 
     Attributes
     ----------
     instead : dict
         By name, what stands for the functions of this module in the kernels.
-    force_constants, friction_constants, reading_constants : (laws, 2, c) float
+    force_constants, friction_constants, reading_constants : (1 or E, laws, 2, c) float
     laws, reading_laws : (int, int)
         How many laws with memory there are, at least one, and how much each of them remembers.
     pulls : bool
@@ -105,18 +105,16 @@ class EffectFunctions(NamedTuple):
     pulls: bool
 
 
-def functions_of(sensor: Sensor, dt: float) -> EffectFunctions:
-    """Return the effects of a sensor for steps of `dt` seconds.
+def functions_of(sensors: Sequence[Sensor], dt: float) -> EffectFunctions:
+    """Return the effects of a sensor for steps of `dt` seconds; of one, or of one for each environment with the same effects.
 
     Raises
     ------
     ParameterError
         An effect acts on readings in another way than by a law of one texel.
     """
-    acting = list(in_signal_order(sensor.effects, readout=False))
-    forces = [(item, form) for item, form in acting if form.law is not None]
-    frictions = [(item, form) for item, form in acting if form.friction_law is not None]
-    readings = list(in_signal_order(sensor.effects, readout=True))
+    sensor = sensors[0]
+    forces, frictions, readings = _chains(sensor)
     for item, form in readings:
         if form.law is None:
             raise ParameterError(
@@ -145,16 +143,30 @@ def functions_of(sensor: Sensor, dt: float) -> EffectFunctions:
             reading_with_effects, {"laws of force": on_force, "laws of readings": on_reading}, scope
         ),
     }
-    gain = sensor.parameters.gain
+    chains = [_chains(one) for one in sensors]
     return EffectFunctions(
         instead,
-        _constants(forces, [dt, 0.0], None),
-        _constants(frictions, [dt, 0.0], None),
-        _constants(readings, [0.0, dt], gain),
+        np.array([_constants(force, [dt, 0.0], None) for force, _, _ in chains]),
+        np.array([_constants(friction, [dt, 0.0], None) for _, friction, _ in chains]),
+        np.array([
+            _constants(chain[2], [0.0, dt], one.parameters.gain) for one, chain in zip(sensors, chains, strict=True)
+        ]),
         _memory(forces),
         _memory(readings),
         any(form.after_clip for _, form in forces),
-    )
+    )  # fmt: skip
+
+
+Chain: TypeAlias = list[tuple[Effect, Form]]
+"""Effects one after the other, with their forms."""
+
+
+def _chains(sensor: Sensor) -> tuple[Chain, Chain, Chain]:
+    """Return the effects on normal forces, friction and readings."""
+    acting = list(in_signal_order(sensor.effects, readout=False))
+    forces = [(item, form) for item, form in acting if form.law is not None]
+    frictions = [(item, form) for item, form in acting if form.friction_law is not None]
+    return forces, frictions, list(in_signal_order(sensor.effects, readout=True))
 
 
 _FORCE_LAW = (
@@ -184,7 +196,7 @@ def _with_laws(template: Callable[..., Any], calls: dict[str, list[str]], scope:
     return made
 
 
-def _constants(chain: Sequence[tuple[Effect, Form]], lengths: list[float], gain: float | None) -> np.ndarray:
+def _constants(chain: Chain, lengths: list[float], gain: float | None) -> np.ndarray:
     """Return the constants of laws for two lengths of a step, (laws, 2, c), padded with zeros."""
     tables = []
     for item, form in chain:
@@ -198,5 +210,5 @@ def _constants(chain: Sequence[tuple[Effect, Form]], lengths: list[float], gain:
     return joined
 
 
-def _memory(chain: Sequence[tuple[Effect, Form]]) -> tuple[int, int]:
+def _memory(chain: Chain) -> tuple[int, int]:
     return max(len(chain), 1), max((form.state_size for _, form in chain), default=1) or 1

@@ -12,10 +12,10 @@ from ...geometry.mesh import TriangleMesh
 from ...geometry.shapes import Shape
 from ...geometry.texels import Texels
 from ...solver.jumps import jump_arrays
+from ..load_search import IntArray
 
-IntArray: TypeAlias = np.ndarray
 BoolArray: TypeAlias = np.ndarray
-"""Arrays of integers and of truth values; the translation goes by these names."""
+"""An array of truth values; the translation goes by this name."""
 
 
 class SensorArrays(NamedTuple):
@@ -40,7 +40,7 @@ class SensorArrays(NamedTuple):
         Contact law of one contact point, the same for all environments or one for each.
     conversion : (n or E n, 2) float
         Zero and scale of each texel's reading, the same for all environments or one after the other.
-    force_constants, friction_constants, reading_constants : (laws, 2, c) float
+    force_constants, friction_constants, reading_constants : (E, laws, 2, c) float
         Constants of the laws of effects, for a step and for no time; for readings, for no time and for a step.
     """
 

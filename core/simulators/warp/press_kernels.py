@@ -88,7 +88,7 @@ class Sliding(NamedTuple):
 
 def move_world(world: int, sensor: SensorArrays, worlds: Worlds) -> None:
     """Bring the bodies of an environment to the step's end, and write how targets moved relative to the sensor."""
-    valid = _are_poses(worlds.poses[world])
+    valid = are_poses(worlds.poses[world])
     worlds.valid[world] = valid
     if not valid:
         worlds.begins[world] = True
@@ -97,10 +97,10 @@ def move_world(world: int, sensor: SensorArrays, worlds: Worlds) -> None:
     worlds.fresh[world] = begins
     worlds.begins[world] = False
     for body in range(worlds.poses.shape[1]):
-        _place_next(worlds.poses[world, body], worlds.next_position[world, body], worlds.next_quaternion[world, body])
+        place_next(worlds.poses[world, body], worlds.next_position[world, body], worlds.next_quaternion[world, body])
         if begins:
-            _copy(worlds.next_position[world, body], worlds.position[world, body])
-            _copy(worlds.next_quaternion[world, body], worlds.quaternion[world, body])
+            copy_row(worlds.next_position[world, body], worlds.position[world, body])
+            copy_row(worlds.next_quaternion[world, body], worlds.quaternion[world, body])
         write_velocity(
             worlds.position[world, body], worlds.quaternion[world, body],
             worlds.next_position[world, body], worlds.next_quaternion[world, body], dt, worlds.velocity[world, body],
@@ -112,16 +112,16 @@ def move_world(world: int, sensor: SensorArrays, worlds: Worlds) -> None:
         _turn_motion(dt, worlds.step_motion[world, 0], worlds.rotation[world, 0], worlds.motion[world, target],
                      worlds.end_motion[world, target])  # fmt: skip
     for body in range(worlds.poses.shape[1]):
-        _copy(worlds.next_position[world, body], worlds.position[world, body])
-        _copy(worlds.next_quaternion[world, body], worlds.quaternion[world, body])
+        copy_row(worlds.next_position[world, body], worlds.position[world, body])
+        copy_row(worlds.next_quaternion[world, body], worlds.quaternion[world, body])
         write_rotation(worlds.quaternion[world, body], worlds.rotation[world, body])
         write_backward_step_motion(worlds.velocity[world, body], dt, worlds.step_motion[world, body])
     for target in range(worlds.pose.shape[1]):
         _write_motion(world, 1 + target, worlds, worlds.past_motion[world, target])
-        _write_pose(worlds.position[world], worlds.rotation[world], 1 + target, worlds.pose[world, target])
+        write_pose(worlds.position[world], worlds.rotation[world], 1 + target, worlds.pose[world, target])
 
 
-def _are_poses(poses: np.ndarray) -> bool:
+def are_poses(poses: np.ndarray) -> bool:
     """Whether all of the poses (b, 7) are finite, with quaternions that are not zero."""
     good = True
     for body in range(poses.shape[0]):
@@ -135,7 +135,7 @@ def _are_poses(poses: np.ndarray) -> bool:
     return good
 
 
-def _place_next(pose: np.ndarray, position: np.ndarray, quaternion: np.ndarray) -> None:
+def place_next(pose: np.ndarray, position: np.ndarray, quaternion: np.ndarray) -> None:
     """Write a pose (7,) as position and unit quaternion."""
     w, x, y, z = pose[3], pose[4], pose[5], pose[6]
     length = math.sqrt(w * w + x * x + y * y + z * z)
@@ -145,7 +145,8 @@ def _place_next(pose: np.ndarray, position: np.ndarray, quaternion: np.ndarray) 
         quaternion[i] = pose[3 + i] / length
 
 
-def _copy(values: np.ndarray, out: np.ndarray) -> None:
+def copy_row(values: np.ndarray, out: np.ndarray) -> None:
+    """Copy the entries of a row."""
     for i in range(values.shape[0]):
         out[i] = values[i]
 
@@ -170,7 +171,7 @@ def _turn_motion(dt: float, step_motion: np.ndarray, rotation: np.ndarray, motio
                 out[3 + 3 * k + j] += dt * turn * motion[3 + 3 * m + j]
 
 
-def _write_pose(position: np.ndarray, rotation: np.ndarray, body: int, pose: np.ndarray) -> None:
+def write_pose(position: np.ndarray, rotation: np.ndarray, body: int, pose: np.ndarray) -> None:
     """Write the sensor's rotation (row by row) and position in the frame of a target's body."""
     for i in range(3):
         total = 0.0
@@ -192,19 +193,27 @@ def press_texel(
     world: int, texel: int, sensor: SensorArrays, targets: TargetArrays, tree: Tree, worlds: Worlds, slots: Slots, out: Results
 ) -> None:
     """Bring the contact points of a texel to the step's end, and write down what the texel measures there."""
+    press_points(world, texel, sensor, targets, tree, worlds, slots, out)
+    write_reading(world, texel, sensor, worlds, slots, out)
+
+
+def press_points(
+    world: int, texel: int, sensor: SensorArrays, targets: TargetArrays, tree: Tree, worlds: Worlds, slots: Slots, out: Results
+) -> None:
+    """Bring the contact points of a texel to the step's end, and write down its force there."""
     force, along_x, along_y, touched = 0.0, 0.0, 0.0, False
-    valid, count = worlds.valid[world], targets.kind.shape[0]
-    if valid:
+    count = targets.kind.shape[0]
+    if worlds.valid[world]:
         for point in range(sensor.first_point[texel], sensor.first_point[texel + 1]):
             law = read_law(sensor.law, world % sensor.law.shape[0])
             if worlds.fresh[world]:
-                _begin_point(world, point, slots)
+                begin_point(world, point, slots)
                 if HAS_EFFECTS == 1:  # which remember the depth at rest
                     for target in range(count):
-                        _find_contact(world, target, point, sensor, targets, tree, worlds, slots)
+                        find_contact(world, target, point, sensor, targets, tree, worlds, slots)
             _advance_point(world, point, law, sensor, worlds, slots)
             for target in range(count):
-                _find_contact(world, target, point, sensor, targets, tree, worlds, slots)
+                find_contact(world, target, point, sensor, targets, tree, worlds, slots)
                 if slots.pressed[world, target, point] >= 0.0:
                     fn = _write_force(world, target, point, law, sensor, worlds, slots)
                     fx, fy, fz = (
@@ -220,8 +229,12 @@ def press_texel(
     out.texels[world, texel, 1] = along_x
     out.texels[world, texel, 2] = along_y
     out.contact[world, texel] = touched
+
+
+def write_reading(world: int, texel: int, sensor: SensorArrays, worlds: Worlds, slots: Slots, out: Results) -> None:
+    """Write down the reading for the force of a texel."""
     reading = 0.0
-    if valid:
+    if worlds.valid[world]:
         row = (world * (sensor.first_point.shape[0] - 1) + texel) % sensor.conversion.shape[0]
         zero, scale = sensor.conversion[row, 0], sensor.conversion[row, 1]
         when = 0 if worlds.fresh[world] else 1
@@ -230,12 +243,13 @@ def press_texel(
                 for j in range(slots.reading_memory.shape[3]):
                     slots.reading_memory[world, texel, i, j] = 0.0
         reading = reading_with_effects(
-            force, zero, scale, when, sensor.reading_constants, slots.reading_memory[world, texel]
+            out.texels[world, texel, 0], zero, scale, when,
+            sensor.reading_constants[world], slots.reading_memory[world, texel],
         )  # fmt: skip
     out.readings[world, texel] = reading
 
 
-def _begin_point(world: int, point: int, slots: Slots) -> None:
+def begin_point(world: int, point: int, slots: Slots) -> None:
     """Forget all that a contact point remembers."""
     for target in range(slots.pressed.shape[1]):
         slots.pressed[world, target, point] = NO_CONTACT
@@ -269,8 +283,8 @@ def _advance_point(world: int, point: int, law: ContactLaw, sensor: SensorArrays
             square = moved.x * moved.x + moved.y * moved.y + moved.z * moved.z
             end = slots.depth[world, target, point] + sensor.dt * moved.rate
             tangent = _tangent(
-                TexelMotion(slots.depth[world, target, point], moved.rate, 0.0, math.sqrt(square)), painted, scale, sensor,
-                slots.memory[world, point],
+                world, TexelMotion(slots.depth[world, target, point], moved.rate, 0.0, math.sqrt(square)), painted, scale,
+                sensor, slots.memory[world, point],
             )  # fmt: skip
             z = slots.bristle[world, target, point]
             zx, zy, zz = z[0], z[1], z[2]
@@ -278,17 +292,19 @@ def _advance_point(world: int, point: int, law: ContactLaw, sensor: SensorArrays
                 (nx, ny, nz), (zx, zy, zz),
                 (moved.x + moved.rate * nx, moved.y + moved.rate * ny, moved.z + moved.rate * nz), tangent, sensor.dt, law,
             )  # fmt: skip
-            _move_bristle(contact, px, py, pz, nx, ny, nz, worlds.end_motion[world, target], z)
+            _move_bristle(contact, _sliding_at(px, py, pz, nx, ny, nz, worlds.end_motion[world, target]), z)
             if end > deepest:
                 deepest, deepest_rate, deepest_slide = end, moved.rate, sensor.dt * math.sqrt(square)
     if HAS_EFFECTS == 1:
         force_with_effects(
             STEP, TexelMotion(deepest, deepest_rate, deepest_slide, 0.0), whole_texel_law(painted, sensor.share, 1.0),
-            sensor.force_constants, slots.memory[world, point], True,
+            sensor.force_constants[world], slots.memory[world, point], True,
         )  # fmt: skip
 
 
-def _tangent(motion: TexelMotion, painted: ContactLaw, scale: float, sensor: SensorArrays, memory: np.ndarray) -> Tangent:
+def _tangent(
+    world: int, motion: TexelMotion, painted: ContactLaw, scale: float, sensor: SensorArrays, memory: np.ndarray
+) -> Tangent:
     """Return the normal law at the step's end, linearised, and what effects and paint make of friction."""
     bias, slope = normal_tangent(motion.depth, motion.rate, sensor.dt, painted)
     viscosity, pulls = 0.0, sensor.pulls == 1
@@ -296,20 +312,17 @@ def _tangent(motion: TexelMotion, painted: ContactLaw, scale: float, sensor: Sen
         end = motion.depth + sensor.dt * motion.rate
         force, by_depth, by_rate = force_with_effects(
             STEP, TexelMotion(end, motion.rate, 0.0, motion.speed), whole_texel_law(painted, sensor.share, 1.0),
-            sensor.force_constants, memory, False,
+            sensor.force_constants[world], memory, False,
         )  # fmt: skip
-        factor, viscosity = friction_with_effects(motion.speed, force, sensor.friction_constants)
+        factor, viscosity = friction_with_effects(motion.speed, force, sensor.friction_constants[world])
         slope = sensor.share * max(by_depth * sensor.dt + by_rate, 0.0) if end > 0.0 else 0.0
         bias = sensor.share * force - slope * motion.rate
         scale, viscosity = scale * factor, sensor.share * viscosity
     return Tangent(bias, slope, scale, viscosity, pulls)
 
 
-def _move_bristle(
-    contact: LinearContact, px: float, py: float, pz: float, nx: float, ny: float, nz: float, motion: np.ndarray, z: np.ndarray
-) -> None:
-    """Bring a bristle (3,) to the step's end, in the sensor's axes at that time."""
-    v = _sliding_at(px, py, pz, nx, ny, nz, motion)
+def _move_bristle(contact: LinearContact, v: Sliding, z: np.ndarray) -> None:
+    """Bring a bristle (3,) to the step's end, given the sliding in the sensor's axes at that time."""
     zx = next_deflection(contact.keep, z[0], contact.gain, v.x)
     zy = next_deflection(contact.keep, z[1], contact.gain, v.y)
     zz = next_deflection(contact.keep, z[2], contact.gain, v.z)
@@ -317,7 +330,7 @@ def _move_bristle(
     z[0], z[1], z[2] = scale * zx, scale * zy, scale * zz
 
 
-def _find_contact(
+def find_contact(
     world: int, target: int, point: int, sensor: SensorArrays, targets: TargetArrays, tree: Tree, worlds: Worlds, slots: Slots
 ) -> None:
     """Find where a contact point touches a target now, and write it down; a bristle is zero where nothing touches."""
@@ -411,9 +424,9 @@ def _write_force(
         speed = math.sqrt(square)
         whole, _, _ = force_with_effects(
             NOW, TexelMotion(depth, v.rate, 0.0, speed), whole_texel_law(painted, sensor.share, 1.0),
-            sensor.force_constants, slots.memory[world, point], False,
+            sensor.force_constants[world], slots.memory[world, point], False,
         )  # fmt: skip
-        factor, viscosity = friction_with_effects(speed, whole, sensor.friction_constants)
+        factor, viscosity = friction_with_effects(speed, whole, sensor.friction_constants[world])
         fn = sensor.share * whole
     friction = with_friction(painted, factor, sensor.share * viscosity)
     held = deflection_scale(z[0] * z[0] + z[1] * z[1] + z[2] * z[2], max_bristle_deflection(fn, friction))

@@ -24,9 +24,12 @@ from ...model.sensor import Sensor
 from ...model.target import Target
 from ...solver.detection.deforming_surfaces import point_rows
 from ..environment_parameters import Columns, sensors_of
+from ..load_balance import check_targets
+from ..load_search import LoadSearch
 from ..pressed_sensors import available_memory, check_memory, fault_of
 from ..sensor_on_mesh import SensorOnMesh
-from . import press_kernels
+from . import balance_kernels, press_kernels
+from .balance_kernels import Beginning
 from .effect_functions import EffectFunctions, functions_of
 from .engine import require_warp
 from .press_arrays import Jumps, Results, SensorArrays, Slots, TargetArrays, Worlds
@@ -55,7 +58,7 @@ class WarpSensors:
         Compute in float32, which is faster on most GPUs. Depths then carry the rounding of the poses, 6e-8 of a coordinate.
 
     parameters : mapping of str to (E,) float, optional
-        In which the sensors of environments differ, as of :class:`.PressedSensors`; effects are the same in all.
+        In which the sensors of environments differ, as of :class:`.PressedSensors`.
 
     Raises
     ------
@@ -82,6 +85,11 @@ class WarpSensors:
     poses : (E, 1 + T, 7) warp.array
         Of the sensor and of each target: position (m) and quaternion (w, x, y, z). A program on the device may write them
         itself, and then call :meth:`step` without poses.
+    residual : (E, 1), (E, 3) or (E, 6) warp.array, N and N·m
+        Part of the loads given to the last step that no contact balances; None where none was given.
+    displacement : (E, 6) warp.array, metres and rad
+        Of the targets from their poses at the last step, for the loads: in the world, and rotation vector about their origin;
+        None before a load was given.
     """
 
     def __init__(
@@ -100,16 +108,15 @@ class WarpSensors:
         self._warp, self.device = warp, _device(warp, device)
         self._environments, sensor = environments, item.sensor
         points = contact_points(sensor.texels, sensor.parameters.points_per_texel)
-        effects = functions_of(sensor, dt)
+        sensors = sensors_of(sensor, parameters, environments) if parameters else [sensor]
+        effects = functions_of(sensors, dt)
         e, n, t, p = environments, len(sensor.texels), len(targets), len(points.texel)
-        self._size = e, n, t
-        one = Slots.zero(1, t, p, n, effects.laws, effects.reading_laws), Worlds.zero(1, t), Results.zero(1, n, t)
-        check_memory(e, COPIES * sum(array.nbytes for part in one for array in part), self._free_memory())
-        sensors = _varied(sensor, parameters or {}, e)
+        self._size, self._of_slots = (e, n, t), (t, p, n, effects.laws, effects.reading_laws)
+        self._check_memory(Slots.zero(1, *self._of_slots), Worlds.zero(1, t), Results.zero(1, n, t))
         tree = build_tree([one for one in targets if isinstance(one, TriangleMesh)] or [_NO_MESH])
-        translation = _translation(warp, single, effects, sensor)
-        slots = Slots.zero(e, t, p, n, effects.laws, effects.reading_laws)
-        parts = _sensor_arrays(sensors, points, effects, dt), _target_arrays(targets), tree, Worlds.zero(e, t), slots
+        translation = self._translation = _translation(warp, single, effects, sensor)
+        slots = Slots.zero(e, *self._of_slots)
+        parts = _sensor_arrays(sensors, points, effects, dt, e), _target_arrays(targets), tree, Worlds.zero(e, t), slots
         values = [translation.value(part, self.device) for part in (*parts, Results.zero(e, n, t))]
         self._sensor, self._targets, self._tree, self._worlds, self._slots, out = values
         self._out = out
@@ -117,7 +124,10 @@ class WarpSensors:
         self.wrench, self.too_deep, self.valid, self.poses = out.wrench, out.too_deep, self._worlds.valid, self._worlds.poses
         jumps = translation.value(Jumps.of(mounted_texels(sensor), targets, e), self.device)
         self._jumps, self.jumped = jumps, jumps.jumped
-        self._mask = warp.zeros(e, dtype=warp.bool, device=self.device)
+        self._item, self._kernel_of_load = sensor, None
+        self._balance: tuple[Any, ...] = ()
+        self.residual: Any = None
+        self.displacement: Any = None
         kernels = press_kernels
         self._move, self._sum = translation.kernel(kernels.move_world, 1), translation.kernel(kernels.sum_world, 1)
         self._press, self._reset = translation.kernel(kernels.press_texel, 2), translation.kernel(kernels.reset_worlds, 1)
@@ -130,12 +140,13 @@ class WarpSensors:
     def __repr__(self) -> str:
         return f"<WarpSensors: {self._size[0]} environments, {self._size[1]} texels, {self._size[2]} targets, on {self.device}>"
 
-    def _free_memory(self) -> float:
-        """Return the bytes that are free on the device."""
+    def _check_memory(self, *parts: Any) -> None:
+        """Raise :class:`.ParameterError` where arrays of all environments, given those of one, are more than is free."""
         device = self._warp.get_device(self.device)
-        return float(device.free_memory) if device.is_cuda else available_memory()
+        free = float(device.free_memory) if device.is_cuda else available_memory()
+        check_memory(len(self), COPIES * sum(array.nbytes for part in parts for array in part), free)
 
-    def step(self, sensor_poses: Any = None, target_poses: Any = None) -> WarpSensors:
+    def step(self, sensor_poses: Any = None, target_poses: Any = None, wrench: Any = None) -> WarpSensors:
         """Go on by one step, to these poses; the results are in the arrays of this object.
 
         Parameters
@@ -143,20 +154,28 @@ class WarpSensors:
         sensor_poses : (E, 7) float, optional
             Arrays of NumPy; by default :attr:`poses` holds the poses already.
         target_poses : (E, T, 7) or, of one target, (E, 7) float, optional
+        wrench : (E, 6), (E, 3) or (E, 1) float, N and N·m, optional
+            Load of each environment, as in :meth:`.PressedSensor.step`; an array of NumPy, or of Warp on the device.
 
         Raises
         ------
         ParameterError
-            Poses have another shape. Those that are not finite are no error (see :attr:`valid`).
+            Poses or loads have another shape, or loads are given in float32 or for several targets. Those that are not finite
+            are no error (see :attr:`valid`).
         """
         if sensor_poses is not None or target_poses is not None:
             self._take(sensor_poses, target_poses)
         e, n, _ = self._size
         launch, device = self._warp.launch, self.device
-        launch(self._move, dim=e, inputs=[self._sensor, self._worlds], device=device)
         arrays = [self._sensor, self._targets, self._tree, self._worlds, self._slots, self._out]
-        launch(self._press, dim=(e, n), inputs=arrays, device=device)
-        launch(self._sum, dim=e, inputs=[self._worlds, self._slots, self._out], device=device)
+        if wrench is not None:
+            inputs = [self._take_loads(wrench), *arrays, *self._balance]
+            launch(self._kernel_of_load, dim=e, inputs=inputs, device=device)
+        else:
+            self._forget_loads()
+            launch(self._move, dim=e, inputs=[self._sensor, self._worlds], device=device)
+            launch(self._press, dim=(e, n), inputs=arrays, device=device)
+            launch(self._sum, dim=e, inputs=[self._worlds, self._slots, self._out], device=device)
         launch(self._mark, dim=e, inputs=[self._worlds, self._jumps, self._out], device=device)
         return self
 
@@ -204,6 +223,47 @@ class WarpSensors:
         poses = np.concatenate([sensor[:, None], target.reshape(e, t, 7)], axis=1)
         self._warp.copy(self.poses, self._warp.array(poses, dtype=self.poses.dtype, device=self.device))
 
+    def _take_loads(self, wrench: Any) -> int:
+        """Copy loads to the device, and return how many components they have."""
+        warp, (e, _, t) = self._warp, self._size
+        on_device = isinstance(wrench, warp.array)
+        load: Any = wrench if on_device else np.asarray(wrench)
+        numbers = str(load.device) == self.device if on_device else load.dtype.kind in "fiu"
+        if load.shape not in ((e, 1), (e, 3), (e, 6)) or not numbers:
+            raise ParameterError(
+                f"The loads are of shape {load.shape}: give numbers of shape ({e}, 6), ({e}, 3) or ({e}, 1), "
+                f"as an array of NumPy or on {self.device}."
+            )
+        check_targets(t)
+        if self._translation.real is not warp.float64:
+            raise ParameterError("In float32 a load cannot be found to a millionth: make the sensors with single=False.")
+        degrees = int(load.shape[1])
+        if not self._balance:
+            self._make_balance()
+        _, beginning, search = self._balance
+        if not on_device:
+            load = warp.array(load, dtype=warp.float64, device=self.device)
+        warp.copy(search.given[:, :degrees], load)
+        self.residual, self.displacement = beginning.residual[:, :degrees], search.at
+        return degrees
+
+    def _make_balance(self) -> None:
+        """Make the kernel of steps under loads, and its arrays."""
+        e, sensor = len(self), self._item
+        searches = [LoadSearch.of(sensor.texels, sensor.parameters.max_penetration, count) for count in (1, e)]
+        self._check_memory(Slots.zero(1, *self._of_slots), Beginning.zero(1), searches[0])
+        parts = Slots.zero(e, *self._of_slots), Beginning.zero(e), searches[1]
+        self._balance = tuple(self._translation.value(part, self.device) for part in parts)
+        self._kernel_of_load = self._translation.kernel(balance_kernels.balance_world, 1)
+
+    def _forget_loads(self) -> None:
+        """Go on without displacement."""
+        self.residual = None
+        if self._balance:
+            search = self._balance[2]
+            search.at.zero_()
+            search.state.zero_()
+
 
 _NO_MESH = TriangleMesh(np.eye(3), np.array([[0, 1, 2]]))
 """Stands for the tree where all targets are simple shapes."""
@@ -211,14 +271,6 @@ _NO_MESH = TriangleMesh(np.eye(3), np.array([[0, 1, 2]]))
 
 COPIES = 2
 """How often the arrays of an environment are in memory while they are made: of NumPy, and on the device."""
-
-
-def _varied(sensor: Sensor, parameters: Columns, environments: int) -> list[Sensor]:
-    """Return the sensor of each environment, or one for all; raise :class:`.ParameterError` for what has to be the same."""
-    for name in parameters:
-        if name.startswith("effect."):
-            raise ParameterError(f"On Warp effects are the same in all environments, also '{name:.80}': take PressedSensors.")
-    return sensors_of(sensor, parameters, environments) if parameters else [sensor]
 
 
 def _check(sensor: Sensor, targets: Sequence[TriangleMesh | Shape], dt: float, environments: int) -> None:
@@ -269,7 +321,14 @@ def _translation(warp: ModuleType, single: bool, effects: EffectFunctions, senso
     return _TRANSLATIONS[key]
 
 
-def _sensor_arrays(sensors: Sequence[Sensor], points: ContactPoints, effects: EffectFunctions, dt: float) -> SensorArrays:
+def _of_each(values: np.ndarray, environments: int) -> np.ndarray:
+    """Return values of all environments (E, …), given those of each or of one."""
+    return np.broadcast_to(values, (environments, *values.shape[1:]))
+
+
+def _sensor_arrays(
+    sensors: Sequence[Sensor], points: ContactPoints, effects: EffectFunctions, dt: float, environments: int
+) -> SensorArrays:
     sensor, parameters = sensors[0], sensors[0].parameters
     share, n = 1.0 / parameters.points_per_texel, len(sensor.texels)
     painted = [np.ones(n) if values is None else values for values in (sensor.painted.k, sensor.painted.friction)]
@@ -283,9 +342,9 @@ def _sensor_arrays(sensors: Sequence[Sensor], points: ContactPoints, effects: Ef
         multipliers=np.column_stack([values[points.texel] for values in painted]),
         law=np.array([contact_law(one.parameters, share) for one in sensors], float),
         conversion=np.concatenate([_conversion(one) for one in sensors]),
-        force_constants=effects.force_constants,
-        friction_constants=effects.friction_constants,
-        reading_constants=effects.reading_constants,
+        force_constants=_of_each(effects.force_constants, environments),
+        friction_constants=_of_each(effects.friction_constants, environments),
+        reading_constants=_of_each(effects.reading_constants, environments),
     )
 
 

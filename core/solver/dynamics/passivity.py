@@ -30,6 +30,8 @@ MAX_BISECTIONS = 24
 
 def credit_initial_contacts(model: SolverModel, state: State, workspace: Workspace) -> None:
     """Credit contacts that exist at the very start, and were just found, with the energy of their springs."""
+    if not workspace.contacts.number.any():
+        return
     multipliers, energy = model.points.multipliers, 0.0
     for pair, row in enumerate(model.pairs.law):
         law, contacts = ContactLaw(*row), contacts_of(pair, workspace)

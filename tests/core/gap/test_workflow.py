@@ -24,7 +24,7 @@ from palpate.core.gap.report.sentences import noise_sentence
 from palpate.core.gap.selection.candidates import Candidate, scales_of
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.findings import Diagnosis
-from palpate.core.gap.selection.score_test import ScoreTest
+from palpate.core.gap.selection.rao_score import ScoreTest
 from palpate.core.gap.selection.screening import starting_points
 from palpate.core.io.sensor_toml import read_sensor
 from palpate.core.jobs.job_runner import run_job

@@ -117,11 +117,15 @@ def test_a_plate_on_a_pad_in_mjlab():
     simulation = Simulation(2, SimulationCfg(mujoco=MujocoCfg(timestep=0.0005)), model=scene.compile(), device="cpu")
     scene.initialize(simulation.mj_model, simulation.model, simulation.data)
     simulation.forward()
-    for _ in range(2000):
+    sums = []
+    for step in range(2500):
         simulation.step()
         scene.update(0.0005)
-    data = scene["touch"].data
-    assert data.contact.all()
-    assert data.texels[:, :, 0].sum(dim=1).tolist() == pytest.approx([9.81] * 2, abs=1e-3)
+        if step >= 2000:
+            sums.append(scene["touch"].data.texels[:, :, 0].sum(dim=1).tolist())
+    # Positions of 10 mm round to 9.3e-10 m in float32: of the depth's rate, times the damping of 64 texels, this is 1.2e-3 N.
+    assert scene["touch"].data.contact.all()
+    assert np.mean(sums, axis=0) == pytest.approx([9.81] * 2, abs=1e-4)
+    assert np.abs(np.array(sums) - 9.81).max() < 2 * 9.3e-10 / 0.0005 * 64 * 10.0
     with pytest.raises(ParameterError, match="update the scene after each step"):
         scene["touch"].update(0.002)

@@ -110,3 +110,10 @@ BAD = [
 def test_what_makes_no_column_is_refused(wrong, sentence):
     with pytest.raises((ParameterError, PalpateError), match=sentence):
         PressedSensors(pad(5, 4), BOX, DT, COUNT, 1, wrong)
+
+
+def test_where_texels_are_is_the_same_everywhere():
+    item = pad(5, 4)
+    item = replace(item, sensor=replace(item.sensor, effects=(effect("misalignment"), effect("creep"))))
+    with pytest.raises(ParameterError, match=r"no parameter 'effect.misalignment.x' that may differ between environments"):
+        PressedSensors(item, BOX, DT, COUNT, 1, {"effect.misalignment.x": np.linspace(0.0, 1e-3, COUNT)})

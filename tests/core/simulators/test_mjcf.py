@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from exported_sensors import FLOAT32, ball, pad
 
+from palpate.core.simulators.contact_translation import mujoco_contact
 from palpate.core.simulators.formats import mjcf
 from palpate.core.simulators.registry import export_sensors
 
@@ -76,7 +77,7 @@ def test_a_kilogram_sinks_in_as_far_as_on_ours(tmp_path):
 def test_the_depth_of_another_mass_is_the_same_as_the_note_says(tmp_path):
     (light, *_, item), (heavy, *_) = weighed(0.5, tmp_path / "light"), weighed(2.0, tmp_path / "heavy")
     assert light == pytest.approx(heavy, rel=1e-3)
-    assert "per mass" in " ".join(mjcf._notes(item))
+    assert "per mass" in " ".join(mjcf._notes(item, mujoco_contact(item)))
 
 
 def test_a_body_that_is_not_convex_is_touched_where_it_is(tmp_path):
@@ -102,3 +103,17 @@ def test_what_mujoco_cannot_express_is_in_the_file_too(tmp_path):
     text = written.files[0].read_text(encoding="utf-8")
     assert written.notes and all(note in text for note in written.notes)
     assert any("painted k" in note for note in written.notes)
+
+
+def test_the_error_of_the_contact_is_told(tmp_path):
+    """A linear sensor has none, and its `solref` is that of its springs; one that stiffens has."""
+    springs = pad()
+    model, written = loaded(springs, tmp_path / "springs")
+    law, texels = springs.sensor.parameters, len(springs.sensor.texels)
+    geom = model.geom(f"{springs.name} collision")
+    assert geom.solimp[:2] == pytest.approx(mjcf.IMPEDANCE)
+    share = (1.0 - mjcf.IMPEDANCE) * texels / 4.0
+    assert geom.solref == pytest.approx([-share * law.k, -share * law.cn], rel=1e-9)
+    assert not any("of the largest force" in note for note in written.notes)
+    _, written = loaded(pad(normal_law="hunt-crossley", k=3e4), tmp_path / "power")
+    assert any("of the largest force" in note for note in written.notes)

@@ -292,8 +292,31 @@ def test_environments_have_parameters_of_their_own(normal_law):
         for name in ("texels", "readings", "wrench"):
             assert np.abs(getattr(found, name).numpy().reshape(-1) - getattr(expected, name).reshape(-1)).max() < AGREE
     assert np.abs(ours.texels.numpy() - same.texels.numpy()).max() > 1e-3
-    with pytest.raises(ParameterError, match="On Warp effects are the same in all environments, also 'effect.creep.amount'"):
-        WarpSensors(item, SHAPE, DT, 4, parameters={"effect.creep.amount": np.ones(4)})
+
+
+@pytest.mark.long("Warp compiles kernels for these effects")
+def test_environments_have_effects_of_their_own():
+    """On forces, on friction and on readings, beside stiffness and gain."""
+    item = pad(4, 3, points_per_texel=4)
+    names = ("creep", "viscous-friction", "lag")
+    item = replace(item, sensor=replace(item.sensor, effects=tuple(effect(name) for name in names)))
+    columns = {
+        "k": np.linspace(500.0, 2000.0, 4),
+        "gain": np.linspace(0.5, 2.0, 4),
+        "effect.creep.amount": np.linspace(0.0, 0.5, 4),
+        "effect.creep.time": np.linspace(0.02, 0.1, 4),
+        "effect.viscous-friction.viscosity": np.linspace(0.0, 5.0, 4),
+        "effect.lag.time": np.linspace(0.01, 0.1, 4),
+    }
+    core = PressedSensors(item, SHAPE, DT, 4, parameters=columns)
+    ours, same = WarpSensors(item, SHAPE, DT, 4, parameters=columns), WarpSensors(item, SHAPE, DT, 4)
+    for now in random_poses(8, 6, 4):
+        expected, found = core.step(now[:, 0], now[:, 1]), ours.step(now[:, 0], now[:, 1])
+        same.step(now[:, 0], now[:, 1])
+        for name in ("texels", "readings", "wrench"):
+            assert np.abs(getattr(found, name).numpy().reshape(-1) - getattr(expected, name).reshape(-1)).max() < AGREE
+    for one in (0, 3):
+        assert np.abs(ours.readings.numpy()[one] - same.readings.numpy()[one]).max() > 1e-3
 
 
 def test_more_environments_than_memory_are_one_sentence(monkeypatch):

@@ -462,6 +462,34 @@ def test_simulations_that_share_what_is_alike_give_the_same_bits():
     assert trees[0] is trees[1] is trees[3] is not trees[2]
 
 
+def test_a_simulation_begins_again_on_the_arrays_of_one_that_is_gone():
+    """Bodies move otherwise in each of them, some on a softer sensor; one that is still there keeps its arrays."""
+    base, shared = cube_on_pad(1.0, frames=4), SharedResults()
+
+    def other(height: float, k: float = 2000.0):
+        start = base.bodies[1].motion
+        path = replace(start, positions=start.positions - np.array([0.0, 0.0, height]))
+        sensor = replace(base.sensors[0], parameters=replace(base.sensors[0].parameters, k=k))
+        return replace(base, bodies=(base.bodies[0], replace(base.bodies[1], motion=path)), sensors=(sensor,))
+
+    used = []
+    for scenario in (other(0.0), other(1e-4), other(2e-4), other(1e-4, 500.0), other(-1e-4), other(2e-4)):
+        simulation = Simulation(scenario, shared=shared)
+        used.append(simulation.arrays[3].bodies.rotation)
+        together, alone = simulation.advance_all(), Simulation(scenario).advance_all()
+        for name in ("normal_force", "shear", "depth", "slip"):
+            values, expected = (getattr(found.sensors["pad"], name) for found in (together, alone))
+            np.testing.assert_array_equal(values, expected)
+        np.testing.assert_array_equal(together.poses, alone.poses)
+        simulation = None
+    assert used[1] is used[2] is used[3] is used[5] is not used[0]
+    first, second = (Simulation(other(height), shared=shared) for height in (1e-4, 2e-4))
+    assert first.arrays[3].bodies.rotation is used[1] is not second.arrays[3].bodies.rotation
+    second.advance_all()
+    frame, expected = first.advance(), Simulation(other(1e-4)).advance()
+    np.testing.assert_array_equal(frame.sensors["pad"].normal_force, expected.sensors["pad"].normal_force)
+
+
 def test_neighbour_lists_change_nothing():
     """A ball rolls and slides over a pad; with no list at all every query goes through the tree."""
     ball = shape(trimesh.creation.icosphere(3, 0.012))
@@ -477,9 +505,10 @@ def test_neighbour_lists_change_nothing():
         assert np.array_equal(frame.sensors["pad"].normal_force, recording.sensors["pad"].normal_force[i])
         assert np.array_equal(frame.sensors["pad"].shear, recording.sensors["pad"].shear[i])
     simulation = Simulation(scenario)
-    lists = simulation._neighbour_lists
-    simulation._neighbour_lists = lists._replace(triangles=np.zeros((len(lists.triangles), 0), np.int32))
-    simulation._neighbour_lists.shortest_distance[:] = -1.0  # as if no list had been made
+    lists = simulation._detection.neighbours
+    without = lists._replace(triangles=np.zeros((len(lists.triangles), 0), np.int32))
+    without.shortest_distance[:] = -1.0  # as if no list had been made
+    simulation._detection = simulation._detection._replace(neighbours=without)
     for i in range(16):
         frame = simulation.advance() if i else simulation.observe()
         assert np.array_equal(frame.sensors["pad"].shear, recording.sensors["pad"].shear[i])

@@ -11,7 +11,7 @@ import pytest
 
 from palpate.core.effects.engine.registry import effect
 from palpate.core.gap.fitting.intervals import ParameterInterval
-from palpate.core.gap.fitting.least_squares import Fit, FreeParameter, TrialView, fit, free_base_parameters, held_out_squares
+from palpate.core.gap.fitting.least_squares import Fit, FreeParameter, TrialView
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.report import sentences, summary
 from palpate.core.gap.report.comparison import gap_errors
@@ -22,7 +22,6 @@ from palpate.core.gap.selection.confidence import CLEAR_LEAD, _closes_most, unse
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.forward_selection import SelectionState, SelectionStep
 from palpate.core.gap.selection.gap_sizes import GapSizes, Improvement
-from palpate.core.gap.selection.harmful_effects import without_harmful_effects
 from palpate.core.gap.selection.verdict import FAULTY, REFUTED, conclude
 from palpate.core.jobs.job_runner import run_job
 from palpate.core.model.sensor_parameters import SensorParameters
@@ -104,34 +103,14 @@ def test_noise_in_the_fitted_recordings_is_no_gap_only_where_the_check_is_noise_
     assert "without load it reads" in sentences.headline(result, gap_errors(result))
 
 
-def extra_state(rig, views):
-    """A state with saturation and with an extra gain of single texels, as if both had joined."""
-    texels = cases.ROWS * cases.COLUMNS
-    gains = effect("gain-mismatch", "listed", factor=tuple(np.ones(texels)))
-    model = Model(rig.parameters, (effect("saturation", "rational", level=0.25), gains))
-    free = [
-        *free_base_parameters(rig.parameters, ("k", "cn"), 1.0),
-        FreeParameter(0, "level", 1e-3, 10.0, log=True),
-        FreeParameter(1, "factor", 0.0, 100.0, per_texel=True, resting_value=1.0),
-    ]
-    found = fit(views, model, free)
-    improvements = {"saturation": Improvement(0.9, 0.9), "gain-mismatch": Improvement(0.05, 0.5)}
-    return SelectionState(found, held_out_squares(views, found), {}, improvements)
-
-
-@pytest.mark.parametrize("stays", [True, False])
-def test_an_extra_that_makes_the_check_worse_is_dropped(stays):
-    """Gains that the check recording has too stay; those of the fitted recordings alone go, and the main effect remains."""
-    gains = np.exp(np.random.default_rng(3).normal(0, 0.1, cases.ROWS * cases.COLUMNS))
+@pytest.mark.long("two whole diagnoses")
+def test_check_recordings_choose_no_effect():
+    """The amended model has the same effects, whatever the check recording holds; only what is said of it changes."""
     rig = cases.rig(contact=lambda f, t: f / (1.0 + 4.0 * f), seed=5, trials=4, seconds=6.0)
-    trials = [replace(t, reading=t.reading * gains) if stays or t.use == "fit" else t for t in rig.trials]
-    rig = replace(rig, trials=tuple(trials))
-    views = [TrialView(Predictor(t, rig), noise=(1e-3, 1.0), stretch_count=2) for t in rig.of("fit")]
-    check = [TrialView(Predictor(t, rig), noise=(1e-3, 1.0)) for t in rig.of("check")]
-    state = without_harmful_effects(views, check, extra_state(rig, views), GAP_SIZES)
-    left = [one.name for one in state.fit.model.effects]
-    assert left == (["saturation", "gain-mismatch"] if stays else ["saturation"])
-    assert state.dropped == (() if stays else ("gain-mismatch",))
+    plain, other = diagnosed(rig), diagnosed(with_check(rig, 0.6))
+    chosen = [[(one.name, one.form) for one in result.best.model.effects] for result in (plain, other)]
+    assert chosen[0] and chosen[0] == chosen[1]
+    assert not plain.check.is_refuted and other.check.is_refuted
 
 
 def test_what_closes_most_stays_sure_beside_little_that_is_ambiguous():

@@ -194,9 +194,10 @@ def test_neighbour_lists_change_nothing():
     scenario = replace(scenario, targets=(target,))
     expected = run(scenario).sensors["pad"]
     simulation = Simulation(scenario)
-    lists = simulation._neighbour_lists
-    simulation._neighbour_lists = lists._replace(triangles=np.zeros((len(lists.triangles), 0), np.int32))
-    simulation._neighbour_lists.shortest_distance[:] = -1.0  # what was made already had room
+    lists = simulation._detection.neighbours
+    without = lists._replace(triangles=np.zeros((len(lists.triangles), 0), np.int32))
+    without.shortest_distance[:] = -1.0  # what was made already had room
+    simulation._detection = simulation._detection._replace(neighbours=without)
     for i in range(10):
         frame = simulation.advance() if i else simulation.observe()
         assert np.array_equal(frame.sensors["pad"].normal_force, expected.normal_force[i])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Score tests: by how much could the squares of a fit fall if its model also changed in some direction?"""
+"""Rao's score tests: by how much could the squares of a fit fall if its model also changed in some direction?"""
 
 from __future__ import annotations
 
