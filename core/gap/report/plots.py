@@ -101,10 +101,19 @@ def _quantity(result: Diagnosis, channel: str) -> str:
     return "normal force (N)" if unit == "N" else f"reading ({unit})"
 
 
-def _worst_channel(result: Diagnosis, predictor: Predictor) -> tuple[str, np.ndarray, Callable[[Model], np.ndarray]]:
+def _worst_channel(
+    result: Diagnosis, predictor: Predictor, stimulus: np.ndarray | None = None
+) -> tuple[str, np.ndarray, Callable[[Model], np.ndarray]]:
+    """The channel with the largest error: its name, what was measured, and what a model predicts.
+
+    With the `stimulus` of each texel (samples, n), those whose stimulus changes come first.
+    """
     trial, base = predictor.trial, predictor.predict(result.base.model)
     if trial.reading is not None:
         miss = np.nansum((trial.reading - base.reading) ** 2, axis=0)
+        changes = np.ptp(stimulus, axis=0) > 0.0 if stimulus is not None else np.ones(len(miss), bool)
+        if changes.any():
+            miss[~changes] = 0.0
         texel = int(np.argmax(miss))
         return f"texel {texel}", trial.reading[:, texel], lambda model: predictor.predict(model).reading[:, texel]
     assert trial.force is not None and base.force is not None
@@ -260,8 +269,8 @@ def phase_bars(result: Diagnosis, errors: GapErrors) -> Figure:
 def loops(result: Diagnosis) -> Figure:
     """Reading over depth (or load, or travel) of the texel with the largest error: what an effect's signature looks like."""
     predictor = max(result.of("fit"), key=lambda p: float(np.nansum(_base_squared_error(p, result))))
-    name, measured, pick = _worst_channel(result, predictor)
     s, trial = predictor.stimulus, predictor.trial
+    name, measured, pick = _worst_channel(result, predictor, s.depth if s.force_share is None else s.force_share)
     if "texel" in name:
         texel = int(name.split()[1])
         x = s.force_share[:, texel] if s.force_share is not None else 1e3 * s.depth[:, texel]
