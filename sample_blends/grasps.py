@@ -44,13 +44,16 @@ def _sphere(scene, name):
 
 def _box(scene, name):
     made = scene_builder.box(scene, name, (30.0, 44.0, 64.0), bevel=1.2)
+    made.data.materials.append(scene_builder.clear_block("Wood, seen through"))  # else it would hide the heat maps
     made.data.materials.append(scene_builder.material("Wood", (0.55, 0.36, 0.19), roughness=0.55))
+    made.modifiers["Bevel"].material = 1
+    made.data.polygons[4].material_index = 1  # the bottom, which lies in the table's surface: both would be drawn in spots
     return made
 
 
 def _cylinder(scene, name):
     made = scene_builder.cylinder(scene, name, 16.0, 70.0, bevel=0.8)
-    made.data.materials.append(scene_builder.material("Brass", (0.8, 0.58, 0.25), metallic=1.0, roughness=0.28))
+    made.data.materials.append(scene_builder.see_through_steel("Steel, seen through", clear=0.8, edge=0.6))
     return made
 
 
