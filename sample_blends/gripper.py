@@ -121,7 +121,9 @@ def spray_bottle(scene, name: str):
     body += [(8.0, 52.0)]
     vertices, faces = surface_of_revolution(body)
     bottle = scene_builder.mesh_object(scene, name, vertices, faces)
-    plastic = scene_builder.material("Blue plastic, seen through", (0.05, 0.22, 0.6), roughness=0.25)
+    plastic = scene_builder.see_through_steel("Blue plastic, seen through", clear=0.75, edge=0.8)
+    shader = plastic.node_tree.nodes["Principled BSDF"]
+    shader.inputs["Base Color"].default_value, shader.inputs["Metallic"].default_value = (0.05, 0.22, 0.6, 1.0), 0.0
     bottle.data.materials.append(plastic)
     white = scene_builder.material("White plastic", (0.8, 0.8, 0.78), roughness=0.4)
     cap = scene_builder.cylinder(scene, f"{name} cap", 10.5, 12.0, (0.0, 0.0, 57.0), bevel=0.8)

@@ -243,7 +243,7 @@ def test_a_start_in_the_middle_computes_nothing():
     live_cache.drop_all()
     play(scene, 5, 6)
     assert live_cache.get(scene) is None
-    assert "go to the first frame" in frame_status.status_of(scene).text
+    assert "play from the first frame" in frame_status.status_of(scene).text
 
 
 @pytest.mark.parametrize(
