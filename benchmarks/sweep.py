@@ -28,6 +28,7 @@ import numpy as np
 import trimesh
 from solver_scenes import shape
 
+from palpate.core.compiled.thread_team import count_of_cores
 from palpate.core.geometry.texels import texels_from_region
 from palpate.core.io.scenario_npz import save_scenario
 from palpate.core.model.body import Body
@@ -45,7 +46,6 @@ from palpate.core.study.run_record import RunRecord
 from palpate.core.study.study_file import Run, plan_for, read_study
 from palpate.core.study.variation import varied_scenario
 from palpate.sweep.child import Scenes, compute_run, pack_frames
-from palpate.sweep.trial import count_of_cores
 
 from .solver import GRIDS, SLOPE, mujoco_weighing, pad, palpate_weighing
 from .solver import cube as weighed_cube
@@ -61,8 +61,8 @@ SPEED = 0.1
 """Of the approach, m/s: short runs are mostly contact then."""
 LENGTHS = {"50_ms": 0.02, "500_ms": 0.47}
 """Rest after the press, s, by the length of a run."""
-STUDIES = {"presses": (0.55, TEXELS, 1500), "long": (19.9, 1024, 10)}
-"""Whole studies: rest after the press, s, texels, and runs; of 60 frames, and of 2,000. They stand for 10,000 and 100 runs."""
+STUDIES = {"presses": (0.55, TEXELS, 10_000), "long": (19.9, 1024, 100)}
+"""Whole studies: rest after the press, s, texels, and runs; of 60 frames, and of 2,000."""
 COMPARED = {84: (0.47, 40), 1024: (4.9, 4)}
 """Presses with MuJoCo, by their texels: rest after the press, s, and runs of a round."""
 DATASET_RUNS = 300

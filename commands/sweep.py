@@ -171,7 +171,7 @@ def _print_names(place: Path, arguments: argparse.Namespace) -> None:
 
 
 def _workers(arguments: argparse.Namespace) -> int:
-    from ..sweep.trial import count_of_cores
+    from ..core.compiled.thread_team import count_of_cores
 
     return arguments.workers or count_of_cores()
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..core.compiled.thread_team import count_of_cores
 from ..core.errors import PalpateError
 from ..core.io.file_writing import writable_folder
 from ..core.io.folder_lock import FolderLock
@@ -21,7 +22,6 @@ from .program import require_allowed
 from .scene_evaluation import REFUSE, read_blend
 from .status import Status, status_of
 from .study_folder import OpenStudy
-from .trial import count_of_cores
 from .worker import Limits
 
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import tempfile
 import time
@@ -129,8 +128,3 @@ def _seconds_to_close(folder: Path, runs: Sequence[Run]) -> tuple[float, float]:
         return 0.0, 0.0
     whole = _seconds_of(lambda: publish(folder, runs)) + _seconds_of(lambda: write_report(folder, runs))
     return whole, min(_seconds_of(lambda: publish(folder, runs), time.process_time) for _ in range(2))
-
-
-def count_of_cores() -> int:
-    """Return how many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

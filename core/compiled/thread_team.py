@@ -178,11 +178,11 @@ def make_queue(points: int, threads: int | None = None) -> tuple[np.ndarray, int
 
 def threads_for(points: int, threads: int | None = None) -> int:
     """Return how many threads to use; the arguments are those of :func:`make_queue`."""
-    return threads or int(os.environ.get("PALPATE_THREADS", "0")) or min(_processors(), 1 + points // POINTS_PER_THREAD)
+    return threads or int(os.environ.get("PALPATE_THREADS", "0")) or min(count_of_cores(), 1 + points // POINTS_PER_THREAD)
 
 
-def _processors() -> int:
-    """How many processors this process may use."""
+def count_of_cores() -> int:
+    """Return how many cores this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
