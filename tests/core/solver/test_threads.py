@@ -43,7 +43,7 @@ def test_threads_change_no_bit(scene):
 @compiled
 def test_helpers_are_called_where_they_are_worth_while(monkeypatch):
     monkeypatch.delenv("PALPATE_THREADS", raising=False)
-    monkeypatch.setattr(thread_team, "_processors", lambda: 4)
+    monkeypatch.setattr(thread_team, "count_of_cores", lambda: 4)
     assert thread_team.make_queue(thread_team.POINTS_PER_THREAD - 1)[1] == 0
     assert thread_team.make_queue(thread_team.POINTS_PER_THREAD)[1] == 1
     assert thread_team.make_queue(10**6)[1] == 3
