@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 BLOCK_NUMBERS = 1 << 16
-"""Numbers that are taken into account at once: 512 kB, as much as the cache of a core holds. Half as
-many took a quarter more time."""
+"""Numbers that are taken into account at once: 512 kB, as much as the cache of a core holds. Half as many took a quarter more
+time."""
 
 
 class RunningStatistics:
