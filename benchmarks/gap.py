@@ -28,7 +28,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
@@ -55,8 +55,8 @@ def run() -> Iterator[dict]:
     results = results_in(Path(kept)) if kept else _results(plan, set(_spread(plan, baselines)))
     matrix, rows = confusion(results), table(results)
     print(matrix, rows, sep="\n\n", file=sys.stderr)
-    (_folder() / "confusion.txt").write_text(matrix + "\n", encoding="utf-8")
-    (_folder() / "table.md").write_text(rows + "\n", encoding="utf-8")
+    (results_folder() / "confusion.txt").write_text(matrix + "\n", encoding="utf-8")
+    (results_folder() / "table.md").write_text(rows + "\n", encoding="utf-8")
     yield from figures(results)
 
 
@@ -69,41 +69,64 @@ def _spread(plan: list[tuple[str, int]], count: int) -> list[tuple[str, int]]:
 # --- cases, one after the other
 
 
-def _folder() -> Path:
+def results_folder() -> Path:
+    """Return the folder of results, which is made if it lacks."""
     folder = HOUSE / "build" / "gap"
     folder.mkdir(parents=True, exist_ok=True)
     return folder
 
 
 def _results(plan: list[tuple[str, int]], compared: set[tuple[str, int]]) -> list[dict]:
-    path = _folder() / f"results-{fingerprint()}.jsonl"
-    lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
-    done = {(r["kind"], r["number"]): r for r in map(json.loads, lines)}
+    path = results_folder() / f"results-{fingerprint()}.jsonl"
+    done = done_in(path)
     todo = [entry for entry in plan if entry not in done or (entry in compared and "baselines" not in done[entry])]
-    processes = int(os.environ.get("PALPATE_GAP_PROCESSES", "2"))
+    done |= carried_out(examine, [(*entry, entry in compared) for entry in todo], path)
+    return [done[entry] for entry in plan]
+
+
+def done_in(path: Path) -> dict[tuple[str, int], dict]:
+    """Return the results in a file by kind and number, the last of each; none if there is no file."""
+    return {(r["kind"], r["number"]): r for r in results_in(path)} if path.is_file() else {}
+
+
+def carried_out(work: Callable[..., dict], todo: list[tuple], path: Path) -> dict[tuple[str, int], dict]:
+    """Call `work` with each entry of `todo` in processes, and append each result to a file as it comes.
+
+    Returns
+    -------
+    dict
+        Results by kind and number.
+    """
+    processes, found = int(os.environ.get("PALPATE_GAP_PROCESSES", "2")), {}
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool, path.open("a", encoding="utf-8") as file:
-        waiting = [pool.submit(examine, kind, number, (kind, number) in compared) for kind, number in todo]
+        waiting = [pool.submit(work, *entry) for entry in todo]
         for count, future in enumerate(as_completed(waiting), start=1):
             result = future.result()
-            done[result["kind"], result["number"]] = result
+            found[result["kind"], result["number"]] = result
             file.write(json.dumps(result) + "\n")
             file.flush()
             said = f"{result['kind']} {result['number']}: {result['outcome']}"
             print(f"{count}/{len(todo)} {said} ({result['seconds']:.0f} s)", file=sys.stderr, flush=True)
-    return [done[entry] for entry in plan]
+    return found
 
 
 def examine(kind: str, number: int, compare: bool = False) -> dict[str, Any]:
     """Draw a case, have it diagnosed from its files, and hold the outcome against the answer."""
+    return examined(cases.draw(kind, number), compare=compare)
+
+
+def examined(
+    case: cases.Case, write: Callable[[cases.Case, Path], Path] = cases.write, compare: bool = False
+) -> dict[str, Any]:
+    """Have a case diagnosed from the files that `write` makes in a folder, and hold the outcome against the answer."""
     from palpate.core.gap.dataset.rig import read_rig
     from palpate.core.gap.selection.diagnosis import diagnose
     from palpate.core.jobs.job_runner import run_job
 
-    case = cases.draw(kind, number)
     with tempfile.TemporaryDirectory() as folder:
-        rig_path = cases.write(case, Path(folder))
+        rig_path = write(case, Path(folder))
         began, used = time.perf_counter(), time.process_time()
         result, failed = None, ""
         try:
@@ -111,7 +134,7 @@ def examine(kind: str, number: int, compare: bool = False) -> dict[str, Any]:
         except Exception as error:  # counts as anything but right; the other cases go on
             failed = repr(error)
         seconds, cpu = time.perf_counter() - began, time.process_time() - used
-    entry = {"kind": kind, "number": number, "answer": case.answer, "forms": [h.form for h in case.hidden]}
+    entry = {"kind": case.kind, "number": case.number, "answer": case.answer, "forms": [h.form for h in case.hidden]}
     scored = score(case, result) if result is not None else {**FAILED, "failed": failed}
     entry |= {"shape": "ball" if case.probe.radius else "flat", "share": list(case.share), **scored}
     entry |= {"seconds": round(seconds, 2), "cpu_seconds": round(cpu, 2)}

@@ -9,6 +9,7 @@ not drown all else.
 from __future__ import annotations
 
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -108,9 +109,20 @@ def names_for(kind: str) -> list[str]:
     return list({"other": MAKERS, "own": OWN, "third": THIRD, "outside": OUTSIDE}.get(kind, {"": None}))
 
 
-def draw(kind: str, number: int) -> Case:
-    """Return case `number` of a kind; the same every time."""
-    rng, pad, probe, names = _begun(kind, number)
+def draw(kind: str, number: int, names: Sequence[str] | None = None, coloured: bool | None = None) -> Case:
+    """Return case `number` of a kind; the same every time.
+
+    Parameters
+    ----------
+    kind : str
+    number : int
+    names : sequence of str, optional
+        Of what is hidden, instead of what the number stands for.
+    coloured : bool, optional
+        Whether the noise is coloured, instead of what the kind and the number say.
+    """
+    rng, pad, probe, drawn = _begun(kind, number)
+    names = drawn if names is None else names
     makers = {"own": OWN, "simulated": OWN, "third": THIRD}.get(kind, {**MAKERS, **OUTSIDE})
     way = list(POOR)[number % len(POOR)] if kind == "poor" else ""
     times, paths = _poor(way, rng, probe) if way in PROGRAMMES else _trials(rng, probe, pad)
@@ -121,7 +133,8 @@ def draw(kind: str, number: int) -> Case:
     signals = [respond(contact, pad, hidden) for contact in contacts]
     full = max(float(np.abs(s.reading - pad.zero).max()) for s in signals)
     noise = rng.uniform(0.003, 0.01) * full * (30.0 if way == "too noisy" else 1.0)
-    coloured = kind in ("none", "simulated") and number % 3 == 2
+    if coloured is None:
+        coloured = kind in ("none", "simulated") and number % 3 == 2
     readings = [converted(s.reading + noise * _noise(rng, s.reading.shape, coloured), pad, hidden) for s in signals]
     largest = max(float(np.abs(net_force(s)).max()) for s in signals)
     forces = [net_force(s) + 0.003 * largest * _noise(rng, (len(s.time), 3), coloured) for s in signals]
@@ -397,8 +410,15 @@ def _seen(effect: Hidden | None, name: str, signals: Signals, pad: Pad) -> np.nd
 # --- files
 
 
-def write(case: Case, folder: Path, name: str = "") -> Path:
-    """Write a case as a rig and return the path of its TOML file; only the number, in the name, says anything of the answer."""
+GRID = f"grid = {{ rows = {ROWS}, columns = {COLUMNS}, pitch = [{PITCH!r}, {PITCH!r}] }}"
+"""What a rig says of where the texels are."""
+
+
+def write(case: Case, folder: Path, name: str = "", places: str = GRID) -> Path:
+    """Write a case as a rig and return the path of its TOML file; only the number, in the name, says anything of the answer.
+
+    A reading that is not a number becomes an empty cell. `places` is the rig's line on where the texels are.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     if case.probe.radius is not None:
         shape = f"{{ sphere = {case.probe.radius!r} }}"
@@ -410,15 +430,15 @@ def write(case: Case, folder: Path, name: str = "") -> Path:
     uses = [use for use, count in TRIALS for _ in range(count)]
     lines = [
         'format = "palpate-rig/1"', f'name = "{name or f"case {case.number}"}"', "[sensor]",
-        f"grid = {{ rows = {ROWS}, columns = {COLUMNS}, pitch = [{PITCH!r}, {PITCH!r}] }}", words,
-        "[indenter]", f"shape = {shape}",
+        places, words, "[indenter]", f"shape = {shape}",
     ]  # fmt: skip
     header = ["time", "x", "y", "z", *(f"texel_{i}" for i in range(ROWS * COLUMNS)), "force_x", "force_y", "force_z"]
     for i, use in enumerate(uses):
         lines += ["[[trial]]", f'file = "trial_{i}.csv"', f'use = "{use}"']
         table = np.hstack([case.times[i][:, None], case.paths[i], case.readings[i], case.forces[i]])
         rows = ["%.7g," * (table.shape[1] - 1) % tuple(row[:-1]) + f"{row[-1]:.7g}" for row in table.tolist()]
-        (folder / f"trial_{i}.csv").write_text("\n".join([",".join(header), *rows]) + "\n", encoding="utf-8")
+        text = "\n".join([",".join(header), *rows]).replace("nan", "") + "\n"
+        (folder / f"trial_{i}.csv").write_text(text, encoding="utf-8")
     path = folder / "rig.toml"
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
