@@ -49,6 +49,8 @@ SIMULATED = (0.1, 0.45, 0.3, 0.15)
 """Shares of simulated cases with none to three effects."""
 ORDER = list(MAKERS)
 """The way from the contact to the reading, in which several effects act."""
+BALL_ONLY = ("misalignment", "load-spreading", "crosstalk")
+"""A flat indenter loads all texels alike: where the pad sits, and what neighbours do, cannot show under it."""
 VAGUE = ("creep", "hysteresis", "lag", "softening")
 """What a single slow press does not tell apart."""
 POOR = {
@@ -184,9 +186,8 @@ def _names(kind: str, number: int, rng, ball: bool) -> list[str]:
     if kind == "poor":
         choice = POOR[list(POOR)[number % len(POOR)]]
         return [choice[number // len(POOR) % len(choice)]]
-    pool = names_for(kind) if kind not in SEVERAL else list(MAKERS)
-    # A flat indenter loads all texels alike: where the pad sits, and what neighbours do, cannot show under it.
-    blind = () if ball else ("misalignment", "load-spreading", "crosstalk")
+    pool = names_for(kind) if kind not in SEVERAL else ORDER
+    blind = () if ball else BALL_ONLY
     if kind == "simulated":
         known = [name for name in OWN if name not in blind]
         count = rng.choice(len(SIMULATED), p=SIMULATED)
@@ -194,8 +195,14 @@ def _names(kind: str, number: int, rng, ball: bool) -> list[str]:
     if kind not in SEVERAL:
         name = pool[number % len(pool)]
         return [name if name not in blind else pool[(number + 7) % len(pool)]]
-    clear = [name for name in pool if name not in (*blind, "noise", "quantization", "offset", "dead-texels")]
-    return sorted(map(str, rng.choice(clear, size=SEVERAL[kind], replace=False)), key=ORDER.index)
+    return several_names(rng, SEVERAL[kind], ball)
+
+
+def several_names(rng: np.random.Generator, count: int, ball: bool) -> list[str]:
+    """Return so many effects that can be told apart in the recordings of one sensor, in the order in which they act."""
+    unclear = ("noise", "quantization", "offset", "dead-texels")
+    clear = [name for name in ORDER if name not in unclear and (ball or name not in BALL_ONLY)]
+    return sorted(map(str, rng.choice(clear, size=count, replace=False)), key=ORDER.index)
 
 
 def _words(rng, pad: Pad, kind: str, number: int) -> dict:

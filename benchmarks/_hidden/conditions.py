@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cases of :mod:`.cases` with one hidden effect, recorded under other conditions (:data:`CONDITIONS`).
+"""Cases of :mod:`.cases` with one hidden effect, recorded under other conditions (:data:`CONDITIONS`), or two of another family.
 
 Pad, indenter, trials, strength and size of the noise are those that the formula's kind has under the same number, so that a
-condition can be compared with its absence case by case. ``friction`` alone hides other effects than the number stands for.
+condition can be compared with its absence case by case. ``friction`` and ``pairs`` hide other effects than the number stands for.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ import numpy as np
 from . import cases
 from .world import COLUMNS, ROWS
 
-CONDITIONS = ("coloured", "missing", "mesh", "friction")
+CONDITIONS = ("coloured", "missing", "mesh", "friction", "pairs")
 """Coloured noise on readings and forces; empty cells of readings; a rig whose texels are the vertices of a mesh; friction or
-nothing."""
+nothing; two effects, both in formulas of :mod:`.third`."""
 FORMULAS = ("own", "other", "third")
 """Whose formulas a case's number runs through."""
 MISSING = ("2 %", "10 %", "40 %", "stretch")
@@ -35,6 +35,8 @@ def draw(condition: str, number: int) -> cases.Case:
     """Return case `number` of a condition; the same every time."""
     if condition == "friction":
         return _friction(number)
+    if condition == "pairs":
+        return _pair(number)
     formula = FORMULAS[number % len(FORMULAS)]
     case = cases.draw(formula, number, coloured=True if condition == "coloured" else None)
     if condition == "missing":
@@ -58,6 +60,13 @@ def _friction(number: int) -> cases.Case:
     place = number - number // NOTHING_EVERY  # of this case among those with something hidden
     name = cases.IN_FORCE[place // len(FORMULAS) % len(cases.IN_FORCE)]
     return cases.draw(FORMULAS[place % len(FORMULAS)], number, names=(name,))
+
+
+def _pair(number: int) -> cases.Case:
+    """Two effects in formulas of the third family."""
+    plain = cases.draw("third", number, names=())
+    names = cases.several_names(np.random.default_rng([zlib.crc32(b"pairs"), number]), 2, plain.probe.radius is not None)
+    return replace(cases.draw("third", number, names=names), kind="two")
 
 
 def _emptied(readings: list[np.ndarray], way: str, rng: np.random.Generator) -> list[np.ndarray]:

@@ -50,6 +50,27 @@ def previous(signal: np.ndarray, time: np.ndarray, values: Values, transducers: 
     return result
 
 
+def wires(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Couple the wires of the rows with each other, and those of the columns, the less the farther apart they are."""
+    if transducers.row is None or transducers.column is None:
+        raise EffectError(
+            f"Effect 'crosstalk' (wires) of sensor '{transducers.name}' needs texels in rows and columns: "
+            "choose the form neighbours."
+        )
+    share, fall = scalar(values, "share"), scalar(values, "fall")
+    row, column = (np.unique(line, return_inverse=True)[1] for line in (transducers.row, transducers.column))
+    table = np.zeros((len(signal), int(row.max()) + 1, int(column.max()) + 1))
+    table[:, row, column] = signal
+    across, along = (_coupled_wires(count, share, fall) for count in table.shape[1:])
+    return np.asarray((across @ table @ along)[:, row, column])
+
+
+def _coupled_wires(count: int, share: float, fall: float) -> np.ndarray:
+    """One for a wire itself, and what it takes from each of the others, (count, count) float."""
+    apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
+    return np.where(apart == 0, 1.0, share * fall ** np.maximum(apart - 1, 0))
+
+
 def couplings(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
     """Readings that couple into neighbours and into texels of the same row or column, on top of their own."""
     columns = []
@@ -111,11 +132,28 @@ KIND = Kind(
             neutral={"share": 0.0},
             memoryless=previous,
         ),
+        Form(
+            "wires",
+            "r = (1 + A) f (1 + B),  A and B: c · qᵈ⁻¹ between wires d apart, of rows and of columns",
+            "Paul, Introduction to Electromagnetic Compatibility (2006), chapter 9: crosstalk between parallel wires",
+            (
+                Parameter("share", "1", 0.05, 0.0, 0.5, "Share c that the next wire adds."),
+                Parameter("fall", "1", 0.4, 0.0, 0.9, "Factor q of the share from each wire to the next but one."),
+            ),
+            neutral={"share": 0.0},
+            memoryless=wires,
+        ),
     ),
     experiment="press single texels with a pin, along one row and along one column, at two loads",
     drawing=Drawing(
         "row",
-        values={"neighbours": {"share": 0.2}, "lines": {"share": 1.0}, "common": {"share": 4.0}, "previous": {"share": 0.3}},
+        values={
+            "neighbours": {"share": 0.2},
+            "lines": {"share": 1.0},
+            "common": {"share": 4.0},
+            "previous": {"share": 0.3},
+            "wires": {"share": 0.2, "fall": 0.5},
+        },
     ),
     known_from=("places",),
     families=("spreading",),

@@ -11,6 +11,9 @@ from ..engine.declarations import Drawing, Recordings, Run, Variant
 from ..engine.random_streams import random_walk
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
+MINUTE = 60.0
+"""Seconds after which the amounts of the form "listed" hold."""
+
 
 def linear(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Change at a constant rate."""
@@ -31,6 +34,12 @@ def walk(signal: np.ndarray, time: np.ndarray, values: Values, transducers: Tran
     """Perform a random walk, independently in each texel."""
     spread = scalar(values, "spread")
     return signal + spread * random_walk("drift", seed, time, signal.shape[1]) if spread else signal
+
+
+def listed(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Change in each texel by an amount of its own, with a common power of the time."""
+    share = (np.maximum(time, 0.0) / MINUTE) ** scalar(values, "exponent")
+    return signal + share[:, None] * np.asarray(values["amount"])
 
 
 def functions_of_time(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
@@ -70,6 +79,21 @@ KIND = Kind(
             ),
             neutral={"amount": 0.0},
             memoryless=warm_up,
+            after_conversion=True,
+        ),
+        Form(
+            "listed",
+            "rᵢ = r₀ᵢ + aᵢ · (t / 60 s)ⁿ",
+            "ISO/IEC Guide 99 (2007), 4.21: instrumental drift; a power of the time as in Findley et al., Creep and Relaxation "
+            "of Nonlinear Viscoelastic Materials (1976)",
+            (
+                Parameter(
+                    "amount", "unit", 0.0, -1e5, 1e5, "Change a of the reading of each texel after 60 s.", per_texel=True
+                ),
+                Parameter("exponent", "1", 1.0, 0.1, 3.0, "Exponent n of the time; 1 is a constant rate.", log=True),
+            ),
+            neutral={"amount": 0.0},
+            memoryless=listed,
             after_conversion=True,
         ),
         Form(

@@ -229,7 +229,8 @@ def evidence(result: Diagnosis, errors: GapErrors) -> list[str]:
         before, after = left[one.effect], left[min(one.effect + 1, len(left) - 1)]
         confidence = said_confidence(one.confidence)
         said.append(f"{one.name} ({one.form}): {before:.2%} → {after:.2%}, confidence {confidence}{rivals}")
-        said += [f"{one.name}: {why}, so its name is in doubt" for why in (*one.unsettled, *one.doubts)]
+        so = "so its number is in doubt and its name is not" if one.confidence >= SURE else "so its name is in doubt"
+        said += [f"{one.name}: {why}, {so}" for why in (*one.unsettled, *one.doubts)]
     if result.of("check") and result.findings:
         before, after = errors.base["check"] or 0.0, errors.amended["check"] or 0.0
         said.append(f"check recordings, never fitted: {before:.2%} → {after:.2%}; noise alone is {errors.noise_floor:.2%}")

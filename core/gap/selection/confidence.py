@@ -37,8 +37,8 @@ EXPLAINED = 0.5
 PARTLY_EXPLAINED, DISTINCT_RATIO = 0.35, 1.5
 """Share of the gap that suffices for a sure effect if all other kinds leave at least `DISTINCT_RATIO` times as much."""
 CLEAR_LEAD = 2.0
-"""A kind is sure, although the recordings leave its parameters open, if all others leave this many times as much. Set on the
-creep of a real adhesive, whose amount, time and exponent trade against each other."""
+"""A kind is sure, although the recordings leave its parameters open or one of them is at a bound, if all others leave this many
+times as much. Set on the creep of a real adhesive, whose amount, time and exponent trade against each other."""
 REPEATED_RATIO = 1.75
 """A further effect is sure only if a second effect of a kind in the model is at least this many times as bad."""
 SMALL_SHARE, NEARLY_ALL = 0.1, 0.65
@@ -142,6 +142,7 @@ def unsettled_parameters(effect: Effect, index: int, result: Diagnosis, lead: fl
 
     An effect is left open only if all of its parameters are: two that act as their product alone have wide intervals, and the
     product has not. This does not count if all other kinds leave far more: then the numbers are open and the kind is not.
+    A number at its bound is said all the same.
 
     Parameters
     ----------

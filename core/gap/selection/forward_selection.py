@@ -21,7 +21,15 @@ from ..fitting.least_squares import Fit, FreeParameter, fit, held_out_squares
 from ..fitting.noise_floor import Coverage
 from ..fitting.residual_tests import LEAST_STRUCTURE, ResidualStructure
 from .candidates import DIRECTLY_ESTIMATED, Candidate, FittedCandidate, Scales, candidates, parameters_at_bounds
-from .gap_sizes import FORCES, LEAST_IMPROVEMENT, READINGS, GapSizes, Improvement, friction_kinds
+from .gap_sizes import (
+    FORCES,
+    LEAST_IMPROVEMENT,
+    READINGS,
+    GapSizes,
+    Improvement,
+    friction_kinds,
+    quantities_changed_by,
+)
 from .identifiability import confounded
 from .plausibility import is_plausible
 from .screening import screen
@@ -43,6 +51,9 @@ LEAST_CONSISTENCY = 0.8
 """Least share of the improvements in all changes of the trials' squares: a single trial may be the one that is informative."""
 MOST_EFFECTS = 3
 """Most effects that are searched for, not counting effects on friction."""
+LEAST_SHARE_OF_FORCES = 0.5
+"""An effect on the contact that hardly changes the readings, because a readout effect does as well there, may join if it closes
+at least this share of the gap of the net forces, of which other formulas leave parts."""
 BEAM_RATIO, BEAM_WIDTH = 3.0, 2
 """The first effect may be a compromise between two. Others that leave at most `BEAM_RATIO` times as much of the gap are tried
 as the first effect too, up to `BEAM_WIDTH` kinds in all."""
@@ -63,9 +74,9 @@ much."""
 DEAD_TEXELS_RATIO = 1.5
 """Dead texels are preferred to parameters of single texels if they leave at most this many times as much."""
 UNNEEDED_SHARE = 0.02
-"""The first effect is dropped if the squares rise by less than this share of the gap without it."""
+"""An effect is dropped if the squares rise by less than this share of the gap without it and with those that joined later."""
 REPLACED_SHARE = 0.98
-"""Another first effect must leave less than this share of what the present one leaves."""
+"""Another effect in its place must leave less than this share of what the present one leaves."""
 
 NO_SIGNATURE = "its characteristic signature is not in these recordings"
 
@@ -200,7 +211,7 @@ class ForwardSelection:
         state = self._extended(base, lone, first=True)
         if _is_displaced(state):
             self.gap_sizes.placed = state.means
-        if state is not base:
+        if state is not base or (lone.ranked and self._is_gap_open(base, structure)):
             state = yield from self._best_pair(base, lone, state, structure)
             while (
                 self._effect_count(state) >= 2
@@ -212,11 +223,11 @@ class ForwardSelection:
                 if longer is state:
                     break
                 state = longer
-            if self._effect_count(state) >= 2:
-                state = yield from self._first_reconsidered(state)
+            state = yield from self._all_reconsidered(state)
         state.first = lone
         if self.gap_sizes.both:
             state = yield from self._friction(state)
+            state = yield from self._contact_by_forces(state)
         return state
 
     # --- one effect more
@@ -308,19 +319,22 @@ class ForwardSelection:
         best = choice or self.simplest(step)
         if not self._earns_its_place(best, state, first):
             return state
-        name = best.candidate.name
-        improvement = self.gap_sizes.improvement(
-            state.means, means_of(best.held_out, best.fit), self.gap_sizes.quantity_for(name)
+        return self._joined(state, step, best, self.gap_sizes.quantity_for(best.candidate.name))
+
+    def _joined(self, state: SelectionState, step: SelectionStep, one: FittedCandidate, quantity: int) -> SelectionState:
+        """The state with a candidate of a step, which is judged by readings or by forces."""
+        name, improvement = (
+            one.candidate.name,
+            self.gap_sizes.improvement(state.means, means_of(one.held_out, one.fit), quantity),
         )
-        return SelectionState(best.fit, best.held_out, {**state.steps, name: step}, {**state.improvements, name: improvement})
+        return SelectionState(one.fit, one.held_out, {**state.steps, name: step}, {**state.improvements, name: improvement})
 
     def _earns_its_place(self, one: FittedCandidate, state: SelectionState, first: bool) -> bool:
         """True if a candidate closes enough of the gap, and does worse in hardly any trial."""
         g, quantity = self.gap_sizes, self.gap_sizes.quantity_for(one.candidate.name)
         before, after = state.means[quantity], means_of(one.held_out, one.fit)[quantity]
         gained, left = float(before - after), max(float(before - g.noise[quantity]), 1e-12)
-        change = state.held_out[:, quantity] - one.held_out[:, quantity]
-        if float(change[change > 0].sum()) < LEAST_CONSISTENCY * float(np.abs(change).sum()):
+        if not _is_consistent(one.held_out, state, quantity):
             return False
         if g.both and quantity == FORCES:
             return gained >= max(LEAST_FORCE_IMPROVEMENT * float(g.noise[quantity]), FIRST_LEAST_SHARE * left)
@@ -352,56 +366,89 @@ class ForwardSelection:
     def _best_pair(
         self, base: SelectionState, lone: SelectionStep, single: SelectionState, structure: StructureOfFit
     ) -> Generator[tuple[str, float], None, SelectionState]:
-        """The best pair of effects that begins with one of the best first effects, or the first effect alone."""
+        """The best pair of effects that begins with one of the best first effects, or the first effect alone.
+
+        If no effect joins alone, one of a pair may: each alone fits at the expense of the other, and fails on unseen stretches.
+        """
         if not self._is_gap_open(single, structure):
             return single
-        chosen = next(iter(single.improvements))
-        firsts, least = [single], lone.of(chosen)
-        for one, left in zip(lone.ranked, lone.remaining, strict=True):
-            name = one.candidate.name
-            fresh = name not in self.confounded_kinds and all(name not in state.improvements for state in firsts)
-            if len(firsts) < BEAM_WIDTH and left < BEAM_RATIO * least and fresh:
-                other = self._extended(base, lone, first=True, choice=one)
-                firsts += [other] if other is not base else []
+        firsts = self._first_effects(base, lone, single)
         ends = []
         for number, state in enumerate(firsts):
             step = yield from self._best_next(state, 0.25 + 0.35 * number / len(firsts), 0.35 / len(firsts))
             longer = self._extended(state, step)
-            ends += [longer] if longer is not state or state is single else []  # another first effect counts only in a pair
+            if longer is not state and (single is not base or self._closes_enough(longer, base)):
+                ends.append(longer)
+            elif state is single:
+                ends.append(state)  # another first effect counts only in a pair
+        if not ends:
+            return single
         remaining = self._remaining([end.means for end in ends], self.gap_sizes.main_quantity)
         best = int(np.argmin(remaining))
         return ends[best] if best == 0 or remaining[best] < PAIR_ADVANTAGE * remaining[0] else ends[0]
 
-    def _first_reconsidered(self, state: SelectionState) -> Generator[tuple[str, float], None, SelectionState]:
-        """Replace or drop the first effect, which was chosen without the others, if that is better beside them."""
-        model = state.fit.model
-        first, quantity = model.effects[0].name, self.gap_sizes.main_quantity
+    def _first_effects(self, base: SelectionState, lone: SelectionStep, single: SelectionState) -> list[SelectionState]:
+        """States with one effect that a pair may begin with; those that join alone, if any does, else no friction."""
+        firsts = [] if single is base else [single]
+        least = lone.of(next(iter(single.improvements))) if firsts else lone.remaining[0]
+        for one, left in zip(lone.ranked, lone.remaining, strict=True):
+            name = one.candidate.name
+            fresh = name not in self.confounded_kinds and all(name not in state.improvements for state in firsts)
+            if len(firsts) < BEAM_WIDTH and left < BEAM_RATIO * least and fresh:
+                joins = self._earns_its_place(one, base, first=True) if single is not base else name not in friction_kinds()
+                firsts += [self._joined(base, lone, one, self.gap_sizes.quantity_for(name))] if joins else []
+        return firsts
+
+    def _closes_enough(self, pair: SelectionState, base: SelectionState) -> bool:
+        """True if two effects together close what the first effect alone has to, and do worse in hardly any trial."""
+        quantity = self.gap_sizes.main_quantity
+        closed = self.gap_sizes.closed_share(pair.means, quantity)
+        return closed >= FIRST_LEAST_SHARE and _is_consistent(pair.held_out, base, quantity)
+
+    def _all_reconsidered(self, state: SelectionState) -> Generator[tuple[str, float], None, SelectionState]:
+        """Reconsider each effect but the last, and the last as well if another was dropped after it had been chosen."""
+        chosen = [effect.name for effect in state.fit.model.effects]
+        names = chosen[:-1]
+        for name in names:
+            reconsidered = yield from self._reconsidered(state, name)
+            if self._effect_count(reconsidered) < self._effect_count(state) and len(names) < len(chosen):
+                names.append(chosen[-1])
+            state = reconsidered
+        return state
+
+    def _reconsidered(self, state: SelectionState, name: str) -> Generator[tuple[str, float], None, SelectionState]:
+        """Replace or drop an effect that was chosen without those after it, if that is better beside them."""
+        model, quantity = state.fit.model, self.gap_sizes.main_quantity
+        index = next(i for i, effect in enumerate(model.effects) if effect.name == name)
         rest = tuple(
-            replace(item, effect=item.effect - 1) if item.effect > 0 else item for item in state.fit.free if item.effect != 0
+            replace(item, effect=item.effect - 1) if item.effect > index else item
+            for item in state.fit.free
+            if item.effect != index
         )
-        other = fit(self.view_set.whole, model.without(0), rest, max_steps=6, tolerance=1e-4)
-        steps = {name: step for name, step in state.steps.items() if name != first}
-        improvements = {name: improvement for name, improvement in state.improvements.items() if name != first}
+        other = fit(self.view_set.whole, model.without(index), rest, max_steps=6, tolerance=1e-4)
+        steps = {key: step for key, step in state.steps.items() if key != name}
+        improvements = {key: improvement for key, improvement in state.improvements.items() if key != name}
         without = SelectionState(other, held_out_squares(self.view_set.whole, other), steps, improvements)
-        step = yield from self._best_next(without, 0.8, 0.1)
         lost = float(without.means[quantity] - state.means[quantity])
         if lost < max(LEAST_IMPROVEMENT, UNNEEDED_SHARE * self.gap_sizes.gap(quantity)):  # the later effects do all of its work
             return without
+        step = yield from self._best_next(without, 0.8, 0.1)
         if not step.ranked:
             return state
         best = self.simplest(step)
         before, after = self._remaining([state.means, means_of(best.held_out, best.fit)], quantity)
-        if after < (1.0 if best.candidate.name == first else REPLACED_SHARE) * before - 1e-6:
-            name, improvement = (
-                best.candidate.name,
-                self.gap_sizes.improvement(without.means, means_of(best.held_out, best.fit), quantity),
+        if after < (1.0 if best.candidate.name == name else REPLACED_SHARE) * before - 1e-6:
+            found = self._joined(without, step, best, quantity)
+            own = best.candidate.name
+            return replace(
+                found,
+                fit=last_effect_first(best.fit),
+                steps={own: step, **steps},
+                improvements={own: found.improvements[own], **improvements},
             )
-            return SelectionState(
-                last_effect_first(best.fit), best.held_out, {name: step, **steps}, {name: improvement, **improvements}
-            )
-        told = step if np.isfinite(step.of(first)) else state.steps[first]  # its rivals are judged beside the later effects
-        improvements = {**state.improvements, first: self.gap_sizes.improvement(without.means, state.means, quantity)}
-        return replace(state, steps={**state.steps, first: told}, improvements=improvements)
+        told = step if np.isfinite(step.of(name)) else state.steps[name]  # its rivals are judged beside the later effects
+        improvements = {**state.improvements, name: self.gap_sizes.improvement(without.means, state.means, quantity)}
+        return replace(state, steps={**state.steps, name: told}, improvements=improvements)
 
     def _friction(self, state: SelectionState) -> Generator[tuple[str, float], None, SelectionState]:
         """Add effects on friction, judged by forces alone."""
@@ -422,6 +469,28 @@ class ForwardSelection:
                 break
             state = replace(longer, first=state.first)
         return state
+
+    def _contact_by_forces(self, state: SelectionState) -> Generator[tuple[str, float], None, SelectionState]:
+        """Add an effect on the contact that shows in the net forces alone, because the readings are explained without it."""
+        g, left = self.gap_sizes, float(state.means[FORCES] - self.gap_sizes.noise[FORCES])
+        if not 0 < self._effect_count(state) < MOST_EFFECTS or not g.has_gap(FORCES) or left < g.noise[FORCES]:
+            return state
+        step = yield from self._best_next(state, 0.95, 0.05)
+        for one in step.ranked:
+            if FORCES not in quantities_changed_by(one.fit.model.effects[-1]) or not _is_consistent(
+                one.held_out, state, FORCES
+            ):
+                continue
+            gained = state.means - means_of(one.held_out, one.fit)
+            if gained[FORCES] >= LEAST_SHARE_OF_FORCES * left and gained[READINGS] >= -LEAST_IMPROVEMENT:
+                return replace(self._joined(state, step, one, FORCES), first=state.first)
+        return state
+
+
+def _is_consistent(held_out: np.ndarray, state: SelectionState, quantity: int) -> bool:
+    """True if another model, of which the squares of each trial are given, does worse than a state in hardly any trial."""
+    change = state.held_out[:, quantity] - held_out[:, quantity]
+    return bool(change[change > 0].sum() >= LEAST_CONSISTENCY * np.abs(change).sum())
 
 
 def _is_displaced(state: SelectionState) -> bool:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from ..fitting.residual_tests import LEAST_STRUCTURE, ResidualStructure
 from .candidates import NOT_FITTED, candidates
 from .check_recordings import CheckedRecording
 from .confidence import (
+    CLEAR_LEAD,
     EXPLAINED,
     SURE,
     UNLIKELY_CONFIDENCE,
@@ -28,7 +30,7 @@ from .confidence import (
 )
 from .findings import ClosedShares, Diagnosis, Finding
 from .forward_selection import SelectionState, SelectionStep, means_of
-from .gap_sizes import FORCES, LEAST_IMPROVEMENT, READINGS, GapSizes, friction_kinds
+from .gap_sizes import FORCES, LEAST_IMPROVEMENT, READINGS, GapSizes, friction_kinds, quantities_changed_by
 from .identifiability import SPREADING, curvature_ratio, hardly_distinguishable, indistinguishable, unidentifiable
 from .plausibility import HEIGHT_ALONE, is_height_alone
 from .view_set import ViewSet
@@ -101,24 +103,25 @@ def _judge_effects(result: Diagnosis, view_set: ViewSet, state: SelectionState, 
     fitted = result.best.model.fitted_effects
     left_out = [gap_sizes.closed_share(state.means, quantity) for quantity in (READINGS, FORCES)]
     closed = [_least_share_closed(result, left_out, quantity) for quantity in (READINGS, FORCES)]
-    is_open = any(
+    is_open = [
         gap_sizes.has_gap(quantity) and left_out[quantity] < EXPLAINED and not _is_out_of_reach(result, gap_sizes, quantity)
         for quantity in (READINGS, FORCES)
-    )
-    result.verdict = _verdict(result, gap_sizes, is_open or (bool(fitted) and result.check.is_refuted))
+    ]
+    result.verdict = _verdict(result, gap_sizes, any(is_open) or (bool(fitted) and result.check.is_refuted))
     for index, effect in enumerate(effects):
         times_worse, leaves = _alternatives(effect, state, {e.name for e in effects})
         rivals = _rivals(effect, state, result, times_worse, gap_sizes)
         weight = 1.0 / (1.0 + sum(ratio**RIVAL_EXPONENT for ratio in times_worse.values()))
         quantity = gap_sizes.quantity_for(effect.name)
         share = closed[quantity] if fitted else 1.0
-        unsettled = unsettled_parameters(effect, index, result, min(leaves.values(), default=np.inf))
+        lead = min(leaves.values(), default=np.inf)
+        unsettled = unsettled_parameters(effect, index, result, lead)
         only_height = is_height_alone(result.best.model, index, view_set)
         unsettled += (HEIGHT_ALONE,) if only_height else ()
         support = weight * (0.5 + 0.5 * share if share >= least_share(effect.name, leaves) else 0.5 * share)
         doubts = _doubts(effect, result, state, gap_sizes, is_open)
-        doubts += (REFUTED,) if fitted and result.check.is_refuted else ()
-        lowered = rivals or doubts or only_height or unsettled
+        doubts += (REFUTED,) if fitted and any(map(result.check.refutes, quantities_changed_by(effect))) else ()
+        lowered = rivals or doubts or only_height or (unsettled and lead < CLEAR_LEAD)
         confidence = min(support, UNSURE_CONFIDENCE) if lowered else probability(support)
         if confidence < SURE and not lowered:
             doubts = (_low_support(share, least_share(effect.name, leaves)),)
@@ -132,12 +135,14 @@ def _judge_effects(result: Diagnosis, view_set: ViewSet, state: SelectionState, 
         )
 
 
-def _doubts(effect: Effect, result: Diagnosis, state: SelectionState, gap_sizes: GapSizes, is_open: bool) -> tuple[str, ...]:
+def _doubts(
+    effect: Effect, result: Diagnosis, state: SelectionState, gap_sizes: GapSizes, is_open: Sequence[bool]
+) -> tuple[str, ...]:
     """Why an effect may only compensate for the formula of another one; empty if there is no reason."""
     fitted = result.best.model.fitted_effects
     if len(fitted) < 2:
         return ()
-    absorbs = is_open and may_absorb_misfit(effect, state)
+    absorbs = any(is_open[quantity] for quantity in quantities_changed_by(effect)) and may_absorb_misfit(effect, state)
     why = ABSORBS if absorbs else misfit_of_another(effect, state, fitted, gap_sizes)
     return (why,) if why else ()
 

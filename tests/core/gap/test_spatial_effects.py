@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Readings that carry a part of the channel before, and a cover that is wider than the array, are named as what they are."""
 
+from functools import partial
+
 import gap_cases as cases
 import numpy as np
 import pytest
@@ -17,13 +19,13 @@ def scanned(force, time):
     return force + kept
 
 
-def beneath_a_wide_cover(force, time):
-    """The loads under a cover, 3 mm wide kernels, of which the texels see their part: texels outside are there and not read."""
+def beneath_a_wide_cover(force, time, width=6e-3):
+    """The loads under a cover, kernels of 6 mm, of which the texels see their part: texels outside are there and not read."""
     margin, y, x = 6, *np.mgrid[0 : cases.ROWS, 0 : cases.COLUMNS]
     rows, columns = cases.ROWS + 2 * margin, cases.COLUMNS + 2 * margin
     wide_y, wide_x = np.mgrid[0:rows, 0:columns] - margin
     apart = np.hypot(wide_y.reshape(-1, 1) - y.ravel(), wide_x.reshape(-1, 1) - x.ravel()) * cases.PITCH
-    weight = np.exp(-0.5 * (apart / 3e-3) ** 2)
+    weight = np.exp(-0.5 * (apart / width) ** 2)
     inside = (wide_y.ravel() >= 0) & (wide_y.ravel() < cases.ROWS) & (wide_x.ravel() >= 0) & (wide_x.ravel() < cases.COLUMNS)
     return force @ (weight / weight.sum(axis=0))[inside].T
 
@@ -40,4 +42,12 @@ def test_what_goes_from_texel_to_texel_is_named(change, name, form):
     parameters = result.best.model.parameters
     assert parameters.k == pytest.approx(80.0, rel=0.05)
     found = result.best.model.effects[0].values
-    assert found["share" if name == "crosstalk" else "width"] == pytest.approx(0.12 if name == "crosstalk" else 3e-3, rel=0.05)
+    assert found["share" if name == "crosstalk" else "width"] == pytest.approx(0.12 if name == "crosstalk" else 6e-3, rel=0.05)
+
+
+@pytest.mark.slow("a whole diagnosis of five recordings")
+def test_a_narrow_cover_and_wires_side_by_side_are_not_told_apart():
+    """Where the kernel hardly reaches beyond the next texels, leaking wires and another gain give the same readings."""
+    result = run_job(diagnose(cases.rig(partial(beneath_a_wide_cover, width=3e-3), seed=4)))
+    assert result.verdict == "explained" and set(result.ambiguous[0]) == {"load-spreading", "crosstalk"}
+    assert not any(one.confidence >= SURE for one in result.findings)

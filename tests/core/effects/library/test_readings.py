@@ -270,6 +270,11 @@ def test_crosstalk():
     assert found[0] == pytest.approx(0.5 / N)
     found = read(effect("crosstalk", "previous", share=0.3), image(texel))[0]
     np.testing.assert_allclose(found, image(texel)[0] + 0.3 * np.eye(N)[texel + 1], atol=1e-15)
+    found = read(effect("crosstalk", "wires", share=0.2, fall=0.5), image(texel))[0].reshape(ROWS, COLUMNS)
+    row, column = np.divmod(texel, COLUMNS)
+    along, across = (0.2 * 0.5 ** (np.abs(np.arange(n) - at) - 1.0) for n, at in ((COLUMNS, column), (ROWS, row)))
+    along[column] = across[row] = 1.0
+    np.testing.assert_allclose(found, np.outer(across, along), atol=1e-15)  # a column's wire carries what a row's has leaked
 
 
 def test_a_cover_beyond_the_rim_loses_what_falls_outside():
@@ -317,6 +322,8 @@ def test_listed_values():
     assert np.log(exponent[0]).std() == pytest.approx(0.2, rel=0.25)
     np.testing.assert_allclose(read(powers, np.full((2, N), 0.5), TIME[:2]), 0.5)
     np.testing.assert_allclose(read(effect("offset", "listed", offset=factor), force, TIME[:9]), force + factor)
+    moved = factor * (TIME[:9, None] / 60.0) ** 0.5
+    np.testing.assert_allclose(read(effect("drift", "listed", amount=factor, exponent=0.5), force, TIME[:9]), force + moved)
     dead = (np.arange(N) % 5 == 0).astype(float)
     np.testing.assert_allclose(read(effect("dead-texels", "listed", dead=dead), force, TIME[:9]), force * (1 - dead))
     found = read(effect("dead-texels", "held", dead=dead, level=0.01 * np.arange(N)), force, TIME[:9])
