@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``palpate gap`` on hidden effects under coloured noise, with cells missing, on a mesh, of friction, and in pairs (``_hidden``).
+"""``palpate gap`` on hidden effects under coloured noise, with cells missing, on a mesh, of friction, in pairs (``_hidden``).
 
 Each case is a case of the group ``gap`` under one more condition. Results are kept in build/gap/, one line a case, and a run
 goes on where the last one stopped, as long as neither the workflow nor the generator has changed. The table goes to

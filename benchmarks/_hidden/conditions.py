@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cases of :mod:`.cases` with one hidden effect, recorded under other conditions (:data:`CONDITIONS`), or two of another family.
+"""Cases of :mod:`.cases` under other conditions (:data:`CONDITIONS`), with one hidden effect or two of another family.
 
 Pad, indenter, trials, strength and size of the noise are those that the formula's kind has under the same number, so that a
-condition can be compared with its absence case by case. ``friction`` and ``pairs`` hide other effects than the number stands for.
+condition can be compared with its absence case by case. ``friction`` and ``pairs`` hide other effects than their number says.
 """
 
 from __future__ import annotations
