@@ -18,7 +18,7 @@ def same(first, second):
     return first.answer == second.answer and all(np.array_equal(a, b, equal_nan=True) for a, b in pairs)
 
 
-@pytest.mark.parametrize(("condition", "number"), [("missing", 10), ("mesh", 15), ("friction", 3), ("pairs", 1)])
+@pytest.mark.parametrize(("condition", "number"), [("missing", 10), ("mesh", 15), ("friction", 3), ("pairs", 3)])
 def test_a_case_of_a_condition_is_drawn_the_same_twice_and_its_rig_is_read(tmp_path, condition, number):
     case = conditions.draw(condition, number)
     assert same(case, conditions.draw(condition, number)) and len(case.answer) == {"friction": 0, "pairs": 2}.get(condition, 1)
