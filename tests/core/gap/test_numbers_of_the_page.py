@@ -22,7 +22,9 @@ def page(repository):
 
 
 def test_thresholds_are_those_of_the_source(page):
-    assert f"An effect must close {in_words(forward_selection.FIRST_LEAST_SHARE)} of the gap" in page
+    assert f"An effect, or a pair, must close {in_words(forward_selection.FIRST_LEAST_SHARE)} of the gap" in page
+    assert f"may join by {in_words(forward_selection.LEAST_SHARE_OF_FORCES)} of the forces' gap alone" in page
+    assert "another kind leaves less than twice its error" in page and confidence.CLEAR_LEAD == 2.0
     assert f"Each must close {in_words(forward_selection.NEXT_LEAST_SHARE)} of the remaining gap" in page
     assert f"close at least {in_words(check_recordings.CHECK_CLOSED)} of their squared gap" in page
     assert f"Names with {confidence.SURE:g} or more are findings" in page

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Two hidden effects (benchmarks/_hidden) that are found only together, or where one seems to be something else at first."""
+
+import pytest
+
+from palpate.benchmarks._hidden import cases
+from palpate.core.effects.engine.registry import effect
+from palpate.core.gap.dataset.rig import read_rig
+from palpate.core.gap.selection.confidence import SURE
+from palpate.core.gap.selection.diagnosis import diagnose
+from palpate.core.gap.selection.gap_sizes import FORCES, READINGS, quantities_changed_by
+from palpate.core.jobs.job_runner import run_job
+
+
+def named(number, folder):
+    """What is said of a pair: sure names, verdict, all findings by name."""
+    result = run_job(diagnose(read_rig(cases.write(cases.draw("two", number), folder))))
+    sure = {one.name for one in result.findings if one.confidence >= SURE}
+    return sure, result.verdict, {one.name: one for one in result.findings}
+
+
+@pytest.mark.parametrize(("one", "changes"), [
+    (effect("saturation"), (READINGS,)),
+    (effect("stribeck"), (FORCES,)),
+    (effect("stiffening"), (READINGS, FORCES)),
+    (effect("hysteresis", "preisach"), (READINGS,)),
+    (effect("hysteresis", "duhem"), (READINGS, FORCES)),
+    (effect("misalignment"), (READINGS, FORCES)),
+])  # fmt: skip
+def test_a_check_refutes_only_what_can_change_what_it_measures(one, changes):
+    assert quantities_changed_by(one) == changes
+
+
+@pytest.mark.slow("a whole diagnosis with net forces")
+def test_a_stiffening_that_only_the_net_forces_show_is_named(tmp_path):
+    """A saturation of the readout explains the readings of both; the contact law is left in the forces."""
+    sure, verdict, found = named(47017, tmp_path)
+    assert sure == {"saturation", "stiffening"} == set(cases.answer_of("two", 47017)) and verdict == "explained"
+    assert found["stiffening"].closes > 0.9  # of the forces' gap
+
+
+@pytest.mark.long("a whole diagnosis of two hidden effects")
+def test_two_effects_are_named_of_which_none_joins_alone(tmp_path):
+    """Gains of texels alone fit what spreads as well, and fail on unseen stretches."""
+    sure, _, _ = named(47001, tmp_path)
+    assert sure == {"load-spreading", "gain-mismatch"} == set(cases.answer_of("two", 47001))
+
+
+@pytest.mark.long("a whole diagnosis of two hidden effects")
+def test_a_second_effect_is_dropped_if_a_third_does_its_work(tmp_path):
+    """A reading that goes on rising is chosen before the lag that is there, by a hair."""
+    sure, _, found = named(605, tmp_path)
+    assert sure <= set(cases.answer_of("two", 605)) == {"load-spreading", "lag"}
+    assert "creep" not in found and found["lag"].rivals == ("creep",)
+
+
+@pytest.mark.long("a whole diagnosis of two hidden effects")
+def test_a_kind_that_leads_clearly_is_named_although_a_number_is_at_its_bound(tmp_path):
+    sure, _, found = named(47016, tmp_path)
+    assert sure == {"misalignment", "lag"} and "at its bound" in found["lag"].unsettled[0]
