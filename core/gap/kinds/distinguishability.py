@@ -152,25 +152,6 @@ def distinctions(recorded: Recorded, possible: Set[str]) -> list[Distinction]:
     return Comparison(recorded, possible).distinctions()
 
 
-def left_by_kinds(recorded: Recorded, possible: Set[str]) -> dict[str, float]:
-    """Return for each kind what it leaves, with the base model, of the responses: mean squares in units of the noise.
-
-    Parameters
-    ----------
-    recorded : Recorded
-        Of which the responses may be the base model's with some signal on top of them.
-    possible : set of str
-        Names of the kinds.
-    """
-    variants = possible_variants(recorded, possible)
-    equations = normal_equations(Cascade(recorded), Point(), variants)
-    left: dict[str, float] = {}
-    for variant in variants:
-        solution = equations.solve([variant])
-        left[variant.kind] = min(max(solution.fitted, 0.0), left.get(variant.kind, np.inf))
-    return left
-
-
 def _distinctions(
     equations: CascadeEquations, variants: Sequence[Variant], recorded: Recorded, wanted: Set[tuple[str, str]] | None
 ) -> list[Distinction]:

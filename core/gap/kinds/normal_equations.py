@@ -9,32 +9,15 @@ texels have Gaussian priors and are eliminated by a Schur complement, one texel 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from .bounded_least_squares import bounded_minimum
-from .cascade import BASE, TEXEL, Cascade, Point
-from .decision_numbers import PRIORS
+from .cascade import TEXEL, Cascade, Point
 from .dictionaries import MISALIGNMENT, VARIANTS, Variant
 
 BOUNDS = {"k": (-0.8, 4.0), "damping": (-2.0, 6.0), "gain": (-0.8, 4.0), "zero": (-1.0, 1.0)}
 """Bounds of the corrections of the base model."""
-
-
-@dataclass(frozen=True)
-class Solution:
-    """Coefficients of some kinds, and how well they do.
-
-    Attributes
-    ----------
-    point : Point
-    fitted : float
-        Mean square of the residual, in units of the noise's variance.
-    """
-
-    point: Point
-    fitted: float
 
 
 @dataclass
@@ -63,85 +46,6 @@ class CascadeEquations:
     coupling: np.ndarray
     texel_gram: np.ndarray
     texel_right: np.ndarray
-    _eliminated: dict[tuple[int, ...], tuple[np.ndarray, np.ndarray, float]] = field(default_factory=dict)
-
-    def solve(self, members: Sequence[Variant]) -> Solution:
-        """Return the best coefficients of some variants.
-
-        Parameters
-        ----------
-        members : sequence of Variant
-            With columns at this point.
-        """
-        names = [*(name for name in BASE if name in self.at), *(m.label for m in members if self.at[m.label].start is not None)]
-        picked = np.concatenate([np.arange(self.at[n].start, self.at[n].stop) for n in names]).astype(int)
-        own = tuple(TEXEL.index(name) for m in members for name in m.texel_columns)
-        gram, right, square = self._without_texels(own)
-        gram, right = gram[np.ix_(picked, picked)], right[picked]
-        low, high = self._bounds(names)
-        x = bounded_minimum(gram, right, low, high)
-        fitted = square - 2.0 * x @ right + x @ gram @ x
-        texel = self._texel_values(own, picked, x)
-        count = max(float(self.count.sum()), 1.0)
-        return Solution(self._point(members, names, x, own, texel), float(fitted) / count)
-
-    def _bounds(self, names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
-        low, high = [], []
-        for name in names:
-            width = self.at[name].stop - self.at[name].start
-            a, b = BOUNDS[name] if name in BOUNDS else (self.variants[name].low, self.variants[name].high)
-            if name == MISALIGNMENT.label:
-                a, b = -20.0, 20.0
-            low += [a] * width
-            high += [b] * width
-        return np.array(low), np.array(high)
-
-    def _without_texels(self, own: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray, float]:
-        """Gram matrix, right side and square with the parameters of single texels eliminated."""
-        if own not in self._eliminated:
-            gram, right, square = self.gram.sum(axis=0), self.right.sum(axis=0), float(self.square.sum())
-            if own:
-                inverse, texel_right = self._texel_inverse(own)
-                coupling = self.coupling.sum(axis=0)[list(own)]  # (q, p, n)
-                across = np.einsum("qrn,rpn->qpn", inverse, coupling)
-                gram = gram - np.einsum("qpn,qsn->ps", coupling, across)
-                right = right - np.einsum("qpn,qn->p", across, texel_right)
-                square -= float(np.einsum("qn,qrn,rn->", texel_right, inverse, texel_right))
-            self._eliminated[own] = gram, right, square
-        return self._eliminated[own]
-
-    def _texel_inverse(self, own: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-        """Inverses of the texels' blocks with their priors, (q, q, n), and their right sides, (q, n)."""
-        picked = list(own)
-        block = self.texel_gram.sum(axis=0)[np.ix_(picked, picked)].copy()
-        for i, index in enumerate(own):
-            block[i, i] += PRIORS[TEXEL[index]] ** -2
-        return np.moveaxis(np.linalg.inv(np.moveaxis(block, 2, 0)), 0, 2), self.texel_right.sum(axis=0)[picked]
-
-    def _texel_values(self, own: tuple[int, ...], picked: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Parameters of single texels that go with some coefficients, (q, n)."""
-        if not own:
-            return np.zeros((0, self.texel_right.shape[-1]))
-        inverse, texel_right = self._texel_inverse(own)
-        coupling = self.coupling.sum(axis=0)[list(own)][:, picked]
-        values: np.ndarray = np.einsum("qrn,rn->qn", inverse, texel_right - np.einsum("qpn,p->qn", coupling, x))
-        return values
-
-    def _point(
-        self, members: Sequence[Variant], names: Sequence[str], x: np.ndarray, own: tuple[int, ...], texel: np.ndarray
-    ) -> Point:
-        coefficients: dict[str, np.ndarray] = {}
-        base: dict[str, float] = {}
-        start = 0
-        for name in names:
-            width = self.at[name].stop - self.at[name].start
-            if name in BOUNDS:
-                base[name] = float(x[start])
-            else:
-                coefficients[name] = x[start : start + width]
-            start += width
-        values = {TEXEL[index]: texel[i] for i, index in enumerate(own)}
-        return Point(tuple(members), coefficients, base, values)
 
 
 def joined(first: CascadeEquations, second: CascadeEquations) -> CascadeEquations:
