@@ -98,5 +98,5 @@ def _displaced(recorded: Recorded, number: int, axis: int) -> Column:
     if axis == 2 and source.heights_free:
         return np.zeros_like(run.load), np.zeros(len(run.time))
     displacement = tuple(step if i == axis else 0.0 for i, step in enumerate(POSE_STEP))
-    moved, _ = source.loads(displacement)[number]
+    moved = source.displaced(displacement)[number]
     return _of_force(run, (moved - run.load) / (POSE_STEP[axis] / POSE_SCALE[axis]))

@@ -127,26 +127,20 @@ class Comparison:
         equations = self._equations
         if further is not None:
             equations = equations + normal_equations(planned(self.recorded, further), self._variants)
-        return _distinctions(equations, self._variants, self.recorded, wanted)
-
-
-def _distinctions(
-    equations: NormalEquations, variants: Sequence[Variant], recorded: Recorded, wanted: Set[tuple[str, str]] | None
-) -> list[Distinction]:
-    """Distinctions from equations about the base model, whose units are those of some recordings."""
-    kinds = list(dict.fromkeys(variant.kind for variant in variants))
-    floor = _floor(equations.count, recorded.correlation)
-    found = []
-    for signal in [one for variant in variants for one in signals_of(equations, variant)]:
-        against = [k for k in kinds if k != signal.kind and (wanted is None or (signal.label, k) in wanted)]
-        alone = left_by(equations, signal, ()) if against else 0.0
-        for kind in against:
-            others = [variant for variant in variants if variant.kind == kind]
-            left = min(left_by(equations, one, (other,)) for one in _both_signs(signal, variants) for other in others)
-            share = min(left / alone, 1.0) if alone > 0.0 else 0.0
-            smallest = _smallest(recorded.noise[0 if recorded.has_readings else 1], floor, share * alone / signal.square)
-            found.append(Distinction(signal.label, kind, share, smallest))
-    return found
+        variants, recorded = self._variants, self.recorded
+        kinds = list(dict.fromkeys(variant.kind for variant in variants))
+        floor = _floor(equations.count, recorded.correlation)
+        found = []
+        for signal in [one for variant in variants for one in signals_of(equations, variant)]:
+            against = [k for k in kinds if k != signal.kind and (wanted is None or (signal.label, k) in wanted)]
+            alone = left_by(equations, signal, ()) if against else 0.0
+            for kind in against:
+                others = [variant for variant in variants if variant.kind == kind]
+                left = min(left_by(equations, one, (other,)) for one in _both_signs(signal, variants) for other in others)
+                share = min(left / alone, 1.0) if alone > 0.0 else 0.0
+                smallest = _smallest(recorded.noise[0 if recorded.has_readings else 1], floor, share * alone / signal.square)
+                found.append(Distinction(signal.label, kind, share, smallest))
+        return found
 
 
 def _floor(count: float, correlation: float) -> float:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Recordings as the comparison of kinds sees them: the base model's forces, where something was measured, and the noise.
 
-Forces are in units of the base model's largest force, so that 1 is full load. A recording that begins with an
-untouched sensor is one :class:`RecordedRun`; the recordings of a session are one together, with samples in the pauses that
-nothing was measured at. Samples are thinned, because each kind is a set of smooth functions.
+Forces are in units of the base model's largest force, so that 1 is full load. A recording that begins with an untouched sensor
+is one :class:`RecordedRun`; the recordings of a session are one together, with samples in the pauses that nothing was measured
+at. Samples are thinned, because each kind is a set of smooth functions.
 """
 
 from __future__ import annotations
@@ -114,25 +114,18 @@ class Source:
     heights_free: bool
     most_work: float
     stride: int
-    kept: dict[tuple[float, ...], list[tuple[np.ndarray, np.ndarray]]] = field(default_factory=dict)
+    kept: dict[tuple[float, ...], list[np.ndarray]] = field(default_factory=dict)
 
-    def loads(self, displacement: tuple[float, ...] = (0.0,) * 6) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Return for each run the load with and without damping, (T, n) each, with the texels displaced (m and rad)."""
+    def displaced(self, displacement: tuple[float, ...]) -> list[np.ndarray]:
+        """Return the loads of each run with the texels displaced (m and rad)."""
         if displacement not in self.kept:
-            model = self.model
-            if any(displacement):
-                model = model.with_effect(Effect(MISALIGNMENT.kind, "rigid", dict(zip(POSE, displacement, strict=True))))
-            plain = replace(model, parameters=replace(model.parameters, cn=0.0))
-            found = []
-            for group in self.predictors:
-                found.append((_force(group, model) / self.scale, _force(group, plain) / self.scale))
-            self.kept[displacement] = found
+            moved = self.model.with_effect(Effect(MISALIGNMENT.kind, "rigid", dict(zip(POSE, displacement, strict=True))))
+            self.kept[displacement] = [self.load(group, moved) for group in self.predictors]
         return self.kept[displacement]
 
-
-def _force(group: tuple[Predictor, ...], model: Model) -> np.ndarray:
-    """Normal forces of a run, with its pauses, (T, n) N."""
-    return np.ascontiguousarray(group[0].responses.normal_force(model))
+    def load(self, group: tuple[Predictor, ...], model: Model) -> np.ndarray:
+        """Return the load of a run, with its pauses, by a model, (T, n)."""
+        return np.ascontiguousarray(group[0].responses.normal_force(model)) / self.scale
 
 
 def recorded(
@@ -161,10 +154,10 @@ def recorded(
     posed = all(p.trial.stimulus == "pose" for p in predictors)
     heights_free = any(isinstance(p.trial.contact_height, str) for p in predictors)
     source = Source(rig, model, groups, scale, posed, heights_free, 1.0, stride)
-    loads = source.loads()
-    works = [_work(group, load * scale) for group, (load, _) in zip(groups, loads, strict=True)]
+    loads = [source.load(group, model) for group in groups]
+    works = [_work(group, load * scale) for group, load in zip(groups, loads, strict=True)]
     source = replace(source, most_work=max(max(float(work.max(initial=0.0)) for work in works), 1e-300))
-    runs = tuple(_run(group, source, pair, work) for group, pair, work in zip(groups, loads, works, strict=True))
+    runs = tuple(_run(group, source, load, work) for group, load, work in zip(groups, loads, works, strict=True))
     ranges = [np.ptp(run.force[np.isfinite(run.force)]) for run in runs if np.isfinite(run.force).any()]
     read = any(run.read.any() for run in runs)
     level = max(noise[1].deviation / scale, FORCE_RESOLUTION * float(max(ranges, default=1.0)) if read else 0.0)
@@ -201,8 +194,8 @@ def planned(recorded: Recorded, trial: Trial) -> Recorded:
     before = recorded.source
     group = tuple(predictors_of([_thinned(replace(trial, reading=None, force=None), before.stride)], before.rig))
     source = replace(before, predictors=(group,), kept={})
-    (pair,) = source.loads()
-    run = _run(group, source, pair, _work(group, pair[0] * source.scale))
+    load = source.load(group, source.model)
+    run = _run(group, source, load, _work(group, load * source.scale))
     weighs = any(np.isfinite(one.force).any() for one in recorded.runs)
     read = np.broadcast_to(np.any([one.read.any(axis=0) for one in recorded.runs], axis=0), run.read.shape)
     force = np.zeros_like(run.force) if weighs else run.force
@@ -243,14 +236,10 @@ def _work(group: tuple[Predictor, ...], force: np.ndarray) -> np.ndarray:
     return np.cumsum(force * np.hypot(stimulus.slide, stimulus.rate) * step, axis=0)
 
 
-def _run(
-    group: tuple[Predictor, ...],
-    source: Source,
-    pair: tuple[np.ndarray, np.ndarray],
-    work: np.ndarray,
-) -> RecordedRun:
+def _run(group: tuple[Predictor, ...], source: Source, load: np.ndarray, work: np.ndarray) -> RecordedRun:
     """A run from the predictors of its trials; `work` is in joules."""
-    (load, elastic), model, scale = pair, source.model, source.scale
+    model, scale = source.model, source.scale
+    elastic = source.load(group, replace(model, parameters=replace(model.parameters, cn=0.0)))
     stimulus = group[0].responses.texel_stimulus
     normals = group[0].rig.texels.normal
     axis = normals.mean(axis=0) / max(float(np.linalg.norm(normals.mean(axis=0))), 1e-12)

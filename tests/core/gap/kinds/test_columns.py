@@ -105,6 +105,27 @@ def test_derivatives_are_differences_of_the_model(plain, label):
         assert _almost_everywhere(force, (there[1] - here[1]) / 1e-3)
 
 
+def test_a_texel_that_does_not_press_cannot_press_less(fitted):
+    """Fast releases, where strong damping takes all of the force: what lowers it changes nothing."""
+    parameters = replace(fitted[0].rig.parameters, cn=0.1 * fitted[0].rig.parameters.k)
+    seen, label = recorded(fitted, Model(parameters), {"cn"}, NOISE), "creep"
+    run = seen.runs[0]
+    released = (run.load == 0.0) & (run.elastic > 0.0)
+    added = BY_LABEL[label].columns(run.elastic, run, seen)[0]
+    reading = columns(seen, 0, (BY_LABEL[label],))[label][0][0]
+    assert (added[released] < -0.01).any() and not reading[released].any()
+    pressed = run.load > 0.001
+    assert np.array_equal(reading[pressed], added[pressed])
+
+
+def test_parameters_of_single_texels_are_what_they_say(plain):
+    gain, offset, rate, fading = texel_columns(plain, plain.runs[0])
+    run = plain.runs[0]
+    assert np.array_equal(gain, run.load) and (offset == 1.0).all()
+    assert not rate[0].any() and rate[-1] == pytest.approx(np.ptp(run.time) / plain.duration)
+    assert (fading[run.load == 0.0] == 1.0).all() and fading.min() == pytest.approx(1.0 / (1.0 + run.load.max()))
+
+
 def _with_holes(seen):
     """The same with net forces, and without some of the readings and forces."""
     rng, runs = np.random.default_rng(4), []
