@@ -218,5 +218,5 @@ def test_a_new_file_is_all_that_a_new_effect_needs(copy):
     words = [f"({Path(file).stem} and ({which}))" if which else Path(file).stem for file, which in TESTS.items()]
     said = run("-m", "pytest", "-v", "-x", "-p", "no:cacheprovider", *TESTS, "-k", " or ".join(words))
     assert "::test_a_form_says_what_it_is[power-law-power] PASSED" in said
-    assert "::test_derivatives_are_differences_of_the_cascade[power-law] PASSED" in said
+    assert "::test_derivatives_are_differences_of_the_model[power-law] PASSED" in said
     assert all(f"{Path(file).name}::" in said for file in TESTS)
