@@ -4,10 +4,9 @@
 An effect can be told if
 
 - the stimulus shows what it is known by, as an unloading for hysteresis (:func:`.identifiability.indistinguishable`);
-- no other kind could pass for it. Each kind is fitted to the added change itself, beside the base model: as a dictionary of
-  functions with free coefficients (:mod:`palpate.core.gap.kinds`), and in the forms of the library, whichever leaves less.
-  What it leaves comes on top of what was unexplained before. All other kinds have to leave so many times as much as the
-  effect's own that the workflow calls none of them a rival (:data:`.verdict.RIVAL_RATIO`, or
+- no other kind could pass for it. Each kind is fitted to the added change itself, beside the base model, in its forms in the
+  library. What the best one leaves comes on top of what was unexplained before. All other kinds have to leave so many times as
+  much as the effect's own that the workflow calls none of them a rival (:data:`.verdict.RIVAL_RATIO`, or
   :data:`.verdict.HARDLY_DISTINGUISHABLE_RATIO` for drift and creep where nothing rests);
 - the check recordings show it: without it, at least half of their squared error would not be there, which is what the workflow
   asks of a name (:data:`.check_recordings.CHECK_CLOSED`).
@@ -94,14 +93,8 @@ def _changes(before: Recording, after: Recording) -> dict[str, np.ndarray]:
 
 
 def _left_by_kinds(effect: str, freed: Any, changes: dict[str, np.ndarray], left: float) -> dict[str, float]:
-    """What each kind leaves of the change in the fitted recordings, in units of the square of `left`.
-
-    By its dictionary or by those of the library's forms that do best, whichever leaves less.
-    """
-    from palpate.core.gap.fitting.least_squares import BASE
-    from palpate.core.gap.fitting.noise_floor import ChannelNoise
-    from palpate.core.gap.kinds.distinguishability import COMPARED_KINDS, left_by_kinds
-    from palpate.core.gap.kinds.recorded import recorded
+    """What the best form of each kind leaves of the change in the fitted recordings, in units of the square of `left`."""
+    from palpate.core.gap.kinds.distinguishability import COMPARED_KINDS
     from palpate.core.gap.selection.base_model import base_fit
     from palpate.core.gap.selection.candidates import candidates, scales_of
     from palpate.core.gap.selection.screening import screen
@@ -112,16 +105,14 @@ def _left_by_kinds(effect: str, freed: Any, changes: dict[str, np.ndarray], left
     for one in freed.of("fit"):
         reading = one.predict(model).reading + changes[one.trial.name]
         predictors.append(one.with_numbers_of(replace(one.trial, reading=reading)))
-    free = {item.name for item in freed.base.free if item.effect == BASE}
-    seen = recorded(predictors, model, free, (ChannelNoise(left, 1.0, "what was unexplained"), freed.noise[1]))
     forms = [one for one in candidates(predictors, model) if one.name in COMPARED_KINDS]
-    found = left_by_kinds(seen, {one.name for one in forms})
     views = view_set_of(predictors, (left, freed.noise[1].deviation))
     base = base_fit(freed.rig, views.whole, freed.full[0])
-    for some in (forms, [one for one in forms if one.name == effect]):
+    found = {one.name: base.mean for one in forms}
+    for kind in found:
+        some = [one for one in forms if one.name == kind]  # alone: beside a better kind it would not be fitted to everything
         for _, _, fitted in screen(views, base, some, scales_of(predictors, base.model)):
-            for one in fitted:
-                found[one.candidate.name] = min(one.fit.mean, found.get(one.candidate.name, np.inf))
+            found[kind] = min([found[kind], *(one.fit.mean for one in fitted)])
     return found
 
 

@@ -75,7 +75,7 @@ def _results() -> list[dict]:
 def examine(number: int, random: int) -> dict[str, Any]:
     """Draw a case and carry the planned experiment through, where its recordings leave a pair open."""
     from palpate.core.gap.dataset.rig import read_rig
-    from palpate.core.gap.planning.experiment_plan import plan_after, random_experiment
+    from palpate.core.gap.planning.experiment_plan import plan_after
     from palpate.core.gap.selection.diagnosis import diagnose
     from palpate.core.jobs.job_runner import run_job
 
@@ -97,10 +97,19 @@ def examine(number: int, random: int) -> dict[str, Any]:
         for a, b in zip(design.before, design.after, strict=True)
     ]
     entry["planned"], entry["said"] = _after(case, rig, design.trajectory, 0)
-    found = [_after(case, rig, random_experiment(experiment, before, seed), seed) for seed in range(1, random + 1)]
+    found = [_after(case, rig, _random_trajectory(experiment, before, seed), seed) for seed in range(1, random + 1)]
     entry["random"] = [one for one, _ in found]
     entry["random_said"] = [said for _, said in found]
     return entry
+
+
+def _random_trajectory(experiment: Any, before: Any, seed: int) -> Any:
+    """The trajectory of a random programme within the limits of the planned experiment."""
+    from palpate.core.gap.planning.paths import Ground
+    from palpate.core.gap.planning.programmes import random_programme
+
+    ground = Ground(before.predictors, experiment.limits)
+    return ground.trajectory(random_programme(ground.span, np.random.default_rng(seed)))
 
 
 def _after(case: cases.Case, rig: Any, trajectory: Any, seed: int) -> tuple[str, list]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -87,9 +87,6 @@ class Run(Protocol):
     def work(self) -> np.ndarray:
         """Work done on each texel so far, pressing and sliding, (T, n); 1 is the largest of all runs."""
 
-    def keep(self, name: str, compute: Callable[[], Any]) -> Any:
-        """Return what `compute` returns, which is called once for each name."""
-
 
 class Recordings(Protocol):
     """All fitted recordings of a rig, as columns see them."""
@@ -122,7 +119,7 @@ def no_columns(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray
 
 @dataclass(frozen=True)
 class Variant:
-    """What an effect can add to a signal whatever its formula: all sums of some columns with coefficients inside bounds.
+    """What an effect can add to a signal whatever its formula: all sums of some columns, each with a coefficient.
 
     Formulas of the same effect from other papers lie near this cone. An effect whose formulas have two directions, as
     hysteresis that leads or trails, has a variant for each. The columns are functions of numpy arrays; those with memory are
@@ -133,8 +130,8 @@ class Variant:
     rank : float
         Place on the way from the contact to the reading, among the variants in contact or among the others: lower acts first.
     columns : callable
-    low, high : float
-        Bounds of each coefficient.
+    is_signed : bool
+        Whether the coefficients may be negative.
     name : str
         Which direction; empty if there is one only.
     in_contact : bool
@@ -154,8 +151,7 @@ class Variant:
 
     rank: float
     columns: Columns = no_columns
-    low: float = 0.0
-    high: float = 1.0
+    is_signed: bool = False
     name: str = ""
     in_contact: bool = False
     after_clip: bool = False

@@ -100,17 +100,13 @@ def unloading_pull(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.nda
     """Adhesion that pulls on the way out, at all loads or near the release."""
     from ..engine import signal_operators as operators
 
-    def columns() -> list[np.ndarray]:
-        touching, load = run.elastic > 0.0, np.maximum(run.elastic, 0.0)
-        held = operators.falling(run.elastic, 0.01) * touching
-        moving = (np.gradient(run.elastic, run.time, axis=0) < 0.0) & touching
-        found = [-operators.falling(run.elastic, length) * touching for length in (0.03, 0.1)]
-        for width in (0.08, 0.14, 0.25):
-            near = np.exp(-((load / width) ** 2)) * -np.expm1(-load / (0.1 * width))
-            found += [-held * near, moving * -near]
-        return found
-
-    pulls: list[np.ndarray] = run.keep("adhesion", columns)
+    touching, load = run.elastic > 0.0, np.maximum(run.elastic, 0.0)
+    held = operators.falling(run.elastic, 0.01) * touching
+    moving = (np.gradient(run.elastic, run.time, axis=0) < 0.0) & touching
+    pulls = [-operators.falling(run.elastic, length) * touching for length in (0.03, 0.1)]
+    for width in (0.08, 0.14, 0.25):
+        near = np.exp(-((load / width) ** 2)) * -np.expm1(-load / (0.1 * width))
+        pulls += [-held * near, moving * -near]
     return pulls
 
 

@@ -206,5 +206,5 @@ KIND = Kind(
     experiment="hold one depth for at least a minute, then release and wait as long",
     known_from=("timing",),
     families=("late", "moving"),
-    variants=(Variant(30, relaxing, in_contact=True), Variant(60, rising, 0.0, 2.0, name="rising")),
+    variants=(Variant(30, relaxing, in_contact=True), Variant(60, rising, name="rising")),
 )

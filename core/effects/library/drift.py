@@ -44,13 +44,8 @@ def listed(signal: np.ndarray, time: np.ndarray, values: Values, transducers: Tr
 
 def functions_of_time(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
     """Smooth functions of the time."""
-
-    def columns() -> list[np.ndarray]:
-        share = ((run.time - run.time[0]) / recorded.duration)[:, None] + np.zeros_like(x)
-        return [np.sqrt(share), share, share**2, -np.expm1(-share / 0.1)]
-
-    found: list[np.ndarray] = run.keep("drift", columns)
-    return found
+    share = ((run.time - run.time[0]) / recorded.duration)[:, None] + np.zeros_like(x)
+    return [np.sqrt(share), share, share**2, -np.expm1(-share / 0.1)]
 
 
 KIND = Kind(
@@ -127,6 +122,6 @@ KIND = Kind(
     ),
     known_from=("timing", "rest"),
     families=("moving",),
-    variants=(Variant(90, functions_of_time, -1.0, 1.0, texel_columns=("rate",)),),
+    variants=(Variant(90, functions_of_time, is_signed=True, texel_columns=("rate",)),),
     gain_falls_with="clock",
 )

@@ -98,5 +98,5 @@ KIND = Kind(
         values={"shift": {"x": 0.0, "y": 0.005}, "turn": {"x": 0.003, "y": 0.0, "about_z": 0.4}, "tilt": {"about_x": 0.08}},
     ),
     known_from=("places",),
-    variants=(Variant(0, low=-1.0, high=1.0, in_contact=True, displaces=True),),
+    variants=(Variant(0, is_signed=True, in_contact=True, displaces=True),),
 )

@@ -103,5 +103,5 @@ KIND = Kind(
     experiment="press slowly to the largest permitted depth",
     drawing=Drawing("depth", depth=np.linspace(0, 0.004, 400)),
     families=("nonlinear",),
-    variants=(Variant(10, powers_of_load, 0.0, 3.0, in_contact=True),),
+    variants=(Variant(10, powers_of_load, in_contact=True),),
 )

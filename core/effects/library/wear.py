@@ -75,11 +75,8 @@ def losses(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
     """Force lost by work of pressing and sliding, or by pressing alone."""
     from ..engine.signal_operators import load_put_on
 
-    def lost() -> list[np.ndarray]:
-        paths = (run.work, load_put_on(run.load) / max(recorded.full_path, 1e-12))
-        return [np.expm1(-path / size) for path in paths for size in (0.2, 0.7, 3.0)]
-
-    return [x * loss for loss in run.keep("wear", lost)]
+    paths = (run.work, load_put_on(run.load) / max(recorded.full_path, 1e-12))
+    return [x * np.expm1(-path / size) for path in paths for size in (0.2, 0.7, 3.0)]
 
 
 KIND = Kind(
@@ -148,6 +145,6 @@ KIND = Kind(
     drawing=Drawing("pressings", values={"archard": {"rate": 2e-4}, "work": {"life": 5.0}}),
     known_from=("unloading", "cycles"),
     families=("losing",),
-    variants=(Variant(60, losses, 0.0, 2.0, in_contact=True),),
+    variants=(Variant(60, losses, in_contact=True),),
     gain_falls_with="use",
 )

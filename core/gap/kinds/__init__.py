@@ -3,8 +3,8 @@
 
 ``palpate gap`` uses it for its plans; effects are found by :mod:`..selection`.
 
-``dictionaries`` says what each kind can add to a signal, ``cascade`` composes all kinds between contact and reading, and
-``normal_equations`` fits any set of them. ``distinguishability`` computes from the stimulus which kinds recordings can tell
+``dictionaries`` says what each kind can add to a signal, ``columns`` what becomes of it in readings and net forces, and
+``normal_equations`` sums products of these. ``distinguishability`` computes from the stimulus which kinds recordings can tell
 apart.
 """
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The dictionaries of all kinds, in the order in which they act: what each can add to a signal, column by column.
 
-A kind is not a formula but a cone: all sums of its columns with coefficients inside their bounds; zero coefficients change
-nothing. Each module of the library of effects states its own (see :class:`...effects.engine.declarations.Variant`).
+A kind is not a formula but a cone: all sums of its columns with coefficients from zero on, or of either sign. Each module of
+the library of effects states its own (see :class:`...effects.engine.declarations.Variant`).
 """
 
 from __future__ import annotations

@@ -16,10 +16,10 @@ import numpy as np
 
 from ..dataset.trial import Trial
 from .bounded_least_squares import bounded_minimum
-from .cascade import TEXEL, Cascade, Point
+from .columns import BASE, TEXEL
 from .decision_numbers import FLOOR, FLOOR_DEVIATIONS, LEAST_EXCESS, LEAST_SHARE_TOLD, PRIORS, TOLD_APART, TYPICAL_SIZE
 from .dictionaries import MISALIGNMENT, VARIANTS, Variant
-from .normal_equations import BOUNDS, CascadeEquations, joined, normal_equations
+from .normal_equations import NormalEquations, normal_equations
 from .recorded import Recorded, planned
 
 
@@ -99,15 +99,6 @@ def possible_variants(recorded: Recorded, possible: Set[str]) -> list[Variant]:
     return found
 
 
-def floor_for(count: float, correlation: float) -> float:
-    """Return what no fit resolves of so many measured values whose noise has a memory of `correlation` samples.
-
-    It is a share of the noise, and the scatter of its mean square.
-    """
-    independent = count / correlation
-    return FLOOR + FLOOR_DEVIATIONS * float(np.sqrt(2.0 / max(independent, 1.0)))
-
-
 class Comparison:
     """Kinds that are compared on recordings, and on recordings with one more that was not made yet.
 
@@ -121,7 +112,7 @@ class Comparison:
     def __init__(self, recorded: Recorded, possible: Set[str]):
         self.recorded = recorded
         self._variants = possible_variants(recorded, possible)
-        self._equations = normal_equations(Cascade(recorded), Point(), self._variants)
+        self._equations = normal_equations(recorded, self._variants)
 
     def distinctions(self, further: Trial | None = None, wanted: Set[tuple[str, str]] | None = None) -> list[Distinction]:
         """Return for each kind, in each of its directions, how well it is told from each other kind.
@@ -135,64 +126,31 @@ class Comparison:
         """
         equations = self._equations
         if further is not None:
-            cascade = Cascade(planned(self.recorded, further))
-            equations = joined(equations, normal_equations(cascade, Point(), self._variants))
-        return _distinctions(equations, self._variants, self.recorded, wanted)
+            equations = equations + normal_equations(planned(self.recorded, further), self._variants)
+        variants, recorded = self._variants, self.recorded
+        kinds = list(dict.fromkeys(variant.kind for variant in variants))
+        floor = _floor(equations.count, recorded.correlation)
+        found = []
+        for signal in [one for variant in variants for one in signals_of(equations, variant)]:
+            against = [k for k in kinds if k != signal.kind and (wanted is None or (signal.label, k) in wanted)]
+            alone = left_by(equations, signal, ()) if against else 0.0
+            for kind in against:
+                others = [variant for variant in variants if variant.kind == kind]
+                left = min(left_by(equations, one, (other,)) for one in _both_signs(signal, variants) for other in others)
+                share = min(left / alone, 1.0) if alone > 0.0 else 0.0
+                smallest = _smallest(recorded.noise[0 if recorded.has_readings else 1], floor, share * alone / signal.square)
+                found.append(Distinction(signal.label, kind, share, smallest))
+        return found
 
 
-def distinctions(recorded: Recorded, possible: Set[str]) -> list[Distinction]:
-    """Return for each kind, in each of its directions, how well recordings tell it from each other kind.
-
-    Parameters
-    ----------
-    recorded : Recorded
-    possible : set of str
-        Names of the kinds to compare.
-    """
-    return Comparison(recorded, possible).distinctions()
-
-
-def left_by_kinds(recorded: Recorded, possible: Set[str]) -> dict[str, float]:
-    """Return for each kind what it leaves, with the base model, of the responses: mean squares in units of the noise.
-
-    Parameters
-    ----------
-    recorded : Recorded
-        Of which the responses may be the base model's with some signal on top of them.
-    possible : set of str
-        Names of the kinds.
-    """
-    variants = possible_variants(recorded, possible)
-    equations = normal_equations(Cascade(recorded), Point(), variants)
-    left: dict[str, float] = {}
-    for variant in variants:
-        solution = equations.solve([variant])
-        left[variant.kind] = min(max(solution.fitted, 0.0), left.get(variant.kind, np.inf))
-    return left
-
-
-def _distinctions(
-    equations: CascadeEquations, variants: Sequence[Variant], recorded: Recorded, wanted: Set[tuple[str, str]] | None
-) -> list[Distinction]:
-    """Distinctions from equations about the base model, whose units are those of some recordings."""
-    kinds = list(dict.fromkeys(variant.kind for variant in variants))
-    floor = floor_for(max(float(equations.count.sum()), 1.0), recorded.correlation[0])
-    found = []
-    for signal in [one for variant in variants for one in signals_of(equations, variant)]:
-        against = [k for k in kinds if k != signal.kind and (wanted is None or (signal.label, k) in wanted)]
-        alone = left_by(equations, signal, ()) if against else 0.0
-        for kind in against:
-            others = [variant for variant in variants if variant.kind == kind]
-            left = min(left_by(equations, one, (other,)) for one in _both_signs(signal, variants) for other in others)
-            share = min(left / alone, 1.0) if alone > 0.0 else 0.0
-            smallest = _smallest(recorded.noise[0 if recorded.has_readings else 1], floor, share * alone / signal.square)
-            found.append(Distinction(signal.label, kind, share, smallest))
-    return found
+def _floor(count: float, correlation: float) -> float:
+    """What no fit resolves of so many measured values, as a share of the noise, and of the scatter of its mean square."""
+    return FLOOR + FLOOR_DEVIATIONS * float(np.sqrt(2.0 / max(count / correlation, 1.0)))
 
 
 def _both_signs(signal: KindSignal, variants: Sequence[Variant]) -> list[KindSignal]:
     """A signal, and its negative if the kind has either sign: one of them may be easier to imitate."""
-    is_signed = any(variant.kind == signal.kind and (variant.low < 0.0 or bool(variant.texel_columns)) for variant in variants)
+    is_signed = any(variant.kind == signal.kind and (variant.is_signed or bool(variant.texel_columns)) for variant in variants)
     return [signal, signal.scaled(-1.0)] if is_signed else [signal]
 
 
@@ -202,31 +160,29 @@ def _smallest(noise: float, floor: float, share: float) -> float:
     return float(noise * np.sqrt(least / share)) if share > 1e-9 else np.inf
 
 
-def signals_of(equations: CascadeEquations, variant: Variant) -> list[KindSignal]:
+def signals_of(equations: NormalEquations, variant: Variant) -> list[KindSignal]:
     """Return what a variant adds: the sum of its columns, each as large as the others beside the base model.
 
     A displacement of the texels has three signals: sideways, in height, and turned. Parameters of single texels are drawn with
     a fixed seed. All are as large as a usual effect.
     """
-    width = equations.at[variant.label].stop - equations.at[variant.label].start
-    first = equations.at[variant.label].start
-    parts = {variant.label: list(range(first, first + width))}
+    own = equations.at[variant.label]
+    parts = {variant.label: list(own)}
     if variant is MISALIGNMENT:
-        parts = {f"{variant.label}/{name}": [first + i for i in picked] for name, picked in _POSE_SIGNALS.items()}
+        parts = {f"{variant.label}/{name}": [own[i] for i in picked] for name, picked in _POSE_SIGNALS.items()}
     found = []
     for label, columns in parts.items():
         signal = _signal(equations, variant, label, columns)
         if signal.square > 0.0:
-            found.append(signal.scaled(np.sqrt(TYPICAL_SIZE**2 * float(equations.count.sum()) / signal.square)))
+            found.append(signal.scaled(np.sqrt(TYPICAL_SIZE**2 * equations.count / signal.square)))
     return found
 
 
 _POSE_SIGNALS = {"sideways": (0, 1), "height": (2,), "turned": (3, 4, 5)}
 
 
-def _signal(equations: CascadeEquations, variant: Variant, label: str, columns: list[int]) -> KindSignal:
-    gram, coupling = equations.gram.sum(axis=0), equations.coupling.sum(axis=0)
-    texel_gram = equations.texel_gram.sum(axis=0)
+def _signal(equations: NormalEquations, variant: Variant, label: str, columns: list[int]) -> KindSignal:
+    gram, coupling, texel_gram = equations.gram, equations.coupling, equations.texel_gram
     weights = np.zeros(len(gram))
     for column in columns:
         unit = KindSignal(variant.kind, label, gram[:, column], float(gram[column, column]), coupling[:, column])
@@ -245,30 +201,27 @@ def _signal(equations: CascadeEquations, variant: Variant, label: str, columns: 
     return KindSignal(variant.kind, label, right, square, texel_right)
 
 
-def left_by(equations: CascadeEquations, signal: KindSignal, others: Sequence[Variant]) -> float:
+def left_by(equations: NormalEquations, signal: KindSignal, others: Sequence[Variant]) -> float:
     """Return the sum of squares of a signal that the base model and some variants leave.
 
     Parameters
     ----------
-    equations : CascadeEquations
+    equations : NormalEquations
         About the base model alone.
     signal : KindSignal
     others : sequence of Variant
         With coefficients of any size on their own side of zero: how much of a small effect they imitate does not depend on it.
     """
-    names = [*(name for name in BOUNDS if name in equations.at), *(variant.label for variant in others)]
-    picked = np.concatenate([np.arange(equations.at[n].start, equations.at[n].stop) for n in names]).astype(int)
-    low = np.concatenate(
-        [
-            np.full(equations.at[n].stop - equations.at[n].start, -np.inf if _has_both_signs(equations, n) else 0.0)
-            for n in names
-        ]
-    )
+    sides = [(equations.at[name], -np.inf) for name in BASE if name in equations.at]
+    base = sum(len(columns) for columns, _ in sides)
+    sides += [(equations.at[variant.label], -np.inf if variant.is_signed else 0.0) for variant in others]
+    picked = [column for columns, _ in sides for column in columns]
+    low = np.array([least for columns, least in sides for _ in columns])
     own = [TEXEL.index(name) for variant in others for name in variant.texel_columns]
-    gram, right, square = equations.gram.sum(axis=0)[np.ix_(picked, picked)], signal.right[picked], signal.square
+    gram, right, square = equations.gram[np.ix_(picked, picked)], signal.right[picked], signal.square
     if own:
-        coupling = equations.coupling.sum(axis=0)[own][:, picked]
-        block = equations.texel_gram.sum(axis=0)[np.ix_(own, own)].copy()
+        coupling = equations.coupling[own][:, picked]
+        block = equations.texel_gram[np.ix_(own, own)]
         for i, index in enumerate(own):
             block[i, i] += PRIORS[TEXEL[index]] ** -2
         inverse = np.moveaxis(np.linalg.inv(np.moveaxis(block, 2, 0)), 0, 2)
@@ -276,12 +229,7 @@ def left_by(equations: CascadeEquations, signal: KindSignal, others: Sequence[Va
         gram = gram - np.einsum("qpn,qsn->ps", coupling, across)
         right = right - np.einsum("qpn,qn->p", across, signal.texel_right[own])
         square -= float(np.einsum("qn,qrn,rn->", signal.texel_right[own], inverse, signal.texel_right[own]))
-    base = sum(equations.at[n].stop - equations.at[n].start for n in names if n in BOUNDS)
     start = np.zeros(len(low))
     start[:base] = np.linalg.lstsq(gram[:base, :base], right[:base], rcond=None)[0]
-    x = bounded_minimum(gram, right, low, np.full(len(low), np.inf), start)
+    x = bounded_minimum(gram, right, low, start)
     return max(float(square - 2.0 * x @ right + x @ gram @ x), 0.0)
-
-
-def _has_both_signs(equations: CascadeEquations, name: str) -> bool:
-    return name in BOUNDS or equations.variants[name].low < 0.0

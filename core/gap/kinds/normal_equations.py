@@ -1,221 +1,84 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Least squares of the cascade about a point: Gram blocks of half-recordings, parameters of single texels eliminated.
-
-At a point the cascade is linear in its coefficients. Sums of products of its columns are kept for each half of each recording,
-so that any set of kinds is solved for without going back to the samples. Parameters of single
-texels have Gaussian priors and are eliminated by a Schur complement, one texel at a time.
-"""
+"""Sums of products of the columns of kinds over recordings, from which least squares follow without going back to samples."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from .bounded_least_squares import bounded_minimum
-from .cascade import BASE, TEXEL, Cascade, Point
-from .decision_numbers import PRIORS
-from .dictionaries import MISALIGNMENT, VARIANTS, Variant
-
-BOUNDS = {"k": (-0.8, 4.0), "damping": (-2.0, 6.0), "gain": (-0.8, 4.0), "zero": (-1.0, 1.0)}
-"""Bounds of the corrections of the base model."""
+from .columns import Column, columns, texel_columns
+from .dictionaries import Variant
+from .recorded import Recorded
 
 
 @dataclass(frozen=True)
-class Solution:
-    """Coefficients of some kinds, and how well they do.
+class NormalEquations:
+    """Sums of products of columns, in units of the noise.
 
     Attributes
     ----------
-    point : Point
-    fitted : float
-        Mean square of the residual, in units of the noise's variance.
-    """
-
-    point: Point
-    fitted: float
-
-
-@dataclass
-class CascadeEquations:
-    """Sums of products of the columns at a point, by blocks (halves of recordings).
-
-    Attributes
-    ----------
-    at : dict of str to slice
+    at : dict of str to range
         Columns of each base correction and each variant.
-    variants : dict of str to Variant
-    gram, right : (B, p, p), (B, p) float
-    square, count : (B,) float
-        Of the target: what the coefficients from zero on would have to explain.
-    coupling : (B, q, p, n) float
-        Products of the columns with those of the parameters of single texels.
-    texel_gram, texel_right : (B, q, q, n), (B, q, n) float
+    gram : (p, p) float
+    coupling : (q, p, n) float
+        Products with the columns of parameters of single texels.
+    texel_gram : (q, q, n) float
+        Products of these with each other.
+    count : float
+        Number of measured values.
     """
 
-    at: dict[str, slice]
-    variants: dict[str, Variant]
+    at: dict[str, range]
     gram: np.ndarray
-    right: np.ndarray
-    square: np.ndarray
-    count: np.ndarray
     coupling: np.ndarray
     texel_gram: np.ndarray
-    texel_right: np.ndarray
-    _eliminated: dict[tuple[int, ...], tuple[np.ndarray, np.ndarray, float]] = field(default_factory=dict)
+    count: float
 
-    def solve(self, members: Sequence[Variant]) -> Solution:
-        """Return the best coefficients of some variants.
-
-        Parameters
-        ----------
-        members : sequence of Variant
-            With columns at this point.
-        """
-        names = [*(name for name in BASE if name in self.at), *(m.label for m in members if self.at[m.label].start is not None)]
-        picked = np.concatenate([np.arange(self.at[n].start, self.at[n].stop) for n in names]).astype(int)
-        own = tuple(TEXEL.index(name) for m in members for name in m.texel_columns)
-        gram, right, square = self._without_texels(own)
-        gram, right = gram[np.ix_(picked, picked)], right[picked]
-        low, high = self._bounds(names)
-        x = bounded_minimum(gram, right, low, high)
-        fitted = square - 2.0 * x @ right + x @ gram @ x
-        texel = self._texel_values(own, picked, x)
-        count = max(float(self.count.sum()), 1.0)
-        return Solution(self._point(members, names, x, own, texel), float(fitted) / count)
-
-    def _bounds(self, names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
-        low, high = [], []
-        for name in names:
-            width = self.at[name].stop - self.at[name].start
-            a, b = BOUNDS[name] if name in BOUNDS else (self.variants[name].low, self.variants[name].high)
-            if name == MISALIGNMENT.label:
-                a, b = -20.0, 20.0
-            low += [a] * width
-            high += [b] * width
-        return np.array(low), np.array(high)
-
-    def _without_texels(self, own: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray, float]:
-        """Gram matrix, right side and square with the parameters of single texels eliminated."""
-        if own not in self._eliminated:
-            gram, right, square = self.gram.sum(axis=0), self.right.sum(axis=0), float(self.square.sum())
-            if own:
-                inverse, texel_right = self._texel_inverse(own)
-                coupling = self.coupling.sum(axis=0)[list(own)]  # (q, p, n)
-                across = np.einsum("qrn,rpn->qpn", inverse, coupling)
-                gram = gram - np.einsum("qpn,qsn->ps", coupling, across)
-                right = right - np.einsum("qpn,qn->p", across, texel_right)
-                square -= float(np.einsum("qn,qrn,rn->", texel_right, inverse, texel_right))
-            self._eliminated[own] = gram, right, square
-        return self._eliminated[own]
-
-    def _texel_inverse(self, own: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-        """Inverses of the texels' blocks with their priors, (q, q, n), and their right sides, (q, n)."""
-        picked = list(own)
-        block = self.texel_gram.sum(axis=0)[np.ix_(picked, picked)].copy()
-        for i, index in enumerate(own):
-            block[i, i] += PRIORS[TEXEL[index]] ** -2
-        return np.moveaxis(np.linalg.inv(np.moveaxis(block, 2, 0)), 0, 2), self.texel_right.sum(axis=0)[picked]
-
-    def _texel_values(self, own: tuple[int, ...], picked: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Parameters of single texels that go with some coefficients, (q, n)."""
-        if not own:
-            return np.zeros((0, self.texel_right.shape[-1]))
-        inverse, texel_right = self._texel_inverse(own)
-        coupling = self.coupling.sum(axis=0)[list(own)][:, picked]
-        values: np.ndarray = np.einsum("qrn,rn->qn", inverse, texel_right - np.einsum("qpn,p->qn", coupling, x))
-        return values
-
-    def _point(
-        self, members: Sequence[Variant], names: Sequence[str], x: np.ndarray, own: tuple[int, ...], texel: np.ndarray
-    ) -> Point:
-        coefficients: dict[str, np.ndarray] = {}
-        base: dict[str, float] = {}
-        start = 0
-        for name in names:
-            width = self.at[name].stop - self.at[name].start
-            if name in BOUNDS:
-                base[name] = float(x[start])
-            else:
-                coefficients[name] = x[start : start + width]
-            start += width
-        values = {TEXEL[index]: texel[i] for i, index in enumerate(own)}
-        return Point(tuple(members), coefficients, base, values)
+    def __add__(self, other: NormalEquations) -> NormalEquations:
+        """Return the equations of two sets of recordings together; both have the same columns, in the same units."""
+        return NormalEquations(
+            self.at,
+            self.gram + other.gram,
+            self.coupling + other.coupling,
+            self.texel_gram + other.texel_gram,
+            self.count + other.count,
+        )
 
 
-def joined(first: CascadeEquations, second: CascadeEquations) -> CascadeEquations:
-    """Return the equations of two sets of recordings together; both have the same columns, in the same units."""
-    names = ("gram", "right", "square", "count", "coupling", "texel_gram", "texel_right")
-    both = {name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in names}
-    return CascadeEquations(first.at, first.variants, **both)
-
-
-def normal_equations(cascade: Cascade, point: Point, variants: Sequence[Variant]) -> CascadeEquations:
-    """Return the normal equations at a point.
+def normal_equations(recorded: Recorded, variants: Sequence[Variant]) -> NormalEquations:
+    """Return the normal equations of the base model and some variants.
 
     Parameters
     ----------
-    cascade : Cascade
-    point : Point
+    recorded : Recorded
     variants : sequence of Variant
-        Those of the point, and others of which nothing is there yet.
     """
-    blocks: list[dict[str, np.ndarray]] = []
-    at: dict[str, slice] = {}
-    for number in range(len(cascade.recorded.runs)):
-        made = cascade.columns(point, number, variants)
-        if not at:
-            start = 0
-            for name, columns in made.items():
-                at[name] = slice(start, start + len(columns))
-                start += len(columns)
-        blocks += _blocks(cascade, point, number, made, at)
-    stacked = {key: np.stack([block[key] for block in blocks]) for key in blocks[0]}
-    return CascadeEquations(at, {v.label: v for v in (*VARIANTS, MISALIGNMENT)}, **stacked)
+    first, *others = (_of_run(recorded, number, variants) for number in range(len(recorded.runs)))
+    return sum(others, first)
 
 
-def _blocks(
-    cascade: Cascade,
-    point: Point,
-    number: int,
-    made: dict[str, list[tuple[np.ndarray, np.ndarray]]],
-    at: dict[str, slice],
-) -> list[dict[str, np.ndarray]]:
-    """Sums of products of both halves of a run."""
-    recorded, run = cascade.recorded, cascade.recorded.runs[number]
-    here, own = cascade.course(point, number), cascade.texel_columns(point, number)
-    known, known_force = np.isfinite(run.reading), np.isfinite(run.force)
-    weight, force_weight = known / recorded.noise[0], known_force / recorded.noise[1]
-    n, columns = recorded.texel_count, [pair for pairs in made.values() for pair in pairs]
-    table = np.empty((len(columns), len(run.time), n + 1))
-    for row, (reading, force) in zip(table, columns, strict=True):
+def _of_run(recorded: Recorded, number: int, variants: Sequence[Variant]) -> NormalEquations:
+    """The normal equations of one run."""
+    run, n = recorded.runs[number], recorded.texel_count
+    at: dict[str, range] = {}
+    pairs: list[Column] = []
+    for name, own in columns(recorded, number, variants).items():
+        at[name] = range(len(pairs), len(pairs) + len(own))
+        pairs += own
+    known, known_force = run.read, np.isfinite(run.force)
+    weight = known / recorded.noise[0]
+    table = np.empty((len(pairs), len(run.time), n + 1))
+    for row, (reading, force) in zip(table, pairs, strict=True):
         np.multiply(reading, weight, out=row[:, :n])
-        np.multiply(force, force_weight, out=row[:, n])
-    texel = np.stack([own[name] * weight for name in TEXEL])
-    target = np.empty((len(run.time), n + 1))
-    target[:, :n] = np.where(known, run.reading - here.reading, 0.0) * weight
-    target[:, n] = np.where(known_force, run.force - here.force, 0.0) * force_weight
-    for name, values in [*((k, np.array([v])) for k, v in point.base.items()), *point.coefficients.items()]:
-        if name in at:
-            target += np.tensordot(values, table[at[name]], (0, 0))
-    for index, name in enumerate(TEXEL):
-        if name in point.texel:
-            target[:, :n] += point.texel[name] * texel[index]
-    made_blocks = []
-    for half in run.halves:
-        c, p, t = table[:, half], texel[:, half], target[half]
-        flat = c.reshape(len(c), -1)
-        by_texel = np.ascontiguousarray(p.transpose(2, 0, 1))
-        made_blocks.append(
-            {
-                "gram": flat @ flat.T,
-                "right": flat @ t.ravel(),
-                "square": np.array(float(np.vdot(t, t))),
-                "count": np.array(float(known[half].sum() + known_force[half].sum())),
-                "coupling": np.matmul(by_texel, c[:, :, :n].transpose(2, 1, 0)).transpose(1, 2, 0),
-                "texel_gram": np.einsum("qtn,rtn->qrn", p, p),
-                "texel_right": np.einsum("qtn,tn->qn", p, t[:, :n]),
-            }
-        )
-    return made_blocks
+        np.multiply(force, known_force / recorded.noise[1], out=row[:, n])
+    flat, texel = table.reshape(len(table), -1), texel_columns(recorded, run) * weight
+    by_texel = np.ascontiguousarray(texel.transpose(2, 0, 1))
+    return NormalEquations(
+        at,
+        flat @ flat.T,
+        np.matmul(by_texel, table[:, :, :n].transpose(2, 1, 0)).transpose(1, 2, 0),
+        np.einsum("qtn,rtn->qrn", texel, texel),
+        float(known.sum() + known_force.sum()),
+    )

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Recordings as the comparison of kinds sees them: the base model's forces, what was measured, and the noise, without units.
+"""Recordings as the comparison of kinds sees them: the base model's forces, where something was measured, and the noise.
 
-Forces and readings are in units of the base model's largest force, so that 1 is full load. A recording that begins with an
-untouched sensor is one :class:`RecordedRun`; the recordings of a session are one together, with samples in the pauses that
-nothing was measured at. Samples are thinned, because each kind is a set of smooth functions.
+Forces are in units of the base model's largest force, so that 1 is full load. A recording that begins with an untouched sensor
+is one :class:`RecordedRun`; the recordings of a session are one together, with samples in the pauses that nothing was measured
+at. Samples are thinned, because each kind is a set of smooth functions.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -20,7 +20,7 @@ from ...model.effect import Effect
 from ..dataset.rig import Rig
 from ..dataset.trial import Trial
 from ..fitting.noise_floor import ChannelNoise
-from ..forward.predictor import Model, Predictor, number_name, predictors_of
+from ..forward.predictor import Model, Predictor, predictors_of
 from .decision_numbers import FORCE_RESOLUTION, LEAST_RATE, MOST_VALUES
 from .dictionaries import MISALIGNMENT
 
@@ -39,31 +39,21 @@ class RecordedRun:
         The base model's normal force of each texel, and without damping; that is positive exactly where there is contact.
     work : (T, n) float
         Work done on each texel so far, pressing and sliding; 1 is the largest of all runs.
-    reading : (T, n) float
-        Measured; NaN where nothing was.
+    read : (T, n) bool
+        Where a reading was measured.
     force : (T,) float
         Measured net force along the mean normal, without the base model's friction; NaN where nothing was.
     towards_normal : (T, n) float
         Share of each texel's force that goes along the mean normal.
-    halves : tuple of slice
-        Its parts, each of which is left out of a fit once.
     """
 
     time: np.ndarray
     load: np.ndarray
     elastic: np.ndarray
     work: np.ndarray
-    reading: np.ndarray
+    read: np.ndarray
     force: np.ndarray
     towards_normal: np.ndarray
-    halves: tuple[slice, ...]
-    kept: dict[str, Any] = field(default_factory=dict)
-
-    def keep(self, name: str, compute: Callable[[], Any]) -> Any:
-        """Return what `compute` returns, which is called once for each name."""
-        if name not in self.kept:
-            self.kept[name] = compute()
-        return self.kept[name]
 
 
 @dataclass(frozen=True)
@@ -75,8 +65,8 @@ class Recorded:
     runs : tuple of RecordedRun
     noise : (float, float)
         Standard deviation of readings and of the net force.
-    correlation : (float, float)
-        Integral of the noise's autocorrelation in thinned samples, at least 1.
+    correlation : float
+        Integral of the autocorrelation of the readings' noise in thinned samples, at least 1.
     place : (n, 2) float
         Places of the texels in their plane, in pitches.
     rows : (n, 2) int or None
@@ -93,7 +83,7 @@ class Recorded:
 
     runs: tuple[RecordedRun, ...]
     noise: tuple[float, float]
-    correlation: tuple[float, float]
+    correlation: float
     place: np.ndarray
     rows: np.ndarray | None
     duration: float
@@ -109,12 +99,7 @@ class Recorded:
     @property
     def has_readings(self) -> bool:
         """True if any texel was read, rather than net forces alone."""
-        return any(bool(np.isfinite(run.reading).any()) for run in self.runs)
-
-    @property
-    def count(self) -> float:
-        """Number of measured values."""
-        return float(sum(np.isfinite(run.reading).sum() + np.isfinite(run.force).sum() for run in self.runs))
+        return any(bool(run.read.any()) for run in self.runs)
 
 
 @dataclass(frozen=True)
@@ -129,27 +114,18 @@ class Source:
     heights_free: bool
     most_work: float
     stride: int
-    kept: dict[tuple[float, ...], list[tuple[np.ndarray, np.ndarray]]] = field(default_factory=dict)
+    kept: dict[tuple[float, ...], list[np.ndarray]] = field(default_factory=dict)
 
-    def loads(self, displacement: tuple[float, ...] = (0.0,) * 6) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Return for each run the load with and without damping, (T, n) each, with the texels displaced (m and rad)."""
+    def displaced(self, displacement: tuple[float, ...]) -> list[np.ndarray]:
+        """Return the loads of each run with the texels displaced (m and rad)."""
         if displacement not in self.kept:
-            model = self.model
-            if any(displacement):
-                model = model.with_effect(Effect(MISALIGNMENT.kind, "rigid", dict(zip(POSE, displacement, strict=True))))
-            plain = replace(model, parameters=replace(model.parameters, cn=0.0))
-            found = []
-            for group in self.predictors:
-                found.append((_force(group, model) / self.scale, _force(group, plain) / self.scale))
-            if len(self.kept) > 16:
-                self.kept.pop(next(key for key in self.kept if any(key)))
-            self.kept[displacement] = found
+            moved = self.model.with_effect(Effect(MISALIGNMENT.kind, "rigid", dict(zip(POSE, displacement, strict=True))))
+            self.kept[displacement] = [self.load(group, moved) for group in self.predictors]
         return self.kept[displacement]
 
-
-def _force(group: tuple[Predictor, ...], model: Model) -> np.ndarray:
-    """Normal forces of a run, with its pauses, (T, n) N."""
-    return np.ascontiguousarray(group[0].responses.normal_force(model))
+    def load(self, group: tuple[Predictor, ...], model: Model) -> np.ndarray:
+        """Return the load of a run, with its pauses, by a model, (T, n)."""
+        return np.ascontiguousarray(group[0].responses.normal_force(model)) / self.scale
 
 
 def recorded(
@@ -178,19 +154,19 @@ def recorded(
     posed = all(p.trial.stimulus == "pose" for p in predictors)
     heights_free = any(isinstance(p.trial.contact_height, str) for p in predictors)
     source = Source(rig, model, groups, scale, posed, heights_free, 1.0, stride)
-    loads = source.loads()
-    works = [_work(group, load * scale) for group, (load, _) in zip(groups, loads, strict=True)]
+    loads = [source.load(group, model) for group in groups]
+    works = [_work(group, load * scale) for group, load in zip(groups, loads, strict=True)]
     source = replace(source, most_work=max(max(float(work.max(initial=0.0)) for work in works), 1e-300))
-    runs = tuple(_run(group, source, pair, work) for group, pair, work in zip(groups, loads, works, strict=True))
+    runs = tuple(_run(group, source, load, work) for group, load, work in zip(groups, loads, works, strict=True))
     ranges = [np.ptp(run.force[np.isfinite(run.force)]) for run in runs if np.isfinite(run.force).any()]
-    read = any(np.isfinite(run.reading).any() for run in runs)
+    read = any(run.read.any() for run in runs)
     level = max(noise[1].deviation / scale, FORCE_RESOLUTION * float(max(ranges, default=1.0)) if read else 0.0)
     names = {"k", *(["damping"] if "cn" in free else []), *(name for name in ("gain", "zero") if name in free)}
     place, rows = _places(rig)
     return Recorded(
         runs,
         (noise[0].deviation / abs(gain) / scale, level),
-        (max(noise[0].correlation_time / stride, 1.0), max(noise[1].correlation_time / stride, 1.0)),
+        max(noise[0].correlation_time / stride, 1.0),
         place,
         rows,
         max(float(np.ptp(run.time)) for run in runs),
@@ -218,13 +194,12 @@ def planned(recorded: Recorded, trial: Trial) -> Recorded:
     before = recorded.source
     group = tuple(predictors_of([_thinned(replace(trial, reading=None, force=None), before.stride)], before.rig))
     source = replace(before, predictors=(group,), kept={})
-    (pair,) = source.loads()
-    run = _run(group, source, pair, _work(group, pair[0] * source.scale))
+    load = source.load(group, source.model)
+    run = _run(group, source, load, _work(group, load * source.scale))
     weighs = any(np.isfinite(one.force).any() for one in recorded.runs)
-    silent = np.all([~np.isfinite(one.reading).any(axis=0) for one in recorded.runs], axis=0)
-    reading = np.where(silent, np.nan, np.zeros_like(run.reading)) if recorded.has_readings else run.reading
+    read = np.broadcast_to(np.any([one.read.any(axis=0) for one in recorded.runs], axis=0), run.read.shape)
     force = np.zeros_like(run.force) if weighs else run.force
-    return replace(recorded, runs=(replace(run, reading=reading, force=force),), source=source)
+    return replace(recorded, runs=(replace(run, read=read, force=force),), source=source)
 
 
 def _stride(predictors: Sequence[Predictor]) -> int:
@@ -261,55 +236,28 @@ def _work(group: tuple[Predictor, ...], force: np.ndarray) -> np.ndarray:
     return np.cumsum(force * np.hypot(stimulus.slide, stimulus.rate) * step, axis=0)
 
 
-def _run(
-    group: tuple[Predictor, ...],
-    source: Source,
-    pair: tuple[np.ndarray, np.ndarray],
-    work: np.ndarray,
-) -> RecordedRun:
+def _run(group: tuple[Predictor, ...], source: Source, load: np.ndarray, work: np.ndarray) -> RecordedRun:
     """A run from the predictors of its trials; `work` is in joules."""
-    (load, elastic), model, scale = pair, source.model, source.scale
+    model, scale = source.model, source.scale
+    elastic = source.load(group, replace(model, parameters=replace(model.parameters, cn=0.0)))
     stimulus = group[0].responses.texel_stimulus
     normals = group[0].rig.texels.normal
     axis = normals.mean(axis=0) / max(float(np.linalg.norm(normals.mean(axis=0))), 1e-12)
     direction = np.broadcast_to(-normals if stimulus.normal is None else stimulus.normal, (*load.shape, 3))
     towards = -(direction @ axis)
-    reading, force = np.full(load.shape, np.nan), np.full(len(load), np.nan)
+    read, force = np.zeros(load.shape, bool), np.full(len(load), np.nan)
     for predictor in group:
         trial, rows = predictor.trial, predictor.samples
         if trial.use != "fit":
             continue
         if trial.reading is not None:
-            reading[rows] = _in_forces(trial, model) / scale
+            read[rows] = np.isfinite(trial.reading)
         if trial.force is not None:
             predicted = predictor.predict(model).force
             assert predicted is not None
             friction = -(predicted @ axis) / scale - (load[rows] * towards[rows]).sum(axis=1)
             force[rows] = -(trial.force @ axis) / scale - friction
-    middle = len(load) // 2
-    return RecordedRun(
-        stimulus.time,
-        load,
-        elastic,
-        work / source.most_work,
-        reading,
-        force,
-        towards,
-        (slice(0, middle), slice(middle, len(load))),
-    )
-
-
-def _in_forces(trial: Trial, model: Model) -> np.ndarray:
-    """Readings as forces (N), without the recording's own factor and zero."""
-    p, reading = model.parameters, trial.reading
-    assert reading is not None
-    rest = 0.0 if trial.tared else p.zero
-    own = [
-        model.recordings.get(number_name(word, value), default) if isinstance(value, str) else value
-        for word, value, default in (("factor", trial.factor, 1.0), ("zero", trial.zero, 0.0))
-    ]
-    found: np.ndarray = (reading - rest - own[1]) / own[0] / p.gain
-    return found
+    return RecordedRun(stimulus.time, load, elastic, work / source.most_work, read, force, towards)
 
 
 def _places(rig: Rig) -> tuple[np.ndarray, np.ndarray | None]:

@@ -21,7 +21,7 @@ from ..selection.unfitted import unfitted
 from .design import Design, DesignSpace, Question, best_design
 from .limits import Limits, limits_of
 from .outlook import Outlook, least_sureness
-from .paths import Ground, Trajectory
+from .paths import Ground
 from .programmes import random_programme, usual_programmes
 
 TRIED_RANDOM = 6
@@ -186,12 +186,6 @@ def plan_after(result: Diagnosis, wishes: Wishes | None = None) -> Job[PlannedEx
     space = DesignSpace(seen, fitted, ground, kinds)
     question = _question_of(space, kinds)
     return (yield from _planned(space, question, 0)) if question else None
-
-
-def random_experiment(experiment: PlannedExperiment, result: Diagnosis, seed: int) -> Trajectory:
-    """Return the trajectory of a random programme within the limits of an experiment, for comparison with the planned one."""
-    ground = Ground(result.predictors, experiment.limits)
-    return ground.trajectory(random_programme(ground.span, np.random.default_rng(seed)))
 
 
 def _planned(space: DesignSpace, question: Question, begins: int) -> Generator[Progress, None, PlannedExperiment]:

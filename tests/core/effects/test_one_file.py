@@ -39,7 +39,7 @@ ALLOWED = {
     "core/effects/engine/declarations.py": ({"temperature"}, "what recordings must hold"),
     "core/gap/dataset/column_names.py": ({"temperature"}, COLUMN),
     "core/gap/dataset/rig.py": ({"temperature"}, COLUMN),
-    "core/gap/kinds/cascade.py": ({"offset"}, NUMBERS_OF_TEXELS),
+    "core/gap/kinds/columns.py": ({"offset"}, NUMBERS_OF_TEXELS),
     "core/gap/kinds/decision_numbers.py": ({"offset"}, NUMBERS_OF_TEXELS),
     "core/gap/logs/column_meaning.py": ({"temperature"}, COLUMN),
     "core/gap/logs/proposal.py": ({"temperature"}, COLUMN),
@@ -122,7 +122,7 @@ COPIED = ("__init__.py", "benchmarks", "commands", "core", "pyproject.toml", "te
 TESTS = {
     "tests/core/effects/engine/test_registry.py": "",
     "tests/core/effects/library/test_library.py": "power-law",
-    "tests/core/gap/kinds/test_cascade.py": "power-law",
+    "tests/core/gap/kinds/test_columns.py": "power-law",
     "tests/core/gap/kinds/test_distinguishability.py": "every_kind",
     "tests/core/gap/selection/test_identifiability.py": "pace or nonlinear or unloading",
     "tests/core/gap/test_hidden_cases.py": "every_effect or own_forms",
@@ -218,5 +218,5 @@ def test_a_new_file_is_all_that_a_new_effect_needs(copy):
     words = [f"({Path(file).stem} and ({which}))" if which else Path(file).stem for file, which in TESTS.items()]
     said = run("-m", "pytest", "-v", "-x", "-p", "no:cacheprovider", *TESTS, "-k", " or ".join(words))
     assert "::test_a_form_says_what_it_is[power-law-power] PASSED" in said
-    assert "::test_derivatives_are_differences_of_the_cascade[power-law] PASSED" in said
+    assert "::test_derivatives_are_differences_of_the_model[power-law] PASSED" in said
     assert all(f"{Path(file).name}::" in said for file in TESTS)

@@ -12,7 +12,7 @@ from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.fitting.noise_floor import ChannelNoise
 from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.kinds.dictionaries import MISALIGNMENT, VARIANTS
-from palpate.core.gap.kinds.distinguishability import distinctions
+from palpate.core.gap.kinds.distinguishability import Comparison
 from palpate.core.gap.kinds.recorded import recorded
 
 
@@ -28,7 +28,7 @@ def _told(kind, number, folder):
     noise = ChannelNoise(0.005 * np.ptp(predictors[0].trial.reading), 1.0, "given"), ChannelNoise(0.05, 1.0, "given")
     seen = recorded(predictors, Model(rig.parameters), {"cn"}, noise)
     kinds = {"misalignment", "dead-zone", "saturation", "creep", "hysteresis", "load-spreading", "crosstalk"}
-    return {(one.signal, one.other): one for one in distinctions(seen, kinds)}
+    return {(one.signal, one.other): one for one in Comparison(seen, kinds).distinctions()}
 
 
 @pytest.mark.long("a whole search among pairs of kinds")

@@ -15,7 +15,7 @@ from palpate.commands import main
 from palpate.core.errors import ParameterError
 from palpate.core.gap.fitting.noise_floor import ChannelNoise
 from palpate.core.gap.forward.predictor import Model, predictors_of
-from palpate.core.gap.kinds.cascade import Cascade, Point
+from palpate.core.gap.kinds.columns import columns
 from palpate.core.gap.kinds.distinguishability import possible_variants
 from palpate.core.gap.kinds.recorded import planned, recorded
 from palpate.core.gap.planning.design import DesignSpace, best_design
@@ -53,9 +53,8 @@ def _table(space, further):
     variants = possible_variants(space.recorded, {"creep", "hysteresis"})
     base, own = [], {variant.label: [] for variant in variants}
     for seen in (space.recorded, further):
-        cascade = Cascade(seen)
         for number in range(len(seen.runs)):
-            made = cascade.columns(Point(), number, variants)
+            made = columns(seen, number, variants)
             flat = {name: np.array([reading.ravel() / seen.noise[0] for reading, _ in pairs]) for name, pairs in made.items()}
             base.append(np.concatenate([flat[name] for name in made if name not in own]))
             for name in own:
@@ -108,7 +107,7 @@ def test_a_planned_recording_has_the_units_of_those_that_were_made():
     again = planned(both, rig.trials[1])
     for name in ("load", "elastic", "work", "towards_normal"):
         assert np.array_equal(getattr(again.runs[0], name), getattr(both.runs[1], name))
-    assert again.count == rig.trials[1].reading.size and again.full_path == both.full_path
+    assert again.runs[0].read.all() and not np.isfinite(again.runs[0].force).any() and again.full_path == both.full_path
 
 
 @pytest.mark.long("compares with random trajectories")
