@@ -42,12 +42,13 @@ def test_counts_of_the_results_add_up(repository):
     assert {"own", "other", "third", "none", "two", "three", "outside"} <= set(count)
     for kind, (cases, right, _) in count.items():
         assert hidden[kind][6] == f"{100 * right / cases:.0f} %", kind
+    flat = " ".join(text.split())
     cases, right, wrong = (sum(one[i] for one in count.values()) for i in range(3))
-    assert f"{wrong} of the {cases} cases have a wrong name ({100 * wrong / cases:.1f} %" in text
+    assert f"{wrong} of the {cases} cases have a wrong name ({100 * wrong / cases:.1f} %" in flat
     one = [count[kind] for kind in ("own", "other", "third")]
-    assert f"Of the {sum(c for c, _, _ in one)} cases with one effect {sum(r for _, r, _ in one)} are right" in text
+    assert f"Of the {sum(c for c, _, _ in one)} cases with one effect {sum(r for _, r, _ in one)} are right" in flat
     bins = [re.match(r"(\d+) of (\d+)", row[2]).groups() for row in rows if len(row) == 4 and "–" in row[0]]
     names = sum(int(count) for _, count in bins)
-    assert f"({names} names, doubts included)" in text
+    assert f"({names} names, doubts included)" in flat
     sure = [(int(right), int(count)) for right, count in bins[2:]]
     assert f"right in {sum(right for right, _ in sure)} of {sum(count for _, count in sure)} cases" in text
