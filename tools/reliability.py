@@ -33,7 +33,7 @@ DEVIATIONS = 1.96
 FAMILIES = (
     ("the library's formulas", ("own",), "#1f5fa8", "s"),
     ("other formulas", ("other", "two", "three", "poor"), "#c4541a", "o"),
-    ("a third family, on which nothing was set", ("third",), "#2a7f3f", "^"),
+    ("a third family, on which nothing was set", ("third", "pairs"), "#2a7f3f", "^"),
 )
 """Words, kinds of cases, colour and mark of what is drawn."""
 
@@ -138,9 +138,10 @@ def draw(rows: Sequence[dict[str, Any]], path: Path) -> None:
             share, ends = np.array([one.share for one in bins]), np.array([one.interval for one in bins]).T
             mean, spread = [one.mean for one in bins], np.abs(ends - share)
             axes.errorbar(mean, share, yerr=spread, fmt=mark, color=colour, markersize=4, capsize=2, elinewidth=1, label=words)
-            for one, below in zip(bins, ends[0], strict=True):
-                where = {"textcoords": "offset points", "xytext": (0, -9), "ha": "center"}
-                axes.annotate(f"{one.right}/{one.count}", (one.mean, below), fontsize=6, color=colour, **where)
+            side = 1 if mark == FAMILIES[-1][-1] else -1  # marks that lie upon each other have their labels on both sides
+            where = {"textcoords": "offset points", "xytext": (5 * side, -2), "ha": "left" if side > 0 else "right"}
+            for one, low in zip(bins, ends[0], strict=True):
+                axes.annotate(f"{one.right}/{one.count}", (one.mean, low), fontsize=6, color=colour, **where)
     axes.set_xscale("logit")  # most names are near 1
     axes.set_xticks(TICKS, [f"{tick:g}" for tick in TICKS])
     axes.set_xticks([], minor=True)
