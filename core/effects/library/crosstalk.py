@@ -25,14 +25,10 @@ def neighbours(values: Values, transducers: TransducerArray) -> CouplingMatrix:
 
 def lines(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Add a share of the mean of the row and of the mean of the column."""
-    if transducers.row is None or transducers.column is None:
-        raise EffectError(
-            f"Effect 'crosstalk' (lines) of sensor '{transducers.name}' needs texels in rows and columns: "
-            "choose the form neighbours."
-        )
+    rows_and_columns = _rows_and_columns(transducers, "lines")
     share = scalar(values, "share")
     result = signal.copy()
-    for line in (transducers.row, transducers.column):
+    for line in rows_and_columns:
         member = (line[:, None] == np.unique(line)).astype(float)
         result += share * (signal @ (member / member.sum(axis=0))) @ member.T
     return result
@@ -52,17 +48,23 @@ def previous(signal: np.ndarray, time: np.ndarray, values: Values, transducers: 
 
 def wires(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Couple the wires of the rows with each other, and those of the columns, the less the farther apart they are."""
-    if transducers.row is None or transducers.column is None:
-        raise EffectError(
-            f"Effect 'crosstalk' (wires) of sensor '{transducers.name}' needs texels in rows and columns: "
-            "choose the form neighbours."
-        )
+    rows_and_columns = _rows_and_columns(transducers, "wires")
     share, fall = scalar(values, "share"), scalar(values, "fall")
-    row, column = (np.unique(line, return_inverse=True)[1] for line in (transducers.row, transducers.column))
+    row, column = (np.unique(line, return_inverse=True)[1] for line in rows_and_columns)
     table = np.zeros((len(signal), int(row.max()) + 1, int(column.max()) + 1))
     table[:, row, column] = signal
     across, along = (_coupled_wires(count, share, fall) for count in table.shape[1:])
     return np.asarray((across @ table @ along)[:, row, column])
+
+
+def _rows_and_columns(transducers: TransducerArray, form: str) -> tuple[np.ndarray, np.ndarray]:
+    """Row and column of each texel, (n,) int each."""
+    if transducers.row is None or transducers.column is None:
+        raise EffectError(
+            f"Effect 'crosstalk' ({form}) of sensor '{transducers.name}' needs texels in rows and columns: "
+            "choose the form neighbours."
+        )
+    return transducers.row, transducers.column
 
 
 def _coupled_wires(count: int, share: float, fall: float) -> np.ndarray:
