@@ -25,10 +25,9 @@ def neighbours(values: Values, transducers: TransducerArray) -> CouplingMatrix:
 
 def lines(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Add a share of the mean of the row and of the mean of the column."""
-    rows_and_columns = _rows_and_columns(transducers, "lines")
     share = scalar(values, "share")
     result = signal.copy()
-    for line in rows_and_columns:
+    for line in _rows_and_columns(transducers, "lines"):
         member = (line[:, None] == np.unique(line)).astype(float)
         result += share * (signal @ (member / member.sum(axis=0))) @ member.T
     return result
@@ -48,9 +47,8 @@ def previous(signal: np.ndarray, time: np.ndarray, values: Values, transducers: 
 
 def wires(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Couple the wires of the rows with each other, and those of the columns, the less the farther apart they are."""
-    rows_and_columns = _rows_and_columns(transducers, "wires")
     share, fall = scalar(values, "share"), scalar(values, "fall")
-    row, column = (np.unique(line, return_inverse=True)[1] for line in rows_and_columns)
+    row, column = (np.unique(line, return_inverse=True)[1] for line in _rows_and_columns(transducers, "wires"))
     table = np.zeros((len(signal), int(row.max()) + 1, int(column.max()) + 1))
     table[:, row, column] = signal
     across, along = (_coupled_wires(count, share, fall) for count in table.shape[1:])
