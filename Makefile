@@ -15,11 +15,9 @@ BLENDER ?= 4.3
 ONLY ?=
 # Address of documentation and support, for the zips that are uploaded to extensions.blender.org
 WEBSITE ?=
-# Arguments for the attack, as in `make attack ATTACK_ARGS='faults --tries 50'`; SHORT=1 takes less than ten minutes
-ATTACK_ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-long test-all test-ui compiled bench attack docs zip lint clean distclean env env50
+.PHONY: help demo test test-long test-all test-ui compiled bench docs zip lint clean distclean env env50
 .NOTPARALLEL:
 
 help:
@@ -31,7 +29,6 @@ help:
 	@echo 'make test-ui  the extension in a real Blender window (Debian, as root: it sets up a Blender of its own);'
 	@echo '              BLENDER=5.2 for that one (default $(BLENDER))'
 	@echo 'make bench    benchmarks, one JSON line per figure; ONLY=solver for one group'
-	@echo 'make attack   faults, kills, power cuts and bad input in thousands; SHORT=1 for ten minutes, ATTACK_ARGS=faults for one area'
 	@echo 'make docs     the documentation as a site, in build/site/'
 	@echo 'make zip      the extension zips for every platform and Python, in dist/, checked by the rules of extensions.blender.org;'
 	@echo '              WEBSITE=https://… makes those to upload, too, in dist/upload/'
@@ -95,9 +92,6 @@ $(VENV)/.bench: $(VENV)/.ready
 
 bench: $(VENV)/.bench
 	@$(BIN)/python -m benchmarks $(ONLY)
-
-attack: env
-	@SHORT=$(SHORT) nice $(BIN)/python -m attack $(ATTACK_ARGS)
 
 $(VENV)/.docs: $(VENV)/.ready
 	$(BIN)/python -m pip install --quiet --editable '.[docs]'

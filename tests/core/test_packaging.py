@@ -9,7 +9,7 @@ import tomllib
 import pytest
 
 # Folders of the repository that are not part of the package.
-OUTSIDE = {"tests", "tools", "benchmarks", "attack", "docs", "build", "dist"}
+OUTSIDE = {"tests", "tools", "benchmarks", "docs", "build", "dist"}
 
 
 @pytest.fixture(scope="module")

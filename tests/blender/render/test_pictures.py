@@ -13,12 +13,12 @@ import bpy
 import numpy as np
 import pytest
 from blender_scenes import changes, dump, press_and_drop, save
+from file_faults import KILL, Injector, Stopped
 
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import bake_display
 from palpate.addon.render import figure_export, figure_request, render, render_setup, video
 from palpate.addon.render.figure_request import FigureRequest
-from palpate.attack.injector import KILL, Injector, Stopped
 from palpate.commands import main
 from palpate.core.errors import FileError, ParameterError, SceneError
 from palpate.core.figures.figure_style import FigureStyle

@@ -16,7 +16,6 @@ from palpate.core.effects.engine.registry import library
 ROOT = Path(__file__).resolve().parents[3]
 SOURCES = (
     "addon",
-    "attack",
     "benchmarks",
     "commands",
     "core",
@@ -45,13 +44,9 @@ ALLOWED = {
     "core/gap/logs/proposal.py": ({"temperature"}, COLUMN),
     "core/gap/selection/candidates.py": ({"temperature"}, "what recordings must hold"),
     "core/gap/selection/plausibility.py": ({"offset"}, "the parameter that the signature of an offset is about"),
-    "attack/commands.py": ({"noise"}, "the name of a file of random bytes"),
     "benchmarks/_simulated.py": ({"wear"}, "a group of columns"),
     "benchmarks/companding.py": ({"noise"}, "a word of a sentence"),
     "benchmarks/exactness.py": ({"lag"}, "a law of friction"),
-    # examples: sensors that are given some effects
-    "attack/damaged_files.py": ({"creep", "noise"}, "a sensor in a file that is damaged"),
-    "attack/unfinished_bakes.py": ({"creep", "drift", "hysteresis", "lag", "noise"}, "a sensor whose bake is killed"),
     # answers of benchmarks
     "benchmarks/_hidden/cases.py": (set(), TRUTH),
     "benchmarks/_hidden/mounting.py": (set(), TRUTH),

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from sample_bake import grid_texels, recording_of, round_texels, write_bake, write_sensor
 
-from palpate.attack.sample_bake import grid_texels, recording_of, round_texels, write_bake, write_sensor
 from palpate.core.errors import FileError, PalpateError
 from palpate.core.export import formats, registry
 from palpate.core.export.formats import hdf5

@@ -9,8 +9,8 @@ from contextlib import suppress
 from dataclasses import replace
 
 import pytest
+from file_faults import KILL, Injector, Stopped
 
-from palpate.attack.injector import KILL, Injector, Stopped
 from palpate.core.errors import FileError
 from palpate.core.export import registry
 from palpate.core.export.exporter import Exporter

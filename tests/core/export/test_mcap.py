@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from sample_bake import grid_texels, recording_of, round_texels, write_sensor
 
-from palpate.attack.sample_bake import grid_texels, recording_of, round_texels, write_sensor
 from palpate.core.errors import PalpateError
 from palpate.core.export.formats.mcap_messages import topic_names
 from palpate.core.export.registry import export

@@ -6,8 +6,8 @@ import sys
 
 import numpy as np
 import pytest
+from sample_bake import COLUMNS, PITCH, ROWS, grid_texels, recording_of, round_texels
 
-from palpate.attack.sample_bake import COLUMNS, PITCH, ROWS, grid_texels, recording_of, round_texels
 from palpate.core.errors import FileError, ParameterError, SensorError
 from palpate.core.figures import figure_canvas, figure_style, tactile_image
 from palpate.core.figures.figure_style import FigureStyle

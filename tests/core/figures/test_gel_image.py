@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from sample_bake import recording_of, round_texels
 from scipy import ndimage
 
-from palpate.attack.sample_bake import recording_of, round_texels
 from palpate.core.errors import ParameterError, SensorError
 from palpate.core.figures import color_maps, gel_image
 from palpate.core.figures.gel_image import GelStyle, gel_pixels, write_gel_image

@@ -2,9 +2,9 @@
 """Rigs that once ended in a traceback, and the generator that found them."""
 
 import pytest
+from random_rigs import random_rig, read_and_diagnose
 from rig_files import RIG, write
 
-from palpate.attack.random_rigs import random_rig, read_and_diagnose
 from palpate.core.errors import FileError
 from palpate.core.gap.dataset.rig import read_rig
 

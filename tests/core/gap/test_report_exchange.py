@@ -8,8 +8,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from file_faults import KILL, Injector, Stopped
 
-from palpate.attack.injector import KILL, Injector, Stopped
 from palpate.core.errors import FileError
 from palpate.core.gap.report import summary
 from palpate.core.io import disk_space

@@ -4,8 +4,8 @@
 import os
 
 import pytest
+from sample_bake import write_bake
 
-from palpate.attack.sample_bake import write_bake
 from palpate.commands import main
 
 FOAM = "compression,pressure\n0.001,1\n0.002,2\n0.003,3.1\n"

@@ -6,8 +6,8 @@ import shutil
 
 import numpy as np
 import pytest
+from sample_bake import write_bake
 
-from palpate.attack.sample_bake import write_bake
 from palpate.core.errors import FileError
 from palpate.core.io.bake_reader import read_bake
 from palpate.core.io.npz import write_arrays

@@ -7,8 +7,8 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from file_faults import KILL, Injector, Stopped
 
-from palpate.attack.injector import KILL, Injector, Stopped
 from palpate.core.errors import FileError
 from palpate.core.io import bake_switch
 from palpate.core.io.folder_lock import FolderLock

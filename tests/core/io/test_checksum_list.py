@@ -6,8 +6,8 @@ import subprocess
 from dataclasses import replace
 
 import pytest
+from sample_bake import grid_texels, write_sensor
 
-from palpate.attack.sample_bake import grid_texels, write_sensor
 from palpate.core.errors import FileError
 from palpate.core.io.bake_folder import IMAGE_LIST_NAME, read_manifest, write_manifest
 from palpate.core.io.bake_reader import read_bake

@@ -19,9 +19,9 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 import pytest
+from file_faults import Injector
 from oracles import openexr_writer
 
-from palpate.attack.injector import Injector
 from palpate.core.errors import FileError, PalpateError
 from palpate.core.geometry.layout.grid_layout import GridLayout
 from palpate.core.geometry.layout.texture_maps import uv_layout

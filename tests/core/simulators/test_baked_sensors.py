@@ -6,9 +6,9 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
+from sample_bake import grid_texels, round_texels, write_sensor
 
 import palpate as pp
-from palpate.attack.sample_bake import grid_texels, round_texels, write_sensor
 from palpate.core.effects.engine.registry import effect, to_dict
 from palpate.core.errors import FileError
 from palpate.core.io.bake_folder import MANIFEST_NAME, read_manifest, write_manifest

@@ -7,8 +7,8 @@ import json
 
 import numpy as np
 import pytest
+from sample_bake import grid_texels, recording_of, round_texels, write_sensor
 
-from palpate.attack.sample_bake import grid_texels, recording_of, round_texels, write_sensor
 from palpate.commands import export as export_command
 from palpate.commands import main
 from palpate.core.export.registry import exporters

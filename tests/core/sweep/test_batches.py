@@ -9,10 +9,9 @@ import random
 from itertools import pairwise
 
 import pytest
+from small_study import run_hashes, tree, write_study
 from sweep_runs import new_study
 
-from palpate.attack.sweep_study import run_hashes, write_study
-from palpate.attack.trees import tree
 from palpate.core.errors import FileError
 from palpate.core.io import group_sync
 from palpate.core.io.group_sync import GroupSync

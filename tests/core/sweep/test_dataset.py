@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from sample_bake import grid_texels, recording_of, round_texels
 from sweep_runs import FRICTION, new_study, unit_sensor, write_failure, write_press, write_run
 
-from palpate.attack.sample_bake import grid_texels, recording_of, round_texels
 from palpate.core.errors import FileError
 from palpate.core.io.recording_npz import load_recording
 from palpate.core.io.sensor_npz import load_sensor

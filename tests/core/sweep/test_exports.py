@@ -7,9 +7,9 @@ import json
 
 import numpy as np
 import pytest
+from sample_bake import grid_texels, recording_of
 from sweep_runs import new_study, unit_sensor, write_run
 
-from palpate.attack.sample_bake import grid_texels, recording_of
 from palpate.core.errors import FileError
 from palpate.sweep.dataset import publish
 from palpate.sweep.exports import EXPORTS, export_hdf5, export_zarr

@@ -6,8 +6,8 @@ import os
 from types import SimpleNamespace
 
 import pytest
+from small_study import run_hashes, write_study
 
-from palpate.attack.sweep_study import run_hashes, write_study
 from palpate.core.errors import FileError, PalpateError
 from palpate.core.study import run_shards
 from palpate.core.study.run_files import done_runs, failed_runs, run_batch

@@ -8,9 +8,9 @@ import re
 
 import numpy as np
 import pytest
+from sample_bake import grid_texels, recording_of, round_texels
 from sweep_runs import new_study, unit_sensor, write_failure, write_run
 
-from palpate.attack.sample_bake import grid_texels, recording_of, round_texels
 from palpate.core.errors import FileError
 from palpate.sweep.dependencies import Dependency, dependencies
 from palpate.sweep.report import StudyColumns, _metric_row, _strongest_sentence, write_report

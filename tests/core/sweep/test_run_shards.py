@@ -9,10 +9,9 @@ import shutil
 
 import numpy as np
 import pytest
+from file_faults import EXIT, Injector
+from small_study import run_hashes, tree, write_study
 
-from palpate.attack.injector import EXIT, Injector
-from palpate.attack.sweep_study import run_hashes, write_study
-from palpate.attack.trees import tree
 from palpate.core.errors import FileError
 from palpate.core.study import run_shards
 from palpate.core.study.run_files import RUNS, done_runs, make_folders, run_batch

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from small_study import run_hashes
 from study_scenes import HEAD, tiny_scene
 
-from palpate.attack.sweep_study import run_hashes
 from palpate.core.errors import PalpateError
 from palpate.core.io.bake_folder import IMAGE_LIST_NAME, check_sha256, frame_file, read_manifest
 from palpate.core.io.bake_reader import read_bake

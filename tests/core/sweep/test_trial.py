@@ -2,8 +2,8 @@
 """What a dry run says of the time that a study takes."""
 
 import pytest
+from small_study import write_study
 
-from palpate.attack.sweep_study import write_study
 from palpate.sweep import trial
 from palpate.sweep.study_folder import begin_study
 from palpate.sweep.trial import Estimate, try_runs

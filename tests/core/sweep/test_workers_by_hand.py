@@ -10,9 +10,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
+from small_study import run_hashes
 from study_scenes import HEAD, tiny_scene
 
-from palpate.attack.sweep_study import run_hashes
 from palpate.core.io.scenario_npz import save_scenario
 from palpate.core.study.run_files import done_runs
 from palpate.sweep.finished_runs import StoredRuns

@@ -2,7 +2,7 @@
 """Makes one file operation of this process fail: an error of the operating system, or a kill at that moment.
 
 The functions of :mod:`os`, :func:`open`, and the writing of tactile images are wrapped while an :class:`Injector` is active.
-Only operations below one folder count. Nothing is really synchronised meanwhile, so that thousands of tries are quick.
+Only operations below one folder count. Nothing is really synchronised meanwhile, so that hundreds of tries are quick.
 """
 
 from __future__ import annotations
@@ -49,8 +49,6 @@ class Injector:
     ----------
     calls : list of str
         What was done, as ``rename Pad/x``.
-    observe : callable, optional
-        Called with (operation, path) before and after each operation.
     """
 
     def __init__(self, root: Path, at: int = 0, kind: str = "EIO"):
@@ -60,7 +58,6 @@ class Injector:
         self._stack = ExitStack()
         self._stopped = self._paused = False
         self.calls: list[str] = []
-        self.observe: Callable[[str, str, bool], None] | None = None
 
     def __enter__(self) -> Injector:
         for name, paths in _PATHS.items():
@@ -104,19 +101,13 @@ class Injector:
             if fails and self._kind == KILL:
                 self._stopped = True
                 raise Stopped
-            if self.observe is not None:
-                self.observe(name, path, False)
             if fails and self._kind == DONE:
                 function()
                 raise OSError(errno.EIO, os.strerror(errno.EIO), path)
             if fails:
                 number = getattr(errno, self._kind)
                 raise OSError(number, os.strerror(number), path)
-        result = function()
-        if self.observe is not None:
-            with self._lock:
-                self.observe(name, path, True)
-        return result
+        return function()
 
     def _counts(self, path: Any, directory: int | None = None) -> str:
         """Return the absolute path if it is below the root, else an empty text."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small sensors, made-up recordings of them, and bakes of these, from which tests and attacks on readers start."""
+"""Small sensors, made-up recordings of them, and bakes of these, from which tests of readers start."""
 
 from __future__ import annotations
 

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A study of presses that take milliseconds, and hashes of its folder that two equal studies share."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from sample_bake import grid_texels
+
+from palpate.core.geometry.mesh import TriangleMesh
+from palpate.core.io.scenario_npz import save_scenario
+from palpate.core.model.body import Body
+from palpate.core.model.motion import Motion
+from palpate.core.model.scenario import Scenario
+from palpate.core.model.sensor import Sensor
+from palpate.core.model.sensor_parameters import SensorParameters
+from palpate.core.model.target import Target
+from palpate.core.study.run_files import RUNS
+from palpate.core.study.run_shards import ShardIndex, digests_in
+from palpate.sweep.finished_runs import StoredRuns
+
+STUDY = """format = "palpate-sweep/1"
+name = "small presses"
+scene = "pad.npz"
+design = "random"
+samples = {runs}
+seed = {seed}
+fps = 100
+[vary]
+"Pad.mus" = {{ uniform = [0.3, 1.0] }}
+{more}
+[press]
+depth = {{ uniform = [0.2e-3, 2e-3] }}
+speed = 0.1
+hold = {hold}
+"""
+FAILING = '"Pad.mud" = { choice = [0.2, 0.25, 2.0] }'
+"""Every third value of the friction is above that at rest, which no sensor has: the run fails."""
+
+
+def scenario() -> Scenario:
+    """A ball over a pad of 5 × 3 texels."""
+    solid = trimesh.creation.icosphere(1, 0.006)
+    ball = TriangleMesh(np.array(solid.vertices), np.array(solid.faces))
+    bodies = (Body("Pad", Motion.at_rest()), Body("Ball", Motion.at_rest((0.0, 0.0, 0.02))))
+    sensor = Sensor("Pad", 0, grid_texels(), SensorParameters())
+    return Scenario(bodies, (sensor,), (Target("Ball", 1, ball),), 1, 3, 50.0, name="pad")
+
+
+def write_study(folder: Path, runs: int, seed: int = 1, fails: bool = False, more: str = "", hold: float = 0.0) -> Path:
+    """Write scene and study into a folder that is made, and return the study's file; presses are held for `hold` seconds."""
+    folder.mkdir(parents=True, exist_ok=True)
+    save_scenario(folder / "pad.npz", scenario())
+    file = folder / "study.toml"
+    file.write_text(STUDY.format(runs=runs, seed=seed, more=FAILING if fails else more, hold=hold), encoding="utf-8")
+    return file
+
+
+def run_hashes(folder: Path) -> dict[str, str]:
+    """Return a hash of each run in the shards of a study, wherever it stands there; the seconds that it took are left out."""
+    shards = ShardIndex(folder / RUNS)
+    found = {}
+    runs = StoredRuns(folder)
+    for digest in digests_in(folder / RUNS):
+        record, frames = runs.record(digest), shards.read(digest)
+        about = asdict(record) | {"folder": "", "seconds": 0.0}
+        words, at = json.dumps(about, sort_keys=True).encode(), 8 + int.from_bytes(frames[:4], "little")
+        layout = shards.common(json.loads(frames[8:at])["layout"])
+        found[digest] = hashlib.sha256(b"".join((words, frames[at:], layout))).hexdigest()
+    return found
+
+
+def tree(folder: Path) -> dict[str, str]:
+    """Return a hash of each file below a folder, and the word "folder" of each folder, by relative path."""
+    return {
+        path.relative_to(folder).as_posix(): "folder" if path.is_dir() else hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in folder.rglob("*")
+    }
