@@ -54,13 +54,13 @@ class Plan:
     @property
     def path_of_motion(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Times (m,), s, and positions (m, 3), m, of the probe in the sensor's frame; None where no poses are planned."""
-        positions = None if self.outlook.experiment is None else self.outlook.experiment.design.trajectory.positions()
+        positions = None if self.outlook.experiment is None else self.outlook.experiment.trajectory.positions()
         return None if self.outlook.experiment is None or positions is None else (self._times, positions)
 
     @property
     def _times(self) -> np.ndarray:
         assert self.outlook.experiment is not None
-        return self.outlook.experiment.design.trajectory.time
+        return self.outlook.experiment.trajectory.time
 
     def report(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write plan.json, and the trajectory as plan.csv where there is one; return the files."""

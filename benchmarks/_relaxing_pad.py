@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A pad whose stress relaxes, under a ball that presses it slowly and once: recordings that leave open what is hidden.
 
-``tests/core/gap/planning/test_carried_through.py`` and ``tools/planned_experiment.py`` carry the next experiment through on it.
+``tests/core/gap/planning/test_carried_through.py`` carries the next experiment through on it.
 """
 
 from __future__ import annotations

@@ -94,7 +94,7 @@ def _changes(before: Recording, after: Recording) -> dict[str, np.ndarray]:
 
 def _left_by_kinds(effect: str, freed: Any, changes: dict[str, np.ndarray], left: float) -> dict[str, float]:
     """What the best form of each kind leaves of the change in the fitted recordings, in units of the square of `left`."""
-    from palpate.core.gap.kinds.distinguishability import COMPARED_KINDS
+    from palpate.core.effects.engine.declarations import FIT
     from palpate.core.gap.selection.base_model import base_fit
     from palpate.core.gap.selection.candidates import candidates, scales_of
     from palpate.core.gap.selection.screening import screen
@@ -105,7 +105,7 @@ def _left_by_kinds(effect: str, freed: Any, changes: dict[str, np.ndarray], left
     for one in freed.of("fit"):
         reading = one.predict(model).reading + changes[one.trial.name]
         predictors.append(one.with_numbers_of(replace(one.trial, reading=reading)))
-    forms = [one for one in candidates(predictors, model) if one.name in COMPARED_KINDS]
+    forms = [one for one in candidates(predictors, model) if one.kind.found_by == FIT and one.form.friction_law is None]
     views = view_set_of(predictors, (left, freed.noise[1].deviation))
     base = base_fit(freed.rig, views.whole, freed.full[0])
     found = {one.name: base.mean for one in forms}

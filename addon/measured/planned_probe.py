@@ -96,7 +96,7 @@ def put_on_probe(context, obj, experiment: PlannedExperiment, rig):
     """
     from ...core.gap.report.plan_files import experiment_words, planned_sentence
 
-    scene, trajectory = context.scene, experiment.design.trajectory
+    scene, trajectory = context.scene, experiment.trajectory
     metres = units.metres_per_unit(scene)
     probe = _probe(context, obj, rig, metres)
     scene.frame_set(scene.frame_start)

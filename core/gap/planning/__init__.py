@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The next experiment: what recordings can tell apart, and the trajectory that tells best what they cannot.
+"""The next experiment: which kinds of effects recordings separate, and which of a dozen programmes separates the others best.
 
-``limits`` says how far the probe may go, ``programmes`` are sequences of presses, ``paths`` makes trajectories of them.
-``outlook`` says how sure one may be, ``design`` computes it for a further recording and looks for the best one, and
-``experiment_plan`` puts it together.
+``limits`` says how far the probe may go, ``programmes`` names sequences of motions, ``paths`` makes trajectories of them.
+``separation`` asks the forward model how well recordings separate two kinds, and ``experiment_plan`` chooses the programme.
 """
 
-__all__ = ["experiment_plan", "limits", "outlook", "paths", "programmes"]
+__all__ = ["experiment_plan", "limits", "paths", "programmes", "separation"]

@@ -1,90 +1,93 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The next experiment of a rig: which kinds its recordings cannot tell apart, and the trajectory that tells a pair best."""
+"""The next experiment of a rig: which kinds its recordings cannot separate, and the programme that separates a pair best."""
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...effects.engine.declarations import FIT
 from ...effects.engine.registry import library
 from ...errors import ParameterError
 from ...jobs.progress import Job, Progress
 from ..dataset.rig import Rig
-from ..fitting.least_squares import BASE
-from ..forward.predictor import Predictor
-from ..kinds.distinguishability import COMPARED_KINDS
-from ..kinds.recorded import recorded
+from ..fitting.least_squares import FreeParameter, free_base_parameters
+from ..fitting.noise_floor import ChannelNoise
+from ..forward.predictor import Model, Predictor
+from ..selection.base_model import base_parameters_to_search, recording_numbers
+from ..selection.candidates import Candidate, candidates, scales_of
 from ..selection.findings import Diagnosis
 from ..selection.unfitted import unfitted
-from .design import Design, DesignSpace, Question, best_design
 from .limits import Limits, limits_of
-from .outlook import Outlook, least_sureness
-from .paths import Ground
-from .programmes import random_programme, usual_programmes
+from .paths import Ground, Trajectory
+from .separation import Separation, Signals
 
-TRIED_RANDOM = 6
-"""Random programmes that are tried beside the usual ones to see which pairs an experiment can tell at all."""
-TOLD_BY_EXPERIMENT = 0.75
-"""Sureness from which on an experiment can tell a pair."""
-TOTAL = 1000
+Pair = tuple[str, str]
+"""A kind that acts, and a rival."""
 
 
 @dataclass(frozen=True)
 class PlannedExperiment:
-    """A further recording that tells kinds of effects apart.
+    """A further recording that separates kinds of effects.
 
     Attributes
     ----------
     kinds : tuple of str
-        What it is to tell apart.
-    design : Design
+        What it is to separate.
+    programme : str
+        Name of the programme that was chosen.
+    trajectory : Trajectory
+    before, after : tuple of Separation
+        Of each kind and each other one, by the recordings alone and with the further one.
     limits : Limits
     """
 
     kinds: tuple[str, ...]
-    design: Design
+    programme: str
+    trajectory: Trajectory
+    before: tuple[Separation, ...]
+    after: tuple[Separation, ...]
     limits: Limits
 
     @property
-    def sure_before(self) -> float:
-        """How probably the kind that acts is told from the others by the recordings alone, whichever it is."""
-        return least_sureness(self.design.before)
+    def separation_before(self) -> float:
+        """The least separated pair by the recordings alone, in standard deviations of the noise."""
+        return min(one.deviations for one in self.before)
 
     @property
-    def sure_after(self) -> float:
+    def separation_after(self) -> float:
         """The same with the further recording."""
-        return least_sureness(self.design.after)
+        return min(one.deviations for one in self.after)
 
 
 @dataclass(frozen=True)
 class ExperimentPlan:
-    """What recordings can tell, and the next experiment.
+    """What recordings separate, and the next experiment.
 
     Attributes
     ----------
-    outlooks : tuple of Outlook
-        For each kind, in each of its directions, and each other kind.
+    separations : tuple of Separation
+        For each kind that the recordings could show and each other kind.
     cannot_show : dict of str to str
         Kinds that these recordings cannot show, each with the reason.
     experiment : PlannedExperiment or None
-        None if the recordings tell all kinds apart.
+        None if the recordings separate all kinds.
     """
 
-    outlooks: tuple[Outlook, ...]
+    separations: tuple[Separation, ...]
     cannot_show: dict[str, str]
     experiment: PlannedExperiment | None
 
     @property
-    def signals(self) -> tuple[str, ...]:
-        """What the outlooks are about, in the order in which kinds act."""
-        return tuple(dict.fromkeys(one.distinction.signal for one in self.outlooks))
+    def kinds(self) -> tuple[str, ...]:
+        """The kinds that the recordings could show."""
+        return tuple(dict.fromkeys(one.kind for one in self.separations))
 
-    def taken_for(self, signal: str) -> list[Outlook]:
-        """Return the kinds that a signal may be taken for, the likeliest first."""
-        open_ones = [one for one in self.outlooks if one.distinction.signal == signal and not one.is_told]
-        return sorted(open_ones, key=lambda one: one.sureness)
+    def taken_for(self, kind: str) -> list[Separation]:
+        """Return the kinds that a kind may be taken for, the likeliest first."""
+        return sorted((one for one in self.separations if one.kind == kind and not one.is_separated), key=lambda one: one.share)
 
 
 @dataclass(frozen=True)
@@ -94,7 +97,7 @@ class Wishes:
     Attributes
     ----------
     between : tuple of str
-        Kinds that it is to tell apart.
+        Kinds that it is to separate.
     depth : float or None
         See :class:`.limits.Limits`, as for those below.
     speed : float or None
@@ -108,13 +111,13 @@ class Wishes:
     duration: float | None = None
     area: tuple[float, float, float, float] | None = None
 
-    def limits(self, predictors: Sequence[Predictor]) -> Limits:
-        """Return the limits of an experiment after some recordings."""
-        return limits_of(predictors, self.depth, self.speed, self.duration, self.area)
+    def ground(self, predictors: Sequence[Predictor]) -> Ground:
+        """Return where an experiment after some recordings may press."""
+        return Ground(predictors, limits_of(predictors, self.depth, self.speed, self.duration, self.area))
 
 
 def plan_experiment(rig: Rig, wishes: Wishes | None = None) -> Job[ExperimentPlan]:
-    """Compute which kinds the fitted recordings of a rig can tell apart, and the recording that tells the open pair best.
+    """Compute which kinds the fitted recordings of a rig separate, and choose the programme that separates an open pair best.
 
     Nothing is fitted: only their stimulus, their noise and the rig's own parameters count.
 
@@ -137,24 +140,21 @@ def plan_experiment(rig: Rig, wishes: Wishes | None = None) -> Job[ExperimentPla
         A limit or a kind that is wanted has no meaning here.
     """
     wishes = wishes or Wishes()
-    yield Progress("contacts of every trial", 0, TOTAL)
+    yield Progress("contacts of every trial", 0, 100)
     known = unfitted(rig)
-    compared = (known.shown | known.cannot_show.keys()) & COMPARED_KINDS
-    _check_kinds(wishes.between, compared)
-    yield Progress("signals of every kind", 100, TOTAL)
-    seen = recorded(known.fitted, known.start, known.free, known.channels)
-    ground = Ground(known.predictors, wishes.limits(known.predictors))
-    space = DesignSpace(seen, known.fitted, ground, sorted(compared))
-    yield Progress("pairs that an experiment can separate", 300, TOTAL)
-    question = _question_of(space, wishes.between) if wishes.between else _open_question(space)
-    experiment = None
-    if question:
-        experiment = yield from _planned(space, question, 500)
-    return ExperimentPlan(tuple(space.before), known.cannot_show, experiment)
+    ground = wishes.ground(known.predictors)
+    full = scales_of(known.fitted, known.start).reading
+    names = base_parameters_to_search(rig, known.fitted)
+    free = [*free_base_parameters(known.start.parameters, names, full), *recording_numbers(rig, known.fitted, full)]
+    search = _Search(ground, known.fitted, known.start, free, known.channels)
+    shown = [kind for kind in search.kinds if kind not in known.cannot_show]
+    _check_kinds(wishes.between, search.kinds)
+    experiment, separations = yield from search.run(wishes.between or tuple(shown), choose_pair=not wishes.between)
+    return ExperimentPlan(tuple(one for one in separations if one.kind in shown), known.cannot_show, experiment)
 
 
 def plan_after(result: Diagnosis, wishes: Wishes | None = None) -> Job[PlannedExperiment | None]:
-    """Plan the experiment that tells the kinds of a diagnosis apart which it leaves ambiguous.
+    """Plan the experiment that separates the kinds of a diagnosis which it leaves ambiguous.
 
     Parameters
     ----------
@@ -168,74 +168,108 @@ def plan_after(result: Diagnosis, wishes: Wishes | None = None) -> Job[PlannedEx
     Returns
     -------
     PlannedExperiment or None
-        None if nothing is ambiguous, or only kinds between which no trajectory can be planned.
+        None if nothing is ambiguous, or only kinds between which no experiment can be planned.
     """
-    yield Progress("planning the next experiment", 0, TOTAL)
-    wishes = wishes or Wishes()
-    groups = [tuple(name for name in group if name in COMPARED_KINDS) for group in result.ambiguous]
-    kinds = wishes.between or next((group for group in groups if len(group) > 1), ())
-    if not kinds:
-        return None
-    fitted = result.of("fit")
-    free = {item.name for item in result.base.free if item.effect == BASE}
-    seen = recorded(fitted, result.base.model, free, result.noise)
+    yield Progress("planning the next experiment", 0, 100)
+    wishes, fitted = wishes or Wishes(), result.of("fit")
     try:
-        ground = Ground(result.predictors, wishes.limits(result.predictors))
+        ground = wishes.ground(result.predictors)
     except ParameterError:
         return None  # the sentence says what to record; a limit that nobody gave is no reason to fail
-    space = DesignSpace(seen, fitted, ground, kinds)
-    question = _question_of(space, kinds)
-    return (yield from _planned(space, question, 0)) if question else None
+    search = _Search(ground, fitted, result.base.model, result.base.free, result.noise)
+    groups = [tuple(name for name in group if name in search.kinds) for group in (wishes.between, *result.ambiguous)]
+    kinds = next((group for group in groups if len(group) > 1), ())
+    return (yield from search.run(kinds, choose_pair=False))[0] if kinds else None
 
 
-def _planned(space: DesignSpace, question: Question, begins: int) -> Generator[Progress, None, PlannedExperiment]:
-    """The best experiment for a question, with only those kinds in the equations that it is about."""
-    kinds = tuple(dict.fromkeys(name for signal, other in sorted(question) for name in (signal.split("/")[0], other)))
-    steps = best_design(DesignSpace(space.recorded, space.fitted, space.ground, kinds), question)
-    while True:
-        try:
-            share = next(steps)
-        except StopIteration as stop:
-            return PlannedExperiment(kinds, stop.value, space.ground.limits)
-        yield Progress(f"a trajectory that separates {' from '.join(kinds)}", begins + int((TOTAL - begins) * share), TOTAL)
+class _Search:
+    """The programmes of a ground, and the kinds that the recordings or one of them could show."""
+
+    def __init__(
+        self,
+        ground: Ground,
+        fitted: Sequence[Predictor],
+        model: Model,
+        free: Sequence[FreeParameter],
+        noise: tuple[ChannelNoise, ChannelNoise],
+    ):
+        self._ground, self._fitted, self._model, self._free, self._noise = ground, list(fitted), model, free, noise
+        trials = [p.trial for p in self._fitted]
+        like = replace(
+            ground.like,
+            reading=next((one.reading for one in trials if one.reading is not None), None),
+            force=next((one.force for one in trials if one.force is not None), None),
+        )
+        self._further: dict[str, tuple[Trajectory, Predictor]] = {}
+        for name, programme in ground.programmes().items():
+            trajectory = ground.trajectory(programme)
+            self._further[name] = trajectory, Predictor(trajectory.as_trial(like), ground.rig)
+        found = _fitted_kinds(self._fitted, model)
+        names = {one.name for one in found}
+        more = _fitted_kinds([*self._fitted, *(further for _, further in self._further.values())], model)
+        self._candidates = [*found, *(one for one in more if one.name not in names)]
+        self.kinds = tuple(dict.fromkeys(one.name for one in self._candidates))
+
+    def run(self, kinds: Sequence[str], choose_pair: bool) -> Job[tuple[PlannedExperiment | None, list[Separation]]]:
+        """Return the experiment for some kinds, or for the pair of them that is worth it, and what recordings separate."""
+        tried = self._candidates if choose_pair else [one for one in self._candidates if one.name in kinds]
+        signals = Signals(self._model, self._free, tried, self._fitted, self._noise)
+        products = signals.products(self._fitted)
+        yield Progress("signals of every kind", 20, 100)
+        pairs = [(kind, other) for kind in kinds for other in kinds if kind != other]
+        before = dict(zip(pairs, signals.separations(products, pairs), strict=True))
+        open_ones = {pair for pair in pairs if not choose_pair or not before[pair].is_separated}
+        wanted = [pair for pair in pairs if pair in open_ones or pair[::-1] in open_ones]
+        after: dict[str, dict[Pair, Separation]] = {}
+        for number, (name, (_, further)) in enumerate(self._further.items() if wanted else ()):
+            yield Progress(f"the programme '{name}'", 20 + 80 * number // len(self._further), 100)
+            found = signals.separations(products + signals.products([further]), wanted)
+            after[name] = dict(zip(wanted, found, strict=True))
+        if not wanted:
+            return None, list(before.values())
+        question = _worthwhile(wanted, before, after) if choose_pair else wanted
+        best = max(after, key=lambda name: _value(after[name], question))
+        experiment = PlannedExperiment(
+            tuple(dict.fromkeys(kind for kind, _ in question)),
+            best,
+            self._further[best][0],
+            tuple(before[pair] for pair in question),
+            tuple(after[best][pair] for pair in question),
+            self._ground.limits,
+        )
+        return experiment, list(before.values())
 
 
-def _check_kinds(names: Sequence[str], compared: frozenset[str]) -> None:
-    """Raise if no planned trajectory can distinguish some of the kinds."""
+def _value(after: dict[Pair, Separation], question: Sequence[Pair]) -> float:
+    """The mean logarithm of the separations: not the least one, because no programme may separate one of the pairs."""
+    return float(np.mean([np.log(max(after[pair].deviations, 1e-3)) for pair in question]))
+
+
+def _worthwhile(wanted: Sequence[Pair], before: dict[Pair, Separation], after: dict[str, dict[Pair, Separation]]) -> list[Pair]:
+    """The pair that recordings separate least and that a programme separates; if none does, that which comes nearest."""
+
+    def both(found: dict[Pair, Separation], pair: Pair) -> tuple[bool, float]:
+        sides = found[pair], found[pair[::-1]]
+        return all(one.is_separated for one in sides), min(one.share for one in sides)
+
+    best = {pair: max(both(found, pair) for found in after.values()) for pair in wanted}
+    can = [pair for pair in wanted if best[pair][0]]
+    nearest = max(wanted, key=lambda pair: (best[pair], pair))
+    chosen = min(can, key=lambda pair: (both(before, pair)[1], pair)) if can else nearest
+    return [chosen, chosen[::-1]]
+
+
+def _fitted_kinds(predictors: Sequence[Predictor], model: Model) -> list[Candidate]:
+    """Candidates of the kinds that are found by a fit."""
+    return [one for one in candidates(predictors, model) if one.kind.found_by == FIT]
+
+
+def _check_kinds(names: Sequence[str], possible: Sequence[str]) -> None:
+    """Raise if no experiment can be planned for some of the kinds."""
     for name in names:
         if name not in library():
-            raise ParameterError(f"There is no effect '{name}': choose from {', '.join(sorted(compared))}.")
-        if name not in compared:
-            raise ParameterError(f"No trajectory is planned for '{name}': choose from {', '.join(sorted(compared))}.")
+            raise ParameterError(f"There is no effect '{name}': choose from {', '.join(sorted(possible))}.")
+        if name not in possible:
+            raise ParameterError(f"No trajectory is planned for '{name}': choose from {', '.join(sorted(possible))}.")
     if len(set(names)) == 1:
         raise ParameterError(f"'{names[0]}' stands alone: name another effect to separate it from.")
-
-
-def _question_of(space: DesignSpace, kinds: Sequence[str]) -> Question:
-    """What is asked about some kinds: which of them acts."""
-    return frozenset((one.distinction.signal, one.other) for one in space.before if one.kind in kinds and one.other in kinds)
-
-
-def _open_question(space: DesignSpace) -> Question:
-    """The pair that the recordings tell least and that an experiment can tell; if none can, that which comes nearest."""
-    pairs: dict[frozenset[str], list[Outlook]] = {}
-    for one in space.before:
-        if not one.is_told:
-            pairs.setdefault(frozenset((one.kind, one.other)), []).append(one)
-    if not pairs:
-        return frozenset()
-    wanted = frozenset((one.distinction.signal, one.other) for pair in pairs.values() for one in pair)
-    rng, span = np.random.default_rng(0), space.ground.span
-    programmes = [*usual_programmes(span), *(random_programme(span, rng) for _ in range(TRIED_RANDOM))]
-    best = dict.fromkeys(pairs, 0.0)
-    for programme in programmes:
-        told = space.told(space.ground.trajectory(programme), wanted)
-        for pair in pairs:
-            of_pair = [one for one in told if {one.kind, one.other} == pair]
-            best[pair] = max(best[pair], least_sureness(of_pair) if of_pair else 0.0)
-    can = [pair for pair in pairs if best[pair] >= TOLD_BY_EXPERIMENT]
-    if can:
-        chosen = min(can, key=lambda pair: (least_sureness(pairs[pair]), sorted(pair)))
-    else:
-        chosen = max(pairs, key=lambda pair: (best[pair], sorted(pair)))
-    return _question_of(space, tuple(chosen))

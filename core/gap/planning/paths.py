@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From a programme of presses to a trajectory: poses of the probe over time, or depths or forces where a rig knows these.
+"""From a programme to a trajectory: poses of the probe over time, or depths or forces where a rig knows these.
 
 The probe keeps the orientation of the recordings, travels clear of the sensor and presses along the sensor's mean normal.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -17,15 +18,17 @@ from ..dataset.trial import Trial
 from ..forward.predictor import Predictor
 from ..forward.stimulus import stimulus_of
 from .limits import Limits
-from .programmes import SLOWEST, PlannedPress, PlannedStep, Programme, Range
+from .programmes import Move, Programme, programmes
 
 Knot = tuple[float, int, float]
 """Time (s), place and depth."""
 
-MOST_PLACES = 24
-"""Number of places at which a trajectory may press, at most, half of them between texels."""
-OWN_SEED = 20
-"""Seed of the places between texels."""
+MOST_PLACES = 6
+"""Number of places at which a programme may press, at most."""
+MOST_REPEATS = 1000
+"""Repetitions of a programme, at most."""
+TRACK_PITCHES, TRACK_PLACES = 3.0, 13
+"""Length of a slide in pitches of the texels, and the number of its places at which the height is computed."""
 CLEARANCE = 0.3
 """How far the probe is from the sensor while it travels, as a share of the depth's limit."""
 FIRST_REST = 0.6
@@ -79,7 +82,7 @@ class Trajectory:
         return None if self.level is None else np.interp(self.time, self.knots, self.level)
 
     def as_trial(self, like: Trial) -> Trial:
-        """Return a recording with this stimulus and without responses, otherwise like another one."""
+        """Return a recording with this stimulus, otherwise like another one. Its responses are zero if that one has any."""
         time, positions = self.time, self.positions()
         turns = None if self.quaternion is None else np.tile(self.quaternion, (len(time), 1))
         return replace(
@@ -91,10 +94,11 @@ class Trajectory:
             quaternion=turns,
             level=self.levels(),
             slide=np.zeros((len(time), 2)),
-            reading=None,
-            force=None,
+            reading=None if like.reading is None else np.zeros((len(time), like.reading.shape[1])),
+            force=None if like.force is None else np.zeros((len(time), 3)),
             session="",
             repeats="",
+            temperature=None,
         )
 
 
@@ -112,7 +116,9 @@ class Ground:
     like : Trial
         The recording that planned ones are like.
     places : (m, 3) float, m
-        On the sensor; one row without meaning where depths or forces are known.
+        On the sensor, those of the track last; one row without meaning where depths or forces are known.
+    track : tuple of int
+        Places along which the probe can slide; empty where depths or forces are known.
     touch : (m,) float, m
         Height of the probe's origin over each place, along `up`, at which it touches.
     up : (3,) float
@@ -130,94 +136,86 @@ class Ground:
         self.up = self.rig.texels.normal.sum(axis=0)
         self.up = self.up / max(float(np.linalg.norm(self.up)), 1e-12)
         self.quaternion: np.ndarray | None = None
-        if self.like.position is None or self.like.quaternion is None:
-            self.places, self.touch = np.zeros((1, 3)), np.zeros(1)
-        else:
+        self.places, self.touch = np.zeros((1, 3)), np.zeros(1)
+        self.track: tuple[int, ...] = ()
+        clear = np.zeros(1)
+        if self.like.position is not None and self.like.quaternion is not None:
             deepest = int(np.argmax(touching[0].stimulus.load.max(axis=1)))
             self.quaternion = self.like.quaternion[deepest]
             self.places = _places(self.rig, limits)
-            self.touch = (
-                self._touching_heights() if self.is_posed else np.full(len(self.places), self.like.position[deepest, 2])
-            )
-        self._clear = np.zeros(len(self.places))  # depth of the probe while it travels, negative above the sensor
-        if self.is_posed:
-            heights = self.places @ self.up + self.touch
-            self._clear = heights - float(heights.max()) - CLEARANCE * limits.depth
-        self._fallback = PlannedPress(0, (PlannedStep(1.0, 1.0, 0.0),), 1.0, 0.0)
-        needed = self._with_press([(0.0, 0, self._clear[0]), (FIRST_REST, 0, self._clear[0])], self._fallback)[-1][0]
-        if needed + FIRST_REST > limits.duration:
+            self.touch, clear = np.full(len(self.places), self.like.position[deepest, 2]), np.zeros(len(self.places))
+            if self.like.stimulus == "pose":
+                way = _track(self.rig, limits, self.places[0])
+                self.track = tuple(range(len(self.places), len(self.places) + len(way)))
+                self.places = np.concatenate([self.places, way])
+                self.touch = self._touching_heights()
+                heights = self.places @ self.up + self.touch
+                clear = heights - float(heights.max()) - CLEARANCE * limits.depth
+        self._clear = clear  # depth of the probe while it travels, negative above the sensor
+        needed = FIRST_REST + limits.depth / limits.speed * 2.0 + FIRST_REST
+        if needed > limits.duration:
             raise ParameterError(
-                f"One press to the full depth takes {needed + FIRST_REST:.3g} s, more than the {limits.duration:g} s that are "
+                f"One press to the full depth takes {needed:.3g} s, more than the {limits.duration:g} s that are "
                 "allowed: raise the limit of the duration or of the speed."
             )
 
-    @property
-    def is_posed(self) -> bool:
-        """True if the rig knows poses, rather than depths or forces."""
-        return self.like.stimulus == "pose"
-
-    @property
-    def span(self) -> Range:
-        """What programmes may be made of."""
-        slowest = self.limits.depth / (SLOWEST * self.limits.duration * self.limits.speed)
-        return Range(len(self.places), float(np.clip(slowest, 1e-3, 0.5)), self.limits.duration)
+    def programmes(self) -> dict[str, Programme]:
+        """Return the programmes that this probe can carry out."""
+        return programmes(self.limits.duration, len(self.places) - len(self.track), self.track)
 
     def trajectory(self, programme: Programme) -> Trajectory:
         """Return the trajectory of as many presses of a programme as there is time for."""
-        begin = [(0.0, programme[0].place, float(self._clear[programme[0].place]))]
-        begin.append((FIRST_REST, *begin[0][1:]))
-        knots = begin
-        for press in (*programme, self._fallback):
-            longer = self._with_press(knots, press)
+        start = programme[0][0].place
+        knots = [(0.0, start, self._clear[start]), (FIRST_REST, start, self._clear[start])]
+        fallback = Move(1.0, 1.0, 0.0, start), Move(None, 1.0, 0.0, start)
+        for press in (*itertools.chain.from_iterable(itertools.repeat(programme, MOST_REPEATS)), fallback):
+            longer = [*knots]
+            if press[0].place != knots[-1][1]:
+                self._move(longer, Move(None, 1.0, 0.0, press[0].place))
+            for move in press:
+                self._move(longer, move)
             if longer[-1][0] + FIRST_REST <= self.limits.duration:
                 knots = longer
-            elif knots is not begin:
+            elif len(knots) > 2:
                 break
-        knots = [*knots, (self.limits.duration, *knots[-1][1:])]
-        time, place, depth = (np.array(column) for column in zip(*knots, strict=True))
-        return self._through(time, place, depth)
+        knots.append((self.limits.duration, *knots[-1][1:]))
+        return self._no_deeper(knots)
 
-    def _with_press(self, knots: list[Knot], press: PlannedPress) -> list[Knot]:
-        """Knots with those of one press more: travel, steps, release, rest."""
-        time, before, depth = knots[-1]
-        made, clear = list(knots), float(self._clear[press.place])
+    def _move(self, knots: list[Knot], move: Move) -> None:
+        """Add the knots of a move."""
+        time, place, depth = knots[-1]
+        wanted = float(self._clear[move.place]) if move.depth is None else move.depth * self.limits.depth
+        way = abs(wanted - depth)
+        if move.place != place:
+            way = float(np.linalg.norm(self._position(move.place, wanted) - self._position(place, depth)))
+        time += max(way / (move.speed * self.limits.speed), SHORTEST_SEGMENT)
+        knots.append((time, move.place, wanted))
+        if move.hold > SHORTEST_SEGMENT:
+            knots.append((time + move.hold, move.place, wanted))
 
-        def go(depth_wanted: float, way: float, speed: float) -> None:
-            nonlocal time, depth
-            time += max(way / (speed * self.limits.speed), SHORTEST_SEGMENT)
-            depth = depth_wanted
-            made.append((time, press.place, depth))
-
-        def wait(seconds: float) -> None:
-            nonlocal time
-            if seconds > SHORTEST_SEGMENT:
-                time += seconds
-                made.append((time, press.place, depth))
-
-        if press.place != before:
-            way = self._clear_position(press.place) - self._clear_position(before)
-            go(clear, float(np.linalg.norm(way)), 1.0)
-        for step in press.steps:
-            wanted = step.depth * self.limits.depth
-            go(wanted, abs(wanted - depth), step.speed)
-            wait(step.hold)
-        go(clear, depth - clear, press.release)
-        wait(press.rest)
-        return made
-
-    def _clear_position(self, place: int) -> np.ndarray:
-        """Where the probe is clear of the sensor over a place, (3,) m."""
-        found: np.ndarray = self.places[place] + (self.touch[place] - self._clear[place]) * self.up
+    def _position(self, place: int, depth: float) -> np.ndarray:
+        """Where the probe is at a depth at a place, (3,) m."""
+        found: np.ndarray = self.places[place] + (self.touch[place] - depth) * self.up
         return found
+
+    def _no_deeper(self, knots: list[Knot]) -> Trajectory:
+        """The trajectory through knots. Slides are raised where the surface between their places stands out."""
+        time, place, depth = (np.array(column) for column in zip(*knots, strict=True))
+        planned = self._through(time, place, depth)
+        if self.track:
+            excess = float(stimulus_of(planned.as_trial(self.like), self.rig).load.max()) - self.limits.depth
+            if excess > 0.0:
+                planned = self._through(time, place, np.where(depth > 0.0, depth - 1.01 * excess, depth))
+        return planned
 
     def _through(self, time: np.ndarray, place: np.ndarray, depth: np.ndarray) -> Trajectory:
         """The trajectory through knots at times, places and depths."""
         step = self.like.step
-        if self.is_posed:
-            position = self.places[place] + (self.touch[place] - depth)[:, None] * self.up
-            return Trajectory(time, position, self.quaternion, None, step)
         if self.quaternion is None:
             return Trajectory(time, None, None, depth, step, self.like.stimulus)
+        if self.track:
+            position = self.places[place] + (self.touch[place] - depth)[:, None] * self.up
+            return Trajectory(time, position, self.quaternion, None, step)
         position = self.places[place] + self.touch[place][:, None] * self.up
         return Trajectory(time, position, self.quaternion, depth, step, self.like.stimulus)
 
@@ -259,19 +257,22 @@ class Ground:
 
 
 def _places(rig: Rig, limits: Limits) -> np.ndarray:
-    """Texels that are spread over the area, and places between them, (m, 3) m."""
+    """Texels that are spread over the area, the most central one first, (m, 3) m."""
     texels = rig.texels
     inside = np.flatnonzero(limits.holds(texels.position))
     if not len(inside):
         raise ParameterError("No texel lies inside the area that is allowed: give it in metres, in the sensor's frame.")
     centre = texels.position[inside].mean(axis=0)
     picked = [int(inside[np.argmin(np.linalg.norm(texels.position[inside] - centre, axis=1))])]
-    while len(picked) < min(MOST_PLACES // 2, len(inside)):  # each the farthest one from all before
+    while len(picked) < min(MOST_PLACES, len(inside)):  # each the farthest one from all before
         apart = np.linalg.norm(texels.position[inside][:, None] - texels.position[picked][None], axis=2).min(axis=1)
         picked.append(int(inside[np.argmax(apart)]))
-    on = texels.position[picked]
-    pitch = float(np.sqrt(np.median(texels.area))) if len(texels) > 1 else 0.0
-    shift = np.random.default_rng(OWN_SEED).uniform(-0.5, 0.5, (len(picked), 2)) * pitch
-    side = np.cross(texels.normal[picked], texels.tangent[picked])
-    between = on + shift[:, :1] * texels.tangent[picked] + shift[:, 1:] * side
-    return np.concatenate([on, between[limits.holds(between)]])
+    return np.asarray(texels.position[picked])
+
+
+def _track(rig: Rig, limits: Limits, middle: np.ndarray) -> np.ndarray:
+    """Places along a straight slide through a place, along the texels' first tangent, inside the area, (m, 3) m."""
+    pitch = float(np.sqrt(np.median(rig.texels.area)))
+    share = np.linspace(-0.5, 0.5, TRACK_PLACES)[:, None]
+    way = middle + share * TRACK_PITCHES * pitch * rig.texels.tangent[0]
+    return way[limits.holds(way)]

@@ -4,55 +4,51 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from ...io.file_list import FileList
 from ...io.file_writing import atomic_write
-from ..kinds.decision_numbers import LEAST_SHARE_TOLD
 from ..planning.experiment_plan import ExperimentPlan, PlannedExperiment
-from ..planning.outlook import Outlook
 from ..planning.paths import Trajectory
+from ..planning.separation import LEAST_SHARE, Separation
 
-FORMAT = "palpate-plan/1"
+FORMAT = "palpate-plan/2"
 PLAN, TRAJECTORY = "plan.json", "plan.csv"
 """Files of a plan in advance."""
 NEXT_TRAJECTORY = "next_experiment.csv"
 """File of the trajectory that is planned after a run."""
-LEAST_GAIN = 0.05
-"""Gain in sureness below which a trajectory is not worth its time. Chosen by eye."""
+LEAST_GAIN = 1.2
+"""Factor of the separation below which a trajectory is not worth its time. Chosen by eye."""
 
 
 def table_rows(plan: ExperimentPlan) -> list[tuple[str, str]]:
-    """Return for each signal with which kinds it may be confused, and how much of it these leave."""
+    """Return for each kind with which others it may be confused, and how much of it these leave."""
     rows = []
-    for signal in plan.signals:
-        if signal.split("/")[0] not in plan.cannot_show:
-            words = ", ".join(f"{one.other} ({_left(one)})" for one in plan.taken_for(signal))
-            rows.append((signal.replace("/", ", "), words or "distinguishable from all others"))
+    for kind in plan.kinds:
+        words = ", ".join(f"{one.other} ({_left(one)})" for one in plan.taken_for(kind))
+        rows.append((kind, words or "distinguishable from all others"))
     return rows + [(kind, why) for kind, why in plan.cannot_show.items()]
 
 
-def _left(one: Outlook) -> str:
-    """Why a signal may be taken for another kind."""
-    if not one.is_shown:
-        return "not shown"
-    return f"{one.distinction.share:.0%} left" if one.distinction.share < LEAST_SHARE_TOLD else "if it is small"
+def _left(one: Separation) -> str:
+    """Why a kind may be taken for another one."""
+    return f"{one.share:.0%} left" if one.share < LEAST_SHARE else "if it is small"
 
 
 def planned_sentence(words: Mapping[str, Any]) -> str:
-    """Return what a planned experiment, as :func:`experiment_words` gives it, is good for, and how sure one will be."""
+    """Return what a planned experiment, as :func:`experiment_words` gives it, is good for."""
     what = " from ".join(words["between"])
-    if words["sure_after"] - words["sure_before"] < LEAST_GAIN:
+    before, after = words["separation_before"], words["separation_after"]
+    if after < LEAST_GAIN * before:
         return (
-            f"No trajectory within these limits separates {what} better than your recordings (confidence "
-            f"{words['sure_before']:.0%}): allow more depth, speed, duration or places. The best one found is {words['file']}."
+            f"No programme within these limits separates {what} better than your recordings ({before:.3g} standard deviations "
+            f"of the noise): allow more depth, speed, duration or places. The best one is {words['file']}."
         )
     return (
-        f"{words['file']} is a trajectory of {words['limits']['duration']:.3g} s that separates {what}: "
-        f"confidence {words['sure_after']:.0%} with it, {words['sure_before']:.0%} without."
+        f"{words['file']} is a trajectory of {words['limits']['duration']:.3g} s ({words['programme']}) that separates {what} "
+        f"by {after:.3g} standard deviations of the noise; your recordings alone by {before:.3g}."
     )
 
 
@@ -61,31 +57,31 @@ def experiment_words(experiment: PlannedExperiment, file: str) -> dict[str, Any]
     limits = experiment.limits
     return {
         "file": file,
+        "programme": experiment.programme,
         "between": list(experiment.kinds),
-        "sure_before": round(experiment.sure_before, 3),
-        "sure_after": round(experiment.sure_after, 3),
+        "separation_before": round(experiment.separation_before, 3),
+        "separation_after": round(experiment.separation_after, 3),
         "limits": {
             "depth": limits.depth,
             "speed": limits.speed,
             "duration": limits.duration,
             "area": None if limits.area is None else list(limits.area),
         },
-        "before": _pairs(experiment.design.before),
-        "after": _pairs(experiment.design.after),
+        "before": _pairs(experiment.before),
+        "after": _pairs(experiment.after),
     }
 
 
-def _pairs(outlooks: Sequence[Outlook]) -> list[dict[str, Any]]:
+def _pairs(separations: Sequence[Separation]) -> list[dict[str, Any]]:
     return [
         {
-            "signal": one.distinction.signal,
+            "effect": one.kind,
             "taken_for": one.other,
-            "share_left": round(one.distinction.share, 4),
-            "smallest": round(one.distinction.smallest, 6) if math.isfinite(one.distinction.smallest) else None,
-            "shown": one.is_shown,
-            "told": one.is_told,
+            "share_left": round(one.share, 4),
+            "separation": round(one.deviations, 3),
+            "separated": one.is_separated,
         }
-        for one in outlooks
+        for one in separations
     ]
 
 
@@ -106,14 +102,14 @@ def write_plan(plan: ExperimentPlan, folder: Path) -> list[Path]:
     files, one = FileList(folder), plan.experiment
     words = {
         "format": FORMAT,
-        "pairs": _pairs(plan.outlooks),
+        "pairs": _pairs(plan.separations),
         "cannot_show": plan.cannot_show,
         "experiment": None if one is None else experiment_words(one, TRAJECTORY),
     }
     with files.new_files("plan") as new:
         made = [new / PLAN]
         if one is not None:
-            write_trajectory(one.design.trajectory, new / TRAJECTORY)
+            write_trajectory(one.trajectory, new / TRAJECTORY)
             made.append(new / TRAJECTORY)
         with atomic_write(new / PLAN) as temporary:
             temporary.write_text(json.dumps(words, indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")

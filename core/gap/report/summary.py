@@ -203,7 +203,7 @@ def write_report(result: Diagnosis, folder: Path, errors: GapErrors | None = Non
             temporary.write_text(json.dumps(found, indent=2, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
         made = [f"{name}.{kind}" for name in pictures for kind in FILE_TYPES]
         if experiment is not None:
-            write_trajectory(experiment.design.trajectory, new / NEXT_TRAJECTORY)
+            write_trajectory(experiment.trajectory, new / NEXT_TRAJECTORY)
             made.append(NEXT_TRAJECTORY)
         files.replace(new, {"gap": [new / name for name in ("sensor.toml", *made, "report.html", "gap.json")]})
     yield Progress("done", 1000, 1000)

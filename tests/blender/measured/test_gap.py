@@ -96,7 +96,7 @@ def test_a_planned_experiment_becomes_keyframes_of_a_probe_and_is_undone(scene, 
     assert bpy.ops.palpate.gap_plan("EXEC_DEFAULT", True, duration=8.0, depth=0.001) == {"FINISHED"}
     probe, obj = bpy.data.objects["Planned Probe"], bpy.data.objects["Pad"]
     assert probe.palpate.role == "TARGET" and scene.frame_end == 5 + 8 * scene.render.fps
-    assert "'Planned Probe'" in planned_probe.sentence_of(obj) and "confidence" in planned_probe.sentence_of(obj)
+    assert "'Planned Probe'" in planned_probe.sentence_of(obj) and "separates" in planned_probe.sentence_of(obj)
     radii = [vertex.co.length for vertex in probe.data.vertices]
     assert max(radii) == pytest.approx(cases.RADIUS, rel=1e-5)  # the shape that pressed in the recordings
     lowest, speeds, before = [], [], None

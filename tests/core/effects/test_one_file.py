@@ -117,8 +117,6 @@ COPIED = ("__init__.py", "benchmarks", "commands", "core", "pyproject.toml", "te
 TESTS = {
     "tests/core/effects/engine/test_registry.py": "",
     "tests/core/effects/library/test_library.py": "power-law",
-    "tests/core/gap/kinds/test_columns.py": "power-law",
-    "tests/core/gap/kinds/test_distinguishability.py": "every_kind",
     "tests/core/gap/selection/test_identifiability.py": "pace or nonlinear or unloading",
     "tests/core/gap/test_hidden_cases.py": "every_effect or own_forms",
     "tests/tools/test_effects_page.py": "this_library or every_experiment",
@@ -129,14 +127,13 @@ USES = """
 from types import SimpleNamespace
 import gap_cases as cases
 from palpate.core.gap.forward.predictor import Model, predictors_of
-from palpate.core.gap.kinds.distinguishability import COMPARED_KINDS
 from palpate.core.gap.report.experiments import next_experiment
 from palpate.core.gap.selection.candidates import candidates
 from palpate.core.gap.selection.identifiability import NONLINEAR
 
 rig = cases.rig(trials=1, seconds=2.0)
 assert "power-law" in {one.name for one in candidates(predictors_of(rig.trials, rig), Model(rig.parameters))}
-assert "power-law" in COMPARED_KINDS and "power-law" in NONLINEAR
+assert "power-law" in NONLINEAR
 asked = next_experiment(SimpleNamespace(ambiguous=[("power-law", "saturation")]))
 assert "press slowly, from the first touch to the highest load" in asked, asked
 """
@@ -213,5 +210,4 @@ def test_a_new_file_is_all_that_a_new_effect_needs(copy):
     words = [f"({Path(file).stem} and ({which}))" if which else Path(file).stem for file, which in TESTS.items()]
     said = run("-m", "pytest", "-v", "-x", "-p", "no:cacheprovider", *TESTS, "-k", " or ".join(words))
     assert "::test_a_form_says_what_it_is[power-law-power] PASSED" in said
-    assert "::test_derivatives_are_differences_of_the_model[power-law] PASSED" in said
     assert all(f"{Path(file).name}::" in said for file in TESTS)

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import pytest
 
-from palpate.core.gap.kinds.decision_numbers import LEAST_SHARE_TOLD
+from palpate.core.gap.planning.separation import LEAST_SHARE
 from palpate.core.gap.selection import check_recordings, confidence, forward_selection, verdict
 
 SHARES = {Fraction(1, 2): "half", Fraction(1, 4): "a quarter", Fraction(1, 5): "a fifth", Fraction(1, 10): "a tenth"}
@@ -31,7 +31,7 @@ def test_thresholds_are_those_of_the_source(page):
     assert f"at most {verdict.RIVAL_RATIO:g} times its error (`ambiguous`, at most {confidence.UNSURE_CONFIDENCE:g};" in page
     assert f"A doubt without a rival has at most {confidence.UNLIKELY_CONFIDENCE:g}." in page
     assert f"closes less than {in_words(confidence.SMALL_SHARE)} of the gap" in page
-    assert f"Kinds with less than {in_words(LEAST_SHARE_TOLD)} left are listed" in page
+    assert f"Kinds with less than {in_words(LEAST_SHARE)} left are listed" in page
 
 
 def test_counts_of_the_results_add_up(repository):

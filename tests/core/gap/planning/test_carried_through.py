@@ -21,7 +21,7 @@ def test_the_trajectory_that_is_written_resolves_what_was_ambiguous(tmp_path):
     rig = pad.write(tmp_path, rng)
     before = said(rig, tmp_path / "before")
     assert any("creep" in group for group in before["ambiguous"])
-    assert before["planned_experiment"]["sure_after"] > before["planned_experiment"]["sure_before"]
+    assert before["planned_experiment"]["separation_after"] > before["planned_experiment"]["separation_before"]
     pad.add_planned(rig, tmp_path / "before" / "next_experiment.csv", rng)
     after = said(rig, tmp_path / "after")
     assert not after["ambiguous"] and after["verdict"] == "explained"

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a further recording would separate: against least squares over all samples, and as files of a plan."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import gap_cases as cases
+import numpy as np
+import pytest
+
+from palpate.commands import main
+from palpate.core.errors import ParameterError
+from palpate.core.gap.fitting.least_squares import free_base_parameters
+from palpate.core.gap.fitting.noise_floor import ChannelNoise
+from palpate.core.gap.forward.predictor import Model, predictors_of
+from palpate.core.gap.planning.experiment_plan import Wishes, plan_experiment
+from palpate.core.gap.planning.separation import STARTS, Signals
+from palpate.core.gap.report.plan_files import planned_sentence, table_rows, write_plan
+from palpate.core.gap.selection.candidates import candidates, scales_of
+from palpate.core.jobs.job_runner import run_job
+
+NOISE = ChannelNoise(0.005, 1.0, "given"), ChannelNoise(0.05, 1.0, "given")
+
+
+@pytest.fixture(scope="module")
+def rig():
+    """A rig whose recordings go down once, slowly, and stay there: they do not tell creep from much else."""
+    made = cases.rig(trials=2, seconds=8.0)
+    trials = []
+    for trial in made.trials:
+        place = trial.position.copy()
+        place[:, 2] = cases.RADIUS + np.interp(trial.time, [0.0, 1.0, 8.0], [0.001, 0.001, -0.002])
+        trials.append(replace(trial, position=place))
+    return replace(made, trials=tuple(trials))
+
+
+def test_what_a_rival_leaves_is_that_of_least_squares_over_all_samples(rig):
+    fitted = predictors_of(rig.trials[:1], rig)
+    model = Model(replace(rig.parameters, cn=0.0))
+    labels = ("gain-mismatch/listed", "saturation/tanh", "creep/power")
+    forms = [one for one in candidates(fitted, model) if one.label in labels]
+    signals = Signals(model, free_base_parameters(model.parameters, ["k"], 1.0), forms, fitted, NOISE)
+    found = {(one.kind, one.other): one for one in signals.separations(signals.products(fitted), signals.pairs)}
+    scales = scales_of(fitted, model)
+
+    def changes(form):
+        effects = [form.effect(values, scales.texels, 1.0) for values in form.starting_values(scales, 1.0, STARTS)]
+        readings = [fitted[0].predict(model.with_effect(effect)).reading for effect in effects]
+        return np.stack([(one - fitted[0].predict(model).reading).ravel() / NOISE[0].deviation for one in readings], axis=1)
+
+    load = fitted[0].predict(model).reading
+    each = np.zeros((*load.shape, load.shape[1]))
+    each[:, np.arange(load.shape[1]), np.arange(load.shape[1])] = load
+    for form in forms:
+        if form.name == "gain-mismatch":
+            continue
+        own, base = changes(form), load.reshape(-1, 1)
+        alone = own - base @ np.linalg.lstsq(base, own, rcond=None)[0]
+        for other in forms:
+            if other is not form:
+                rival = each.reshape(load.size, -1) if other.name == "gain-mismatch" else changes(other)
+                matrix = np.concatenate([base, rival / np.maximum(np.linalg.norm(rival, axis=0), 1e-300)], axis=1)
+                left = own - matrix @ np.linalg.lstsq(matrix, own, rcond=1e-6)[0]
+                share = np.median((left**2).sum(axis=0) / (alone**2).sum(axis=0))
+                assert found[form.name, other.name].share == pytest.approx(share, rel=0.02, abs=1e-5), (form.name, other.name)
+
+
+def test_a_plan_names_a_programme_and_writes_a_recording_that_a_rig_can_have(rig, tmp_path):
+    plan = run_job(plan_experiment(rig, Wishes(between=("creep", "saturation"), duration=6.0)))
+    one = plan.experiment
+    assert set(one.kinds) == {"creep", "saturation"} and one.limits.duration == 6.0
+    assert one.separation_after > 2.0 * one.separation_before
+    rows = dict(table_rows(plan))
+    assert "hysteresis" in plan.cannot_show and rows["hysteresis"] == plan.cannot_show["hysteresis"]
+    path, out = cases.write(rig, tmp_path), tmp_path / "plan"
+    out.mkdir()
+    written = write_plan(plan, out)
+    assert [file.name for file in written] == ["plan.json", "plan.csv"]
+    words = json.loads(written[0].read_text())
+    assert words["experiment"]["programme"] == one.programme and len(words["pairs"]) == len(plan.separations)
+    table = np.genfromtxt(written[1], delimiter=",", names=True)
+    assert table.dtype.names == ("time", "x", "y", "z", "qw", "qx", "qy", "qz")
+    assert np.allclose(np.stack([table[axis] for axis in "xyz"], 1), one.trajectory.positions(), rtol=0, atol=1e-10)
+    assert main(["gap", str(path), "--plan", "--between", "creep", "drift", "--out", str(out)]) == 0
+    assert json.loads(written[0].read_text())["experiment"]["between"] == ["creep", "drift"]  # the earlier plan is replaced
+
+
+def test_what_is_known_by_unloading_is_planned_with_unloading(rig):
+    plan = run_job(plan_experiment(rig, Wishes(between=("hysteresis", "stiffening"))))
+    depth = cases.RADIUS - plan.experiment.trajectory.positions()[:, 2]
+    assert "hysteresis" in plan.cannot_show and (np.diff(depth) < 0.0).any()
+    assert plan.experiment.separation_after > 2.0 * plan.experiment.separation_before
+
+
+def test_a_programme_that_separates_no_more_is_not_recommended():
+    words = {"file": "plan.csv", "programme": "stairs", "between": ["creep", "lag"], "limits": {"duration": 6.0}}
+    words |= {"separation_before": 5.0, "separation_after": 9.0}
+    assert planned_sentence(words).endswith("by 9 standard deviations of the noise; your recordings alone by 5.")
+    said = planned_sentence(words | {"separation_after": 5.2})
+    assert said.startswith("No programme within these limits separates creep from lag better") and "allow more depth" in said
+
+
+def test_options_of_a_plan_that_do_not_go_together_are_refused(rig, tmp_path, capsys):
+    path = str(cases.write(rig, tmp_path))
+    for options, said in (
+        ([], "--out DIR"),
+        (["--out", str(tmp_path), "--between", "creep", "lag"], "give --plan"),
+        (["--plan", "--sensor", "Pad"], "leave out"),
+        (["--plan", "--between", "creep", "nonsense"], "no effect 'nonsense'"),
+        (["--plan", "--between", "creep", "noise"], "No trajectory is planned for 'noise'"),
+        (["--plan", "--between", "creep", "creep"], "stands alone"),
+        (["--plan", "--depth", "0"], "depth is 0"),
+    ):
+        assert main(["gap", path, *options]) == 1
+        assert said in capsys.readouterr().err
+    with pytest.raises(ParameterError):
+        run_job(plan_experiment(rig, Wishes(area=(5.0, 6.0, 5.0, 6.0))))
