@@ -3,7 +3,7 @@
 
 The models were written down here, and committed, before they were fitted; only the cubic of eFlesh's normal force had been
 tried before. A model is a list of terms whose weights follow from a linear fit for each channel, in a few numbers that all
-channels share (:mod:`._further.handmade`).
+channels share (:mod:`._handmade`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from palpate.core.gap.dataset.second_logger import interpolated
 from palpate.core.gap.logs.column_meaning import GRAVITY
 
-from ._further.handmade import HandmadeModel, low_pass
+from ._handmade import HandmadeModel, low_pass
 from ._recordings import SETS, Columns, Recording, sheet, thinned
 
 RUNS = (("20250401_014340_probe", "fit"), ("20250401_015037_probe", "check"))

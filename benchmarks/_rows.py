@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from pathlib import Path
+from typing import Any
 
 HOUSE = Path(__file__).resolve().parent.parent
 MIX = {"own": 60, "other": 60, "none": 30, "two": 40, "outside": 30, "poor": 20, "third": 100, "three": 50}
@@ -52,6 +53,14 @@ def results_in(path: Path) -> list[dict]:
     files = sorted(path.glob(f"runs/*/{CASE_NAME}")) if path.is_dir() else [path]
     lines = [json.loads(line) for file in files for line in file.read_text(encoding="utf-8").splitlines()]
     return list({(r["kind"], r["number"]): r for r in lines}.values())
+
+
+def sure_names(result: Any) -> set[str]:
+    """Return the effects that a diagnosis names for sure, differences between recordings included."""
+    from palpate.core.gap.selection.confidence import SURE
+
+    between = [result.between] if result.between is not None else []
+    return {one.name for one in (*result.findings, *between) if one.confidence >= SURE}
 
 
 def outcome(answer: list[str], sure: list[str], verdict: str, ambiguous: bool) -> str:

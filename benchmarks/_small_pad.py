@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from ._hidden.rig_text import csv_header
+from ._rows import sure_names
 
 ROWS, COLUMNS, PITCH, RADIUS, K = 5, 3, 4e-3, 14e-3, 60.0
 SECONDS, RATE, DEEP = 22.0, 25.0, 2.5e-3
@@ -61,13 +62,12 @@ def write_recording(file: Path, table: np.ndarray, more: Sequence[str] = ()) -> 
 def examined(write: Write, kind: str, number: int) -> tuple[set[str], Any]:
     """Return what is surely named in a case, and the diagnosis."""
     from palpate.core.gap.dataset.rig import read_rig
-    from palpate.core.gap.selection.confidence import SURE
     from palpate.core.gap.selection.diagnosis import diagnose
     from palpate.core.jobs.job_runner import run_job
 
     with tempfile.TemporaryDirectory() as folder:
         result = run_job(diagnose(read_rig(write(kind, number, Path(folder)))))
-    return {one.name for one in result.findings if one.confidence >= SURE}, result
+    return sure_names(result), result
 
 
 def count_named(name: str, write: Write, hidden: Sequence[str], others: Mapping[str, Collection[str]]) -> Iterator[dict]:

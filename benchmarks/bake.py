@@ -4,8 +4,7 @@
 A cached frame is what scrubbing costs on top of Blender's own work: the same `frame_set` with playback on, less the time with
 it off. The bake is compared with solving the same scenario alone, in turn: it also samples, writes images, keyframes and files.
 It ends when the scene shows it. The folder of the bake before is removed while the user goes on, so that this is waited for
-between the measurements and not in them. Of longer bakes the share of the time is measured that goes into checkpoints and into
-syncing, after which a power cut loses nothing.
+between the measurements and not in them.
 """
 
 from __future__ import annotations
@@ -16,18 +15,13 @@ import statistics
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
-from unittest import mock
 
 ROUNDS, SAMPLE_ROUNDS = 5, 3
 SAMPLES = Path(__file__).resolve().parent.parent / "sample_blends"
 GRIDS = {84: (14, 6), 16384: (128, 128)}
 GOALS = {84: 5.0, 16384: 20.0}
 """Milliseconds for a cached frame."""
-CHECKPOINTED = {84: 6000, 16384: 1000}
-"""Frames of the bakes whose checkpoints are measured, by texels: long enough for several."""
 
 
 def scene_of(texels: int, frames: int, folder: Path):
@@ -157,73 +151,6 @@ def bake_with_channels(frames: int) -> tuple[float, float]:
         return tuple(statistics.median(found[1:]) for found in times.values())
 
 
-@dataclass
-class Costs:
-    """Seconds of a bake, of its checkpoints with their syncing, and of all syncing; and the number of checkpoints."""
-
-    whole: float = 0.0
-    checkpoints: float = 0.0
-    syncing: float = 0.0
-    count: int = 0
-
-
-def checkpoint_costs(texels: int, frames: int, is_synced: bool) -> Costs:
-    """Bake once and return what keeping it safe costs; without syncing, checkpoints are written but not brought to the disk."""
-    from palpate.addon.bake import bake_checkpoint, bake_files
-    from palpate.addon.bake.bake import bake
-    from palpate.core.io import bake_switch
-    from palpate.core.jobs.job_runner import run_job
-
-    costs = Costs()
-    save, sync, fsync = bake_files.BakeFiles.save_checkpoint, os.sync, os.fsync
-    write = bake_checkpoint.BakeCheckpoint.save
-
-    def timed_sync(function, *arguments) -> None:
-        start = time.perf_counter()
-        if is_synced:
-            function(*arguments)
-        costs.syncing += time.perf_counter() - start
-
-    def timed_save(self, *arguments) -> None:
-        start = time.perf_counter()
-        save(self, *arguments)
-        costs.checkpoints += time.perf_counter() - start
-
-    def counted_write(self, *arguments) -> None:
-        costs.count += 1
-        write(self, *arguments)
-
-    with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
-        scene = scene_of(texels, frames, Path(folder))
-        for owner, name, wrapped in (
-            (bake_files.BakeFiles, "save_checkpoint", timed_save),
-            (bake_checkpoint.BakeCheckpoint, "save", counted_write),
-            (os, "sync", lambda: timed_sync(sync)),
-            (os, "fsync", lambda handle: timed_sync(fsync, handle)),
-        ):
-            stack.enter_context(mock.patch.object(owner, name, wrapped))
-        start = time.perf_counter()
-        run_job(bake(scene))
-        costs.whole = time.perf_counter() - start
-        bake_switch.wait_for_removals()
-    return costs
-
-
-def _checkpoint_figures(texels: int, frames: int) -> Iterator[dict]:
-    """Yield the share of a bake's time that goes into checkpoints and into syncing, and a bake without syncing beside it."""
-    synced, alone = checkpoint_costs(texels, frames, True), checkpoint_costs(texels, frames, False)
-    yield {
-        "name": f"bake.checkpoint_share.{texels}", "value": synced.checkpoints / synced.whole, "unit": "1", "goal": 0.03,
-        "peer": f"{synced.count} checkpoints in {synced.whole:.1f} s, without syncing",
-        "peer_value": alone.checkpoints / alone.whole,
-    }  # fmt: skip
-    yield {"name": f"bake.sync_share.{texels}", "value": synced.syncing / synced.whole, "unit": "1", "goal": 0.03}
-    yield {
-        "name": f"bake.synced.{texels}", "value": synced.whole, "unit": "s", "goal": 1.03,
-        "peer": "without syncing", "peer_value": alone.whole, "ratio": synced.whole / alone.whole,
-    }  # fmt: skip
-
-
 def _over_solve(name: str, whole: float, alone: float) -> dict:
     return {
         "name": f"bake.over_solve.{name}", "value": whole, "unit": "s",
@@ -238,8 +165,6 @@ def run() -> Iterator[dict]:
         yield {"name": f"bake.cached_frame.{texels}", "value": cached_frame(texels), "unit": "ms", "goal": GOALS[texels]}
     for texels, frames in ((84, 120), (16384, 24)):
         yield _over_solve(str(texels), *bake_and_solve(texels, frames))
-    for texels, frames in CHECKPOINTED.items():
-        yield from _checkpoint_figures(texels, frames)
     channels, plain = bake_with_channels(240)
     yield {
         "name": "bake.channels.84", "value": channels, "unit": "s", "goal": 1.3,

@@ -5,8 +5,8 @@ The confusion matrix goes to build/gap/confusion.txt, the table of docs/gap-resu
 
 The whole matrix is 390 cases, an hour and a half of one core; a fifth of it is run by default. Results are kept in build/gap/,
 one line a case, and a run goes on where the last one stopped, as long as neither the workflow nor the generator has changed.
-With options (``python -m benchmarks gap --help``) it writes the cases as rigs for other methods, scores their answers, and
-compares them with the baselines: docs/gap-results.md.
+With options (``python -m benchmarks gap --help``) it writes the cases as rigs for other methods and scores their answers:
+docs/gap-results.md.
 
 Environment:
 
@@ -14,7 +14,6 @@ Environment:
 ``PALPATE_GAP_PROCESSES``  how many at a time (2)
 ``PALPATE_GAP_FIRST``      number of the first case of each kind; below 1000 are those to develop on, from 5000 on those that
                            nobody looks at before the figures are drawn (5000)
-``PALPATE_GAP_BASELINES``  on how many of them the baselines run as well (a quarter)
 ``PALPATE_GAP_RESULTS``    a file of results, or the folder of the study docs/sample-study/hidden-effects.toml: nothing is run,
                            its figures are printed
 """
@@ -36,7 +35,7 @@ from typing import Any
 import numpy as np
 
 from ._hidden import cases
-from ._rows import HOUSE, MIX, ROWS, fingerprint, outcome, plan_of, results_in
+from ._rows import HOUSE, MIX, ROWS, fingerprint, outcome, plan_of, results_in, sure_names
 
 FORMULAS = ("own", "other", "third")
 """Kinds of cases with one effect, by whose formula it has."""
@@ -50,20 +49,13 @@ def run() -> Iterator[dict]:
     total = int(os.environ.get("PALPATE_GAP_CASES", "78"))
     first = int(os.environ.get("PALPATE_GAP_FIRST", "5000"))
     plan = plan_of(total, first)
-    baselines = int(os.environ.get("PALPATE_GAP_BASELINES", str(total // 4)))
     kept = os.environ.get("PALPATE_GAP_RESULTS")
-    results = results_in(Path(kept)) if kept else _results(plan, set(_spread(plan, baselines)))
+    results = results_in(Path(kept)) if kept else _results(plan)
     matrix, rows = confusion(results), table(results)
     print(matrix, rows, sep="\n\n", file=sys.stderr)
     (results_folder() / "confusion.txt").write_text(matrix + "\n", encoding="utf-8")
     (results_folder() / "table.md").write_text(rows + "\n", encoding="utf-8")
     yield from figures(results)
-
-
-def _spread(plan: list[tuple[str, int]], count: int) -> list[tuple[str, int]]:
-    """Some cases with one hidden effect, evenly from all of them."""
-    single = [entry for entry in plan if entry[0] in FORMULAS]
-    return [single[i] for i in np.unique(np.linspace(0, len(single) - 1, min(count, len(single))).astype(int))] if count else []
 
 
 # --- cases, one after the other
@@ -76,11 +68,10 @@ def results_folder() -> Path:
     return folder
 
 
-def _results(plan: list[tuple[str, int]], compared: set[tuple[str, int]]) -> list[dict]:
+def _results(plan: list[tuple[str, int]]) -> list[dict]:
     path = results_folder() / f"results-{fingerprint()}.jsonl"
     done = done_in(path)
-    todo = [entry for entry in plan if entry not in done or (entry in compared and "baselines" not in done[entry])]
-    done |= carried_out(examine, [(*entry, entry in compared) for entry in todo], path)
+    done |= carried_out(examine, [entry for entry in plan if entry not in done], path)
     return [done[entry] for entry in plan]
 
 
@@ -112,14 +103,12 @@ def carried_out(work: Callable[..., dict], todo: list[tuple], path: Path) -> dic
     return found
 
 
-def examine(kind: str, number: int, compare: bool = False) -> dict[str, Any]:
+def examine(kind: str, number: int) -> dict[str, Any]:
     """Draw a case, have it diagnosed from its files, and hold the outcome against the answer."""
-    return examined(cases.draw(kind, number), compare=compare)
+    return examined(cases.draw(kind, number))
 
 
-def examined(
-    case: cases.Case, write: Callable[[cases.Case, Path], Path] = cases.write, compare: bool = False
-) -> dict[str, Any]:
+def examined(case: cases.Case, write: Callable[[cases.Case, Path], Path] = cases.write) -> dict[str, Any]:
     """Have a case diagnosed from the files that `write` makes in a folder, and hold the outcome against the answer."""
     from palpate.core.gap.dataset.rig import read_rig
     from palpate.core.gap.selection.diagnosis import diagnose
@@ -137,12 +126,7 @@ def examined(
     entry = {"kind": case.kind, "number": case.number, "answer": case.answer, "forms": [h.form for h in case.hidden]}
     scored = score(case, result) if result is not None else {**FAILED, "failed": failed}
     entry |= {"shape": "ball" if case.probe.radius else "flat", "share": list(case.share), **scored}
-    entry |= {"seconds": round(seconds, 2), "cpu_seconds": round(cpu, 2)}
-    if compare and result is not None:
-        from . import _gap_baselines
-
-        entry["baselines"] = _gap_baselines.all_of(case, result, closed)
-    return entry
+    return entry | {"seconds": round(seconds, 2), "cpu_seconds": round(cpu, 2)}
 
 
 # --- scoring
@@ -152,10 +136,9 @@ def score(case: cases.Case, result: Any) -> dict[str, Any]:
     """Return what was said of a case and how right it is."""
     from palpate.core.gap.report.amended_sensor import with_mean_gain_moved
     from palpate.core.gap.report.experiments import next_experiment
-    from palpate.core.gap.selection.confidence import SURE
 
     model = with_mean_gain_moved(result)
-    sure = [named.name for named in result.findings if named.confidence >= SURE]
+    sure = sorted(sure_names(result))
     said = [[n.name, n.form, n.confidence] for n in result.findings]
     inside = []
     for one in result.intervals:
@@ -302,17 +285,6 @@ def figures(results: list[dict]) -> Iterator[dict]:
     if inside:
         yield {"name": "gap.own.interval_coverage", "value": float(np.mean(inside)), "unit": "share", "goal": 0.95}
     yield from _middle("seconds", [r["cpu_seconds"] for r in results], "s", 30.0)
-    compared = [r for r in results if "baselines" in r]
-    for name in compared[0]["baselines"] if compared else ():
-        told = [r["baselines"][name] for r in compared]
-        for what in ("right", "wrong"):
-            share = float(np.mean([one[what] for one in told]))
-            own = float(np.mean([r["outcome"] == what for r in compared]))
-            yield {"name": f"gap.baseline.{what}", "value": own, "unit": "share", "peer": name, "peer_value": share}
-        both = [(r["closed"], one["closed"]) for r, one in zip(compared, told, strict=True) if r["closed"] is not None]
-        if both:
-            mine, other = np.median(np.array(both, float), axis=0).tolist()
-            yield {"name": "gap.baseline.closed", "value": mine, "unit": "share", "peer": name, "peer_value": other}
 
 
 def _middle(name: str, values: list[float | None], unit: str, goal: float | None) -> Iterator[dict]:

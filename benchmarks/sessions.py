@@ -19,11 +19,11 @@ import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ._hidden import sessions
+from ._rows import sure_names
 
 
 def run() -> Iterator[dict]:
@@ -60,7 +60,6 @@ def _examined(kind: str, clock: str, number: int) -> tuple[str, bool]:
     """One word for what was said of a case, and whether something was named although the check error rose."""
     from palpate.core.gap.dataset.rig import read_rig
     from palpate.core.gap.report.comparison import gap_errors
-    from palpate.core.gap.selection.confidence import SURE
     from palpate.core.gap.selection.diagnosis import diagnose
     from palpate.core.jobs.job_runner import run_job
 
@@ -68,7 +67,7 @@ def _examined(kind: str, clock: str, number: int) -> tuple[str, bool]:
     with tempfile.TemporaryDirectory() as folder:
         result = run_job(diagnose(read_rig(sessions.write(case, Path(folder)))))
     errors = gap_errors(result)
-    named = {one.name for one in result.findings if one.confidence >= SURE} | _between(result, SURE)
+    named = sure_names(result)
     said = outcome(case.answer, named, result.verdict, bool(result.ambiguous))
     before, after = errors.base["check"] or 0.0, errors.amended["check"] or 0.0
     words = [f"{one.name}/{one.form} {one.confidence}" for one in result.findings]
@@ -78,8 +77,3 @@ def _examined(kind: str, clock: str, number: int) -> tuple[str, bool]:
     )
     print(f"{line} ({time.process_time() - began:.0f} s)", file=sys.stderr, flush=True)
     return said, bool(named or result.verdict == "explained") and after > before
-
-
-def _between(result: Any, least: float) -> set[str]:
-    """What is said of differences between recordings."""
-    return set() if result.between is None or result.between.confidence < least else {result.between.name}

@@ -408,9 +408,14 @@ def log_files(kind: str) -> Files:
 
 
 def _write_mat(path: Path) -> None:
+    """Compressed arrays, which carry checksums: SciPy ends the process on some damaged files without (docs/security.md)."""
     from scipy.io import savemat
 
-    savemat(path, {"time": TIME, "depth": DEPTH, "taxels": READING, "ft": {"force": 60e3 * DEPTH, "label": "pad"}})
+    savemat(
+        path,
+        {"time": TIME, "depth": DEPTH, "taxels": READING, "ft": {"force": 60e3 * DEPTH, "label": "pad"}},
+        do_compression=True,
+    )
 
 
 def _write_hdf5(path: Path) -> None:

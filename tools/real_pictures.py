@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draw the pictures of benchmarks/RESULTS.md: python tools/real_pictures.py, after python -m benchmarks real further.
+"""Draw the pictures of benchmarks/RESULTS.md: python tools/real_pictures.py, after python -m benchmarks real.
 
-The curves are those of the reports in build/real and build/further; the counts of the insole are read from the recordings
+The curves are those of the reports in build/real; the counts of the insole are read from the recordings
 (``PALPATE_REAL_DATA``).
 """
 
@@ -16,7 +16,6 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 IMAGES = ROOT / "docs" / "images"
 CURVES = ("insole", "tube", "adhesive", "foam")
-FURTHER = ("polymer", "microfluidic", "barometers", "joint", "velostat", "hydrogel")
 
 
 def curves(reports: list[Path], path: Path) -> None:
@@ -67,6 +66,5 @@ def rest(data: Path, path: Path) -> None:
 if __name__ == "__main__":
     sys.path.insert(0, str(ROOT.parent))
     curves([ROOT / "build" / "real" / name for name in CURVES], IMAGES / "gap-real.png")
-    curves([ROOT / "build" / "further" / name for name in FURTHER], IMAGES / "gap-further.png")
     rest(Path(os.environ.get("PALPATE_REAL_DATA", ROOT.parent / "shared" / "data")), IMAGES / "gap-insole.png")
-    print(f"wrote gap-real.png, gap-further.png and gap-insole.png in {IMAGES}")
+    print(f"wrote gap-real.png and gap-insole.png in {IMAGES}")

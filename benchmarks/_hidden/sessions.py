@@ -16,10 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from .mounting import PITCH, places_of, pressed
 from .rig_text import csv_header, rig_head
 
-ROWS, COLUMNS = 6, 4
+ROWS, COLUMNS, PITCH = 6, 4, 3.4e-3
 RATE, SECONDS = 25.0, 14.0
 RECORDINGS, CHECKED = 7, 2
 CLOCKS = ("session", "own", "one")
@@ -59,7 +58,7 @@ def draw(kind: str, clock: str, number: int) -> Case:
     paths = [_path(time, programme(rng, deep), radius) for _ in range(RECORDINGS)]
     pauses = np.exp(rng.uniform(np.log(5.0), np.log(rng.choice([30.0, 200.0])), RECORDINGS - 1))
     starts = np.concatenate([[0.0], np.cumsum(pauses + SECONDS)])
-    forces = [pressed(places_of(ROWS, COLUMNS), path, radius, k, time) for path in paths]
+    forces = [pressed(places_of(), path, radius, k, time) for path in paths]
     if kind != "healthy":
         forms = DEVELOPMENT[kind] if number < FIRST_SEALED else SEALED[kind]
         act = forms[number % len(forms)](rng, k * deep, float(starts[-1] + SECONDS))
@@ -76,6 +75,25 @@ def draw(kind: str, clock: str, number: int) -> Case:
     if clock == "own" and kind == "softening":
         answer = ("softening", "wear")  # the gain falls from file to file; that it stops to do so, few files show
     return Case(kind, clock, number, answer, radius, words, list(starts), [time] * RECORDINGS, paths, readings, checked)
+
+
+def places_of() -> np.ndarray:
+    """(n, 2) metres: x and y of each texel, row by row."""
+    y, x = np.mgrid[0:ROWS, 0:COLUMNS] * PITCH
+    return np.stack([x.ravel() - x.mean(), y.ravel() - y.mean()], axis=1)
+
+
+def pressed(places: np.ndarray, middle: np.ndarray, radius: float, k: float, time: np.ndarray) -> np.ndarray:
+    """Spring and damper of each texel along the ball's normal, where the texel's own line meets the ball, (T, n) N."""
+    away = middle[:, None, :2] - places
+    left = radius**2 - (away**2).sum(axis=2)
+    high = np.sqrt(np.maximum(left, 0.0))
+    sunk = high - middle[:, 2:]
+    depth = np.where((left > 0) & (sunk > 0), sunk * high / radius, 0.0)
+    velocity = np.gradient(middle, time, axis=0)[:, None, :]
+    normal = np.concatenate([-away, -high[:, :, None]], axis=2) / radius
+    pace = (velocity * normal).sum(axis=2)
+    return np.where(depth > 0, np.maximum(k * depth + 0.01 * k * pace, 0.0), 0.0)
 
 
 def _path(time: np.ndarray, knots: list[tuple[float, float, float, float]], radius: float) -> np.ndarray:

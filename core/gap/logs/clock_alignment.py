@@ -26,7 +26,7 @@ LEAST_OVERLAP = 0.5
 LEAST_CORRELATION, MOST_RIVAL = 0.5, 0.6
 """The shift is sure if the correlation of changes is at least this, and that at any other shift less than this share of it.
 They were chosen on 100 recordings of six presses with noise, of which 98 pass and 3 are off by more than four standard errors
-and 0.05 s; how these were made was not kept. Of 100 others (``make bench ONLY=clock_alignment``) 100 pass with a noise of 2 and
+and 0.05 s; how these were made was not kept. Of 100 others (benchmarks/RESULTS.md) 100 pass with a noise of 2 and
 of 10 % of the largest force, and 97 with 30 %, and none is off. Of 200 pairs of unrelated recordings 36 pass, as presses look
 alike: the correlation cannot tell whose files they are."""
 LEAST_UNCERTAINTY = 0.5

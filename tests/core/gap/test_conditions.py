@@ -1,13 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hidden effects under coloured noise, with cells missing, on a mesh, and of friction (benchmarks/conditions.py)."""
 
-import json
-
 import numpy as np
 import pytest
 
-from palpate.benchmarks import conditions as group
-from palpate.benchmarks import gap
 from palpate.benchmarks._hidden import cases, conditions
 from palpate.core.gap.dataset.rig import grid_texels, read_rig
 
@@ -67,12 +63,6 @@ def test_the_share_of_cells_that_is_said_is_missing(way):
         assert low - 1e-3 < len(at) / len(one) < high + 1e-3 and np.ptp(at) == len(at) - 1
 
 
-def test_ways_go_in_turn_and_every_effect_meets_each():
-    ways = [conditions.way_of("missing", number) for number in range(80)]
-    assert ways[:4] == list(conditions.MISSING) and conditions.way_of("mesh", 3) == ""
-    assert all({ways[i + 20 * j] for j in range(4)} == set(ways) for i in range(20))
-
-
 def test_friction_is_of_each_effect_and_formula_or_nothing(monkeypatch):
     plain = cases.draw("none", 0)
     asked = []
@@ -81,38 +71,3 @@ def test_friction_is_of_each_effect_and_formula_or_nothing(monkeypatch):
     hidden = {(formula, name) for formula in conditions.FORMULAS for name in cases.IN_FORCE}
     assert len(asked) == 8 and {entry for entry in asked if len(entry) > 1} == hidden
     assert [case.kind for case in drawn[3::4]] == ["none", "none"]
-
-
-def test_a_run_goes_on_where_the_last_one_stopped(monkeypatch, tmp_path):
-    """What is in the file is not done again, and figures count nothing hidden and nothing said as right."""
-
-    def one(kind, number, formula, answer, outcome):
-        return {"kind": kind, "number": number, "formula": formula, "answer": answer, "outcome": outcome, "sure": [], "way": ""}
-
-    monkeypatch.setenv("PALPATE_CONDITIONS_FIRST", "20")
-    monkeypatch.setenv("PALPATE_CONDITIONS_CASES", "2")
-    monkeypatch.setenv("PALPATE_CONDITIONS_ONLY", "mesh friction")
-    monkeypatch.setattr(gap, "results_folder", lambda: tmp_path)
-    kept = [one("mesh", 20, "own", ["creep"], "right"), one("friction", 20, "none", [], "no gap")]
-    path = tmp_path / f"conditions-{group.fingerprint()}.jsonl"
-    path.write_text("".join(json.dumps(entry) + "\n" for entry in kept), encoding="utf-8")
-    new = {
-        ("mesh", 21): one("mesh", 21, "other", ["lag"], "wrong"),
-        ("friction", 21): one("friction", 21, "own", ["lag"], "no gap"),
-    }
-
-    def carried_out(work, todo, where):
-        assert work is group.examine and todo == list(new) and where == path
-        return new
-
-    monkeypatch.setattr(gap, "carried_out", carried_out)
-    assert {figure["name"]: figure["value"] for figure in group.run()} == {
-        "conditions.mesh.right": 0.5,
-        "conditions.mesh.wrong": 0.5,
-        "conditions.friction.right": 0.5,
-        "conditions.friction.wrong": 0.0,
-    }
-    assert "| on a mesh | 2 | 1 | 1 | lag: wrong |" in (tmp_path / "conditions.md").read_text(encoding="utf-8")
-    monkeypatch.setenv("PALPATE_CONDITIONS_ONLY", "rust")
-    with pytest.raises(ValueError, match="rust"):
-        next(group.run())

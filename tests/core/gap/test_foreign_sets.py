@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from palpate.benchmarks._foreign import FOREIGN, _eflesh
-from palpate.benchmarks._further.handmade import predict_by_hand
+from palpate.benchmarks._handmade import predict_by_hand
 from palpate.benchmarks._recordings import Recording
 from palpate.core.gap.logs.column_meaning import GRAVITY
 

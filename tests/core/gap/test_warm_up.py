@@ -3,11 +3,16 @@
 
 from pathlib import Path
 
-from palpate.benchmarks import _small_pad, warm_up
+import pytest
+
+from palpate.benchmarks._hidden import sessions
+from palpate.benchmarks._rows import sure_names
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.selection.between_recordings import as_one_session
 from palpate.core.gap.selection.candidates import candidates
+from palpate.core.gap.selection.diagnosis import diagnose
+from palpate.core.jobs.job_runner import run_job
 
 
 def gains_by_themselves(rig):
@@ -17,7 +22,7 @@ def gains_by_themselves(rig):
 
 
 def test_it_needs_a_clock_that_goes_on(tmp_path: Path):
-    path = warm_up.write("stretched", 1, tmp_path)
+    path = sessions.write(sessions.draw("warm-up", "session", 5000), tmp_path)
     rig = read_rig(path)
     assert gains_by_themselves(rig) == {"warm-up/exponential", "warm-up/rational"}
     alone = "\n".join(line for line in path.read_text().splitlines() if not line.startswith(("session", "started")))
@@ -28,6 +33,8 @@ def test_it_needs_a_clock_that_goes_on(tmp_path: Path):
     assert assumed is not None and gains_by_themselves(assumed) == {"drift/sensitivity"}
 
 
-def test_a_gain_that_follows_two_exponentials_is_named():
-    sure, result = _small_pad.examined(warm_up.write, "two exponentials", 0)
-    assert sure == {"warm-up"} and result.verdict == "explained"
+@pytest.mark.long("a whole diagnosis of a session")
+def test_a_gain_that_warms_up_by_a_formula_of_others_is_named(tmp_path: Path):
+    case = sessions.draw("warm-up", "session", 5000)
+    result = run_job(diagnose(read_rig(sessions.write(case, tmp_path))))
+    assert sure_names(result) == set(case.answer) == {"warm-up"} and result.verdict == "explained"

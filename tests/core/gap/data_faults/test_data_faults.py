@@ -11,7 +11,7 @@ import pytest
 
 from palpate.benchmarks._faulty import faults as made
 from palpate.benchmarks._faulty.sensors import FAMILIES
-from palpate.benchmarks._further.handmade import low_pass
+from palpate.benchmarks._handmade import low_pass
 from palpate.benchmarks._recordings import Recording
 from palpate.benchmarks.data_faults import is_right
 from palpate.core.errors import PalpateError
