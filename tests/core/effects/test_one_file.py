@@ -14,24 +14,11 @@ import pytest
 from palpate.core.effects.engine.registry import library
 
 ROOT = Path(__file__).resolve().parents[3]
-SOURCES = (
-    "addon",
-    "benchmarks",
-    "commands",
-    "core",
-    "examples",
-    "operators",
-    "paper",
-    "panels",
-    "sample_blends",
-    "sweep",
-)
-SOURCES += ("tools",)
+SOURCES = ("addon", "commands", "core", "examples", "operators", "paper", "panels", "sample_blends", "sweep", "tools")
 LIBRARY = "core/effects/library/"
 
 COLUMN = "a column of recordings"
 NUMBERS_OF_TEXELS = "a parameter of single texels"
-TRUTH = "what is hidden in recordings does not come from the library that has to find it"
 ALLOWED = {
     # words that are names of effects and of something else
     "commands/fit.py": ({"offset"}, "the constant of a straight line, as the title of a column"),
@@ -44,16 +31,6 @@ ALLOWED = {
     "core/gap/logs/proposal.py": ({"temperature"}, COLUMN),
     "core/gap/selection/candidates.py": ({"temperature"}, "what recordings must hold"),
     "core/gap/selection/plausibility.py": ({"offset"}, "the parameter that the signature of an offset is about"),
-    "benchmarks/foreign.py": ({"warm-up", "softening", "wear"}, TRUTH),
-    "benchmarks/companding.py": ({"noise"}, "a word of a sentence"),
-    # answers of benchmarks
-    "benchmarks/_hidden/cases.py": (set(), TRUTH),
-    "benchmarks/_hidden/other.py": (set(), TRUTH),
-    "benchmarks/_hidden/own.py": (set(), TRUTH),
-    "benchmarks/_hidden/sessions.py": (set(), TRUTH),
-    "benchmarks/_hidden/third.py": (set(), TRUTH),
-    "benchmarks/temperature.py": (set(), TRUTH),
-    "benchmarks/wear_or_drift.py": (set(), TRUTH),
 }
 """Files outside the library that may name effects, which (all, if none is listed), and why. Tests may: they are examples."""
 
@@ -194,7 +171,7 @@ def copy(tmp_path_factory):
     return folder, run
 
 
-@pytest.mark.slow("runs the tests of effects in a copy of the package")
+@pytest.mark.long("runs the tests of effects in a copy of the package")
 def test_a_new_file_is_all_that_a_new_effect_needs(copy):
     """The commands of docs/architecture.md, "How to add an effect"."""
     folder, run = copy

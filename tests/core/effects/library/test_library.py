@@ -14,7 +14,16 @@ from palpate.core.model.effect import Effect
 from palpate.core.model.sensor_parameters import SensorParameters
 
 FORMS = [(kind.name, form.name) for kind in library().values() for form in kind.forms]
-every_form = pytest.mark.parametrize(("name", "form"), FORMS, ids=["-".join(names) for names in FORMS])
+OTHERS = [pytest.mark.long("the other forms of a kind")]
+every_form = pytest.mark.parametrize(
+    ("name", "form"),
+    [
+        pytest.param(kind.name, form.name, id=f"{kind.name}-{form.name}", marks=OTHERS if form is not kind.forms[0] else ())
+        for kind in library().values()
+        for form in kind.forms
+    ],
+)
+"""The quick tier has the first form of each kind, the long tier the others."""
 
 ROWS, COLUMNS, PITCH = 4, 3, 0.0034
 PARAMETERS = SensorParameters(k=1000.0, cn=10.0)
