@@ -224,13 +224,15 @@ class Sensor(SensorOnMesh):
         return f"<div>{escape(repr(self))}</div>{layout_svg(self.texels)}"
 
 
-def read_sensor(path: str | os.PathLike[str]) -> Sensor:
+def read_sensor(path: str | os.PathLike[str], name: str | None = None) -> Sensor:
     """Read a sensor: a sensor.toml with a grid or a mesh, as ``palpate gap`` writes it, or a file of another simulator.
 
     Parameters
     ----------
     path : path
-        .toml, or one of the formats of docs/simulators.md (probe list, MJCF, URDF).
+        .toml, or one of the formats of docs/simulators.md (probe list, MJCF, URDF, USD).
+    name : str, optional
+        Of the sensor, in a file of another simulator that has several.
 
     Raises
     ------
@@ -247,15 +249,12 @@ def read_sensor(path: str | os.PathLike[str]) -> Sensor:
     from ..core.simulators.registry import import_sensors
 
     sensors = import_sensors(path)[1]
-    found = sensors[0]
-    if len(sensors) != 1 or found.position is None or found.faces is None:
-        said = "has no texels" if len(sensors) == 1 else f"has {len(sensors)} sensors"
-        raise FileError(f"'{path}' {said}: give a file with the texels of one sensor.")
-    mesh = checked_mesh(found.position, found.faces, found.name)[0]
-    found.parameters.check(found.name)
-    texels = texels_from_region(mesh, np.ones(len(mesh.vertices), bool), found.name)
-    model = ModelSensor(found.name, 0, texels, found.parameters, effects=found.effects)
-    return Sensor(model, mesh, found.surface, found.frame_position, found.frame_quaternion)
+    chosen = [one for one in sensors if name in (None, one.name)]
+    if len(chosen) != 1 or chosen[0].position is None:
+        known = ", ".join(repr(one.name) for one in sensors)
+        raise FileError(f"'{path}' has the sensors {known}: give the name of one that has texels.")
+    item = chosen[0].on_mesh()
+    return Sensor(item.sensor, item.mesh, item.surface, item.position, item.quaternion)
 
 
 def sensors_from_blend(

@@ -26,7 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     blender.add_script_arguments(save)
     save.set_defaults(action=_export)
     load = kinds.add_parser("import", help="put the sensors of a file of another program into a .blend")
-    load.add_argument("file", metavar="FILE", help="MJCF, URDF, probe list (.json), OpenRAVE's XML, or a .blend of GenTact")
+    load.add_argument(
+        "file", metavar="FILE", help="MJCF, URDF, USD, probe list (.json), OpenRAVE's XML, or a .blend of GenTact"
+    )
     load.add_argument("scene", metavar="SCENE.blend", help="existing file that gets the sensors")
     load.add_argument("--sensor", metavar="NAME", action="append", help="only this sensor of the file; may be given again")
     load.add_argument("--save-as", metavar="OUT.blend", help="save into another .blend (default: SCENE.blend itself)")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sensors from files of other programs: MuJoCo, URDF, probe lists, OpenRAVE, and GenTact's .blend files."""
+"""Sensors from files of other programs: MuJoCo, URDF, USD, probe lists, OpenRAVE, and GenTact's .blend files."""
 
 from __future__ import annotations
 
@@ -11,15 +11,17 @@ import numpy as np
 
 from ...core.errors import FileError, SceneError
 from ...core.geometry.mesh import TriangleMesh, vertex_normals
+from ...core.geometry.plausible_size import require_sensor_size
 from ..properties import effect_stack
 from ..scene import mesh_arrays
+from ..scene.display_names import STATED_NORMAL
 from ..session import transforms, units
 from . import exchange, sensors
 
 FLAG, POSITION, NORMAL = "is_sensor", "sensor_pos", "sensor_normal"
 """Attributes of points in GenTact's files."""
-SAME_NORMAL = 1.0
-"""Degrees; a smaller difference between a file's normals and those of the surface through its texels is not mentioned."""
+SAME_NORMAL = 0.1
+"""Degrees; a smaller difference between a file's normals and those of the surface through its texels is not kept."""
 
 
 def import_file(context, path, names=()) -> tuple[list, list[str]]:
@@ -52,12 +54,14 @@ def import_file(context, path, names=()) -> tuple[list, list[str]]:
     owners = [_owner(context, item) if item.position is None else None for item in chosen]
     for item in chosen:
         item.parameters.check(item.name)
+        if item.position is not None:
+            require_sensor_size(item.position, item.name)
     objects, notes = [], []
     for item, owner in zip(chosen, owners, strict=True):
         notes += item.notes
         if owner is None:
             owner = _new_sensor(context, item)
-            notes += _normal_notes(owner, item)
+            _keep_normals(owner, item)
         exchange.put_parameters(owner, item.parameters)
         if item.effects:
             effect_stack.put_stack(owner, item.effects)
@@ -110,13 +114,13 @@ def _new_object(context, name: str, vertices: np.ndarray, faces: np.ndarray):
     return obj
 
 
-def _normal_notes(obj, item) -> list[str]:
-    """Return a note if the file's normals are not those of the surface through the texels, which Palpate uses."""
+def _keep_normals(obj, item) -> None:
+    """Keep the file's normals on the vertices if they are not those of the surface through the texels."""
     own = vertex_normals(TriangleMesh(np.asarray(item.position, float), np.asarray(item.faces)))
     angle = np.degrees(np.arccos(np.clip(np.einsum("ij,ij->i", own, item.normal), -1.0, 1.0)).max())
-    if not angle > SAME_NORMAL:
-        return []
-    return [f"'{obj.name}': normals are those of the surface through the texels, up to {angle:.0f}° from those of the file."]
+    if not angle <= SAME_NORMAL:
+        attribute = obj.data.attributes.new(STATED_NORMAL, "FLOAT_VECTOR", "POINT")
+        attribute.data.foreach_set("vector", np.asarray(item.normal, np.float32).ravel())
 
 
 def _read_gentact(context, path) -> list:

@@ -12,6 +12,8 @@ INDENTATION_MODIFIER = "Palpate Indentation"
 MODIFIERS = {HEAT_MAP_MODIFIER, INDENTATION_MODIFIER}
 REST_POSITION = "palpate_rest"
 """Vertex attribute of an indented mesh: where its vertices are without indentation; those of its own mesh come first."""
+STATED_NORMAL = "palpate_normal"
+"""Vertex attribute of an imported sensor: normals that its file states, where they are not those of the surface."""
 SMOOTH_VALUE = "palpate_smooth"
 """Vertex attribute of an indented mesh: the penetration, which is smoothed from subdivision to subdivision."""
 OLD_MATERIAL = ".palpate_old_material"

@@ -167,7 +167,7 @@ class _StartReader:
         if obj.palpate.role == "TARGET":
             self._add(self.targets, Target(obj.name, index, mesh, smooth=is_smooth), obj, mesh, to_body)
             return
-        sensor = sensor_reader.read_sensor(obj, index, mesh)
+        sensor = sensor_reader.read_sensor(obj, index, mesh, linear)
         sensor = channel_reader.with_channels(obj, sensor, to_body, self.depsgraph)
         self.warnings += uv_layouts.layout_warnings(obj, sensor.texels)
         self.sensor_objects.append(obj)

@@ -6,12 +6,13 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.geometry.mesh import TriangleMesh, checked_mesh
-from ...core.geometry.texels import texels_from_region
+from ...core.geometry.texels import FRAME_NORMAL, Texels, texels_from_region
 from ...core.model.sensor import Sensor
 from ...core.model.sensor_parameters import Painted
 from ..properties import effect_stack, painted_maps, parameter_properties
 from ..session import units
 from . import body_poses, mesh_arrays, sensor_regions, uv_layouts
+from .display_names import STATED_NORMAL
 
 
 def sensor_in_own_frame(scene, obj, depsgraph) -> tuple[Sensor, TriangleMesh]:
@@ -24,7 +25,7 @@ def sensor_in_own_frame(scene, obj, depsgraph) -> tuple[Sensor, TriangleMesh]:
     """
     _, _, stretch = body_poses.decompose(obj, body_poses.world_matrix(obj, depsgraph))
     mesh, _ = mesh_in_body_frame(obj, depsgraph, stretch * units.metres_per_unit(scene))
-    return read_sensor(obj, 0, mesh), mesh
+    return read_sensor(obj, 0, mesh, stretch), mesh
 
 
 def mesh_in_body_frame(obj, depsgraph, linear: np.ndarray, offset: np.ndarray | float = 0.0) -> tuple[TriangleMesh, list[str]]:
@@ -49,7 +50,7 @@ def mesh_in_body_frame(obj, depsgraph, linear: np.ndarray, offset: np.ndarray | 
     return mesh, warnings + more
 
 
-def read_sensor(obj, body: int, mesh: TriangleMesh) -> Sensor:
+def read_sensor(obj, body: int, mesh: TriangleMesh, linear: np.ndarray) -> Sensor:
     """Return the sensor or pad that an object is.
 
     Parameters
@@ -59,15 +60,32 @@ def read_sensor(obj, body: int, mesh: TriangleMesh) -> Sensor:
         Index of its body.
     mesh : TriangleMesh
         Of the object, in the body's frame.
+    linear : (3, 3) float
+        Of the map from the object to the body's frame.
     """
     parameters = parameter_properties.sensor_parameters(obj.palpate)
     parameters.check(obj.name)
     is_read_out = obj.palpate.role == "SENSOR"
     texels = texels_from_region(mesh, sensor_regions.region_vertices(obj, len(mesh.vertices)), obj.name)
+    texels = _with_stated_normals(obj.data, texels, linear)
     if is_read_out:
         texels = uv_layouts.with_uv_layout(obj, texels)
     painted = _painted_at(obj, texels.vertex)
     return Sensor(obj.name, body, texels, parameters, readout=is_read_out, painted=painted, effects=effect_stack.stack(obj))
+
+
+def _with_stated_normals(data, texels: Texels, linear: np.ndarray) -> Texels:
+    """The texels with the normals that the file of an imported sensor states, if it states others than the surface has."""
+    attribute = data.attributes.get(STATED_NORMAL)
+    if attribute is None or attribute.domain != "POINT" or attribute.data_type != "FLOAT_VECTOR":
+        return texels
+    stated = np.empty(3 * len(attribute.data), np.float32)
+    attribute.data.foreach_get("vector", stated)
+    normal = np.linalg.solve(linear.T, stated.astype(float).reshape(-1, 3)[texels.vertex].T).T
+    has_one = np.linalg.norm(normal, axis=1) > 0.0  # vertices that were added later have none
+    frames = texels.local_frames
+    frames[has_one, FRAME_NORMAL] = normal[has_one]
+    return texels.with_local_frames(frames)
 
 
 def _painted_at(obj, vertex: np.ndarray) -> Painted:

@@ -10,6 +10,10 @@ from ..errors import SensorError
 NEIGHBOURS = 20
 """Points of which each point's triangles are made. On an even pattern six are next to it; in a grid whose rows
 are three times as far apart as its columns, the next rows are the seventh to twelfth."""
+FLAT_ENOUGH = 0.3
+"""Cosine between each normal and their mean from which on the points are joined in one plane."""
+LEAST_SINE = 0.1
+"""Of the angle between the sides of a triangle that a point gets which has none."""
 LONGEST_EDGE = 2.5
 """Longest edge of a triangle, in the usual distance to a fourth neighbour around it; across a gap there is no surface. 
 The fourth is one step away in a square grid, and two along the rows of a grid whose rows are further apart."""
@@ -50,15 +54,13 @@ def triangles_between(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     if distance[:, 1].min() == 0.0:
         raise SensorError(f"Texel {int(distance[:, 1].argmin())} is at the same place as another: leave one of them out.")
     reach = LONGEST_EDGE * np.median(distance[near[:, 1:], min(4, count - 1)], axis=1)
-    votes: dict[tuple[int, ...], int] = {}
-    for point in range(count):
-        own = [other for other, far in zip(near[point, 1:], distance[point, 1:]) if far <= reach[point]]
-        own = [other for other in own if normals[other] @ normals[point] > 0.0]
-        for triangle in _triangles_at(points, normals[point], [point, *own]):
-            votes[triangle] = votes.get(triangle, 0) + 1
-    found = [triangle for triangle, number in votes.items() if number == 3]
+    mean = normals.mean(axis=0) / max(float(np.linalg.norm(normals.mean(axis=0))), 1e-12)
+    if (normals @ mean).min() > FLAT_ENOUGH:  # one plane sees all of the surface, and decides alike for all points
+        found = _triangles_in_plane(points, mean, reach)
+    else:
+        found = _triangles_by_votes(points, normals, distance, near, reach)
     missing = sorted(set(range(count)) - {corner for triangle in found for corner in triangle})
-    found += [tuple(sorted((point, *near[point, 1:3].tolist()))) for point in missing]
+    found += [_nearest_triangle(points, point, near[point, 1:]) for point in missing]
     triangles = np.array(sorted(set(found)))
     a, b, c = (points[triangles[:, i]] for i in range(3))
     across = np.cross(b - a, c - a)
@@ -69,19 +71,67 @@ def triangles_between(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     return triangles
 
 
+def _triangles_by_votes(
+    points: np.ndarray, normals: np.ndarray, distance: np.ndarray, near: np.ndarray, reach: np.ndarray
+) -> list[tuple[int, ...]]:
+    """Return the triangles that all of their corners have among the Delaunay triangles of their own tangent plane."""
+    votes: dict[tuple[int, ...], int] = {}
+    for point in range(len(points)):
+        own = [other for other, far in zip(near[point, 1:], distance[point, 1:]) if far <= reach[point]]
+        own = [other for other in own if normals[other] @ normals[point] > 0.0]
+        for triangle in _triangles_at(points, normals[point], [point, *own]):
+            votes[triangle] = votes.get(triangle, 0) + 1
+    return [triangle for triangle, number in votes.items() if number == 3]
+
+
+def _triangles_in_plane(points: np.ndarray, normal: np.ndarray, reach: np.ndarray) -> list[tuple[int, ...]]:
+    """Return the Delaunay triangles across a direction whose edges are not longer than the reach of both of their ends."""
+    from scipy.spatial import Delaunay, QhullError
+
+    flat = _flattened(points, normal, points[0])
+    try:
+        simplices = Delaunay(flat).simplices
+    except QhullError:  # all on a line
+        return []
+    ends = simplices[:, [[0, 1], [1, 2], [2, 0]]]
+    length = np.linalg.norm(points[ends[:, :, 0]] - points[ends[:, :, 1]], axis=2)
+    a, b, c = (flat[simplices[:, i]] for i in range(3))
+    doubled = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+    kept = (length <= reach[ends].min(axis=2)).all(axis=1)
+    kept &= doubled > LEAST_SINE * length.max(axis=1) * length.min(axis=1)  # none along a straight border
+    return [tuple(sorted(simplex)) for simplex in simplices[kept].tolist()]
+
+
+def _nearest_triangle(points: np.ndarray, point: int, near: np.ndarray) -> tuple[int, ...]:
+    """Return the triangle of a point with its nearest neighbour and the nearest one that is not in line with both."""
+    first, rest = int(near[0]), near[1:].tolist()
+    along = points[first] - points[point]
+    for other in rest:
+        side = points[other] - points[point]
+        if np.linalg.norm(np.cross(along, side)) > LEAST_SINE * np.linalg.norm(along) * np.linalg.norm(side):
+            return tuple(sorted((point, first, other)))
+    return tuple(sorted((point, first, rest[0])))
+
+
 def _triangles_at(points: np.ndarray, normal: np.ndarray, own: list[int]) -> list[tuple[int, ...]]:
     """Return the Delaunay triangles, in a plane, that have the first of some points as a corner; corners in ascending order."""
     from scipy.spatial import Delaunay, QhullError
 
     if len(own) < 3:
         return []
-    axis = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
-    axis /= np.linalg.norm(axis)
-    flat = (points[own] - points[own[0]]) @ np.stack([axis, np.cross(normal, axis)], axis=1)
-    # A regular grid has four points on each circle; a shear of a millionth decides alike for all of them.
-    flat = flat + 1e-6 * np.column_stack([(points[own] @ [0.3, 0.5, 0.7]), (points[own] @ [0.2, -0.4, 0.6])])
+    flat = _flattened(points[own], normal, points[own[0]])
     try:
         simplices = Delaunay(flat).simplices
     except QhullError:  # all on a line
         return []
     return [tuple(sorted(own[i] for i in simplex)) for simplex in simplices if 0 in simplex]
+
+
+def _flattened(points: np.ndarray, normal: np.ndarray, origin: np.ndarray) -> np.ndarray:
+    """Return coordinates in the plane across a normal, (n, 2) metres."""
+    axis = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+    axis /= np.linalg.norm(axis)
+    flat = (points - origin) @ np.stack([axis, np.cross(normal, axis)], axis=1)
+    # A regular grid has four points on each circle; a shear of a millionth decides alike for all of them.
+    sheared: np.ndarray = flat + 1e-6 * np.column_stack([points @ [0.3, 0.5, 0.7], points @ [0.2, -0.4, 0.6]])
+    return sheared

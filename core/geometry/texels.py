@@ -113,6 +113,42 @@ def texels_from_region(mesh: TriangleMesh, region: np.ndarray, name: str = "sens
     )
 
 
+def texels_with_normals(
+    mesh: TriangleMesh,
+    normal: np.ndarray,
+    tangent: np.ndarray | None = None,
+    area: np.ndarray | None = None,
+    grid: tuple[np.ndarray, np.ndarray] | None = None,
+) -> Texels:
+    """Build a texel at every vertex of a mesh, with normals that are known.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        Texels at the corners of its triangles.
+    normal : (nv, 3) float
+        Unit vectors.
+    tangent : (nv, 3) float, optional
+        Unit vectors across the normals. Default: along the layout.
+    area : (nv,) float, square metres, optional
+        Default: a third of the adjoining triangles.
+    grid : ((nv,) int, (nv,) int), optional
+        Row and column of each texel, where they form a grid.
+    """
+    if grid is None:
+        layout, along = _layout(mesh.vertices, normal, mesh.triangles, mesh.quads)
+    else:
+        row, column = grid
+        layout = GridLayout(int(row.max()) + 1, int(column.max()) + 1, row, column, mesh.triangles)
+        first = np.lexsort((column, row))
+        along = np.tile(mesh.vertices[first[-1]] - mesh.vertices[first[-1 - int(column.max())]], (len(normal), 1))
+    if area is None:
+        area = vertex_areas(mesh, np.ones(len(mesh.triangles), bool))
+        area = np.where(area > 0.0, area, np.median(area[area > 0.0]))
+    across = _tangents(along, normal) if tangent is None else tangent
+    return Texels(np.arange(len(normal)), mesh.vertices, normal, across, area, layout)
+
+
 def _triangles_inside(mesh: TriangleMesh, region: np.ndarray, name: str) -> np.ndarray:
     """Return which triangles have all corners in the region, (nt,) bool; raises RegionError when none has."""
     if not region.any():

@@ -1,45 +1,43 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sensors of MJCF files: ``tactile``, whose mesh has the texels for vertices, and the plugin ``touch_grid``."""
+"""Sensors of MJCF files, as MuJoCo compiles them: ``tactile``, ``touch`` on sites, and the plugin ``touch_grid``.
+
+MuJoCo resolves defaults, classes, includes and frames. A tactile's texels are the vertices of its mesh; the touch sites of
+a body are the texels of one sensor; a touch_grid has directions, which become texels on a sphere.
+"""
 
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 
 from ..errors import FileError
-from ..geometry.mesh import TriangleMesh, checked_mesh, vertex_normals
+from ..geometry.mesh import checked_mesh, vertex_normals
 from ..geometry.point_surface import triangles_between
+from ..geometry.rotations import rotation_matrices
 from ..io.sensor_toml import MOST_TEXELS
 from ..io.xml_file import read_xml
+from .optional_package import optional_package
 from .sensor_format import FoundSensor
-from .xml_reading import mesh_beside, numbers_in, quaternion_of, vector_in
 
-SITE_SIZE = 0.005
-"""Metres: MuJoCo's default size of a site."""
 PLUGIN = "mujoco.sensor.touch_grid"
-DEEPEST_BODY = 200
-"""Bodies inside each other; a deeper file is refused, because it is read by recursion."""
-
-
-@dataclass
-class _Model:
-    """What is needed of an MJCF file: its meshes, and geoms and sites with their frames in the world."""
-
-    path: str | os.PathLike
-    mesh_folder: str = ""
-    degrees: bool = True
-    meshes: dict[str, ElementTree.Element] = field(default_factory=dict)
-    placed: dict[tuple[str, str], tuple[ElementTree.Element, np.ndarray]] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
+DEEPEST = 250
+"""Elements inside each other; MuJoCo reads them by recursion."""
+SINGLE = 2e-7
+"""Relative precision of MuJoCo's vertices; the file's own numbers are taken where they are the same in this precision."""
+PROBE = 1e-5
+"""Radius (m) of the ball at a touch site by which MuJoCo finds the nearest surface of the site's body."""
 
 
 def is_mjcf(path: str | os.PathLike) -> bool:
-    """Return True if a file is XML with <mujoco>; raises FileError if it cannot be read."""
-    return Path(path).suffix.lower() in (".xml", ".mjcf") and read_xml(path, "a model").find("mujoco") is not None
+    """Return True if a file is XML with <mujoco> or a part of one; raises FileError if it cannot be read."""
+    if Path(path).suffix.lower() not in (".xml", ".mjcf"):
+        return False
+    root = read_xml(path, "a model")
+    return root.find("mujoco") is not None or root.find("mujocoinclude") is not None
 
 
 def read_mjcf(path: str | os.PathLike) -> list[FoundSensor]:
@@ -48,153 +46,180 @@ def read_mjcf(path: str | os.PathLike) -> list[FoundSensor]:
     Raises
     ------
     FileError
-        It is damaged or holds no tactile sensor, or a mesh is missing.
+        The package mujoco is missing, MuJoCo refuses the file, or it has no tactile sensor.
     """
-    root = read_xml(path, "a model").find("mujoco")
-    assert root is not None
-    model = _Model(path)
-    if root.find(".//include") is not None:
-        model.notes.append("Files that it includes were not read.")
-    for compiler in root.iter("compiler"):
-        model.mesh_folder = compiler.get("meshdir", compiler.get("assetdir", model.mesh_folder))
-        model.degrees = compiler.get("angle", "degree") != "radian"
-    for mesh in root.iterfind("asset/mesh"):
-        model.meshes[mesh.get("name") or Path(mesh.get("file", "")).stem] = mesh
-    for world in root.iterfind("worldbody"):
-        _place(model, world, np.eye(4), 0)
-    found = [_tactile(model, item, number) for number, item in enumerate(root.iterfind("sensor/tactile"))]
-    grids = [item for item in root.iterfind("sensor/plugin") if item.get("plugin") == PLUGIN]
-    found += [_touch_grid(model, item, number) for number, item in enumerate(grids)]
+    mujoco = optional_package("mujoco", f"'{path}' is an MJCF file")
+    root = read_xml(path, "a model")
+    if root.find("mujoco") is None:
+        raise FileError(f"'{path}' is a part of a model (<mujocoinclude>): give the file that includes it.")
+    if _depth(root) > DEEPEST:
+        raise FileError(f"'{path}' nests more than {DEEPEST} elements: a robot has fewer.")
+    mujoco.set_mju_user_warning(lambda message: None)  # else it writes a log into the current folder
+    try:
+        spec = mujoco.MjSpec.from_file(os.fspath(path))
+        model = spec.compile()
+    except Exception as error:  # MuJoCo raises ValueError, and others for meshes and plugins
+        words = " ".join(str(error).split())
+        hint = ": if it is a part of a model, give the file that includes it" if "unrecognized name" in words else ""
+        raise FileError(f"MuJoCo cannot compile '{path}' ({words:.160}){hint or ': correct it'}.") from error
+    finally:
+        mujoco.set_mju_user_warning(None)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    kinds, found, touch = mujoco.mjtSensor, [], []
+    for number, item in enumerate(spec.sensors):
+        kind = int(model.sensor_type[number])
+        if kind == kinds.mjSENS_TACTILE:
+            found.append(_tactile(path, root, model, data, number, item.name or f"tactile {number + 1}"))
+        elif kind == kinds.mjSENS_PLUGIN and item.plugin.plugin_name == PLUGIN:
+            found.append(_touch_grid(path, model, data, number, item, item.name or f"touch grid {number + 1}"))
+        elif kind == kinds.mjSENS_TOUCH:
+            touch.append(int(model.sensor_objid[number]))
+    notes = ["MuJoCo's geoms, contact and joints were not imported; parameters have their defaults."]
+    found += _touch_sensors(mujoco, spec, model, data, touch, notes)
     if not found:
-        raise FileError(f"'{path}' has no <tactile> and no {PLUGIN} in its <sensor>: give a file that has one.")
+        few = f"; it has <touch> on {len(touch)} sites, and three on one body make a sensor" if touch else ""
+        raise FileError(
+            f"'{path}' has no <tactile>, no <touch> and no {PLUGIN} in its <sensor>{few}: give a file that has one."
+        )
+    for one in found:
+        one.notes.extend(notes)
     return found
 
 
-def _place(model: _Model, parent: ElementTree.Element, frame: np.ndarray, depth: int) -> None:
-    """Note the frames of all geoms and sites below a body."""
-    if depth > DEEPEST_BODY:
-        raise FileError(f"'{model.path}' nests more than {DEEPEST_BODY} bodies: a robot has fewer.")
-    for child in parent:
-        if child.tag in ("geom", "site", "body", "frame"):
-            own = frame @ _pose(model, child)
-            if child.tag in ("geom", "site"):
-                model.placed[child.tag, child.get("name", "")] = child, own
-            else:
-                _place(model, child, own, depth + 1)
+def _depth(root: ElementTree.Element) -> int:
+    """Return how many elements are inside each other."""
+    depth, level = 0, [root]
+    while level:
+        depth, level = depth + 1, [child for element in level for child in element]
+    return depth
 
 
-def _pose(model: _Model, element: ElementTree.Element) -> np.ndarray:
-    """Return the matrix of an element's frame in its parent's."""
-    from scipy.spatial.transform import Rotation
-
-    matrix = np.eye(4)
-    matrix[:3, 3] = vector_in(model.path, element, "pos", "0 0 0")
-    turn = Rotation.identity()
-    try:
-        if element.get("quat") is not None:
-            turn = Rotation.from_quat(np.roll(vector_in(model.path, element, "quat", "", 4), -1))
-        elif element.get("euler") is not None:  # about the turned axes, in the default order
-            turn = Rotation.from_euler("XYZ", vector_in(model.path, element, "euler", ""), degrees=model.degrees)
-        elif element.get("axisangle") is not None:
-            *axis, angle = vector_in(model.path, element, "axisangle", "", 4)
-            turn = Rotation.from_rotvec((np.radians(angle) if model.degrees else angle) * np.array(axis) / np.linalg.norm(axis))
-        elif element.get("xyaxes") is not None or element.get("zaxis") is not None:
-            model.notes.append(
-                f"The rotation of <{element.tag} name='{element.get('name', '')}'> by its axes was not imported."
-            )
-    except ValueError as error:  # a quaternion of length zero
-        raise FileError(f"The rotation of <{element.tag}> in '{model.path}' is none ({error}): correct it.") from error
-    matrix[:3, :3] = turn.as_matrix()
-    return matrix
-
-
-def _tactile(model: _Model, sensor: ElementTree.Element, number: int) -> FoundSensor:
-    """Return the sensor of a <tactile>."""
-    name = sensor.get("name") or f"tactile {number + 1}"
-    mesh = model.meshes.get(sensor.get("mesh", ""))
-    if mesh is None:
-        raise FileError(f"Sensor '{name}' in '{model.path}' names the mesh '{sensor.get('mesh', '')}', which is not there.")
-    place = model.placed.get(("geom", sensor.get("geom", "")))
-    if place is None:
-        raise FileError(f"Sensor '{name}' in '{model.path}' names the geom '{sensor.get('geom', '')}', which is not there.")
-    position, normal, faces = _mesh_arrays(model, mesh, name)
-    notes = [*model.notes, f"'{name}': MuJoCo's geoms, contact and joints were not imported; parameters have their defaults."]
-    frame = place[1]
+def _tactile(path: str | os.PathLike, root: ElementTree.Element, model: Any, data: Any, number: int, name: str) -> FoundSensor:
+    """Return the sensor of a <tactile>: MuJoCo keeps meshes in their inertial frame, and puts that into the geom's."""
+    mesh, geom = int(model.sensor_objid[number]), int(model.sensor_refid[number])
+    first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+    _require_count(path, name, count)
+    turn, shift = rotation_matrices(model.mesh_quat[mesh][None])[0], model.mesh_pos[mesh]
+    position = model.mesh_vert[first : first + count].astype(float) @ turn.T + shift
+    position = _in_full_precision(root, model.mesh(mesh).name, model.mesh_scale[mesh], position)
+    start, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+    shape = checked_mesh(position, model.mesh_face[start : start + faces], name)[0]
+    start, normals = int(model.mesh_normaladr[mesh]), int(model.mesh_normalnum[mesh])
+    stated = model.mesh_normal[start : start + normals].astype(float) @ turn.T
+    tangent = None
+    if normals == 3 * count:  # the second and third of each vertex span the plane in which MuJoCo measures sliding
+        frames = _in_full_precision(root, model.mesh(mesh).name, np.ones(3), stated, "normal").reshape(count, 3, 3)
+        frames = frames / np.linalg.norm(frames, axis=2, keepdims=True)
+        normal, tangent = frames[:, 0], frames[:, 1]
+    else:
+        normal = stated if normals == count else vertex_normals(shape)
+    world = rotation_matrices(_quaternion(data.geom_xmat[geom])[None])[0] @ turn.T
     return FoundSensor(
-        name, position, normal, faces, frame_position=frame[:3, 3], frame_quaternion=quaternion_of(frame[:3, :3]), notes=notes
+        name,
+        position,
+        normal / np.linalg.norm(normal, axis=1, keepdims=True),
+        shape.triangles,
+        tangent=tangent,
+        frame_position=data.geom_xpos[geom] - world @ shift,
+        frame_quaternion=_quaternion(world),
     )
 
 
-def _mesh_arrays(model: _Model, mesh: ElementTree.Element, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the vertices, normals and faces of a mesh in its file's frame."""
-    path = model.path
-    if mesh.get("builtin") is not None or mesh.find("plugin") is not None:
-        raise FileError(f"The mesh of '{name}' in '{path}' is made by MuJoCo: save the model from MuJoCo, which writes it out.")
-    if mesh.get("file") is not None:
-        loaded = mesh_beside(path, mesh.get("file", ""), model.mesh_folder)
-        loaded = TriangleMesh(loaded.vertices * vector_in(path, mesh, "scale", "1 1 1"), loaded.triangles)
-        return loaded.vertices, vertex_normals(loaded), loaded.triangles
-    values = numbers_in(path, mesh, "vertex")
-    if len(values) % 3 or not 9 <= len(values) <= 3 * MOST_TEXELS:
-        raise FileError(
-            f"The mesh of '{name}' in '{path}' has {len(values)} coordinates: give three for each of 3 to {MOST_TEXELS}."
+def _in_full_precision(
+    root: ElementTree.Element, mesh: str, scale: np.ndarray, single: np.ndarray, key: str = "vertex"
+) -> np.ndarray:
+    """Return what the file writes of a mesh where MuJoCo has the same numbers in single precision, else what MuJoCo has."""
+    for element in root.iterfind("mujoco/asset/mesh"):
+        words = (element.get(key) or "").split()
+        if element.get("name") == mesh and len(words) == single.size:
+            written = np.array(words, float).reshape(-1, 3) * scale
+            if np.abs(written - single).max() <= SINGLE * max(float(np.abs(single).max()), 1e-3):
+                return written
+    return single
+
+
+def _touch_sensors(mujoco: Any, spec: Any, model: Any, data: Any, sites: list[int], notes: list[str]) -> list[FoundSensor]:
+    """Return for each body with three touch sites a sensor whose texels these are.
+
+    A touch site states no direction: its normal is that of the nearest surface of its own body, which MuJoCo computes.
+    """
+    groups: dict[int, list[int]] = {}
+    for site in sites:
+        groups.setdefault(int(model.site_bodyid[site]), []).append(site)
+    chosen = {body: own for body, own in groups.items() if len(own) >= 3}
+    alone = len(sites) - sum(map(len, chosen.values()))
+    if chosen and alone:
+        notes.append(f"{alone} <touch> on bodies with fewer than three of them were not imported.")
+    return [
+        _touch_sensor(model, data, body, own, _site_normals(mujoco, spec, model, data, own)) for body, own in chosen.items()
+    ]
+
+
+def _touch_sensor(model: Any, data: Any, body: int, sites: list[int], normals: np.ndarray) -> FoundSensor:
+    turn, place = rotation_matrices(data.xquat[body][None])[0], data.xpos[body].copy()
+    position, normal = (data.site_xpos[sites] - place) @ turn, normals @ turn
+    name = model.body(body).name or "touch"
+    note = f"'{name}': its {len(sites)} texels are <touch> sites, with the normals of the nearest surface of their body."
+    faces = triangles_between(position, normal)
+    return FoundSensor(
+        name, position, normal, faces, frame_position=place, frame_quaternion=data.xquat[body].copy(), notes=[note]
+    )
+
+
+def _site_normals(mujoco: Any, spec: Any, model: Any, data: Any, sites: list[int]) -> np.ndarray:
+    """Return directions out of the nearest surface of the body of each site, (n, 3) in the world."""
+    probed = spec.copy()
+    bodies = {body.id: body for body in probed.bodies}
+    for site in sites:
+        bodies[int(model.site_bodyid[site])].add_geom(
+            name=f"palpate probe {site}",
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            size=[PROBE, 0, 0],
+            mass=0,
+            pos=model.site_pos[site],
         )
-    position = values.reshape(-1, 3) * vector_in(path, mesh, "scale", "1 1 1") - vector_in(path, mesh, "refpos", "0 0 0")
-    corners, normals = numbers_in(path, mesh, "face", ""), numbers_in(path, mesh, "normal", "")
-    if len(corners) % 3 or (corners % 1).any():
-        raise FileError(f"The faces of '{name}' in '{path}' are not triples of whole numbers: correct them.")
-    per_vertex = len(normals) // len(values) if len(normals) % len(values) == 0 else 0
-    if len(normals) and per_vertex not in (1, 3):
-        raise FileError(f"The mesh of '{name}' in '{path}' has {len(normals) // 3} normals for {len(position)} vertices.")
-    normal = normals.reshape(len(position), -1)[:, :3] if len(normals) else np.zeros((0, 3))
-    if len(corners):
-        shape, _ = checked_mesh(position, corners.reshape(-1, 3).astype(int), name)
-        faces = shape.triangles
-        normal = normal if len(normal) else vertex_normals(shape)
-    else:
-        if not len(normal):
-            raise FileError(f"The mesh of '{name}' in '{path}' has neither faces nor normals: add one of them.")
-        faces = triangles_between(position, normal)
-    return position, normal, faces
+    with_probes = probed.compile()
+    there = mujoco.MjData(with_probes)
+    mujoco.mj_kinematics(with_probes, there)
+    found = np.zeros((len(sites), 3))
+    for row, site in zip(found, sites, strict=True):
+        probe = with_probes.geom(f"palpate probe {site}").id
+        best, span = np.inf, np.zeros(6)
+        for geom in np.flatnonzero(with_probes.geom_bodyid == model.site_bodyid[site]):
+            if not with_probes.geom(geom).name.startswith("palpate probe"):
+                distance = mujoco.mj_geomDistance(with_probes, there, int(geom), probe, 1.0, span)
+                if distance < best:
+                    best, row[:] = distance, (span[3:] - span[:3]) * np.sign(distance)
+        if not row.any():  # a body without geoms: the site's own z axis
+            row[:] = data.site_xmat[site].reshape(3, 3)[:, 2]
+    return found / np.linalg.norm(found, axis=1, keepdims=True)
 
 
-def _touch_grid(model: _Model, sensor: ElementTree.Element, number: int) -> FoundSensor:
+def _touch_grid(path: str | os.PathLike, model: Any, data: Any, number: int, item: Any, name: str) -> FoundSensor:
     """Return the sensor of a touch_grid: its bins of directions, on a sphere around the site."""
-    name, path = sensor.get("name") or f"touch grid {number + 1}", model.path
-    place = model.placed.get(("site", sensor.get("objname", "")))
-    if place is None:
-        raise FileError(f"Sensor '{name}' in '{path}' names the site '{sensor.get('objname', '')}', which is not there.")
-    settings = {item.get("key"): item for item in sensor.iterfind("config")}
+    site, settings = int(model.sensor_objid[number]), dict(item.plugin.config)
     missing = next((key for key in ("size", "fov") if key not in settings), None)
     if missing:
         raise FileError(f"Sensor '{name}' in '{path}' has no <config key=\"{missing}\">: add it.")
-    columns, rows = vector_in(path, settings["size"], "value", "", 2)
-    if min(columns, rows) < 2 or columns * rows > MOST_TEXELS or columns % 1 or rows % 1:
-        raise FileError(
-            f"Sensor '{name}' in '{path}' has {columns:g} × {rows:g} bins: two each way and {MOST_TEXELS} at most are read."
-        )
-    fov = vector_in(path, settings["fov"], "value", "", 2)
-    gamma = vector_in(path, settings["gamma"], "value", "", 1)[0] if "gamma" in settings else 0.0
-    azimuth, elevation = (_bin_middles(int(n), limit, gamma) for n, limit in zip((columns, rows), fov))
+    columns, rows = (int(float(word)) for word in settings["size"].split())
+    if min(columns, rows) < 2:
+        raise FileError(f"Sensor '{name}' in '{path}' has {columns} × {rows} bins: two each way are the fewest that are read.")
+    _require_count(path, name, columns * rows)
+    fov = [float(word) for word in settings["fov"].split()]
+    gamma = float(settings.get("gamma", 0.0))
+    azimuth, elevation = (_bin_middles(n, limit, gamma) for n, limit in zip((columns, rows), fov))
     y, x = np.meshgrid(elevation, azimuth, indexing="ij")
     direction = np.stack([np.cos(y) * np.sin(x), np.sin(y), -np.cos(y) * np.cos(x)], axis=-1).reshape(-1, 3)
-    sizes = numbers_in(path, place[0], "size", str(SITE_SIZE))
-    if not len(sizes) or sizes[0] <= 0.0:
-        raise FileError(f"The site of sensor '{name}' in '{path}' has no size above zero: correct it.")
-    radius = float(sizes[0])
-    row, column = (index.ravel() for index in np.indices((int(rows), int(columns))))
-    notes = [
-        *model.notes,
-        f"'{name}': a touch_grid has directions and no surface; its texels are on a sphere of the site's size, {radius:g} m.",
-        f"'{name}': MuJoCo's geoms, contact and joints were not imported; parameters have their defaults.",
-    ]
-    grid = np.arange(len(row)).reshape(int(rows), int(columns))
+    radius = float(model.site_size[site][0])
+    row, column = (index.ravel() for index in np.indices((rows, columns)))
+    note = f"'{name}': a touch_grid has directions and no surface; its texels are on a sphere of the site's size, {radius:g} m."
+    grid = np.arange(len(row)).reshape(rows, columns)
     corners = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=-1).reshape(-1, 4)
     faces = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
-    frame = place[1]
-    turn = quaternion_of(frame[:3, :3])
+    place, turn = data.site_xpos[site].copy(), _quaternion(data.site_xmat[site])
     return FoundSensor(
-        name, radius * direction, direction, faces, row, column, frame_position=frame[:3, 3], frame_quaternion=turn, notes=notes
+        name, radius * direction, direction, faces, row, column, frame_position=place, frame_quaternion=turn, notes=[note]
     )
 
 
@@ -205,3 +230,15 @@ def _bin_middles(count: int, limit: float, gamma: float) -> np.ndarray:
     edges = np.radians(limit) * (share * edges**5 + (1.0 - share) * edges)
     middles: np.ndarray = (edges[1:] + edges[:-1]) / 2.0
     return middles
+
+
+def _require_count(path: str | os.PathLike, name: str, count: int) -> None:
+    if not 3 <= count <= MOST_TEXELS:
+        raise FileError(f"Sensor '{name}' in '{path}' has {count} texels: from 3 to {MOST_TEXELS} are read.")
+
+
+def _quaternion(matrix: np.ndarray) -> np.ndarray:
+    """Return the quaternion (w, x, y, z) of a rotation matrix, (3, 3) or (9,)."""
+    from scipy.spatial.transform import Rotation
+
+    return np.roll(Rotation.from_matrix(np.reshape(matrix, (3, 3))).as_quat(), 1)

@@ -10,8 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ..geometry.mesh import TriangleMesh
+from ..errors import FileError
+from ..geometry.mesh import TriangleMesh, checked_mesh
+from ..geometry.plausible_size import require_sensor_size
+from ..geometry.texels import texels_with_normals
 from ..model.effect import Effect
+from ..model.sensor import Sensor
 from ..model.sensor_parameters import SensorParameters
 from .sensor_on_mesh import SensorOnMesh
 
@@ -44,6 +48,10 @@ class FoundSensor:
         Texels at the corners of triangles; those of the file, or made from the points.
     row, column : (n,) int or None
         Where the texels form a grid.
+    tangent : (n, 3) float or None
+        Unit vectors of the texels' x axes, and
+    area : (n,) float, square metres, or None
+        of each texel, where the file states them.
     surface : TriangleMesh or None
         What carries the texels, where the file has it.
     parameters : SensorParameters
@@ -61,12 +69,32 @@ class FoundSensor:
     faces: np.ndarray | None = None
     row: np.ndarray | None = None
     column: np.ndarray | None = None
+    tangent: np.ndarray | None = None
+    area: np.ndarray | None = None
     surface: TriangleMesh | None = None
     parameters: SensorParameters = field(default_factory=SensorParameters)
     frame_position: np.ndarray = field(default_factory=lambda: np.zeros(3))
     frame_quaternion: np.ndarray = field(default_factory=lambda: np.array([1.0, 0.0, 0.0, 0.0]))
     effects: tuple[Effect, ...] = ()
     notes: list[str] = field(default_factory=list)
+
+    def on_mesh(self) -> SensorOnMesh:
+        """Return it as a sensor whose mesh is the texels and the triangles between them; its normals are those of the file.
+
+        Raises
+        ------
+        PalpateError
+            The file has parameters only, or they, the texels or their sizes are not valid.
+        """
+        if self.position is None or self.normal is None or self.faces is None:
+            raise FileError(f"'{self.name}' has parameters and no texels.")
+        require_sensor_size(self.position, self.name)
+        self.parameters.check(self.name)
+        mesh = checked_mesh(self.position, self.faces, self.name)[0]
+        grid = None if self.row is None or self.column is None else (self.row, self.column)
+        texels = texels_with_normals(mesh, self.normal, self.tangent, self.area, grid)
+        sensor = Sensor(self.name, 0, texels, self.parameters, effects=self.effects)
+        return SensorOnMesh(sensor, mesh, self.surface, self.frame_position, self.frame_quaternion)
 
 
 Write = Callable[[Sequence[SensorOnMesh], Path], Written]

@@ -14,6 +14,10 @@ from ...io.file_writing import write_file
 from ...model.sensor_parameters import SENSOR_PARAMETERS
 from ..sensor_format import SensorFormat, Written
 from ..sensor_on_mesh import SensorOnMesh, identifiers, texel_arrays, unmodelled
+from ..usd_reading import OWN, is_usd, read_usd
+
+DIGITS = 15
+"""Of the arrays in double precision."""
 
 
 def write_usd(sensors: Sequence[SensorOnMesh], folder: Path) -> Written:
@@ -38,11 +42,11 @@ def _stage(item: SensorOnMesh, prim: str) -> list[str]:
     lines = ["#usda 1.0", "(", f"    defaultPrim = {_text(prim)}", "    metersPerUnit = 1", '    upAxis = "Z"', ")", ""]
     lines += [f'def Xform "{prim}" (', f"    displayName = {_text(item.name)}", ")", "{"]
     lines += _pose(item)
-    lines += [f"    custom string palpate:note = {_text(_note(item))}"]
+    lines += [f"    custom string {OWN}note = {_text(_note(item))}"]
     for name in SENSOR_PARAMETERS:
         value = getattr(item.sensor.parameters, name)
         kind = "string" if isinstance(value, str) else "int" if isinstance(value, int) else "double"
-        lines.append(f"    custom {kind} palpate:{name} = {_text(value) if isinstance(value, str) else repr(value)}")
+        lines.append(f"    custom {kind} {OWN}{name} = {_text(value) if isinstance(value, str) else repr(value)}")
     lines += ["", '    def Mesh "surface" (', '        prepend apiSchemas = ["PhysicsCollisionAPI"]', "    )", "    {"]
     lines += [
         f"        point3f[] points = {_tuples(surface.vertices)}",
@@ -78,6 +82,9 @@ def _points(item: SensorOnMesh) -> list[str]:
         f"vector3f[] primvars:tangent = {_tuples(tangent)}{per_texel}",
         f"float[] primvars:area = {_list(area)}{per_texel}",
     ]
+    for name, values in (("position", position), ("normal", normal), ("tangent", tangent)):
+        lines.append(f"custom double3[] {OWN}{name} = {_tuples(values, DIGITS)}")
+    lines.append(f"custom double[] {OWN}area = {_list(area, DIGITS)}")
     for name, values in arrays.items():
         kind = "int" if values.dtype.kind in "iu" else "float"
         lines.append(f"{kind}[] primvars:{name} = {_list(values)}{per_texel}")
@@ -89,16 +96,18 @@ def _text(value: str) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
-def _list(values: np.ndarray) -> str:
-    return "[" + ", ".join(_number(value) for value in values.tolist()) + "]"
+def _list(values: np.ndarray, digits: int = 9) -> str:
+    return "[" + ", ".join(_number(value, digits) for value in values.tolist()) + "]"
 
 
-def _tuples(values: np.ndarray) -> str:
-    return "[" + ", ".join("(" + ", ".join(map(_number, row)) + ")" for row in values.tolist()) + "]"
+def _tuples(values: np.ndarray, digits: int = 9) -> str:
+    return "[" + ", ".join(f"({', '.join(_number(value, digits) for value in row)})" for row in values.tolist()) + "]"
 
 
-def _number(value: float) -> str:
-    return str(value) if isinstance(value, int) else f"{value + 0.0:.9g}"
+def _number(value: float, digits: int) -> str:
+    return str(value) if isinstance(value, int) else f"{value + 0.0:.{digits}g}"
 
 
-FORMAT = SensorFormat("usd", "USD", "Texels as points with primvars, and the surface as a collision mesh", write_usd)
+FORMAT = SensorFormat(
+    "usd", "USD", "Texels as points with primvars, and the surface as a collision mesh", write_usd, read_usd, is_usd
+)

@@ -122,7 +122,7 @@ def read_texels(obj):
     return sensor_reader.sensor_in_own_frame(bpy.context.scene, obj, participants.depsgraph_of(bpy.context.scene))[0].texels
 
 
-@pytest.mark.parametrize("kind", ["mjcf", "urdf", "probes"])
+@pytest.mark.parametrize("kind", ["mjcf", "urdf", "probes", "usd"])
 def test_an_exported_sensor_comes_back_in_its_place(kind, tmp_path):
     scenes.press()
     pad = bpy.data.objects["Pad"]
@@ -142,7 +142,7 @@ def test_an_exported_sensor_comes_back_in_its_place(kind, tmp_path):
     else:
         assert np.allclose(np.array(new.matrix_world), np.array(pad.matrix_world), atol=FLOAT32)
         assert texels.layout.shape == item.sensor.texels.layout.shape
-    assert new.palpate.k == pytest.approx(70.0 if kind == "probes" else 58.5)
+    assert new.palpate.k == pytest.approx(70.0 if kind in ("probes", "usd") else 58.5)
 
 
 def gentact(folder, flagged=9):
@@ -170,7 +170,13 @@ def test_gentacts_file_gives_its_sensors_and_leaves_nothing_else(tmp_path):
     assert not bpy.data.libraries and not bpy.data.collections
     texels = read_texels(bpy.context.object)
     assert np.abs(texels.position - points).max() < FLOAT32
-    assert (texels.normal @ [0.0, 0.0, 1.0] > 0.5).all()
+    radial = points / np.linalg.norm(points, axis=1)[:, None]
+    assert np.abs(texels.normal - radial).max() < FLOAT32  # those of the file, not of the facets between the points
+    bpy.context.object.scale = (1.0, 1.0, 2.0)
+    bpy.context.view_layer.update()
+    stretched = radial / [1.0, 1.0, 2.0]
+    stretched /= np.linalg.norm(stretched, axis=1)[:, None]
+    assert np.abs(read_texels(bpy.context.object).normal - stretched).max() < FLOAT32
     assert bpy.context.object.location.x == pytest.approx(1.0)
 
 
