@@ -112,9 +112,9 @@ def _rooms():
     from . import operators, panels
     from .addon.events import handlers
     from .addon.properties import registration
-    from .addon.session import library_folders, openexr_check
+    from .addon.session import library_folders
 
-    return [library_folders, openexr_check, registration, operators, panels, handlers, _CommandLine]
+    return [library_folders, registration, operators, panels, handlers, _CommandLine]
 
 
 class _CommandLine:

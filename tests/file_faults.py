@@ -169,12 +169,12 @@ class Injector:
         return buffered if "b" in mode else io.TextIOWrapper(buffered, encoding, errors, newline)
 
     def _wrap_images(self) -> None:
-        """Wrap the writing of tactile images, many at a time."""
-        from palpate.core.io import exr_codec
+        """Wrap the writing of tactile images, which a library does."""
+        from palpate.core.io import tactile_exr
 
-        def write_all(original: Callable[..., Any], paths: Any, *arguments: Any, **options: Any) -> Any:
-            inside = self._counts(paths[0])
-            function = functools.partial(original, paths, *arguments, **options)
+        def write_image(original: Callable[..., Any], path: Any, *arguments: Any, **options: Any) -> Any:
+            inside = self._counts(path)
+            function = functools.partial(original, path, *arguments, **options)
             if not inside:
                 return function()
 
@@ -185,7 +185,7 @@ class Injector:
             return self._operation("write", inside, function, spoil)
 
         os_truncate = os.truncate.__wrapped__ if hasattr(os.truncate, "__wrapped__") else os.truncate
-        self._wrap(exr_codec, "write_all", write_all)
+        self._wrap(tactile_exr, "write_image", write_image)
 
 
 class _WatchedFile(io.FileIO):

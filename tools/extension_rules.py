@@ -43,10 +43,8 @@ PLATFORM_TAGS = {
 PROCESS, NETWORK_USE, SEARCH = "starts a process", "uses a network", "changes where all extensions search for modules"
 EXCUSED = {
     (PROCESS, "addon/session/first_use.py"): "compiles the solver beside Blender, so that its window stays usable",
-    (PROCESS, "addon/session/openexr_check.py"): "tries whether OpenEXR and Blender get along; a crash there is not Blender's",
     (PROCESS, "addon/study/study_process.py"): "runs a study with the program that the user names in the preferences",
     (NETWORK_USE, "commands/console.py"): "a pair of sockets within the process, by which Ctrl-C wakes a thread",
-    (SEARCH, "addon/session/openexr_trial.py"): "is a process of its own, which searches where Blender does",
     (SEARCH, "core/solver/precompile_process.py"): "is a process of its own, which searches where Blender does",
 }
 """What a reviewer has to ask about: what a file does, and why it may. The page has the same list."""

@@ -13,7 +13,6 @@ __all__ = [
     "frame_status",
     "identity",
     "library_folders",
-    "openexr_check",
     "redraw",
     "session_state",
     "transforms",

@@ -15,7 +15,7 @@ __all__ = [
     "checksum_list",
     "csv_table",
     "disk_space",
-    "exr_backend",
+    "exr_file",
     "file_list",
     "file_writing",
     "folder_lock",

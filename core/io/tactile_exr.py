@@ -5,8 +5,6 @@
 the sensor's unit, ``depth`` in metres, ``slip`` in metres per second, ``contact`` 0 or 1. All are 32-bit floats; pixels
 that show no texel are 0. Row 0 of the layout is the bottom of the picture. A sensor with several channels has the vector layer
 ``channels`` besides, which shows at each texel the channels of the nearest place where such are measured.
-
-Palpate's own codec writes all images, so that a scene gives the same bytes in every Blender.
 """
 
 from __future__ import annotations
@@ -25,9 +23,7 @@ from ..geometry.texels import Texels
 from ..model.recording import Frame, SensorFrame
 from ..model.sensor import Sensor
 from ..model.vector_readings import VectorReadings
-from . import exr_codec
-from .exr_backend import backend
-from .exr_codec import FormatError, in_order
+from .exr_file import FormatError, read_image, write_image
 from .file_writing import atomic_write, write_file
 
 CHANNELS = ("R", "G", "B", "reading", "depth", "slip", "contact")
@@ -39,7 +35,6 @@ CHANNEL_LAYER = "channels"
 UNITS = {"R": "N", "G": "N", "B": "N", "depth": "m", "slip": "m/s", "contact": "1"}
 """Units of the channels; that of ``reading`` is the sensor's."""
 
-_IN_FILE = in_order(CHANNELS)
 _PREFIX = "palpate."  # OpenEXR has header attributes of its own, some with a type ("name", "owner", "type")
 
 
@@ -52,13 +47,13 @@ def exr_channels(layout: GridLayout | UVLayout, frame: SensorFrame) -> dict[str,
         A value is not finite or too large for 32 bits (a fault of the program, not of the user).
     """
     pictures = _pictures(layout, [frame], CHANNELS)[0]
-    return {name: np.ascontiguousarray(pictures[::-1, i]) for i, name in enumerate(CHANNELS)}
+    return {name: np.ascontiguousarray(picture[::-1]) for name, picture in zip(CHANNELS, pictures)}
 
 
 def _pictures(
     layout: GridLayout | UVLayout, frames: Sequence[SensorFrame], names: Sequence[str], nearest: np.ndarray | None = None
 ) -> np.ndarray:
-    """(f, height, channels, width) float32 of frames and channels in order, from the top."""
+    """(f, channels, height, width) float32 of frames and channels in order, from the top."""
     columns = {
         "R": [frame.normal_force for frame in frames],
         "G": [frame.shear[:, 0] for frame in frames],
@@ -79,7 +74,7 @@ def _pictures(
     image = image.reshape(*layout.shape, len(names), len(frames))
     contact = names.index("contact")
     image[:, :, contact] = image[:, :, contact] >= 0.5
-    return np.ascontiguousarray(np.moveaxis(image[::-1], (3, 0, 2, 1), (0, 1, 2, 3)), dtype="<f4")
+    return np.ascontiguousarray(np.moveaxis(image[::-1], (3, 2, 0, 1), (0, 1, 2, 3)), dtype=np.float32)
 
 
 def describe(sensor: Sensor, frame: Frame, digest: str) -> dict[str, str]:
@@ -166,9 +161,10 @@ def _write(
     metadata: Sequence[Mapping[str, str]],
     nearest: np.ndarray | None = None,
 ) -> None:
-    names = _IN_FILE if nearest is None else in_order((*_IN_FILE, *layer_names(_channels_of(frames[0]))))
-    attributes = [{_PREFIX + key: str(value) for key, value in about.items()} for about in metadata]
-    exr_codec.write_all(paths, names, _pictures(layout, frames, names, nearest), attributes)
+    names = CHANNELS if nearest is None else (*CHANNELS, *layer_names(_channels_of(frames[0])))
+    pictures = _pictures(layout, frames, names, nearest)
+    for path, own, about in zip(paths, pictures, metadata, strict=True):
+        write_image(path, dict(zip(names, own)), {_PREFIX + key: str(value) for key, value in about.items()})
 
 
 def layer_names(channels: VectorReadings) -> list[str]:
@@ -219,12 +215,12 @@ def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, 
     if not Path(path).is_file():
         raise FileError(f"'{path}' does not exist: bake first, or choose another file.")
     try:
-        pictures, attributes = backend().module.read(path)
+        pictures, attributes = read_image(path)
     except OSError as error:
         raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): check its permissions.") from error
     except FormatError as error:
         raise FileError(f"'{path}' is damaged or not an OpenEXR image ({error}): bake again.") from error
-    found = {name: picture[::-1].astype(np.float32) for name, picture in pictures.items()}
+    found = {name: np.ascontiguousarray(picture[::-1]) for name, picture in pictures.items()}
     order = [name for name in CHANNELS if name in found] + [name for name in found if name not in CHANNELS]
     metadata = {key.removeprefix(_PREFIX): value for key, value in attributes.items() if key.startswith(_PREFIX)}
     return {name: found[name] for name in order}, metadata

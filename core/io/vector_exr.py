@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import ParameterError
-from .exr_codec import in_order, write_all
+from .exr_file import write_image
 from .file_list import FileList
 from .file_writing import writable_folder, write_file
 
@@ -50,13 +50,11 @@ def write_vector_exrs(folder: Path, values: np.ndarray, shape: tuple[int, int], 
             f"An image of {rows} × {columns} places has {3 * rows * columns} channels and these readings have {channels}: "
             "give the rows and columns of the magnetometers."
         )
-    names = in_order(f"{LAYER}.{axis}" for axis in AXES)
-    order = [AXES.index(name[-1]) for name in names]
-    images = values.reshape(-1, rows, columns, 3)[:, ::-1, :, order]
-    table = np.ascontiguousarray(np.moveaxis(images, 3, 2), dtype="<f4")
-    about = [{"palpate.unit": unit, "palpate.frame": str(frame)} for frame in range(len(table))]
+    images = values.reshape(-1, rows, columns, 3)[:, ::-1].astype(np.float32)
     files = FileList(writable_folder(folder, create=True))
     with files.new_files(LAYER) as new, write_file(new / LAYER, atomic=False):
-        paths = [new / f"{LAYER}_{frame:0{DIGITS}d}.exr" for frame in range(len(table))]
-        write_all(paths, names, table, about)
+        paths = [new / f"{LAYER}_{frame:0{DIGITS}d}.exr" for frame in range(len(images))]
+        for frame, (path, image) in enumerate(zip(paths, images)):
+            pictures = {f"{LAYER}.{axis}": image[:, :, i] for i, axis in enumerate(AXES)}
+            write_image(path, pictures, {"palpate.unit": unit, "palpate.frame": str(frame)})
         return files.replace(new, {LAYER: paths})

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import palpate as pp
-from palpate.core.io import exr_codec
+from palpate.core.io.exr_file import read_image
 from palpate.core.skins.layer import texel_displacements
 
 
@@ -152,7 +152,7 @@ def test_channels_are_saved_as_vector_images(pressed, tmp_path):
     pad, rec = pressed
     seen = rec.channels(skin(pad))
     paths = pp.save_channels(seen, tmp_path / "images", 3, 3)
-    channels, attributes = exr_codec.read(paths[-1])
+    channels, attributes = read_image(paths[-1])
     np.testing.assert_array_equal(channels["field.Z"][::-1].ravel(), seen.values[-1, :, 2].astype(np.float32))
     assert len(paths) == len(rec) and attributes["palpate.unit"] == "T"
     with pytest.raises(pp.PalpateError, match="4 × 4 places has 48 channels and these readings have 27"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import copy
 import errno
+import importlib.util
 import json
 import math
 import os
@@ -20,14 +21,13 @@ import numpy as np
 import OpenEXR
 import pytest
 from file_faults import Injector
-from oracles import openexr_writer
 
 from palpate.core.errors import FileError, PalpateError
 from palpate.core.geometry.layout.grid_layout import GridLayout
 from palpate.core.geometry.layout.texture_maps import uv_layout
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.texels import texels_from_region
-from palpate.core.io import exr_backend, exr_codec, exr_library, file_writing, npz
+from palpate.core.io import exr_file, file_writing, npz, tactile_exr
 from palpate.core.io.bake_folder import (
     OWN_DIGEST,
     Manifest,
@@ -583,14 +583,7 @@ def grid_of(rows, columns, seed=0):
 METADATA = {"unit": "kPa", "sensor": "Daumen ü/1", "frame": "12", "time": "0.5", "digest": "ab" * 32, "palpate": "0.1.0"}
 
 
-@pytest.fixture(params=[exr_library, exr_codec], ids=["library", "codec"])
-def image_backend(request, monkeypatch):
-    """Run a test with each of the two backends."""
-    monkeypatch.setattr(exr_backend, "_chosen", exr_backend.Backend(request.param, "chosen by a test"))
-    return request.param
-
-
-def test_exr_round_trip(image_backend, tmp_path):
+def test_exr_round_trip(tmp_path):
     for rows, columns in ((14, 6), (2, 2), (1, 7)):
         layout, frame = grid_of(rows, columns), tactile_frame(rows * columns)
         path = tmp_path / "tactile_0012.exr"
@@ -610,7 +603,7 @@ def test_exr_round_trip(image_backend, tmp_path):
             np.testing.assert_array_equal(channels[name][texel], getattr(frame, name).astype(np.float32))
 
 
-def test_exr_as_any_other_program_reads_it(image_backend, tmp_path):
+def test_exr_as_any_other_program_reads_it(tmp_path):
     layout, frame = grid_of(3, 5), tactile_frame(15)
     write_exr(tmp_path / "a.exr", layout, frame, METADATA)
     with OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True) as file:
@@ -623,7 +616,7 @@ def test_exr_as_any_other_program_reads_it(image_backend, tmp_path):
     np.testing.assert_array_equal(last, frame.normal_force[layout.row == 0][order].astype(np.float32))
 
 
-def test_exr_of_a_texture_map(image_backend, tmp_path):
+def test_exr_of_a_texture_map(tmp_path):
     position = np.array([[0, 0, 0], [1, 0, 0], [2, 0.2, 0], [0, 1, 0], [1, 1.2, 0]]) * 1.0
     triangles = np.array([[0, 1, 3], [1, 4, 3], [1, 2, 4]])
     layout, _ = uv_layout(position, np.tile([0, 0, 1.0], (5, 1)), triangles)
@@ -640,7 +633,7 @@ def test_exr_of_a_texture_map(image_backend, tmp_path):
     np.testing.assert_array_equal(channels["reading"], layout.image(frame.reading).astype(np.float32))
 
 
-def test_same_frame_same_bytes(image_backend, tmp_path):
+def test_same_frame_same_bytes(tmp_path):
     for name in ("a.exr", "b.exr"):
         write_exr(tmp_path / name, grid_of(4, 4), tactile_frame(16), METADATA)
     assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
@@ -648,7 +641,7 @@ def test_same_frame_same_bytes(image_backend, tmp_path):
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 3.5e38, -1e300])
 @pytest.mark.parametrize("channel", ["normal_force", "shear", "reading", "slip"])
-def test_value_that_no_pixel_can_hold_is_our_fault(image_backend, tmp_path, value, channel):
+def test_value_that_no_pixel_can_hold_is_our_fault(tmp_path, value, channel):
     frame = tactile_frame(4)
     getattr(frame, channel)[2] = value
     with pytest.raises(ValueError, match="texel 2"):
@@ -656,7 +649,7 @@ def test_value_that_no_pixel_can_hold_is_our_fault(image_backend, tmp_path, valu
     assert os.listdir(tmp_path) == []
 
 
-def test_largest_and_smallest_values(image_backend, tmp_path):
+def test_largest_and_smallest_values(tmp_path):
     frame = tactile_frame(4)
     frame.reading[:] = np.finfo(np.float32).max, -np.finfo(np.float32).max, 1e-300, -0.0
     layout = grid_of(2, 2)
@@ -665,7 +658,7 @@ def test_largest_and_smallest_values(image_backend, tmp_path):
     np.testing.assert_array_equal(channels["reading"][layout.row, layout.column], frame.reading.astype(np.float32))
 
 
-def test_exr_in_wrong_places(image_backend, tmp_path):
+def test_exr_in_wrong_places(tmp_path):
     (tmp_path / "file").write_text("")
     for path in (tmp_path / "missing" / "a.exr", tmp_path / "file" / "a.exr", tmp_path):
         with pytest.raises(FileError) as error:
@@ -675,7 +668,7 @@ def test_exr_in_wrong_places(image_backend, tmp_path):
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (4, 5), (16, 3), (50, 33)])
-def test_images_written_together_are_those_written_one_by_one(image_backend, tmp_path, shape):
+def test_images_written_together_are_those_written_one_by_one(tmp_path, shape):
     layout, rng = grid_of(*shape), np.random.default_rng(7)
     frames = [replace(tactile_frame(math.prod(shape)), depth=rng.random(math.prod(shape))) for _ in range(5)]
     about = [METADATA | {"frame": str(i)} for i in range(5)]
@@ -687,29 +680,19 @@ def test_images_written_together_are_those_written_one_by_one(image_backend, tmp
         assert read_exr(path)[1]["frame"] == own["frame"]
 
 
-def test_a_frame_gives_the_same_bytes_whatever_reads(tmp_path, monkeypatch):
-    written = []
-    for reader in (exr_library, exr_codec):
-        monkeypatch.setattr(exr_backend, "_chosen", exr_backend.Backend(reader, "chosen by a test"))
-        write_exr(tmp_path / "a.exr", grid_of(3, 4), tactile_frame(12), METADATA)
-        assert read_exr(tmp_path / "a.exr")[1] == METADATA
-        written.append((tmp_path / "a.exr").read_bytes())
-    assert written[0] == written[1]
-
-
 def test_failing_writer_leaves_nothing(tmp_path, monkeypatch):
-    def half(paths, *_):
-        Path(paths[0]).write_bytes(b"half")
+    def half(path, *_):
+        Path(path).write_bytes(b"half")
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(exr_codec, "write_all", half)
+    monkeypatch.setattr(tactile_exr, "write_image", half)
     with pytest.raises(FileError) as error:
         write_exr(tmp_path / "a.exr", grid_of(2, 2), tactile_frame(4), METADATA)
     one_sentence(error, tmp_path / "a.exr", "no space left")
     assert os.listdir(tmp_path) == []
 
 
-def test_damaged_exr(image_backend, tmp_path):
+def test_damaged_exr(tmp_path):
     path = tmp_path / "a.exr"
     assert "does not exist" in cannot_load(read_exr, path)
     cannot_load(read_exr, tmp_path)
@@ -724,46 +707,53 @@ def test_damaged_exr(image_backend, tmp_path):
         cannot_load(read_exr, path)
 
 
-@pytest.mark.parametrize("shape", [(1, 1), (16, 3), (17, 5), (100, 333)])
-def test_exr_agrees_with_the_library(tmp_path, shape):
-    """The codec and the library write what the other reads, with equal headers; both read every lossless compression."""
-    rng = np.random.default_rng(1)
-    noise = rng.normal(size=shape).astype(np.float32)
-    channels = {"R": noise, "G": np.zeros(shape, np.float32), "depth": np.cumsum(noise, axis=1, dtype=np.float32)}
-    attributes = {"a": "ü", "palpate.x": "", "b": "no text \udcff", "z": "last"}
-    names = exr_codec.in_order(channels)
-    table = np.stack([channels[name] for name in names], axis=1)[None]
-    headers = []
-    paths = [tmp_path / "library.exr", tmp_path / "codec.exr"]
-    openexr_writer.write(paths[0], channels, attributes)
-    exr_codec.write_all(paths[1:], names, table, [attributes])
-    for path in paths:
-        blocks = -(-shape[0] // 16)
-        data = path.read_bytes()
-        end = data.index(b"last\0") + 5
-        headers.append(data[:end])
-        assert int.from_bytes(data[end : end + 8], "little") == end + 8 * blocks, "the table of blocks follows the header"
-        for reader in (exr_library, exr_codec):
-            found, texts = reader.read(path)
-            assert texts == attributes and list(found) == list(names)
-            for name, picture in channels.items():
-                np.testing.assert_array_equal(found[name], picture)
-    assert headers[0] == headers[1]
-    channels["half"] = noise.astype(np.float16)
-    channels["count"] = rng.integers(0, 1 << 32, shape).astype(np.uint32)
-    for compression in (OpenEXR.NO_COMPRESSION, OpenEXR.ZIPS_COMPRESSION, OpenEXR.ZIP_COMPRESSION):
-        copies = {name: picture.copy() for name, picture in channels.items()}
-        with OpenEXR.File({"compression": compression, "type": OpenEXR.scanlineimage, "b": "text"}, copies) as file:
-            file.write(str(tmp_path / "theirs.exr"))
-        for reader in (exr_library, exr_codec):
-            found, texts = reader.read(tmp_path / "theirs.exr")
-            assert texts["b"] == "text"
-            for name, picture in channels.items():
-                assert found[name].dtype == picture.dtype
-                np.testing.assert_array_equal(found[name], picture)
+def test_a_library_that_cannot_write_says_the_reason_of_the_system(tmp_path):
+    if not os.path.exists("/dev/full"):
+        pytest.skip("no disk that is always full")
+    pictures = {"R": np.random.default_rng(0).random((200, 300), np.float32)}
+    for path, number in (("/dev/full", errno.ENOSPC), (tmp_path / "missing" / "a.exr", errno.ENOENT)):
+        with pytest.raises(OSError) as error:
+            exr_file.write_image(path, pictures, {})
+        assert error.value.errno == number
 
 
-def test_the_library_reads_what_an_image_says_of_itself(image_backend, tmp_path):
+def test_a_name_that_is_no_text_is_written_as_far_as_it_is(tmp_path):
+    write_exr(tmp_path / "a.exr", grid_of(2, 2), tactile_frame(4), {"sensor": "pad \udcff"})
+    assert read_exr(tmp_path / "a.exr")[1] == {"sensor": "pad ?"}
+
+
+@pytest.mark.parametrize("compression", [OpenEXR.NO_COMPRESSION, OpenEXR.ZIPS_COMPRESSION, OpenEXR.PIZ_COMPRESSION])
+def test_images_of_other_programs_are_read(tmp_path, compression):
+    pictures = {"R": np.random.default_rng(1).random((17, 5), np.float32)}
+    pictures |= {"half": pictures["R"].astype(np.float16), "count": np.arange(85, dtype=np.uint32).reshape(17, 5)}
+    with OpenEXR.File({"compression": compression, "type": OpenEXR.scanlineimage}, dict(pictures)) as file:
+        file.write(str(tmp_path / "theirs.exr"))
+    found, _ = exr_file.read_image(tmp_path / "theirs.exr")
+    for name, picture in pictures.items():
+        np.testing.assert_array_equal(found[name], picture.astype(np.float32))
+
+
+def test_only_openimageio_can_write_where_the_process_is_linked_against_another_openexr(tmp_path, monkeypatch):
+    monkeypatch.setattr(exr_file, "library", lambda: "OpenImageIO")
+    if importlib.util.find_spec("OpenImageIO") is None:
+        with pytest.raises(FileError, match="install it"):
+            write_exr(tmp_path / "a.exr", grid_of(2, 2), tactile_frame(4), METADATA)
+        return
+    written = [exr_round_trip(tmp_path / f"{i}.exr") for i in range(2)]
+    assert written[0] == written[1]
+
+
+def exr_round_trip(path):
+    """Return the bytes of an image, whose pixels and metadata are compared."""
+    write_exr(path, grid_of(14, 6), tactile_frame(84), METADATA)
+    channels, metadata = read_exr(path)
+    assert metadata == METADATA
+    for name, picture in exr_channels(grid_of(14, 6), tactile_frame(84)).items():
+        np.testing.assert_array_equal(channels[name], picture)
+    return path.read_bytes()
+
+
+def test_the_library_reads_what_an_image_says_of_itself(tmp_path):
     """Units of every channel, whose it is, when, and what it was made from; all channels are 32-bit floats."""
     parameters = SensorParameters(k=123.0, unit="kPa")
     texels = texels_from_region(TriangleMesh(np.eye(3), np.array([[0, 1, 2]])), np.ones(3, bool))
@@ -789,7 +779,7 @@ def test_the_library_reads_what_an_image_says_of_itself(image_backend, tmp_path)
     assert len(hashes) == 4 and about["parameters"] in hashes
 
 
-def test_any_damage_to_an_exr_is_noticed_or_harmless(image_backend, tmp_path):
+def test_any_damage_to_an_exr_is_noticed_or_harmless(tmp_path):
     """No byte can be changed so that reading ends in anything but a picture or a sentence."""
     path = tmp_path / "a.exr"
     write_exr(path, grid_of(5, 4), tactile_frame(20), METADATA)
@@ -803,26 +793,3 @@ def test_any_damage_to_an_exr_is_noticed_or_harmless(image_backend, tmp_path):
             read_exr(path)
         except FileError as error:
             assert "\n" not in str(error)
-
-
-def test_the_library_is_used_only_where_it_is_safe(monkeypatch):
-    """Without Blender always; beside Blender only after a check has passed, which is asked for once."""
-    asked = []
-    monkeypatch.setattr(exr_backend, "_chosen", None)
-    monkeypatch.setattr(exr_backend, "_is_safe", None)
-    assert "not used yet" in exr_backend.describe()
-    monkeypatch.delitem(sys.modules, exr_backend.HOST, raising=False)
-    assert exr_backend.backend().module is exr_library
-    monkeypatch.setitem(sys.modules, exr_backend.HOST, None)
-    for answer, expected in ((None, exr_codec), (True, exr_library), (False, exr_codec)):
-        exr_backend.set_safety_check(None if answer is None else lambda answer=answer: asked.append(answer) or answer)
-        assert exr_backend.backend().module is exr_backend.backend().module is expected
-        assert ("own codec" in exr_backend.describe()) == (expected is exr_codec)
-    assert asked == [True, False]
-
-
-def test_the_own_codec_serves_where_the_library_is_not_installed(monkeypatch):
-    monkeypatch.setattr(exr_backend, "_chosen", None)
-    monkeypatch.setattr(exr_backend, "LIBRARY", "palpate_no_such_module")
-    assert exr_backend.backend().module is exr_codec
-    assert "not installed" in exr_backend.describe()

@@ -9,10 +9,10 @@ import pytest
 
 from palpate.core.errors import FileError
 from palpate.core.gap.dataset.rig import read_rig
-from palpate.core.io import exr_codec, exr_library
 from palpate.core.io.bake_folder import read_manifest
 from palpate.core.io.bake_reader import read_bake
 from palpate.core.io.csv_table import read_table
+from palpate.core.io.exr_file import read_image
 from palpate.core.io.openrave import read_openrave
 from palpate.core.io.recording_npz import load_recording
 from palpate.core.io.regular_file import open_regular, read_bytes
@@ -20,8 +20,7 @@ from palpate.core.io.sensor_npz import load_sensor
 from palpate.core.io.sensor_toml import read_sensor
 
 READERS = (
-    exr_codec.read,
-    exr_library.read,
+    read_image,
     load_recording,
     load_sensor,
     read_bytes,

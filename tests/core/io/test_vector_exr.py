@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from palpate.core.errors import ParameterError
-from palpate.core.io import exr_codec
+from palpate.core.io.exr_file import read_image
 from palpate.core.io.vector_exr import write_vector_exrs
 
 VALUES = np.random.default_rng(0).normal(size=(3, 6, 3))
@@ -15,7 +15,7 @@ def test_each_frame_is_an_image_with_one_layer(tmp_path):
     paths = write_vector_exrs(tmp_path / "new", VALUES, (2, 3), "T")
     assert [path.name for path in paths] == ["field_0000.exr", "field_0001.exr", "field_0002.exr"]
     for frame, path in enumerate(paths):
-        channels, attributes = exr_codec.read(path)
+        channels, attributes = read_image(path)
         assert set(channels) == {"field.X", "field.Y", "field.Z"}
         assert attributes["palpate.unit"] == "T" and attributes["palpate.frame"] == str(frame)
         for axis, name in enumerate(("field.X", "field.Y", "field.Z")):

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""OpenEXR images of 32-bit floats with named channels and attributes, written and read by a library.
+
+The library is OpenEXR, from PyPI. In a Blender that is linked against an OpenEXR of its own, the dynamic linker would mix the
+symbols of the two, and the first file written would end the process (seen in Debian's Blender 4.3). There the images go through
+OpenImageIO, which Blender brings along. Pixels, names and attributes are the same; equal images give equal bytes in each.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import os
+import sys
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from ..errors import FileError
+from .regular_file import require_regular
+
+_MOST_PACKED = 1100
+"""Bytes of pixels per byte of a file. ZIP cannot compress better, so a header that promises more is damaged."""
+_NO_DATE = "1980:01:01 00:00:00"
+"""OpenImageIO would write the present time, and equal images would differ."""
+
+
+class FormatError(ValueError):
+    """The file is damaged, or no OpenEXR image."""
+
+
+@cache
+def library() -> str:
+    """Return the module that reads and writes images in this process, OpenEXR or OpenImageIO."""
+    return "OpenImageIO" if _process_is_linked_against_openexr() else "OpenEXR"
+
+
+def _process_is_linked_against_openexr() -> bool:
+    """Return True if symbols of an OpenEXR are where those of a module that is loaded later are looked up.
+
+    Modules of Python, such as bpy, keep their libraries to themselves, and so do all on Windows and macOS.
+    """
+    return sys.platform == "linux" and hasattr(ctypes.CDLL(None), "exr_start_read")
+
+
+def _openimageio() -> Any:
+    try:
+        import OpenImageIO
+    except ImportError as error:
+        raise FileError("This Blender's Python has no OpenImageIO: install it, on Debian as python3-openimageio.") from error
+    return OpenImageIO
+
+
+def write_image(path: str | os.PathLike, channels: Mapping[str, np.ndarray], attributes: Mapping[str, str]) -> None:
+    """Write an image, ZIP-compressed; equal images give equal bytes.
+
+    Parameters
+    ----------
+    path : path
+    channels : mapping of str to (height, width) float32
+        The first row is the top of the picture.
+    attributes : mapping of str to str
+        Added to the header.
+
+    Raises
+    ------
+    OSError, FileError
+        The file cannot be written.
+    """
+    texts = {name: value.encode("utf-8", "replace").decode() for name, value in attributes.items()}
+    if library() == "OpenEXR":
+        import OpenEXR
+
+        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **texts}
+        try:
+            OpenEXR.File(header, {name: np.ascontiguousarray(one) for name, one in channels.items()}).write(os.fspath(path))
+        except RuntimeError as error:
+            raise _os_error(str(error)) from error
+        return
+    oiio = _openimageio()
+    height, width = next(iter(channels.values())).shape
+    spec = oiio.ImageSpec(width, height, len(channels), "float")
+    spec.channelnames = tuple(channels)
+    for name, value in {"compression": "zip", "DateTime": _NO_DATE, **texts}.items():
+        spec.attribute(name, value)
+    image = oiio.ImageOutput.create("image.exr")
+    pixels = np.stack(list(channels.values()), axis=-1)
+    if not (image.open(os.fspath(path), spec) and image.write_image(pixels) and image.close()):
+        raise _os_error(image.geterror())
+
+
+def _os_error(message: str) -> OSError:
+    """Return the error of the system that a library's message names, as in "Failed to write. No space left on device."."""
+    number = next((number for number in errno.errorcode if os.strerror(number) in message), None)
+    return OSError(errno.EIO, " ".join(message.split())) if number is None else OSError(number, os.strerror(number))
+
+
+def read_image(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """Read an image.
+
+    Returns
+    -------
+    channels : dict of str to (height, width) float32
+        The first row is the top of the picture.
+    attributes : dict of str to str
+        Those of type string.
+
+    Raises
+    ------
+    FileError, OSError
+        The file cannot be read.
+    FormatError
+        The file is damaged, or no OpenEXR image.
+    """
+    require_regular(path)
+    size = os.path.getsize(path)
+    with open(path, "rb"):  # the libraries do not say why a file cannot be opened
+        pass
+    read = _read_by_openexr if library() == "OpenEXR" else _read_by_openimageio
+    try:
+        return read(os.fspath(path), size)
+    except (FileError, FormatError):
+        raise
+    except Exception as error:  # damage raises half a dozen kinds
+        raise FormatError(" ".join(str(error).split()) or type(error).__name__) from error
+
+
+def _read_by_openexr(path: str, size: int) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    import OpenEXR
+
+    header = OpenEXR.File(path, separate_channels=True, header_only=True).header()
+    low, high = (np.asarray(corner, int) for corner in header["dataWindow"])
+    _require_pixels(high - low + 1, len(header["channels"]), size)
+    channels = OpenEXR.File(path, separate_channels=True).channels()
+    texts = {name: value for name, value in header.items() if isinstance(value, str)}
+    return {name: channel.pixels.astype(np.float32) for name, channel in channels.items()}, texts
+
+
+def _read_by_openimageio(path: str, size: int) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    oiio = _openimageio()
+    image = oiio.ImageInput.open(path)
+    if image is None:
+        raise FormatError(oiio.geterror())
+    spec = image.spec()
+    _require_pixels(np.array([spec.width, spec.height]), spec.nchannels, size)
+    pixels = image.read_image("float")
+    if pixels is None or image.format_name() != "openexr":
+        raise FormatError(image.geterror())
+    texts = {one.name: one.value for one in spec.extra_attribs if isinstance(one.value, str)}
+    return {name: np.ascontiguousarray(pixels[..., i]) for i, name in enumerate(spec.channelnames)}, texts
+
+
+def _require_pixels(shape: np.ndarray, channels: int, size: int) -> None:
+    """Raise FormatError if a file of `size` bytes cannot hold an image of this width and height."""
+    if (shape < 1).any() or 2 * channels * int(shape[0]) * int(shape[1]) > _MOST_PACKED * size:
+        raise FormatError("it is too short for its size")
