@@ -18,7 +18,7 @@ import numpy as np
 from ..errors import FileError, os_error_reason
 from ..model.recording import SENSOR_FIELDS, Recording, SensorRecording, row_blocks
 from ..model.vector_readings import CLIPPED, VALUES, VectorReadings
-from .npz import DAMAGED, open_archive, read_array, write_arrays
+from .npz import DAMAGED, open_archive, write_arrays
 from .regular_file import open_regular
 
 RECORDING_FORMAT = "palpate-recording/2"
@@ -65,7 +65,7 @@ def recording_arrays(recording: Recording) -> dict[str, np.ndarray]:
 
 
 def load_recording(path: str | os.PathLike) -> Recording:
-    """Read a recording that :func:`save_recording` wrote; long arrays of it are mapped (:func:`.npz.read_array`).
+    """Read a recording that :func:`save_recording` wrote.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def described(channels: VectorReadings) -> dict[str, Any]:
 def _channels(members: Any, i: int, about: dict[str, Any] | None) -> VectorReadings | None:
     if about is None:
         return None
-    values, clipped = (read_array(members, f"sensor_{i}/{key}") for key in (VALUES, CLIPPED))
+    values, clipped = (members[f"sensor_{i}/{key}"] for key in (VALUES, CLIPPED))
     place = None if about["place"] is None else np.array(about["place"], float)
     names = tuple(str(name) for name in about["names"])
     shape = (*values.shape[:1], values.shape[1] if place is None else len(place), len(names))
@@ -124,10 +124,10 @@ def _recording(path: str | os.PathLike, members: Any) -> Recording:
         raise FileError(
             f"'{path}' has the format {header['format']!r}, not '{RECORDING_FORMAT}': bake again with this version."
         )
-    arrays = {name: read_array(members, name) for name in ("frames", "times", "poses", "velocities")}
+    arrays = {name: members[name] for name in ("frames", "times", "poses", "velocities")}
     sensors = {}
     for i, name in enumerate(header["sensors"]):
-        own = {key: read_array(members, f"sensor_{i}/{key}") for key in SENSOR_FIELDS}
+        own = {key: members[f"sensor_{i}/{key}"] for key in SENSOR_FIELDS}
         sensors[str(name)] = SensorRecording(**own, channels=_channels(members, i, header.get("channels", {}).get(name)))
     count = len(arrays["frames"])
     parts = [*arrays.values(), *(array for sensor in sensors.values() for array in sensor.arrays())]

@@ -33,7 +33,7 @@ from ..model.target import Target
 from ..skins.channel_readouts import LinearReadout, MagneticReadout
 from ..skins.magnetic_skin import MagneticSkin, Magnetometers, Magnets
 from ..skins.readout_matrix import ReadoutMatrix
-from .npz import DAMAGED, read_array, write_arrays
+from .npz import DAMAGED, open_archive, write_arrays
 from .regular_file import open_regular
 
 SCENARIO_FORMAT = "palpate-scenario/1"
@@ -74,7 +74,7 @@ def load_scenario(path: str | os.PathLike) -> Scenario:
     if not Path(path).exists():
         raise FileError(f"There is no scenario '{path}': check its name and folder.")
     try:
-        with open_regular(path) as opened, np.load(opened, allow_pickle=False) as members:
+        with open_regular(path) as opened, open_archive(opened) as members:
             header = json.loads(str(members["header"]))
             if header["format"] != SCENARIO_FORMAT:
                 raise FileError(
@@ -120,7 +120,7 @@ def _unpacked(node: Any, members: Any) -> Any:
         stated = {name: _unpacked(item, members) for name, item in node["fields"].items()}
         return _CLASSES[node[_CLASS]](**stated)
     if _ARRAY in node:
-        array = read_array(members, f"array_{node[_ARRAY]}")
+        array = members[f"array_{node[_ARRAY]}"]
         return array[()] if node["scalar"] else array
     if _TUPLE in node:
         return tuple(_unpacked(item, members) for item in node[_TUPLE])

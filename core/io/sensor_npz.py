@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 from dataclasses import fields
 from pathlib import Path
@@ -15,7 +16,7 @@ from ..geometry.layout.grid_layout import GridLayout
 from ..geometry.layout.texture_maps import UVLayout
 from ..geometry.texels import Texels
 from ..model.sensor_parameters import Painted
-from .npz import DAMAGED, PackedArchive, open_archive, write_arrays
+from .npz import DAMAGED, open_archive, write_arrays
 from .regular_file import open_regular
 
 SENSOR_FORMAT = "palpate-sensor/1"
@@ -70,7 +71,8 @@ def load_sensor(path: str | os.PathLike) -> tuple[Texels, Painted]:
 
 def unpack_sensor(content: bytes) -> tuple[Texels, Painted]:
     """Read the content of a small file that :func:`save_sensor` wrote; raises what :data:`.npz.DAMAGED` lists."""
-    return sensor_in(PackedArchive(content))
+    with open_archive(io.BytesIO(content)) as members:
+        return sensor_in(members)
 
 
 def sensor_in(members: Any) -> tuple[Texels, Painted]:

@@ -26,14 +26,12 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from ..errors import FileError
 from ..geometry.texels import Texels
 from ..io.bake_folder import MANIFEST_NAME, RECORDING_NAME, folder_names, manifest_bytes
 from ..io.file_writing import atomic_write, file_sha256, os_error_reason, sync_folder, writable_folder, write_hashed
 from ..io.group_sync import GroupSync
-from ..io.npz import PACKED_BYTES, pack_arrays, write_arrays
+from ..io.npz import pack_arrays
 from ..io.private_folder import remove_tree
 from ..io.recording_npz import recording_arrays
 from ..io.sensor_manifest import manifest_of
@@ -275,21 +273,13 @@ def _write_sensors(place: Path, scenario: Scenario, recording: Recording, images
         own.mkdir()
         arrays = recording_arrays(replace(recording, sensors={sensor.name: recording.sensors[sensor.name]}))
         files = {
-            RECORDING_NAME: _write_recording(own / RECORDING_NAME, arrays),
+            RECORDING_NAME: write_hashed(own / RECORDING_NAME, pack_arrays(arrays)),
             SENSOR_NAME: write_hashed(own / SENSOR_NAME, shared.of(_sensor_bytes, sensor.texels, sensor.painted)),
         }
         if images:
             pictures = write_run_images(own, sensor, recording)
             files[pictures[-1]] = file_sha256(own / pictures[-1])  # it lists the others
         write_hashed(own / MANIFEST_NAME, manifest_bytes(manifest_of(scenario, sensor, recording, files)))
-
-
-def _write_recording(path: Path, arrays: Mapping[str, np.ndarray]) -> str:
-    """Write a recording and return its SHA-256."""
-    if sum(array.nbytes for array in arrays.values()) <= PACKED_BYTES:
-        return write_hashed(path, pack_arrays(arrays))
-    write_arrays(path, arrays, atomic=False)
-    return file_sha256(path)
 
 
 def _sensor_bytes(texels: Texels, painted: Painted) -> bytes:

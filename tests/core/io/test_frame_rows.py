@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from palpate.core.errors import FileError
-from palpate.core.io import frame_rows, npz
+from palpate.core.io import frame_rows
 from palpate.core.io.frame_rows import FrameRows, row_type
 from palpate.core.io.growing_file import GrowingFile
 from palpate.core.io.recording_npz import load_recording, save_recording
@@ -88,8 +88,6 @@ def test_blocks_leave_no_file_in_memory(tmp_path, monkeypatch):
     assert np.isfinite(found.poses).all() and resident() > 1000  # kB: all of it was read
     assert sum(len(part.frames) for part in found.blocks()) == 3000
     assert resident() < 200
-    save_recording(tmp_path / "recording.npz", found)
-    assert resident() < 200
 
 
 def test_rows_after_a_checkpoint_are_cut_off(tmp_path):
@@ -146,32 +144,15 @@ def test_a_growing_file_knows_its_checksum(tmp_path):
     file.close()
 
 
-def test_a_long_recording_is_mapped_when_it_is_read(tmp_path, monkeypatch):
-    expected = Recording.stack(frames(30), BODIES, 1e-4, "d")
-    save_recording(tmp_path / "recording.npz", expected)
-    monkeypatch.setattr(npz, "MAPPED_BYTES", 1000)
-    monkeypatch.setattr(npz, "SMALL_BYTES", 1000)
-    found = load_recording(tmp_path / "recording.npz")
-    for name, array in arrays_of(expected).items():
-        own = arrays_of(found)[name]
-        assert own.dtype == array.dtype and own.shape == array.shape and own.tobytes() == array.tobytes(), name
-    assert not found.poses.flags.writeable and found.frames.flags.writeable
-
-
-@pytest.mark.parametrize("change", ["truncated", "another checksum", "more than it says", "less than it says", "columns first"])
-def test_a_long_recording_that_is_damaged_is_refused(tmp_path, monkeypatch, change):
+@pytest.mark.parametrize("change", ["truncated", "another checksum", "less than it says"])
+def test_a_recording_that_is_damaged_is_refused(tmp_path, change):
     path = tmp_path / "recording.npz"
     save_recording(path, Recording.stack(frames(40), BODIES, 1e-4, "d"))
-    monkeypatch.setattr(npz, "MAPPED_BYTES", 1000)
-    monkeypatch.setattr(npz, "SMALL_BYTES", 1000)
     with zipfile.ZipFile(path) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
     content = members["poses.npy"]
-    if change == "columns first":
-        content = content.replace(b"'fortran_order': False,", b"'fortran_order': True, ")
     members["poses.npy"] = {
         "truncated": content[:50],
-        "more than it says": content + bytes(8),
         "less than it says": content[:-8],
     }.get(change, content)
     with zipfile.ZipFile(path, "w") as archive:
