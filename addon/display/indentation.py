@@ -3,8 +3,8 @@
 
 Geometry nodes subdivide the sensor's faces and move their vertices inwards. They read the penetration from an image that is
 packed into the .blend, with a row for each frame, so that the surface plays in any Blender and without the files of the bake.
-The user's mesh keeps its vertices. :mod:`....core.geometry.smooth_grid` says how the penetration is smoothed, and
-:mod:`.indented_surface` is the same surface for the overlay.
+Between the texels the penetration is the surface of Catmull and Clark, which Blender's node for subdivision makes
+(:mod:`....core.geometry.smooth_depth`). The user's mesh keeps its vertices.
 
 What reads a scene must not take the indented surface for the sensor's shape: :func:`.mesh_arrays.evaluated_mesh` gives the mesh
 without it.
@@ -18,10 +18,11 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ...core.geometry.smooth_depth import NEIGHBOUR_WEIGHT, SHARPENINGS
 from ..scene import mesh_arrays
-from ..scene.display_names import INDENTATION_MODIFIER, REST_POSITION
+from ..scene.display_names import INDENTATION_MODIFIER, MODIFIERS, REST_POSITION
 from ..session import transforms
-from . import materials, smooth_subdivision
+from . import materials
 from .baked_sensor import BakedSensor
 
 MARK = "indentation"
@@ -29,7 +30,7 @@ MARK = "indentation"
 FACTOR_LABEL = "Displacement / penetration"
 """Label of the node that holds the factor."""
 MOST_VERTICES = 12_000
-"""Vertices of a subdivided sensor at most; Blender 4.5 evaluates so many in about 15 ms per frame on one core."""
+"""Vertices of a subdivided sensor at most; Blender 4.5 takes about 35 ms per frame for half as many on a busy core."""
 MOST_LEVELS = 3
 """A cell of a coarse grid becomes 8 × 8 faces, on which the outline of a ball looks round."""
 MOST_PIXELS = 4_000_000
@@ -109,7 +110,6 @@ def clear(obj) -> None:
         block = materials.find_block(blocks, f"{uid}:{MARK}")
         if block is not None:
             blocks.remove(block)
-    smooth_subdivision.remove_unused()
 
 
 def factor_of(obj) -> float:
@@ -119,16 +119,6 @@ def factor_of(obj) -> float:
         return 0.0
     node = next((node for node in modifier.node_group.nodes if node.label == FACTOR_LABEL), None)
     return 0.0 if node is None else node.inputs["Scale"].default_value
-
-
-def moving_vertices(obj) -> np.ndarray | None:
-    """(nv,) bool: vertices that an indented object's surface moves at any frame; None for one that is not indented."""
-    attribute = obj.data.attributes.get(_Names(obj.palpate.uid).inward)
-    if attribute is None:
-        return None
-    inward = np.empty(3 * len(obj.data.vertices), dtype=np.float32)
-    attribute.data.foreach_get("vector", inward)
-    return inward.reshape(-1, 3).any(axis=1)
 
 
 @dataclass(frozen=True)
@@ -154,6 +144,8 @@ def may_indent(obj, depsgraph) -> bool:
     """Return True for a sensor with a surface of its own whose modifiers leave the number of its vertices as it is."""
     if obj.palpate.skin.method != "NONE":
         return False
+    if all(modifier.name in MODIFIERS for modifier in obj.modifiers):
+        return True
     with mesh_arrays.evaluated_mesh(obj, depsgraph) as mesh:
         return len(mesh.vertices) == len(obj.data.vertices)
 
@@ -214,9 +206,8 @@ def _nodes(uid: str, name: str, play: _Play, levels: int, factor: float):
     rest = _store(add, start, REST_POSITION, "FLOAT_VECTOR", add("GeometryNodeInputPosition").outputs[0])
     depth_name = f"palpate_depth:{uid}"
     coarse = _store(add, rest, depth_name, "FLOAT", _depth(add, names, play))
-    depth = _attribute(add, depth_name, "FLOAT")
-    fine, depth = smooth_subdivision.smooth_subdivision(add, coarse, depth, levels)
-    depth = smooth_subdivision.math(add, "MAXIMUM", depth, 0.0)
+    fine, depth = _subdivided(add, coarse, _attribute(add, depth_name, "FLOAT"), levels)
+    depth = _math(add, "MAXIMUM", depth, 0.0)
     inward = add("ShaderNodeVectorMath", operation="SCALE")
     link(_attribute(add, names.inward, "FLOAT_VECTOR"), inward.inputs[0])
     link(depth, inward.inputs["Scale"])
@@ -228,6 +219,38 @@ def _nodes(uid: str, name: str, play: _Play, levels: int, factor: float):
     link(exaggerated.outputs["Vector"], move.inputs["Offset"])
     link(move.outputs["Geometry"], add("NodeGroupOutput").inputs[0])
     return group
+
+
+def _subdivided(add, geometry, values, levels: int):
+    """Return the sockets of a mesh whose faces are cut evenly, and of the smooth surface of values through its vertices.
+
+    The node for subdivision smooths places and nothing else, so it is given a mesh whose places are the values. What it takes
+    from them is added to them beforehand.
+    """
+    if not levels:
+        return geometry, values
+    link, sharp = add.tree.links.new, values
+    for _ in range(SHARPENINGS):
+        blur = add("GeometryNodeBlurAttribute", data_type="FLOAT")
+        blur.inputs["Iterations"].default_value, blur.inputs["Weight"].default_value = 1, NEIGHBOUR_WEIGHT
+        link(sharp, blur.inputs["Value"])
+        sharp = _math(add, "ADD", sharp, _math(add, "SUBTRACT", values, blur.outputs["Value"]))
+    place = add("ShaderNodeCombineXYZ")
+    link(sharp, place.inputs["X"])
+    graph = add("GeometryNodeSetPosition")
+    link(geometry, graph.inputs["Geometry"])
+    link(place.outputs["Vector"], graph.inputs["Position"])
+    smooth, even = add("GeometryNodeSubdivisionSurface"), add("GeometryNodeSubdivideMesh")
+    link(graph.outputs["Geometry"], smooth.inputs["Mesh"])
+    link(geometry, even.inputs["Mesh"])
+    smooth.inputs["Level"].default_value = even.inputs["Level"].default_value = levels
+    at = add("GeometryNodeSampleIndex", data_type="FLOAT_VECTOR", domain="POINT")
+    link(smooth.outputs["Mesh"], at.inputs["Geometry"])
+    link(add("GeometryNodeInputPosition").outputs[0], at.inputs["Value"])
+    link(add("GeometryNodeInputIndex").outputs[0], at.inputs["Index"])
+    value = add("ShaderNodeSeparateXYZ")
+    link(at.outputs["Value"], value.inputs[0])
+    return even.outputs["Mesh"], value.outputs["X"]
 
 
 def _depth(add, names: _Names, play: _Play):
@@ -255,6 +278,17 @@ def _depth(add, names: _Names, play: _Play):
     link(texture.outputs["Color"], chosen.inputs[0])
     link(_attribute(add, names.channel, "FLOAT_VECTOR"), chosen.inputs[1])
     return chosen.outputs["Value"]
+
+
+def _math(add, operation: str, first, second):
+    """Return the socket of a calculation with a socket and a socket or number."""
+    node = add("ShaderNodeMath", operation=operation)
+    add.tree.links.new(first, node.inputs[0])
+    if isinstance(second, float):
+        node.inputs[1].default_value = second
+    else:
+        add.tree.links.new(second, node.inputs[1])
+    return node.outputs[0]
 
 
 def _store(add, geometry, name: str, data_type: str, value):

@@ -13,11 +13,11 @@ import bpy
 import numpy as np
 
 from ...core.figures import color_maps
+from ...core.geometry.mesh import TriangleMesh, vertex_normals
 from ...core.io.bake_reader import frame_index
-from ..scene import baked_names
+from ..scene import baked_names, participants
 from ..session import redraw, transforms, units, view_shading
-from . import bake_display, indentation, indented_surface, inset
-from .indented_surface import IndentedSurface
+from . import bake_display, indentation, inset, materials
 
 LIFT = 0.004
 """Distance of the overlay from the sensor's surface, as a share of the sensor's size: at zero the two would flicker."""
@@ -35,9 +35,8 @@ class SensorOverlay:
     Attributes
     ----------
     corners : (c, 3) float32
+        Of one triangle after another.
     colors : (c, 4) float32
-    triangles : (t, 3) int32 or None
-        Corners of each triangle; None where they stand one after another.
     at_rest : (c, 3) float32 or None
         Where the corners would be on a surface without indentation, as the one that Blender draws while playing. What hides
         that surface hides the indentation, and that surface itself does not.
@@ -53,7 +52,6 @@ class SensorOverlay:
     colors: np.ndarray
     line: np.ndarray | None
     plain_only: bool = False
-    triangles: np.ndarray | None = None
     at_rest: np.ndarray | None = None
     normals: np.ndarray | None = None
     batches: list | None = None
@@ -91,8 +89,8 @@ def sensor_overlays(scene, run, frame) -> list[SensorOverlay]:
         if not sensor.readout:
             continue
         readings, pose = frame.sensors[sensor.name], frame.poses[sensor.body]
-        surface = _indented_surface(scene, obj, sensor.texels, factor * readings.depth)
-        overlay = _heat_map(scene, sensor.texels, readings.normal_force, pose, maximum, scale, surface)
+        displacement = (factor if _gives_way(scene, obj) else 0.0) * readings.depth
+        overlay = _heat_map(scene, sensor.texels, readings.normal_force, displacement, pose, maximum, scale)
         overlay.line = _net_force(readings, pose, length, scale)
         overlays.append(overlay)
     return overlays
@@ -124,9 +122,9 @@ def baked_overlays(scene, bake, number: int, maximum: float) -> list[SensorOverl
         if body in recording.body_names:
             pose = poses[recording.body_names.index(body)]
             readings, obj = sensors[name], objects.get(name)
-            surface = _indented_surface(scene, obj, texels, indentation.factor_of(obj) * readings.depth)
-            overlay = _heat_map(scene, texels, readings.normal_force, pose, maximum, units.metres_per_unit(scene), surface)
-            overlay.plain_only, overlay.at_rest = True, None  # the surface that Blender draws is indented, too
+            displacement = indentation.factor_of(obj) * readings.depth
+            overlay = _heat_map(scene, texels, readings.normal_force, displacement, pose, maximum, units.metres_per_unit(scene))
+            overlay.plain_only = True
             overlays.append(overlay)
     return overlays
 
@@ -161,57 +159,47 @@ def _scale(scene, run, frame) -> tuple[float, float]:
     return (limit if settings.use_auto_range else bake_display.user_range(settings)), net
 
 
-@dataclass(frozen=True)
-class _Indented:
-    """A surface, the displacement of its texels, (n,) metres, and which of them may, (n,) bool."""
-
-    surface: IndentedSurface
-    displacement: np.ndarray
-    touched: np.ndarray
-
-
-def _indented_surface(scene, obj, texels, displacement: np.ndarray) -> _Indented | None:
-    """Return the indented surface of a sensor; None if nothing is indented."""
-    if not (displacement > 0.0).any():
-        return None
-    surface = indented_surface.surface_of(scene, obj, texels)
-    if surface is None:
-        return None
-    moving = indentation.moving_vertices(obj)
-    return _Indented(surface, displacement, displacement > 0.0 if moving is None else moving[texels.vertex])
+def _gives_way(scene, obj) -> bool:
+    """Return True for a sensor that a bake would indent."""
+    if obj is None or obj.type != "MESH" or obj.mode == "EDIT":
+        return False
+    # As it is: bringing it up to date while playing would report changes, for which the run is dropped and computed again.
+    depsgraph = participants.view_layer_of(scene).depsgraph
+    return depsgraph is not None and indentation.may_indent(obj, depsgraph)
 
 
 def _heat_map(
-    scene, texels, force: np.ndarray, pose: np.ndarray, maximum: float, scale: float, indented: _Indented | None = None
+    scene, texels, force: np.ndarray, displacement: np.ndarray, pose: np.ndarray, maximum: float, scale: float
 ) -> SensorOverlay:
     """Return the heat map of a sensor at a pose, (7,) in metres; `scale` is the metres of a Blender unit.
 
-    It lies on both sides of the surface, because the body of a sensor that is a sheet is seen from both.
+    It lies on both sides of the surface, because the body of a sensor that is a sheet is seen from both. Its texels are moved
+    inwards by `displacement`, (n,) metres.
     """
     lift = LIFT * _size(texels)
     rotation = transforms.rotation(pose[3:])
     rgb = color_maps.colors(scene.palpate.color_map, bake_display.displayed_values(scene.palpate, force, texels) / maximum)
+    triangles = texels.layout.triangles
+    corner = triangles.ravel()
 
-    def on_both_sides(position: np.ndarray, normal: np.ndarray, rise: np.ndarray | float = 0.0) -> np.ndarray:
-        lifted = normal * np.reshape(lift + rise, (-1, 1))
-        sides = [(pose[:3] + (position + side * lifted) @ rotation.T) / scale for side in (1.0, -1.0)]
+    def on_both_sides(position: np.ndarray) -> np.ndarray:
+        lifted = lift * texels.normal
+        sides = [(pose[:3] + (position + side * lifted)[corner] @ rotation.T) / scale for side in (1.0, -1.0)]
         return np.concatenate(sides).astype(np.float32)
 
-    if indented is None:
-        corner = texels.layout.triangles.ravel()
-        corners = on_both_sides(texels.position[corner], texels.normal[corner])
-        return SensorOverlay(corners, np.tile(_opaque(rgb[corner]), (2, 1)), None)
-    surface = indented.surface
-    position, shade = surface.displaced(indented.displacement, indented.touched)
-    colors = _opaque(surface.between(rgb) * shade[:, None])
-    halves = np.concatenate([surface.quads[:, [0, 1, 2]], surface.quads[:, [0, 2, 3]]])
+    if not (displacement > 0.0).any():
+        return SensorOverlay(on_both_sides(texels.position), np.tile(_opaque(rgb[corner]), (2, 1)), None)
+    position = texels.position - np.maximum(displacement, 0.0)[:, None] * texels.normal
+    # The light comes from between the normal and the tangent.
+    towards = vertex_normals(TriangleMesh(position, triangles))
+    lit = np.clip(np.einsum("ij,ij->i", towards, texels.normal + texels.tangent), 0.0, 1.0)
+    shade = np.where(displacement > 0.0, materials.GLOW + (1.0 - materials.GLOW) * lit, 1.0)
     return SensorOverlay(
-        on_both_sides(position, surface.normal),
-        np.tile(colors, (2, 1)),
+        on_both_sides(position),
+        np.tile(_opaque((rgb * shade[:, None])[corner]), (2, 1)),
         None,
-        triangles=np.ascontiguousarray(np.concatenate([halves, halves + len(position)]), dtype=np.int32),
-        at_rest=on_both_sides(surface.position, surface.normal, surface.rise),
-        normals=np.tile(surface.normal @ rotation.T, (2, 1)).astype(np.float32),
+        at_rest=on_both_sides(texels.position),
+        normals=np.tile(texels.normal[corner] @ rotation.T, (2, 1)).astype(np.float32),
     )
 
 
@@ -296,7 +284,7 @@ def _batches(overlay: SensorOverlay) -> list:
         # Where the dent is seen at a flat angle, the surface that Blender draws reaches beyond it, and would be grey.
         rest = {"pos": overlay.at_rest, "color": overlay.colors}
         drawn = [(plain, rest), (_indentation_shader(), {**content, "at_rest": overlay.at_rest, "normal": overlay.normals})]
-    result = [(shader, batch_for_shader(shader, "TRIS", what, indices=overlay.triangles), {}) for shader, what in drawn]
+    result = [(shader, batch_for_shader(shader, "TRIS", what), {}) for shader, what in drawn]
     if overlay.line is not None:
         lines = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
         viewport = gpu.state.viewport_get()[2:]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The surface of a gel as a camera behind it sees it, lit by a red, a green and a blue lamp from three sides.
 
-The surface is the baked penetration, smooth between texels (:mod:`..geometry.smooth_grid`). It is shaded directly, without a
+The surface is the baked penetration, smooth between texels (:mod:`..geometry.smooth_depth`). It is shaded directly, without a
 renderer: light of lamp i is ``brightness · albedo · max(0, n · lᵢ) / sin(angle)``, n being the unit normal of the surface
 towards the camera and lᵢ the unit vector to the lamp. Light that is blocked by other parts of the surface, reflected between
 them or refracted is left out, and the camera has no perspective. So this is a picture of penalty depths and not a calibrated
@@ -18,7 +18,7 @@ import numpy as np
 
 from ..errors import ParameterError, SensorError
 from ..geometry.layout.grid_layout import GridLayout
-from ..geometry.smooth_grid import smooth_depth, smooth_values
+from ..geometry.smooth_depth import smooth_depth
 from ..geometry.texels import Texels
 from ..model.recording import SensorFrame
 from ..response import metrics
@@ -169,7 +169,7 @@ def marker_places(texels: Texels, name: str, pitch: float | None) -> tuple[np.nd
 def marker_shifts(sensor: SensorFrame, texels: Texels, sigma0: float, places: np.ndarray) -> np.ndarray:
     """Return by how much shear carries markers along: shear of a texel over the stiffness of its bristles, ``u = f / σ₀``.
 
-    The shear is smooth between texels as the penetration is.
+    Between texels the shear is linear.
 
     Parameters
     ----------
@@ -182,9 +182,11 @@ def marker_shifts(sensor: SensorFrame, texels: Texels, sigma0: float, places: np
     -------
     (m, 2) float, metres, along the columns and the rows
     """
-    column, row = (places / _pitches(texels)).T
+    from scipy.ndimage import map_coordinates
+
+    at = (places / _pitches(texels)).T[::-1]
     shift = texels.layout.image(sensor.shear / sigma0)
-    return np.column_stack([smooth_values(shift[:, :, axis], row, column) for axis in (0, 1)])
+    return np.column_stack([map_coordinates(shift[:, :, axis], at, order=1, mode="nearest") for axis in (0, 1)])
 
 
 def _pitches(texels: Texels) -> np.ndarray:
@@ -204,9 +206,11 @@ def _shaded(sensor: SensorFrame, texels: Texels, style: GelStyle) -> np.ndarray:
     """(height, width, 3) float: the linear light of the three lamps from an unprinted gel."""
     width, height = image_size(texels, style.size)
     rows, columns = texels.layout.shape
-    row = (rows - 1) * (1.0 - (np.arange(height) + 0.5) / height)
-    column = (columns - 1) * (1.0 - (np.arange(width) + 0.5) / width)
-    _, row_slope, column_slope = smooth_depth(texels.layout.image(sensor.depth), row, column)
+    # with a pixel beyond each border, so that every slope is between neighbours
+    row = (rows - 1) * (1.0 - (np.arange(-1, height + 1) + 0.5) / height)
+    column = (columns - 1) * (1.0 - (np.arange(-1, width + 1) + 0.5) / width)
+    slopes = np.gradient(smooth_depth(texels.layout.image(sensor.depth), row, column), row, column)
+    row_slope, column_slope = (slope[1:-1, 1:-1] for slope in slopes)
     pitch_x, pitch_y = _pitches(texels)
     # Where the gel is pressed it comes nearer to the camera. To the right of the image are the lower columns.
     normal = np.stack([column_slope / pitch_x, -row_slope / pitch_y, np.ones_like(row_slope)], axis=-1)

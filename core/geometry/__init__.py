@@ -4,8 +4,7 @@
 :mod:`.mesh` checks meshes and computes their normals, areas and mass properties; :mod:`.bvh` finds where segments meet them.
 :mod:`.texels` makes texels of a region's vertices, and :mod:`.projection` shows them from outside. :mod:`.layout` arranges
 texels as images, and :mod:`.sampling` places texels on a surface that has none. :mod:`.point_surface` joins points of a
-surface by triangles. :mod:`.smooth_grid` is the smooth surface of penetration between texels in rows and columns,
-:mod:`.smooth_mesh` that between texels on any faces.
+surface by triangles. :mod:`.smooth_depth` is the smooth surface of penetration between texels in rows and columns.
 """
 
 __all__ = [
@@ -18,7 +17,6 @@ __all__ = [
     "rotations",
     "sampling",
     "shapes",
-    "smooth_grid",
-    "smooth_mesh",
+    "smooth_depth",
     "texels",
 ]
