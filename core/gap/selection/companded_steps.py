@@ -19,7 +19,7 @@ LEAST_READINGS = 400
 """Number of readings from which on steps are looked for."""
 LEAST_CHARACTERISTIC, CHARACTERISTIC_NOISE = 0.2, 5.0
 """Least magnitude of the characteristic function at the frequency of the steps: 0.2 + 5 / √(number of readings). Of 120
-readings with steps none was missed by it, and no alarm was false in 120 without (``python -m benchmarks companding``)."""
+readings with steps none was missed by it, and no alarm was false in 120 without (benchmarks/RESULTS.md)."""
 LEAST_REPEATED = 0.02
 """Share of the readings that repeat another exactly, from which on a converter made them. Noise repeats nothing, and a smooth
 ramp without noise, whose samples are as regular as steps, neither. Chosen by eye."""

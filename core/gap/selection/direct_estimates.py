@@ -41,7 +41,7 @@ as levels) to steps of 2.5 standard deviations of the noise."""
 MOST_FREQUENCIES = 20000
 AS_CLEAR = 0.9
 """Of a power and a logarithm the one counts behind which steps are seen best, and the other if its characteristic function
-reaches this share. Chosen by eye from 40 readings of ``python -m benchmarks companding``."""
+reaches this share. Chosen by eye from 40 readings behind companding converters."""
 
 
 def unresponsive_texels(views: Sequence[TrialView], model: Model, candidate: Candidate, texels: int) -> Effect | None:

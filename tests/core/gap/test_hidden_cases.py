@@ -113,71 +113,12 @@ def test_a_formula_of_the_third_family_changes_what_is_recorded_and_stays_finite
     assert changes[0] < 0.1 * changes[2] and changes[0] < changes[1] < changes[2] and changes[2] > 0.02
 
 
-def test_floating_inputs_forget_their_charge_and_feel_nothing():
-    pad, record = pressed_pad()
-    for strength, count in ((0.02, 1), (0.3, 2), (3.0, 8)):
-        hidden = third.dead_texels(np.random.default_rng(5), strength)
-        dead = hidden.values["texels"]
-        assert len(dead) == count and set(np.diff(dead)) <= {world.COLUMNS}
-        (_, plain, _), (_, reading, _) = record(), record(hidden)
-        alive = np.setdiff1d(np.arange(84), dead)
-        np.testing.assert_array_equal(reading[:, alive], plain[:, alive])
-        charge = np.abs(reading[:, dead] - pad.zero)
-        assert (np.diff(charge, axis=0) < 0).all() and charge.max() < 0.2 * third._full(pad)
-
-
 def test_a_fractional_solid_relaxes_as_the_complementary_error_function():
     """E of order 1/2 is known: E(-√t) = exp(t) erfc(√t). The integral ends where r^(1/2) = 3e-7 of it is left."""
     from scipy.special import erfcx
 
     time = np.array([0.0, 0.01, 0.3, 2.0, 40.0])
     np.testing.assert_allclose(third._mittag_leffler(time, 0.5), erfcx(np.sqrt(time)), atol=1e-6)
-
-
-def test_the_plate_hands_forces_on_and_loses_none():
-    pad, record = pressed_pad()
-    _, plain, _ = record()
-    _, spread, _ = record(third.load_spreading(np.random.default_rng(0), 1.0))
-    np.testing.assert_allclose((spread - pad.zero).sum(axis=1), (plain - pad.zero).sum(axis=1), atol=1e-9 * np.ptp(plain) * 84)
-
-
-def test_three_averages_delay_a_ramp_by_one_and_a_half_of_their_width():
-    pad, record = pressed_pad(radius=None)
-    effect_ = third.lag(np.random.default_rng(0), 0.8)
-    before, _, _ = record()
-    after, _, _ = record(effect_)
-    ramp = slice(round(2.2 / 0.02), round(2.9 / 0.02))  # 1 mm/s for longer than the 0.6 s that the filter remembers
-    slope = pad.gain * pad.k * 1e-3
-    late = (before.reading - after.reading)[ramp] / slope
-    # Boxes are whole sixteenths of a sample and end half of one early.
-    np.testing.assert_allclose(late, 1.5 * effect_.values["width"], atol=1.5 * 0.02 / 16 + 1e-9)
-
-
-def test_bergs_friction_is_a_hyperbola_from_each_reversal_and_turns_with_the_way():
-    pad, record = pressed_pad(radius=None)
-    hidden = third.hysteresis(np.random.default_rng(2), 0.4)
-    plain, loop = record()[0], record(hidden)[0]
-    friction = (loop.force - plain.force)[:, 0] / (hidden.values["share"] * pad.k * third.DEEP)
-    depth, length = plain.depth[:, 0], hidden.values["length"]
-    first = (plain.time > 1.1) & (plain.time < 2.9)
-    np.testing.assert_allclose(friction[first], depth[first] / (length + depth[first]), rtol=1e-9)
-    back = (plain.time > 3.1) & (plain.time < 3.9)
-    held, gone = 3e-3 / (length + 3e-3), 3e-3 - depth[back]
-    np.testing.assert_allclose(friction[back], held - (1 + held) * gone / (length * (1 + held) + gone), rtol=1e-9)
-
-
-def test_sneak_currents_show_on_the_fourth_corner_alone():
-    """Three loaded texels at the corners of a rectangle: the fourth reads a third of what each carries, times the share."""
-    pad, _ = pressed_pad()
-    contact = world.Contact(np.arange(2) * 0.02, *(np.zeros((2, 84)),) * 6)
-    reading = np.full((2, 84), pad.zero)
-    corners = [2 * world.COLUMNS + 1, 2 * world.COLUMNS + 4, 9 * world.COLUMNS + 4]
-    reading[1, corners] += 300.0
-    signals = world.Signals(contact, np.zeros((2, 84)), np.zeros((2, 84, 3)), reading.copy())
-    third.crosstalk(np.random.default_rng(0), 0.5).reading(signals, pad)
-    expected = reading.copy()
-    expected[1, 9 * world.COLUMNS + 1] += 0.5 * 0.2 * 100.0
-    np.testing.assert_allclose(signals.reading, expected, rtol=1e-12)
 
 
 @pytest.mark.long("draws a case with three hidden effects")
