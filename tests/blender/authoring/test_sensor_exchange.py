@@ -37,42 +37,6 @@ def test_probe_lists_of_sample_scenes(sample, item, tmp_path):
     assert ("row" in listed) == (sample != "fingertip")
 
 
-@pytest.mark.parametrize("sample", SAMPLES)
-def test_mujoco_reads_sample_scenes(item, tmp_path):
-    mujoco = pytest.importorskip("mujoco", reason="MuJoCo reads the MJCF: pip install mujoco")
-    model = mujoco.MjModel.from_xml_path(str(export_sensors([item], "mjcf", tmp_path).files[0]))
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_MESH, f"{item.name} texels")
-    first, count = model.mesh_vertadr[index], model.mesh_vertnum[index]
-    geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, f"{item.name} texels")
-    world = model.mesh_vert[first : first + count] @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
-    body = data.body(item.name)
-    ours = item.sensor.texels.position @ body.xmat.reshape(3, 3).T + body.xpos
-    assert count == len(item.sensor.texels) and model.sensor_dim[0] == 3 * count
-    assert np.abs(world - ours).max() < FLOAT32
-
-
-@pytest.mark.parametrize("sample", SAMPLES)
-def test_urdf_libraries_read_sample_scenes(item, tmp_path):
-    yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy reads the URDF: pip install yourdfpy")
-    robot = yourdfpy.URDF.load(str(export_sensors([item], "urdf", tmp_path).files[1]))
-    poses = np.array([robot.get_transform(joint.child, robot.base_link) for joint in robot.robot.joints])
-    assert np.abs(poses[:, :3, 3] - item.sensor.texels.position).max() < FLOAT32
-    assert np.abs(poses[:, :3, 2] - item.sensor.texels.normal).max() < FLOAT32
-
-
-@pytest.mark.parametrize("sample", SAMPLES)
-def test_usd_core_reads_sample_scenes(item, tmp_path):
-    pytest.importorskip("pxr", reason="usd-core reads the USD: pip install usd-core")
-    from pxr import Usd, UsdGeom
-
-    stage = Usd.Stage.Open(str(export_sensors([item], "usd", tmp_path).files[0]))
-    points = UsdGeom.Points(stage.GetPrimAtPath(stage.GetDefaultPrim().GetPath().AppendChild("texels")))
-    assert np.abs(np.array(points.GetPointsAttr().Get()) - item.sensor.texels.position).max() < FLOAT32
-    assert np.abs(np.array(points.GetNormalsAttr().Get()) - item.sensor.texels.normal).max() < FLOAT32
-
-
 def test_a_laid_sensor_brings_the_surface_that_carries_it(scene):
     ball = scenes.ball(radius=0.02, location=(0.1, 0.2, 0.3))
     ball.scale = (2.0, 2.0, 2.0)
