@@ -1,27 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Faults of the data are found with evidence, put right on request, and no healthy rig is accused."""
 
-import ast
+import re
 from dataclasses import replace
 from pathlib import Path
 
+import faulty_rigs as made
 import gap_cases as cases
 import numpy as np
 import pytest
 
-from palpate.benchmarks._faulty import faults as made
-from palpate.benchmarks._faulty.sensors import FAMILIES
 from palpate.benchmarks._handmade import low_pass
 from palpate.benchmarks._recordings import Recording
-from palpate.benchmarks.data_faults import is_right
 from palpate.core.errors import PalpateError
 from palpate.core.gap.data_faults.clock_corrections import refined_shifts, with_shift
 from palpate.core.gap.data_faults.search import find_faults, put_right
 from palpate.core.gap.dataset.fault_kinds import FAULT_KINDS
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.forward.stimulus import stimulus_of
-
-FOLDER = Path(made.__file__).parent
 
 
 def stimuli_of(rig):
@@ -33,14 +29,8 @@ def with_correction(path, words='"all"'):
     return path
 
 
-@pytest.mark.parametrize("path", sorted(FOLDER.glob("*.py")), ids=lambda path: path.stem)
-def test_the_generator_shares_nothing_with_the_package(path):
-    allowed = {"__future__", "collections", "dataclasses", "pathlib", "numpy", "scipy"}
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            assert {name.name.split(".")[0] for name in node.names} <= allowed
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 1 or node.module.split(".")[0] in allowed
+def test_the_generator_shares_nothing_with_the_package():
+    assert not re.search(r"^\s*(from|import) palpate", Path(made.__file__).read_text(encoding="utf-8"), re.MULTILINE)
 
 
 def test_every_kind_of_fault_is_made():
@@ -52,7 +42,7 @@ def test_a_fault_is_found_and_put_right(tmp_path, kind):
     case = made.draw("gel", kind, 0, tmp_path)
     rig = read_rig(case.path)
     found = find_faults(rig, stimuli_of(rig))
-    assert is_right(case, [(fault.kind, fault.trials) for fault in found])
+    assert made.is_right(case, [(fault.kind, fault.trials) for fault in found])
     assert found[0].sentence.endswith("puts it right.") and "\n" not in found[0].sentence
     rig = read_rig(with_correction(case.path))
     mended, faults = put_right(rig, stimuli_of(rig))
@@ -61,7 +51,7 @@ def test_a_fault_is_found_and_put_right(tmp_path, kind):
     assert not find_faults(mended, stimuli_of(mended))
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", made.FAMILIES)
 def test_a_healthy_rig_is_not_accused(tmp_path, family):
     for number in range(3):
         rig = read_rig(made.draw(family, "", number, tmp_path).path)

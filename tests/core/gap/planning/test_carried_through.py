@@ -5,8 +5,8 @@ import json
 
 import numpy as np
 import pytest
+import relaxing_pad as pad
 
-from palpate.benchmarks import _relaxing_pad as pad
 from palpate.commands import main
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A pad whose stress relaxes, under a ball that presses it slowly and once: recordings that leave open what is hidden.
 
-``tests/core/gap/planning/test_carried_through.py`` carries the next experiment through on it.
+``test_carried_through.py`` carries the next experiment through on it.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ._hidden.rig_text import rig_head
-from ._small_pad import COLUMNS, DEEP, PITCH, RADIUS, RATE, ROWS, K, loads, write_recording
+from palpate.benchmarks._hidden.rig_text import rig_head
+from palpate.benchmarks._small_pad import COLUMNS, DEEP, PITCH, RADIUS, RATE, ROWS, K, loads, write_recording
 
 SHARE, TAU, POWER = 0.35, 2.5, 0.6
 """Of the stress that relaxes: by a stretched exponential (Kohlrausch), which the library does not have."""
