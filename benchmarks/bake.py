@@ -3,8 +3,7 @@
 
 A cached frame is what scrubbing costs on top of Blender's own work: the same `frame_set` with playback on, less the time with
 it off. The bake is compared with solving the same scenario alone, in turn: it also samples, writes images, keyframes and files.
-It ends when the scene shows it. The folder of the bake before is removed while the user goes on, so that this is waited for
-between the measurements and not in them.
+It ends when the scene shows it and the bake before is removed.
 """
 
 from __future__ import annotations
@@ -105,7 +104,6 @@ def sample_bake_and_solve(name: str) -> tuple[float, float]:
 
 def _in_turn(scene, rounds: int) -> tuple[float, float]:
     from palpate.addon.bake.bake import bake
-    from palpate.core.io import bake_switch
     from palpate.core.jobs.job_runner import run_job
     from palpate.core.solver.simulation import run
 
@@ -115,10 +113,8 @@ def _in_turn(scene, rounds: int) -> tuple[float, float]:
         start = time.perf_counter()
         scenario = run_job(bake(scene)).scenario
         middle = time.perf_counter()
-        bake_switch.wait_for_removals()
-        begun = time.perf_counter()
         run(scenario)
-        times.append((middle - start, time.perf_counter() - begun))
+        times.append((middle - start, time.perf_counter() - middle))
     return tuple(statistics.median(column) for column in zip(*times, strict=True))
 
 
@@ -127,7 +123,6 @@ def bake_with_channels(frames: int) -> tuple[float, float]:
     import bpy
 
     from palpate.addon.bake.bake import bake
-    from palpate.core.io import bake_switch
     from palpate.core.jobs.job_runner import run_job
 
     with tempfile.TemporaryDirectory() as folder:
@@ -147,7 +142,6 @@ def bake_with_channels(frames: int) -> tuple[float, float]:
                 start = time.process_time()
                 run_job(bake(scene))
                 found.append(time.process_time() - start)
-                bake_switch.wait_for_removals()
         return tuple(statistics.median(found[1:]) for found in times.values())
 
 

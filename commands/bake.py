@@ -196,7 +196,6 @@ def report(baked: BakeResult) -> str:
         rows.append((name, str(count), *(_newtons(value) for value in (*peaks[name], at_end[name]))))
     lines += ["", console.text_table(rows, "<>>>>>")]
     lines += [f"warning: {warning}" for warning in recording.warnings]
-    lines += [f"note: {note}" for note in baked.notes]
     return "\n".join(lines)
 
 

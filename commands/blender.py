@@ -6,17 +6,15 @@ from __future__ import annotations
 import argparse
 import importlib
 import os
-import secrets
-import shutil
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core.errors import FileError, PalpateError, read_errors_said
-from ..core.io import bake_switch
-from ..core.io.file_writing import back_up, exchange_file, remove_leftovers_of, sync_file, writable_file
+from ..core.io.file_writing import writable_file
 from ..core.io.regular_file import open_regular, require_regular
 from . import console
 
@@ -104,7 +102,6 @@ def open_blend(path: str | os.PathLike, scripts: str = REFUSE) -> None:
     require_utf8(path)
     if os.path.isdir(path):
         raise FileError(f"'{path}' is a folder: give the name of a .blend file in it.")
-    bake_switch.settle_blend(path)
     with read_errors_said(path), open_regular(path) as file:
         magic = file.read(7)
     if magic != b"BLENDER" and not magic.startswith(_COMPRESSED):
@@ -177,31 +174,23 @@ def check_writable(path: Path) -> None:
 def save_blend(path: str | os.PathLike, backup: bool = True) -> None:
     """Save the open scene, compressed. With `backup`, an existing file becomes .blend1, as in Blender itself.
 
-    At every moment there is a file of this name, the old one or the new one. A symbolic link stays a link.
+    At every moment there is a file of this name, the old one or the new one. A symbolic link stays a link. Blender goes on with
+    the file that is open.
 
     Raises
     ------
     FileError
         The file cannot be written. An existing file is unchanged.
     """
-    import bpy
-
     blend = blend_to_save(path)
-    backups = blend.backups if backup else 0
+    if not backup:
+        blend = replace(blend, backups=0)
     with _save_errors(path):
-        remove_leftovers_of(blend.path)
-        if _is_open_file(blend.path):
-            waiting = blend.path.with_name(f".{blend.path.name}.{secrets.token_hex(4)}.partial")
-            blend.write(waiting)
-            exchange_file(waiting, blend.path, backups)
-            return
-        if backups and blend.path.exists():
-            back_up(blend.path, backups)
-        with _restored_on_error(blend.path), _without_versions():  # Blender replaces the file with a single rename
-            bpy.ops.wm.save_as_mainfile(filepath=str(blend.path), compress=True, relative_remap=True)
-            if not _is_whole(blend.path):
-                raise OSError("it was cut short")
-            sync_file(blend.path)
+        try:
+            blend.prepare()
+            blend.exchange()
+        finally:
+            blend.waiting.unlink(missing_ok=True)
 
 
 def blend_to_save(path: str | os.PathLike) -> BlendToSave:
@@ -224,22 +213,13 @@ def blend_to_save(path: str | os.PathLike) -> BlendToSave:
 
 
 def _write_copy(waiting: Path, target: Path) -> None:
-    """Write the open scene to `waiting`, which lies beside `target` and will replace it, and bring it onto the disk."""
+    """Write the open scene to `waiting`, which lies beside `target` and will replace it."""
     import bpy
 
     with _save_errors(target):
-        try:
-            with _without_versions():
-                bpy.ops.wm.save_as_mainfile(
-                    filepath=str(waiting), compress=True, copy=True, relative_remap=not _is_open_file(target)
-                )
-            if not _is_whole(waiting):
-                raise OSError("it was cut short")
-            sync_file(waiting)
-        except BaseException:
-            with suppress(OSError):
-                waiting.unlink(missing_ok=True)
-            raise
+        bpy.ops.wm.save_as_mainfile(filepath=str(waiting), compress=True, copy=True, relative_remap=not _is_open_file(target))
+        if not _is_whole(waiting):
+            raise OSError("it was cut short")
 
 
 def _is_open_file(path: Path) -> bool:
@@ -248,20 +228,6 @@ def _is_open_file(path: Path) -> bool:
 
     opened = bpy.data.filepath
     return bool(opened) and path.exists() and os.path.exists(opened) and path.samefile(opened)
-
-
-@contextmanager
-def _without_versions() -> Iterator[None]:
-    """Let Blender keep no earlier versions: it moves the old file away before the new one is in its place."""
-    import bpy
-
-    files = bpy.context.preferences.filepaths
-    versions = files.save_version
-    try:
-        files.save_version = 0
-        yield
-    finally:
-        files.save_version = versions
 
 
 @contextmanager
@@ -279,24 +245,3 @@ def _is_whole(path: Path) -> bool:
     with path.open("rb") as file:
         file.seek(-len(_SEEKABLE_END), os.SEEK_END)
         return file.read() == _SEEKABLE_END
-
-
-@contextmanager
-def _restored_on_error(path: Path) -> Iterator[None]:
-    """Restore a file, or remove a new one, if the body raises. The copy is a hard link where the file system has them."""
-    copy = path.with_name(f".{path.name}.{secrets.token_hex(4)}.partial") if path.exists() else None
-    if copy is not None:
-        try:
-            os.link(path, copy)
-        except OSError:  # the file system has no hard links
-            shutil.copy2(path, copy)
-    try:
-        yield
-    except BaseException:
-        with suppress(OSError):
-            os.replace(copy, path) if copy is not None else path.unlink()
-        if copy is not None:
-            copy.unlink(missing_ok=True)  # where nothing was written, both are one file, and the exchange does nothing
-        raise
-    if copy is not None:
-        copy.unlink()

@@ -14,7 +14,7 @@ from ..core.figures.figure_style import FigureStyle
 from ..core.figures.picture_labels import Label, label_picture
 from ..core.figures.tactile_strip import tactile_strip
 from ..core.figures.time_curves import force_curves
-from ..core.io.file_writing import remove_leftovers, writable_folder
+from ..core.io.file_writing import remove_unfinished_files, writable_folder
 from ..core.response import metrics
 from . import blender, console, figure_options
 from .bake import bake_with_progress, report
@@ -70,10 +70,10 @@ def _build_and_bake(blend: Path, size: tuple[int, int]) -> tuple[Any, BakeResult
     from ..sample_blends import demo
 
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    scene = bpy.context.scene
-    demo.build(scene)
-    demo.frame_picture(scene, size)
+    demo.build(bpy.context.scene)
+    demo.frame_picture(bpy.context.scene, size)
     blender.save_blend(blend, backup=False)  # before the bake, because the bake folder is relative to the file
+    scene = blender.open_scene(blend)
     baked = bake_with_progress(scene)
     scene.frame_set(demo.PICTURE_FRAME)
     blender.save_blend(blend, backup=False)
@@ -123,7 +123,7 @@ def _render_picture(scene: Any, path: Path, arguments: argparse.Namespace) -> No
     stopped = "palpate demo: stopped while rendering; the bake and the scene are finished."
     with (
         console.progress_bar("Rendering the picture", 1, unit="picture") as bar,
-        console.exit_on_interrupt(stopped, lambda: remove_leftovers(path.parent)),
+        console.exit_on_interrupt(stopped, remove_unfinished_files),
         console.blender_output_hidden(),
     ):
         render.render_frame(scene, path, demo.PICTURE_FRAME, samples=arguments.samples, size=arguments.size)

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 from ..core.errors import SceneError
 from ..core.io.disk_space import require_space
-from ..core.io.file_list import FileList
 from ..core.io.file_writing import writable_folder
 from . import blender, checks, console
 
@@ -68,7 +67,6 @@ def run(arguments: argparse.Namespace) -> int:
         folder = writable_folder(arguments.out, create=True)
         checks.outputs_are_no_inputs((folder / name for name in OUTPUTS), (arguments.rig,))
         require_space(folder, summary.report_bytes(rig), "The report")
-        FileList(folder)  # it completes what a killed run has left
     if arguments.blend:
         _sensor_in_scene(arguments)  # wrong names and read-only files are found before the work
     with console.Interrupt.raised_at_once(), console.shown_progress("gap") as show:

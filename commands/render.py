@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.figures.figure_canvas import FILE_TYPES as FORMATS
-from ..core.io.file_list import remove_unneeded
+from ..core.io.file_list import remove_own_files
 from ..core.io.file_writing import writable_folder
 from . import blender, console, figure_options
 
@@ -112,7 +112,7 @@ def run(arguments: argparse.Namespace) -> int:
             **given,
         )
         stopped = "palpate render: stopped; earlier figures are unchanged."
-        with console.exit_on_interrupt(stopped, lambda: remove_unneeded(folder)):
+        with console.exit_on_interrupt(stopped, remove_own_files):
             job = figure_export.make_figures(scene, folder, request)
             written = console.run_with_progress_bar("render", job, describe=lambda step: f"{step.stage}, frame {step.frame}")
     for path in written:

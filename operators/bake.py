@@ -38,7 +38,7 @@ class PALPATE_OT_bake(modal_job.ModalJob, bpy.types.Operator):
         frames = baked.recording.frames
         names = ", ".join(f"'{name}'" for name in baked.folders)
         self.report({"INFO"}, f"Baked frames {frames[0]} to {frames[-1]} of {names}")
-        for warning in (*baked.notes, *baked.recording.warnings):  # the status bar shows the last
+        for warning in baked.recording.warnings:  # the status bar shows the last
             self.report({"WARNING"}, warning)
 
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..core.errors import FileError, os_error_reason
-from ..core.io.temporary_folder import remove_unfinished, temporary_folder
+from ..core.io.hidden_folder import remove_abandoned, temporary_folder
 from ..core.study.run_files import STUDY_NAME
 from ..core.study.study_file import Run, read_study
 from .exchange import exchange_folder, require_own
@@ -47,7 +47,7 @@ def publish(folder: Path, planned: Sequence[Run] = ()) -> None:
         There is no study, a run is damaged, pyarrow is not installed, or something cannot be written.
     """
     require_pyarrow()
-    remove_unfinished(folder)
+    remove_abandoned(folder)
     require_own(folder / DATASET_FOLDER, DATASET_FILES)
     order = run_order(folder, planned)
     try:

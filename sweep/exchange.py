@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from ..core.errors import FileError
-from ..core.io.file_writing import sync_file, sync_folder
+from ..core.io.group_sync import sync_file, sync_folder
 
 
 def require_own(target: Path, files: re.Pattern[str]) -> None:

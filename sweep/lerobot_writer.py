@@ -20,7 +20,7 @@ import numpy as np
 
 from ..core.geometry.layout.grid_layout import GridLayout
 from ..core.geometry.texels import Texels
-from ..core.io.file_writing import sync_file
+from ..core.io.group_sync import sync_file
 from ..core.study.run_record import RunRecord
 from .encoded_run import EncodedRun
 from .features import AXES, TIMESTAMP, Feature, Layout, varied_name

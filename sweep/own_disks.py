@@ -21,7 +21,7 @@ from distributed import WorkerPlugin, get_worker
 
 from ..core.errors import FileError, PalpateError, os_error_reason
 from ..core.io.file_writing import atomic_write
-from ..core.io.temporary_folder import temporary_folder
+from ..core.io.hidden_folder import temporary_folder
 from ..core.study import run_shards
 from ..core.study.run_files import FAILED, RUNS, SCENES, STUDY_NAME, make_folders, write_failure
 from ..core.study.study_file import read_study

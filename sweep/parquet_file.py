@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..core.io.file_writing import sync_file
+from ..core.io.group_sync import sync_file
 from . import thrift_compact as thrift
 from .features import Feature
 from .parquet_pages import RLE, ZSTD, EncodedColumn, depth_of, encoding_of

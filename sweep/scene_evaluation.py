@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import SceneError
+from ..core.io.hidden_folder import temporary_folder
 from ..core.io.scenario_npz import load_scenario
-from ..core.io.temporary_folder import temporary_folder
 from ..core.model.scenario import Scenario
 from ..core.study.run_files import SCENES
 from ..core.study.scene_property import write_overrides

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -12,8 +13,7 @@ from typing import Any
 from ..core.compiled.thread_team import count_of_cores
 from ..core.errors import PalpateError
 from ..core.io.file_writing import writable_folder
-from ..core.io.folder_lock import FolderLock
-from ..core.io.private_folder import PRIVATE_FOLDER, find_private_folder, remove_tree
+from ..core.io.hidden_folder import PRIVATE_FOLDER, FolderLock, is_private_folder
 from ..core.jobs.progress import Progress
 from ..core.study.run_files import done_runs, failed_runs, make_folders
 from ..core.study.study_file import Run
@@ -85,8 +85,8 @@ def locked_folder(place: Path, folder: Path) -> Iterator[None]:
 
 def _remove_unless_begun(folder: Path) -> None:
     """Remove the folder that was made for a study which was then refused, if nothing but Palpate's own mark is in it."""
-    if [path.name for path in folder.iterdir()] == [PRIVATE_FOLDER] and find_private_folder(folder) is not None:
-        remove_tree(folder / PRIVATE_FOLDER)
+    if [path.name for path in folder.iterdir()] == [PRIVATE_FOLDER] and is_private_folder(folder / PRIVATE_FOLDER):
+        shutil.rmtree(folder / PRIVATE_FOLDER, ignore_errors=True)
         with suppress(OSError):
             folder.rmdir()
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import glob
+import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -14,7 +15,6 @@ from typing import Any
 from ..core.errors import FileError
 from ..core.io.bake_folder import folder_names
 from ..core.io.file_writing import atomic_write, file_sha256
-from ..core.io.private_folder import remove_tree
 from ..core.io.scenario_npz import load_scenario, save_scenario
 from ..core.model.scenario import Scenario
 from ..core.study.mesh_choices import MESHES, StudyMeshes, find_meshes, freeze_meshes
@@ -114,7 +114,7 @@ def _whole_or_nothing(folder: Path) -> Iterator[None]:
         yield
     except BaseException:
         for path in made:
-            remove_tree(path)
+            shutil.rmtree(path, ignore_errors=True)
         raise
 
 
@@ -122,7 +122,7 @@ def forget_study(folder: Path) -> None:
     """Remove a study from its folder, as where it was only frozen for a trial; other files of the folder stay."""
     (folder / STUDY_NAME).unlink(missing_ok=True)  # first: without it the rest is no study
     for name in (RUNS, FAILED, SCENES):
-        remove_tree(folder / name)
+        shutil.rmtree(folder / name, ignore_errors=True)
 
 
 def scenarios_of(place: Path, read_blend: ReadBlend) -> dict[str, Scenario | None]:

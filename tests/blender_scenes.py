@@ -4,13 +4,12 @@
 from __future__ import annotations
 
 import os
-import time
 from pathlib import Path
 
 import bpy
 import numpy as np
 
-from palpate.core.io.private_folder import PRIVATE_FOLDER
+from palpate.core.io.hidden_folder import PRIVATE_FOLDER
 
 
 def grid(name="Pad", location=(0.0, 0.0, 0.0), columns=6, rows=14, size=0.05):
@@ -78,13 +77,6 @@ def save(folder, name="scene.blend"):
 def reopen(path):
     bpy.ops.wm.open_mainfile(filepath=str(path))
     return bpy.context.scene
-
-
-def wait_for_removal(folder) -> None:
-    """Wait until the last bake has removed what it replaced, which it does in the background; at most ten seconds."""
-    end = time.monotonic() + 10.0
-    while any(Path(folder).glob(f"**/{PRIVATE_FOLDER}/growing-*")) and time.monotonic() < end:
-        time.sleep(0.02)
 
 
 def contents(folder) -> dict[str, bytes]:

@@ -17,11 +17,11 @@ from palpate.core.io.bake_folder import (
     OWN_DIGEST,
     RECORDING_NAME,
     Manifest,
+    checksum_line,
     folder_names,
     frame_file,
     write_manifest,
 )
-from palpate.core.io.checksum_list import checksum_line
 from palpate.core.io.file_writing import file_sha256
 from palpate.core.io.recording_npz import save_recording
 from palpate.core.io.sensor_npz import SENSOR_NAME, save_sensor

@@ -9,11 +9,11 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import SceneError
-from ...core.io.bake_owner import BakeOwner
+from ...core.io.bake_folder import BakeOwner
 from ...core.io.bake_reader import Bake
 from ...core.jobs.job_runner import part_of_job
 from ...core.jobs.progress import Job, Progress
-from ...core.model.recording import Recording
+from ...core.model.recording import Frame, Recording
 from ...core.model.scenario import Scenario
 from ...core.skins.channel_readouts import with_clipping_warnings
 from ..display import texel_arrows
@@ -35,22 +35,18 @@ class BakeResult:
         What was solved.
     folders : dict of str to Path
         Bake folder of each sensor, by the sensor's name.
-    notes : tuple of str
-        Sentences for the user that are no part of the bake.
     """
 
     recording: Recording
     scenario: Scenario
     folders: dict[str, Path]
-    notes: tuple[str, ...] = ()
 
 
 def bake(scene, into_scene: bool = True, images: bool = True, blend: bake_files.BlendToSave | None = None) -> Job[BakeResult]:
     """Compute the whole frame range of a scene, write the files, and put the result into the scene.
 
-    Nothing in the scene changes before the last step, and an earlier bake stays as it is until then: closing the generator, an
-    error or a kill leaves either the old bake or the new one. After a kill, the next bake of the same scene continues where the
-    killed one stopped.
+    Nothing in the scene changes before the last step, and an earlier bake stays as it is until then, also if the generator is
+    closed. A kill in the last step may leave files of both bakes, which their readers say (:mod:`...core.io.bake_replacement`).
 
     Parameters
     ----------
@@ -60,7 +56,7 @@ def bake(scene, into_scene: bool = True, images: bool = True, blend: bake_files.
     images : bool
         False writes the recordings alone, as for a million frames. A scene cannot show such a bake: `into_scene` is False too.
     blend : BlendToSave, optional
-        The .blend to save with the bake: after a kill both are the old ones or both the new ones. The scene in memory shows the
+        The .blend to save with the bake: the old one stays in its place until all of the bake is. The scene in memory shows the
         new bake before that step.
 
     Raises
@@ -134,21 +130,28 @@ def _bake(scene, into_scene: bool, images: bool, blend: bake_files.BlendToSave |
     name = scene.name
     folder = bake_files.writable_bake_folder(scene)
     reading = yield from _read(scene)
+    scenario = reading.scenario
     if into_scene:
         scene_writer.check_writable(scene, reading)
-    yield from first_use.wait(reading.scenario)
-    bake_files.check_space(folder, reading.scenario, images)
-    simulation = first_use.load_solver().Simulation(reading.scenario)
+    yield from first_use.wait(scenario)
+    bake_files.check_space(folder, scenario, images)
+    simulation = first_use.load_solver().Simulation(scenario)
     owner = _owner(scene, into_scene, blend)
-    with bake_files.BakeFiles(folder, reading.scenario, owner, images) as files:
-        recording = yield from _solve(name, simulation, reading, files)
+    with bake_files.BakeFiles(folder, scenario, owner, images) as files:
+        for frame in simulation.frames():
+            files.write(frame)
+            yield _solved(scenario, frame)
+            reading.objects(_scene_called(name))  # raises if the user has deleted one
+        warnings = (*reading.warnings, *simulation.warnings)
+        recording = with_clipping_warnings(files.recording(simulation.dt, warnings, simulation.step_reason))
         files.complete(recording)
+        shown = _Shown(files.folders, files.bake_id, owner.scene_id)
         if blend is not None:
-            _show(_scene_called(name), reading, recording, _Shown(files.folders, files.bake_id, owner.scene_id))
-        files.switch(blend)
+            _show(_scene_called(name), reading, recording, shown)
+        files.publish(blend)
     if into_scene and blend is None:
-        _show(_scene_called(name), reading, recording, _Shown(files.folders, files.bake_id, owner.scene_id))
-    return BakeResult(recording, reading.scenario, files.folders, tuple(files.notes))
+        _show(_scene_called(name), reading, recording, shown)
+    return BakeResult(recording, scenario, files.folders)
 
 
 def _read(scene) -> Job[SceneReading]:
@@ -162,21 +165,10 @@ def _read(scene) -> Job[SceneReading]:
         )
 
 
-def _solve(name: str, simulation, reading: SceneReading, files: bake_files.BakeFiles) -> Job[Recording]:
-    """Compute forces and readings frame by frame, and write each frame while the next is computed: the second half."""
-    scenario = simulation.scenario
+def _solved(scenario: Scenario, frame: Frame) -> Progress:
+    """Return how far a bake is when a frame is solved: the second half of the work."""
     total = _total_steps(scenario.frame_start, scenario.frame_end)
-    done = files.resume(simulation)
-
-    def save_checkpoint(step: Progress) -> Progress:
-        files.save_checkpoint(simulation)
-        reading.objects(_scene_called(name))  # raises if the user has deleted one
-        return replace(step, done=total // 2 + step.done, total=total)
-
-    job = first_use.load_solver().solve_frames(simulation, files.write_frame, done)
-    yield from part_of_job(job, save_checkpoint)
-    reading.objects(_scene_called(name))
-    return with_clipping_warnings(files.recording(simulation, (*reading.warnings, *simulation.warnings)))
+    return Progress("Computing forces", total // 2 + frame.frame - scenario.frame_start + 1, total, frame.frame)
 
 
 def _owner(scene, into_scene: bool, blend: bake_files.BlendToSave | None) -> BakeOwner:

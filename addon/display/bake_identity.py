@@ -12,7 +12,6 @@ from pathlib import Path
 
 from ...core.errors import FileError, SceneError
 from ...core.io.bake_folder import MANIFEST_NAME, Manifest, read_manifest
-from ...core.io.bake_switch import present_folder
 from . import baked_scene
 
 _manifests: dict[Path, tuple[tuple[int, ...], Manifest | None]] = {}
@@ -57,10 +56,9 @@ def manifest_stamp(folder: Path) -> tuple[int, ...]:
 def _manifest(folder: Path) -> Manifest | None:
     """Return the manifest in a sensor's folder; None when it cannot be read."""
     try:
-        place = present_folder(folder)
-        stamp = manifest_stamp(place)
+        stamp = manifest_stamp(folder)
         if folder not in _manifests or _manifests[folder][0] != stamp:
-            _manifests[folder] = stamp, _read(place)
+            _manifests[folder] = stamp, _read(folder)
     except (OSError, FileError):
         return None
     return _manifests[folder][1]

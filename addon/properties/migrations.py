@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import FileError
-from ...core.io.private_folder import find_private_folder
+from ...core.io.hidden_folder import PRIVATE_FOLDER, is_private_folder
 from ...core.io.settings_migration import VERSION, migrate
 from ..session import session_state
 from .scene_properties import EARLIER_FOLDER
@@ -29,7 +29,7 @@ def _keep_earlier_folder(scene) -> None:
     settings = scene.palpate
     if settings.schema_version or settings.is_property_set("folder"):
         return
-    saved = bool(bpy.data.filepath) and find_private_folder(Path(bpy.path.abspath(EARLIER_FOLDER))) is not None
+    saved = bool(bpy.data.filepath) and is_private_folder(Path(bpy.path.abspath(EARLIER_FOLDER), PRIVATE_FOLDER))
     if settings.baked_digest or saved:
         settings.folder, settings.schema_version = EARLIER_FOLDER, VERSION
 

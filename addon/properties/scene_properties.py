@@ -201,5 +201,5 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
     baked_names: StringProperty(options={"HIDDEN"})
     baked_start: IntProperty(options={"HIDDEN"})
     baked_end: IntProperty(options={"HIDDEN"})
-    # Says that the saved .blend has not changed since its bake (core/io/saved_bake.py).
+    # Says that the saved .blend has not changed since its bake (core/simulators/baked_sensors.py).
     unchanged_note: StringProperty(options={"HIDDEN"})

@@ -23,7 +23,7 @@ from ...core.io.bake_reader import Bake, frame_index, read_sensors
 from ...core.io.disk_space import require_space
 from ...core.io.file_list import FileList
 from ...core.io.file_writing import writable_folder
-from ...core.io.temporary_folder import temporary_folder
+from ...core.io.hidden_folder import temporary_folder
 from ...core.jobs.job_runner import run_job
 from ...core.jobs.progress import Job, Progress
 from ...core.response import metrics

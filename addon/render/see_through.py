@@ -16,7 +16,7 @@ import numpy as np
 from mathutils import Vector
 
 from ...core.io.file_writing import atomic_write
-from ...core.io.temporary_folder import temporary_folder
+from ...core.io.hidden_folder import temporary_folder
 from ..scene import participants
 from . import camera_direction, render
 from .loaded_texels import LoadedTexels

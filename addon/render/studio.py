@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from ...core.io.temporary_folder import temporary_folder
+from ...core.io.hidden_folder import temporary_folder
 from . import render
 
 LAMPS = (((-35.0, 50.0), 2.2, (1.0, 0.97, 0.93)), ((70.0, 30.0), 0.9, (0.9, 0.95, 1.0)), ((170.0, 45.0), 1.6, (1.0, 1.0, 1.0)))

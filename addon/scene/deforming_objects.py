@@ -14,7 +14,7 @@ import numpy as np
 from ...core.errors import SceneError
 from ...core.geometry.mesh import TriangleMesh
 from ...core.geometry.texels import DeformedTexels
-from ...core.io.growing_table import GrowingTable
+from ...core.io.row_table import RowTable, motion_table
 from ...core.model.deformation import Deformation
 from ...core.model.scenario import Scenario
 from ...core.model.sensor import Sensor
@@ -178,7 +178,7 @@ class ShapeHistory:
             for index, part in enumerate(group)
             if part.deformation is not None
         }
-        self._tables: dict[tuple[str, int], GrowingTable] = {}
+        self._tables: dict[tuple[str, int], RowTable] = {}
         self._count = 1
 
     def append(self, shapes: dict[tuple[str, int], np.ndarray]) -> None:
@@ -186,7 +186,7 @@ class ShapeHistory:
         for place, found in shapes.items():
             first = self._first[place]
             if place not in self._tables and found is not first and not np.array_equal(found, first):
-                self._tables[place] = GrowingTable(first)
+                self._tables[place] = motion_table(first)
                 for _ in range(self._count - 1):
                     self._tables[place].append(first)
             if place in self._tables:
@@ -198,6 +198,6 @@ class ShapeHistory:
         groups = {"sensor": list(scenario.sensors), "target": list(scenario.targets)}
         for kind, index in self._first:
             table = self._tables.get((kind, index))
-            deformation = None if table is None else Deformation(times, table.array())
+            deformation = None if table is None else Deformation(times, table.rows())
             groups[kind][index] = replace(groups[kind][index], deformation=deformation)
         return tuple(groups["sensor"]), tuple(groups["target"])

@@ -17,7 +17,7 @@ import numpy as np
 from ...core.effects.engine.sensor_effects import check_scenario
 from ...core.errors import SceneError
 from ...core.geometry.mesh import TriangleMesh, mass_properties
-from ...core.io.growing_table import GrowingTable
+from ...core.io.row_table import motion_table
 from ...core.jobs.progress import Progress
 from ...core.model.body import Body
 from ...core.model.motion import Motion, Signal
@@ -234,11 +234,11 @@ class _MotionHistory:
     def __init__(self, reading: SceneReading):
         bodies = reading.scenario.bodies
         self._poses = {
-            i: (GrowingTable(b.motion.positions[0]), GrowingTable(b.motion.quaternions[0]))
+            i: (motion_table(b.motion.positions[0]), motion_table(b.motion.quaternions[0]))
             for i, b in enumerate(bodies)
             if not b.free
         }
-        self._drive_targets = {i: GrowingTable(bodies[i].drive.target.values[0]) for i in reading.driven_bodies}
+        self._drive_targets = {i: motion_table(bodies[i].drive.target.values[0]) for i in reading.driven_bodies}
         self._shapes = deforming_objects.ShapeHistory(reading.scenario)
 
     def append(self, sample: FrameSample) -> None:
@@ -254,10 +254,10 @@ class _MotionHistory:
         """Return the scenario with the whole motion; `times` (n,) float, seconds, are those of the samples."""
         bodies = list(scenario.bodies)
         for index, (positions, quaternions) in self._poses.items():
-            motion = Motion(times, positions.array(), quaternions.array())
+            motion = Motion(times, positions.rows(), quaternions.rows())
             bodies[index] = replace(bodies[index], motion=motion)
         for index, values in self._drive_targets.items():
-            drive = replace(bodies[index].drive, target=Signal(times, values.array()))
+            drive = replace(bodies[index].drive, target=Signal(times, values.rows()))
             bodies[index] = replace(bodies[index], drive=drive)
         sensors, targets = self._shapes.applied_to(scenario, times)
         return replace(scenario, bodies=tuple(bodies), sensors=sensors, targets=targets)

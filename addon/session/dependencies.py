@@ -11,7 +11,7 @@ import os
 import platform
 import sys
 
-REQUIRED_MODULES = ("numpy", "numba", "llvmlite", "trimesh")
+REQUIRED_MODULES = ("numpy", "numba", "llvmlite", "trimesh", "filelock")
 """Modules without which playing and baking are impossible. Figures, reports and the gap analysis need more packages, which
 pyproject.toml lists; they are imported where they are used."""
 

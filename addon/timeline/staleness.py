@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.errors import PalpateError
-from ...core.io import saved_bake
+from ...core.io.bake_folder import UNCHANGED_NOTE
 from ...core.model.recording import Recording
 from ..properties import start_transforms
 from ..scene import baked_names, body_poses, mesh_fingerprint, participants, scene_fingerprint
@@ -41,7 +41,7 @@ def note_unchanged(scene) -> None:
     """Note in a scene that is about to be saved whether it is as it was baked, for readers without Blender."""
     settings, note = scene.palpate, ""
     if settings.baked_id and scene_fingerprint.fingerprint(scene) == settings.baked_fingerprint:
-        note = saved_bake.note_of(settings.baked_id)
+        note = UNCHANGED_NOTE + settings.baked_id
     if settings.unchanged_note != note:
         settings.unchanged_note = note
 

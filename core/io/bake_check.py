@@ -2,28 +2,31 @@
 """Checks of a bake's content as it is read: whether the files of a sensor's folder are whole and belong together.
 
 A file that opens may still hold what was never baked: an array of another shape or type, a NaN, a frame twice, the texels of
-another sensor. Every such fault is found here once, so that whoever draws or exports a bake may rely on it.
+another sensor. Every such fault is found here once, so that whoever draws or exports a bake may rely on it. An image with its
+SHA-256 in the manifest or the list of images is what was baked. Any other, as in older bakes, is compared with the recording.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
+from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import FileError, PalpateError
 from ..geometry.layout.grid_layout import GridLayout
-from ..geometry.layout.texture_maps import UVLayout
+from ..geometry.layout.texture_maps import OverlapError, UVLayout
 from ..geometry.texels import Texels
-from ..model.recording import Recording, SensorRecording, row_blocks
+from ..model.recording import Recording, SensorFrame, SensorRecording, row_blocks
 from ..model.sensor_parameters import Painted, SensorParameters
 from ..model.vector_readings import VectorReadings
-from .bake_folder import MANIFEST_NAME, RECORDING_NAME, Manifest
+from .bake_folder import IMAGE_LIST_NAME, MANIFEST_NAME, RECORDING_NAME, Manifest, check_sha256, frame_file
 from .recording_npz import described
 from .sensor_npz import SENSOR_NAME
 from .sensor_toml import stated_parameters
+from .tactile_exr import CHANNELS, exr_channels, read_exr
 
 MOST_PIXELS = 1 << 26
 """Pixels of a tactile image above which its size is taken for damage."""
@@ -33,6 +36,8 @@ LARGEST = float(np.finfo(np.float32).max)
 """Largest value of a texel, because its pixels have 32 bits."""
 UNIT_TOLERANCE = 1e-6
 """By how much the length of a unit vector or a quaternion may differ from one."""
+ROUNDING = 1e-5
+"""Share of an image's largest value by which a pixel may differ from the recording, which another order of sums explains."""
 
 _NUMBER, _WHOLE, _FLAG = "f", "iu", "b"
 """Kinds of array types (:attr:`numpy.dtype.kind`)."""
@@ -309,3 +314,63 @@ def _check_channels(sensor: SensorRecording, frames: int, texels: int) -> None:
         _check_array(name, getattr(sensor, name), _NUMBER, (frames, 3))
     for name in ("friction", "depth", "slip"):
         _require(_everywhere(lambda part: part >= 0, getattr(sensor, name)), f"'{name}' has negative values")
+
+
+# --- images
+
+
+def check_images(files: SensorFiles) -> None:
+    """Check the tactile images of one sensor, whose other files have been checked.
+
+    Raises
+    ------
+    FileError
+        An image is missing or damaged, or shows something else than the recording; the message names it.
+    """
+    recording, manifest, name = files.recording, files.manifest, files.manifest.sensor
+    if not manifest.has_images:
+        return
+    if IMAGE_LIST_NAME in manifest.files:
+        _check_listed(files)
+        return
+    for number in recording.frames:
+        file = frame_file(int(number))
+        if file in manifest.files:
+            manifest.check_file(files.folder, file)
+        else:
+            fault = _fault(files, int(number), recording.at(int(number)).sensors[name])
+            if fault:
+                raise FileError(f"'{files.folder / file}' does not belong to its bake ({fault}): bake again.")
+
+
+def _check_listed(files: SensorFiles) -> None:
+    """Check the images that the list of the bake names, one for each frame."""
+    listed = files.manifest.image_checksums(files.folder)
+    for number, found in zip_longest(files.recording.frames, listed):
+        if number is None or found is None or found[0] != frame_file(int(number)):
+            raise FileError(f"'{files.folder / IMAGE_LIST_NAME}' does not list an image for each frame: bake again.")
+        check_sha256(files.folder / found[0], found[1])
+
+
+def _fault(files: SensorFiles, number: int, frame: SensorFrame) -> str:
+    """Return what is wrong with the image of a frame; empty if nothing is."""
+    found, about = read_exr(files.folder / frame_file(number))
+    manifest = files.manifest
+    said = {"sensor": manifest.sensor, "frame": str(number), "digest": manifest.digest, "unit": manifest.unit}
+    for key, value in said.items():
+        if about.get(key, value) != value:
+            return f"its {key} is {about[key]!r:.60} and not {value!r:.60}"
+    try:
+        expected = exr_channels(files.texels.layout, frame)
+    except OverlapError:
+        path = files.folder / SENSOR_NAME
+        raise FileError(f"'{path}' is damaged (two parts of the region cover one pixel): bake again.") from None
+    for channel in CHANNELS:
+        if channel not in found:
+            return f"it has no channel {channel}"
+        if found[channel].shape != manifest.shape:
+            return f"it has {' × '.join(map(str, found[channel].shape))} pixels"
+        difference = np.abs(found[channel] - expected[channel])
+        if channel != "contact" and not (difference <= ROUNDING * np.abs(expected[channel]).max(initial=0.0)).all():
+            return f"its channel {channel} differs from the recording"
+    return ""

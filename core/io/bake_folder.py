@@ -2,7 +2,11 @@
 """A bake folder: names of its folders and files, and the manifest that describes each sensor's bake.
 
 A bake folder holds one folder per sensor. Each of these holds ``recording.npz``, ``sensor.npz``, ``manifest.json`` and, unless
-the bake has no images, one EXR image per frame and ``images.sha256``, the list of their checksums.
+the bake has no images, one EXR image per frame and ``images.sha256``, the list of their checksums. It has the format of
+``sha256sum``, so ``sha256sum -c images.sha256`` checks a folder without Palpate.
+
+A bake belongs to the .blend whose path is in the manifest, as long as that file exists, and in it to the scene with the id that
+the manifest has. So a .blend that was renamed or moved may replace its bake, and a copy may not replace that of its original.
 """
 
 from __future__ import annotations
@@ -14,13 +18,19 @@ import os
 import re
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+from ..effects.engine.registry import to_dict
 from ..errors import FileError, os_error_reason
-from .checksum_list import read_checksums
-from .file_writing import file_sha256, write_file
+from ..model.recording import Recording
+from ..model.scenario import Scenario
+from ..model.sensor import Sensor
+from ..version import VERSION
+from .file_writing import atomic_write, file_sha256
+from .recording_npz import described
+from .regular_file import open_regular
 from .schema import read_json
 from .sensor_npz import SENSOR_NAME
 
@@ -30,11 +40,15 @@ OWN_DIGEST = "manifest_sha256"
 """Key of the SHA-256 of all that the manifest says otherwise; older manifests have none."""
 RECORDING_NAME = "recording.npz"
 IMAGE_LIST_NAME = "images.sha256"
+UNCHANGED_NOTE = "palpate-unchanged-since-bake:"
+"""Begins the note, with the id of its bake, in a .blend whose settings, meshes and animation are those that were baked."""
 
 _SINGLE_FILES = (RECORDING_NAME, SENSOR_NAME, MANIFEST_NAME, IMAGE_LIST_NAME)
 BAKE_FILE_NAMES = re.compile(rf"tactile_-?\d+\.exr|{'|'.join(map(re.escape, _SINGLE_FILES))}")
 """Names of the files in a sensor's folder that a bake writes and replaces."""
 
+_LIST_LINE = re.compile(rb"([0-9a-f]{64})  ([!-~]{1,200})\n")
+_LONGEST_LINE = 300
 _RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{i}" for port in ("com", "lpt") for i in range(1, 10))}
 """Names that Windows reserves for devices."""
 
@@ -191,8 +205,71 @@ def check_sha256(path: Path, sha256: str) -> None:
         raise FileError(f"'{path}' is damaged (its content is not what was baked): bake again.")
 
 
-def write_manifest(folder: str | os.PathLike, manifest: Manifest, atomic: bool = True) -> Path:
-    """Write ``manifest.json`` into `folder`, as :func:`.write_file` does, and return its path.
+def checksum_line(name: str, sha256: str) -> bytes:
+    """Return the line of one file in a list of checksums."""
+    return f"{sha256}  {name}\n".encode("ascii")
+
+
+def read_checksums(path: Path) -> Iterator[tuple[str, str]]:
+    """Yield the name and the SHA-256 of each file of a list.
+
+    Raises
+    ------
+    FileError
+        The list is missing, cannot be read, or is something else.
+    """
+    try:
+        with open_regular(path) as file:
+            while line := file.readline(_LONGEST_LINE):
+                found = _LIST_LINE.fullmatch(line)
+                if found is None:
+                    raise FileError(f"'{path}' is damaged (a line is not a SHA-256 with a name): bake again.")
+                yield found[2].decode("ascii"), found[1].decode("ascii")
+    except FileNotFoundError:
+        raise FileError(f"'{path}' is missing from the bake: bake again.") from None
+    except OSError as error:
+        raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): check its permissions.") from error
+
+
+def manifest_of(scenario: Scenario, sensor: Sensor, recording: Recording, files: Mapping[str, str]) -> Manifest:
+    """Return the manifest of a sensor, complete but for what a .blend and its bake add.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        That was computed.
+    sensor : Sensor
+        One of its sensors.
+    recording : Recording
+        Of the scenario.
+    files : mapping of str to str
+        SHA-256 of the files in the sensor's folder, by name.
+    """
+    channels = recording.sensors[sensor.name].channels
+    return Manifest(
+        sensor=sensor.name,
+        palpate=VERSION,
+        frame_start=scenario.frame_start,
+        frame_end=scenario.frame_end,
+        fps=scenario.fps,
+        dt=recording.dt,
+        digest=recording.digest,
+        unit=sensor.parameters.unit,
+        shape=(int(sensor.texels.layout.shape[0]), int(sensor.texels.layout.shape[1])),
+        parameters=asdict(sensor.parameters),
+        warnings=recording.warnings,
+        complete=True,
+        body=scenario.bodies[sensor.body].name,
+        step_reason=recording.step_reason,
+        sensors=tuple(recording.sensors),
+        files=dict(sorted(files.items())),
+        effects=[to_dict(effect) for effect in sensor.effects],
+        channels={} if channels is None else described(channels),
+    )
+
+
+def write_manifest(folder: str | os.PathLike, manifest: Manifest) -> Path:
+    """Write ``manifest.json`` into `folder` atomically, and return its path.
 
     Raises
     ------
@@ -203,7 +280,7 @@ def write_manifest(folder: str | os.PathLike, manifest: Manifest, atomic: bool =
     """
     path = Path(folder) / MANIFEST_NAME
     content = manifest_bytes(manifest)
-    with write_file(path, atomic) as temporary:
+    with atomic_write(path) as temporary:
         temporary.write_bytes(content)
     return path
 
@@ -258,3 +335,60 @@ def _own_digest(content: Mapping[str, Any]) -> str:
     """Return the SHA-256 of a manifest's content without this digest, whatever the order of its keys."""
     rest = {key: value for key, value in content.items() if key != OWN_DIGEST}
     return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class BakeOwner:
+    """The scene that is baked.
+
+    Attributes
+    ----------
+    scene_id : str
+        Id of the scene; empty where its .blend does not store one.
+    blend : Path or None
+        The .blend that the bake belongs to; None if the scene was never saved.
+    source : Path or None
+        The .blend that was opened, where the scene is saved to another one together with the bake.
+    other_scenes : frozenset of str
+        Ids of the other scenes in the same .blend.
+    """
+
+    scene_id: str = ""
+    blend: Path | None = None
+    source: Path | None = None
+    other_scenes: frozenset[str] = frozenset()
+
+    def scene_path(self, bake_folder: Path) -> str:
+        """Return the path of the .blend as manifests hold it: with ``/``, and relative to the bake folder where possible."""
+        if self.blend is None:
+            return ""
+        blend = os.path.realpath(self.blend)
+        try:
+            return Path(os.path.relpath(blend, os.path.realpath(bake_folder))).as_posix()
+        except ValueError:  # Windows: another drive
+            return Path(blend).as_posix()
+
+
+def other_owner(manifest: Manifest, bake_folder: Path, owner: BakeOwner) -> str:
+    """Return whose bake a manifest describes, in words, if it belongs to another scene than `owner`; empty if not.
+
+    Parameters
+    ----------
+    manifest : Manifest
+        Of a sensor's folder in `bake_folder`.
+    bake_folder : Path
+    owner : BakeOwner
+        The scene that would replace the bake.
+    """
+    if manifest.scene_id != owner.scene_id and manifest.scene_id in owner.other_scenes:
+        return "another scene of the same .blend"
+    if manifest.scene_path and not manifest.scene_path.startswith(("//", "\\\\")) and "\0" not in manifest.scene_path:
+        blend = Path(os.path.normpath(Path(os.path.realpath(bake_folder), manifest.scene_path)))
+    elif manifest.scene_file and owner.blend is not None:  # older manifests, whose .blend lies beside the present one
+        blend = (owner.source or owner.blend).with_name(os.path.basename(manifest.scene_file))
+    else:
+        return ""
+    if not os.path.isfile(blend):
+        return ""
+    is_ours = any(own is not None and own.is_file() and own.samefile(blend) for own in (owner.blend, owner.source))
+    return "" if is_ours else f"'{blend}'"

@@ -14,10 +14,10 @@ from ..errors import FileError
 from ..geometry.texels import Texels
 from ..model.recording import Recording
 from ..model.sensor_parameters import Painted, SensorParameters
-from . import bake_switch
-from .bake_check import SensorFiles, check_bake, checked_parameters
+from .bake_check import SensorFiles, check_bake, check_images, checked_parameters
 from .bake_folder import MANIFEST_NAME, RECORDING_NAME, Manifest, folder_names, read_manifest
-from .image_check import check_images
+from .bake_replacement import is_interrupted
+from .hidden_folder import PRIVATE_FOLDER
 from .recording_npz import load_recording
 from .sensor_npz import SENSOR_NAME, load_sensor
 
@@ -70,8 +70,9 @@ def read_bake(folder: str | os.PathLike, images: bool = True) -> Bake:
     folder = Path(folder)
     if os.path.lexists(folder / MANIFEST_NAME):
         return read_sensors([folder], images)
-    bake_switch.settle(folder)
-    folders = [place for name, place in bake_switch.present_folders(folder) if _is_bake(name, place)]
+    folders = [place for place in sorted(folder.iterdir()) if place.name != PRIVATE_FOLDER and _is_bake(place)]
+    if not folders and is_interrupted(folder):
+        raise FileError(f"A bake in '{folder}' was interrupted while it took the place of the earlier one: bake again.")
     if not folders:
         raise FileError(f"'{folder}' holds no bake: bake first, or choose the folder that Physics › Palpate › Bake names.")
     bake = read_sensors(folders, images)
@@ -92,8 +93,6 @@ def _quoted(names: Iterable[str]) -> str:
 def read_sensors(folders: Sequence[Path], images: bool = True) -> Bake:
     """Read the folders of some sensors of one bake.
 
-    A switch to another bake that was interrupted is carried out first (:mod:`.bake_switch`).
-
     Parameters
     ----------
     folders : sequence of Path
@@ -105,15 +104,12 @@ def read_sensors(folders: Sequence[Path], images: bool = True) -> Bake:
     FileError
         As :func:`read_bake`.
     """
-    for parent in {folder.parent for folder in folders}:
-        bake_switch.settle(parent)
-    folders = [bake_switch.present_folder(folder) for folder in folders]
     manifests = {folder: read_manifest(folder) for folder in folders}
     first = manifests[folders[0]]
     for folder, manifest in manifests.items():
-        if manifest.digest != first.digest:
+        if manifest.digest != first.digest or (manifest.bake_id and first.bake_id and manifest.bake_id != first.bake_id):
             raise FileError(
-                f"The sensors '{first.sensor}' and '{manifest.sensor}' in '{folder.parent}' were baked from different scenes: "
+                f"The sensors '{first.sensor}' and '{manifest.sensor}' in '{folder.parent}' are of different bakes: "
                 "bake again, or choose the folder of one sensor."
             )
     read: dict[str, SensorFiles] = {}
@@ -142,17 +138,17 @@ def read_sensors(folders: Sequence[Path], images: bool = True) -> Bake:
     )
 
 
-def _is_bake(name: str, folder: Path) -> bool:
+def _is_bake(folder: Path) -> bool:
     """Return True if a folder in a bake folder holds a sensor's bake, even a damaged one.
 
     A copy of one that an older version has left is none.
     """
     if not any(os.path.lexists(folder / file) for file in (MANIFEST_NAME, RECORDING_NAME, SENSOR_NAME)):
         return False
-    if not name.endswith((".partial", ".old")):
+    if not folder.name.endswith((".partial", ".old")):
         return True
     sensor = read_manifest(folder).sensor
-    return folder_names([sensor])[sensor] == name
+    return folder_names([sensor])[sensor] == folder.name
 
 
 def frame_index(recording: Recording, frame: int) -> int:

@@ -1,27 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Atomic writing: a file keeps its old content until the new content is complete and on the disk.
+"""Atomic writing: a file keeps its old content until the new content is complete.
 
 The new content is written to a temporary file beside the target, which then replaces the target. A process that is killed
-leaves either the old or the new file. It may also leave a temporary file, whose name contains ``.partial``;
-:func:`remove_leftovers` deletes these. While a temporary file is written it is locked, so that other processes leave it alone.
+leaves either the old or the new file, and perhaps the temporary one, whose name begins with a dot and contains ``.partial``.
 """
 
 from __future__ import annotations
 
 import errno
-import glob
 import hashlib
 import os
-import re
 import secrets
-import shutil
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..errors import FileError, os_error_reason
-from .file_lock import try_lock
 from .regular_file import open_regular
+
+_unfinished: set[Path] = set()
+"""Temporary files that this process is writing."""
 
 
 @contextmanager
@@ -47,10 +46,10 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
     require_replaceable(path)
     target = Path(os.path.realpath(path))
     _require_folder(target.parent)
-    temporary, handle = _new_locked_file(target.parent, target.stem, target.suffix)
+    temporary = _new_file_in(target.parent, target.stem, target.suffix)
+    _unfinished.add(temporary)
     try:
         yield temporary
-        sync_file(temporary)
         os.replace(temporary, target)
     except BaseException as error:
         with suppress(OSError):
@@ -59,9 +58,14 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
             raise FileError(f"'{path}' could not be written ({os_error_reason(error)}): {_remedy(error)}.") from error
         raise
     finally:
-        if handle is not None:
-            os.close(handle)
-    sync_folder(target.parent)
+        _unfinished.discard(temporary)
+
+
+def remove_unfinished_files() -> None:
+    """Remove the temporary files that this process is writing, because it is about to end."""
+    for temporary in list(_unfinished):
+        with suppress(OSError):
+            temporary.unlink()
 
 
 def require_replaceable(path: str | os.PathLike) -> None:
@@ -84,8 +88,8 @@ def write_file(path: str | os.PathLike, atomic: bool = True) -> Iterator[Path]:
     ----------
     path : path
     atomic : bool
-        False writes to `path` itself and does not wait until the data is on the disk. This is many times faster, but an
-        interruption leaves an incomplete file: only for a folder that nobody reads before it is complete.
+        False writes to `path` itself, and an interruption leaves an incomplete file: only for a folder that nobody reads before
+        it is complete.
 
     Yields
     ------
@@ -108,7 +112,7 @@ def write_file(path: str | os.PathLike, atomic: bool = True) -> Iterator[Path]:
 
 
 def writable_folder(path: str | os.PathLike, create: bool = False) -> Path:
-    """Check that files can be written into a folder, by creating one and deleting it.
+    """Check that files can be written into a folder, by making one.
 
     Parameters
     ----------
@@ -135,8 +139,11 @@ def writable_folder(path: str | os.PathLike, create: bool = False) -> Path:
         except OSError as error:
             raise FileError(f"The folder '{folder}' could not be made ({os_error_reason(error)}): {_remedy(error)}.") from error
     _require_folder(folder)
-    _new_file_in(folder, "check", "")
-    _remove_unlocked(folder, "check", "")
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise _cannot_make_file(folder, error) from error
     return folder
 
 
@@ -156,127 +163,10 @@ def writable_file(path: str | os.PathLike) -> Path:
     require_replaceable(path)
     target = Path(os.path.realpath(path))
     writable_folder(target.parent, create=True)
-    _new_file_in(target.parent, target.stem, target.suffix)  # its name may be too long
-    _remove_unlocked(target.parent, target.stem, target.suffix)
-    return target
-
-
-def remove_leftovers(folder: str | os.PathLike, is_ending: bool = False) -> list[Path]:
-    """Delete the temporary files that interrupted calls of :func:`atomic_write` left in `folder`.
-
-    Files that are being written, by this process or by another, stay.
-
-    Parameters
-    ----------
-    folder : path
-    is_ending : bool
-        True if this process is about to end, and its own files are deleted as well. No other process may be writing to the
-        folder then.
-
-    Returns
-    -------
-    list of Path
-        The deleted files, sorted by name.
-    """
-    removed = []
-    for path in sorted(Path(folder).glob(".*.partial*")):
-        if re.fullmatch(r"\..*\.[0-9a-f]{8}\.partial(\.[^.]*)?", path.name) and path.is_file():
-            with suppress(OSError):
-                if is_ending or not _is_being_written(path):
-                    path.unlink()
-                    removed.append(path)
-    return removed
-
-
-def remove_leftovers_of(target: Path) -> None:
-    """Delete what interrupted exchanges of a .blend have left beside it, and Blender's own unfinished file of such a one."""
-    for path in target.parent.glob(f".{glob.escape(target.name)}.*.partial*"):
-        if re.fullmatch(r"[0-9a-f]{8}\.partial@?", path.name[len(target.name) + 2 :]):
-            with suppress(OSError):
-                if path.name.endswith("@") or not _is_being_written(path):
-                    path.unlink(missing_ok=True)
-
-
-def _is_being_written(path: Path) -> bool:
-    """Return True if a process holds the lock on a temporary file. Windows lets nobody delete a file that is open."""
-    if path.is_symlink() or os.name == "nt":
-        return False
-    handle = os.open(path, os.O_RDWR | os.O_NONBLOCK | os.O_NOFOLLOW)
-    try:
-        return not try_lock(handle)
-    finally:
-        os.close(handle)
-
-
-def exchange_file(new: Path, target: Path, backups: int = 0) -> None:
-    """Put a finished file in the place of another; at every moment `target` is one of the two.
-
-    Parameters
-    ----------
-    new : Path
-        In the folder of `target`.
-    target : Path
-    backups : int
-        Number of earlier versions that are kept as ``<target>1``, ``<target>2``, …
-
-    Raises
-    ------
-    OSError
-        It cannot be replaced.
-    """
-    if backups and target.exists():
-        back_up(target, backups)
-    os.replace(new, target)
-    sync_folder(target.parent)
-
-
-def back_up(target: Path, backups: int) -> None:
-    """Give the present file a second name, ``<target>1``; that of before becomes ``<target>2``, and so on.
-
-    The file itself stays in its place. Raises OSError where that is impossible.
-    """
-    versions = [target.with_name(f"{target.name}{number}") for number in range(1, backups + 1)]
-    if versions[0].exists() and versions[0].samefile(target):
-        return  # an interrupted exchange has done it
-    temporary = _new_file_in(target.parent, target.name, "")
-    temporary.unlink()
-    try:
-        os.link(target, temporary)
-    except OSError:  # the file system has no hard links
-        shutil.copy2(target, temporary)
-    for older, newer in zip(reversed(versions), reversed(versions[:-1])):
-        if newer.exists():
-            os.replace(newer, older)
-    os.replace(temporary, versions[0])
-
-
-def sync_folder(folder: Path) -> None:
-    """Flush a folder's list of names to the disk, on systems that allow it, so that a rename survives a power cut."""
+    made = _new_file_in(target.parent, target.stem, target.suffix)  # its name may be too long
     with suppress(OSError):
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
-
-
-def sync_file(path: Path) -> None:
-    """Bring the content of a file onto the disk."""
-    with open(path, "rb+") as file:
-        os.fsync(file.fileno())
-
-
-def write_hashed(path: Path, content: bytes) -> str:
-    """Write a new file in a folder that nobody reads yet and return the SHA-256 of its content; it is not yet on the disk.
-
-    Raises
-    ------
-    OSError
-        It cannot be written.
-    """
-    with open(path, "wb") as file:
-        file.write(content)
-    return hashlib.sha256(content).hexdigest()
+        made.unlink()
+    return target
 
 
 def file_sha256(path: Path) -> str:
@@ -312,43 +202,19 @@ def _require_no_file_above(folder: Path) -> None:
 
 def _new_file_in(folder: Path, stem: str, suffix: str) -> Path:
     """Create an empty file with a unique name; the user's umask decides who may read it."""
-    path, handle = _open_new_file(folder, stem, suffix)
-    os.close(handle)
+    path = folder / f".{stem}.{secrets.token_hex(4)}.partial{suffix}"
+    try:
+        os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o666))
+    except OSError as error:
+        raise _cannot_make_file(folder, error) from error
     return path
 
 
-def _remove_unlocked(folder: Path, stem: str, suffix: str) -> None:
-    """Remove the files of these names that nobody is writing: those of runs that were stopped before they could do so."""
-    for path in folder.glob(f".{glob.escape(stem)}.????????.partial{glob.escape(suffix)}"):
-        with suppress(OSError):  # the next run tries again
-            if not _is_being_written(path):
-                path.unlink()
-
-
-def _new_locked_file(folder: Path, stem: str, suffix: str) -> tuple[Path, int | None]:
-    """Create an empty file as :func:`_new_file_in` does; return it with the descriptor that holds its lock."""
-    while True:
-        path, handle = _open_new_file(folder, stem, suffix)
-        if os.name == "nt":  # Windows could not replace the target by a file that is open
-            os.close(handle)
-            return path, None
-        if try_lock(handle) and path.exists():
-            return path, handle
-        os.close(handle)  # another process took it for a leftover before it was locked
-
-
-def _open_new_file(folder: Path, stem: str, suffix: str) -> tuple[Path, int]:
-    """Create an empty file with a unique name and return it with its descriptor."""
-    path = folder / f".{stem}.{secrets.token_hex(4)}.partial{suffix}"
-    try:
-        return path, os.open(path, os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o666)
-    except OSError as error:
-        # Permissions alone do not decide: root may write despite them, and cannot write to a read-only file system.
-        if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS) or not os.access(folder, os.W_OK):
-            raise FileError(f"The folder '{folder}' is read-only: change its permissions or choose another.") from error
-        raise FileError(
-            f"No file can be made in the folder '{folder}' ({os_error_reason(error)}): {_remedy(error)}."
-        ) from error
+def _cannot_make_file(folder: Path, error: OSError) -> FileError:
+    # Permissions alone do not decide: root may write despite them, and cannot write to a read-only file system.
+    if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS) or not os.access(folder, os.W_OK):
+        return FileError(f"The folder '{folder}' is read-only: change its permissions or choose another.")
+    return FileError(f"No file can be made in the folder '{folder}' ({os_error_reason(error)}): {_remedy(error)}.")
 
 
 def _remedy(error: OSError) -> str:

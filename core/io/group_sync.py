@@ -7,13 +7,12 @@ A request for each of the four files and two folders of a run waits for the disk
 from __future__ import annotations
 
 import ctypes
+import hashlib
 import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-
-from .file_writing import sync_file, sync_folder
 
 _WHOLE = frozenset({0xEF53, 0x58465342, 0x9123683E, 0xF2F52010, 0x01021994})
 """Numbers by which Linux tells ext4, XFS, Btrfs, F2FS and tmpfs, whose ``syncfs`` ends when everything is on the disk. A file
@@ -82,3 +81,32 @@ def _kernel() -> tuple[int, ...]:
     with suppress(ValueError):
         return tuple(int(part) for part in os.uname().release.split("-")[0].split(".")[:2])
     return (0, 0)
+
+
+def sync_folder(folder: Path) -> None:
+    """Flush a folder's list of names to the disk, on systems that allow it, so that a rename survives a power cut."""
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def sync_file(path: Path) -> None:
+    """Bring the content of a file onto the disk."""
+    with open(path, "rb+") as file:
+        os.fsync(file.fileno())
+
+
+def write_hashed(path: Path, content: bytes) -> str:
+    """Write a new file in a folder that nobody reads yet and return the SHA-256 of its content; it is not yet on the disk.
+
+    Raises
+    ------
+    OSError
+        It cannot be written.
+    """
+    with open(path, "wb") as file:
+        file.write(content)
+    return hashlib.sha256(content).hexdigest()

@@ -13,16 +13,17 @@ import numpy as np
 from ..effects.engine.registry import check, from_dict
 from ..errors import FileError, PalpateError, suggestion
 from ..geometry.mesh import TriangleMesh
-from ..io.bake_folder import MANIFEST_NAME
-from ..io.bake_owner import BakeOwner, other_owner
+from ..io.bake_folder import MANIFEST_NAME, UNCHANGED_NOTE, BakeOwner, Manifest, other_owner
 from ..io.bake_reader import Bake, read_bake
-from ..io.saved_bake import has_changed
+from ..io.regular_file import read_bytes
 from ..model.effect import Effect
 from ..model.sensor import Sensor
 from .sensor_on_mesh import SensorOnMesh
 
 DEFAULT_FOLDER = "palpate-bake"
 """Beside the .blend: the bake folder of a scene that names no other."""
+CLOCK = 2.0
+"""Seconds: file systems for memory cards (FAT) store times in steps of this length."""
 
 
 def baked_sensors(
@@ -73,7 +74,7 @@ def _checked_sensor(blend: Path, found: Bake, name: str) -> SensorOnMesh:
     other = other_owner(manifest, folder.parent, BakeOwner(blend=blend))
     if other:
         raise FileError(f"'{folder}' is the bake of {other} and not of '{blend}': give the bake folder of this .blend.")
-    if has_changed(blend, folder, manifest):
+    if _has_changed(blend, folder, manifest):
         raise FileError(
             f"'{blend}' was saved after its bake in '{folder}' and may have changed: "
             f"run 'palpate bake {blend}' (of a compressed file it cannot be told)."
@@ -98,6 +99,13 @@ def _checked_sensor(blend: Path, found: Bake, name: str) -> SensorOnMesh:
     texels = replace(texels, vertex=np.arange(len(texels)))
     sensor = Sensor(name, 0, texels, parameters, painted=found.painted[name], effects=effects)
     return SensorOnMesh(sensor, mesh, None, pose[:3].copy(), pose[3:].copy())
+
+
+def _has_changed(blend: Path, folder: Path, manifest: Manifest) -> bool:
+    """Return True if a .blend was saved after its bake and does not say that it is as it was baked."""
+    if blend.stat().st_mtime <= (folder / MANIFEST_NAME).stat().st_mtime + CLOCK:
+        return False
+    return not manifest.bake_id or (UNCHANGED_NOTE + manifest.bake_id).encode() not in read_bytes(blend)
 
 
 def _effects(tables: Sequence[dict], name: str, texels: int, gain: float) -> tuple[Effect, ...]:

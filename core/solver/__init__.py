@@ -9,7 +9,6 @@ parts of :mod:`.detection` and :mod:`.dynamics`.
 """
 
 __all__ = [
-    "checkpoint",
     "detection",
     "dynamics",
     "jumps",

@@ -77,8 +77,6 @@ class FastCrossings:
         Of simulations.
     """
 
-    CARRIED = ("_warned",)
-
     def __init__(self, scenario: Scenario, center: np.ndarray, shared: SharedResults | None = None):
         shared = shared or SharedResults()
         self._scenario, self._center = scenario, center

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..compiled.thread_team import helper_threads
 from ..effects.engine.sensor_effects import check_scenario, mounted_texels
-from ..geometry.rotations import quaternion_product, rotation_matrices, rotation_vectors, write_backward_step_motion
+from ..geometry.rotations import quaternion_product, rotation_matrices, rotation_vectors
 from ..jobs.job_runner import run_job
 from ..jobs.progress import Job, Progress
 from ..model.pose_interpolation import poses_at
@@ -78,9 +78,6 @@ class Simulation:
     warnings : list of str
         One sentence each; grows while the simulation runs.
     """
-
-    CARRIED = ("frame", "warnings", "_state", "_readers", "_drive_commands", "_fast_crossings")
-    """What goes from frame to frame (see :mod:`.checkpoint`); all the rest follows from it and from the scenario."""
 
     def __init__(self, scenario: Scenario, threads: int | None = None, shared: SharedResults | None = None):
         shared = shared or SharedResults()
@@ -168,6 +165,12 @@ class Simulation:
         seen = self._seen(1)
         self._advance(seen)
         return self._recorded(np.array([self.frame]), seen).at(self.frame)
+
+    def frames(self) -> Iterator[Frame]:
+        """Yield what the sensors measure at each frame that is left, the present one first; none stays in memory."""
+        yield self.observe()
+        while self.frame < self.scenario.frame_end:
+            yield self.advance()
 
     def advance_all(self, with_digest: bool = True) -> Recording:
         """Go through all frames that are left, and return the recording with the present frame as its first one.
@@ -320,16 +323,6 @@ class Simulation:
         if readout is not None:
             recorded.channels = readout.channels(recorded)
         return recorded
-
-    def follow_state(self) -> None:
-        """Bring to the state what follows from it, after the state of a later frame was put into a new simulation."""
-        if self.frame == self.scenario.frame_start:
-            return
-        for velocity, motion in zip(self._state.velocity, self._workspace.bodies.step_motion, strict=True):
-            write_backward_step_motion(velocity, self.dt, motion)
-        if self._deforming_surfaces.any_deforms:
-            self._bring_surfaces(self._step_times(self.frame - 1))
-            self._place_surfaces(self.substeps, self.substeps - 1, self.dt)
 
     def _bring_surfaces(self, times: np.ndarray) -> None:
         """Get the shapes of deforming surfaces between some times, (steps + 1,) s."""
@@ -486,59 +479,31 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.column_stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
-def solve_frames(simulation: Simulation, keep: Callable[[Frame], object], done: int = 0) -> Job[None]:
-    """Run a simulation to its last frame and hand over each frame, so that none has to stay in memory.
+def solve(scenario: Scenario, simulation: Simulation | None = None) -> Job[Recording]:
+    """Run a scenario frame by frame, with all frames in memory.
 
     Closing the generator stops the run; nothing outside is touched.
 
     Parameters
     ----------
-    simulation : Simulation
-    keep : callable
-        Called with each frame.
-    done : int
-        Frames that it has been through, the present one too; these are not handed over again. 0: the present one is the first.
+    scenario : Scenario
+    simulation : Simulation, optional
+        A new one of this scenario, which has not moved yet.
 
     Yields
     ------
     Progress
         After each frame.
-    """
-    scenario = simulation.scenario
-    total = len(scenario.frames)
-    if not done:
-        keep(simulation.observe())
-        done = 1
-    yield Progress("Computing forces", done, total, simulation.frame)
-    while simulation.frame < scenario.frame_end:
-        keep(simulation.advance())
-        done += 1
-        yield Progress("Computing forces", done, total, simulation.frame)
-
-
-def solve(scenario: Scenario, simulation: Simulation | None = None, frames: list[Frame] | None = None) -> Job[Recording]:
-    """Run a scenario frame by frame, with all frames in memory; :func:`solve_frames` keeps none.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    simulation : Simulation, optional
-        Of this scenario, to go on with. Default: a new one.
-    frames : list of Frame, optional
-        Those that it has been through, the present one too; those to come are added to it.
-
-    Yields
-    ------
-    Progress
-        After each frame; what the frame holds is then the last item of `frames`.
 
     Returns
     -------
     Recording
     """
     simulation = simulation or Simulation(scenario)
-    frames = [] if frames is None else frames
-    yield from solve_frames(simulation, frames.append, len(frames))
+    frames, total = [], len(scenario.frames)
+    for frame in simulation.frames():
+        frames.append(frame)
+        yield Progress("Computing forces", len(frames), total, frame.frame)
     names = [body.name for body in scenario.bodies]
     found = Recording.stack(frames, names, simulation.dt, scenario.digest(), simulation.warnings, simulation.step_reason)
     return with_clipping_warnings(found)

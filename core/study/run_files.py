@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -28,15 +29,13 @@ from pathlib import Path
 
 from ..errors import FileError
 from ..geometry.texels import Texels
-from ..io.bake_folder import MANIFEST_NAME, RECORDING_NAME, folder_names, manifest_bytes
-from ..io.file_writing import atomic_write, file_sha256, os_error_reason, sync_folder, writable_folder, write_hashed
-from ..io.group_sync import GroupSync
+from ..io.bake_folder import MANIFEST_NAME, RECORDING_NAME, folder_names, manifest_bytes, manifest_of
+from ..io.file_writing import atomic_write, file_sha256, os_error_reason, writable_folder
+from ..io.group_sync import GroupSync, sync_folder, write_hashed
+from ..io.hidden_folder import remove_abandoned, temporary_folder
 from ..io.npz import pack_arrays
-from ..io.private_folder import remove_tree
 from ..io.recording_npz import recording_arrays
-from ..io.sensor_manifest import manifest_of
 from ..io.sensor_npz import SENSOR_NAME, sensor_arrays
-from ..io.temporary_folder import remove_unfinished, temporary_folder
 from ..model.recording import Recording
 from ..model.scenario import Scenario
 from ..model.sensor_parameters import Painted
@@ -64,7 +63,7 @@ def make_folders(folder: Path) -> None:
         They cannot be made or written to.
     """
     for name in (RUNS, FAILED, SCENES):
-        remove_unfinished(writable_folder(folder / name, create=True))
+        remove_abandoned(writable_folder(folder / name, create=True))
 
 
 def done_runs(folder: Path) -> set[str]:
@@ -141,7 +140,7 @@ def run_folder(place: Path, run: Run) -> Iterator[Path]:
     """
     own = place / run.digest
     with _told(run, place):
-        remove_tree(own)
+        shutil.rmtree(own, ignore_errors=True)
         own.mkdir()
         yield own
 

@@ -6,8 +6,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from ..io.bake_folder import IMAGE_LIST_NAME, frame_file
-from ..io.checksum_list import checksum_line
+from ..io.bake_folder import IMAGE_LIST_NAME, checksum_line, frame_file
 from ..io.file_writing import file_sha256
 from ..io.tactile_exr import describe, nearest_places, write_exrs
 from ..model.recording import Recording

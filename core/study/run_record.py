@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import FileError
-from ..io.file_writing import write_hashed
+from ..io.group_sync import write_hashed
 from ..io.schema import Number, read_json
 
 RUN_FORMAT = "palpate-run/1"

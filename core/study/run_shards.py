@@ -27,7 +27,7 @@ from typing import IO
 import numpy as np
 
 from ..errors import FileError, os_error_reason
-from ..io.file_writing import sync_folder
+from ..io.group_sync import sync_folder
 
 SUFFIX = ".shard"
 SHARD_BYTES = 2 << 30

@@ -53,8 +53,6 @@ class ReadoutChain:
     transducers : TransducerArray
     """
 
-    CARRIED = ("_links",)
-
     def __init__(self, effects: Iterable[Effect], transducers: TransducerArray):
         self.transducers = transducers
         self._links: list[_Memoryless | _Coupling | _Law | _Delay | _Conversion] = []
@@ -98,8 +96,6 @@ class ReadoutChain:
 class _Conversion:
     """Converts newtons to the unit of the sensor (paper, section 4)."""
 
-    CARRIED = ()
-
     def __init__(self, transducers: TransducerArray):
         self.transducers = transducers
 
@@ -112,8 +108,6 @@ class _Conversion:
 class _Memoryless:
     """Applies a formula without memory."""
 
-    CARRIED = ()
-
     def __init__(self, form: Form, values: Values, transducers: TransducerArray, seed: int):
         self.form, self.values, self.transducers, self.seed = form, values, transducers, seed
 
@@ -125,8 +119,6 @@ class _Memoryless:
 class _Coupling:
     """Applies a linear coupling of texels."""
 
-    CARRIED = ()
-
     def __init__(self, weights: CouplingMatrix):
         self.weights = weights
 
@@ -136,8 +128,6 @@ class _Coupling:
 
 class _Law:
     """Applies a law with memory."""
-
-    CARRIED = ("memory", "last")
 
     def __init__(self, form: Form, values: Values, texels: int):
         self.form, self.values = form, values
@@ -153,16 +143,9 @@ class _Law:
 class _Delay:
     """Delays the signal, which is linear between samples and constant before the first."""
 
-    CARRIED = ("time", "signal")
-
     def __init__(self, delay: float, texels: int):
         self.delay = delay
         self.time, self.signal = np.zeros(0), np.zeros((0, texels))  # the part of the past that is still needed
-
-    def check_carried(self) -> None:
-        """Raise ValueError unless each time, of increasing ones, has a sample."""
-        if len(self.time) != len(self.signal) or not (np.diff(self.time) > 0.0).all():
-            raise ValueError("samples of the past do not follow one another")
 
     def apply(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
         if not len(self.time):

@@ -21,8 +21,6 @@ class DriveCommands:
     scenario : Scenario
     """
 
-    CARRIED = ("_controllers",)
-
     def __init__(self, scenario: Scenario):
         self._scenario = scenario
         self._drives = {

@@ -83,8 +83,6 @@ class GripControl:
     touching : bool
     """
 
-    CARRIED = ("push", "touching", "_wanted")
-
     speed: float
     max_force: float
     settling: float = 0.1

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A bake: files, keyframes, arrows, heat maps; what is there before and after it, and that it can be repeated bit for bit."""
 
+import os
 from pathlib import Path
 
 import bpy
@@ -13,19 +14,16 @@ from palpate.addon.display import heat_map, marker_meshes, materials
 from palpate.addon.scene import display_names, scene_reader
 from palpate.addon.session import fcurves, session_state, transforms
 from palpate.core.errors import FileError
-from palpate.core.io import bake_switch
 from palpate.core.io.bake_folder import folder_names, read_manifest
 from palpate.core.io.bake_reader import read_bake
-from palpate.core.io.private_folder import MARKER_NAME, PRIVATE_FOLDER
+from palpate.core.io.hidden_folder import LOCK_NAME, PRIVATE_FOLDER
 from palpate.core.io.recording_npz import load_recording
 from palpate.core.io.tactile_exr import read_exr
 from palpate.core.jobs.job_runner import SlicedJob, run_job
 
 
 def baked(scene):
-    result = run_job(bake(scene))
-    bake_switch.wait_for_removals()
-    return result
+    return run_job(bake(scene))
 
 
 def test_one_folder_per_sensor(tmp_path):
@@ -55,7 +53,6 @@ def test_a_bake_without_images_has_the_same_recordings(tmp_path):
     expected = {path: content for path, content in contents(tmp_path / "palpate-bake").items() if str(path).endswith(".npz")}
     scene.palpate.folder = str(tmp_path / "plain")
     found = run_job(bake(scene, into_scene=False, images=False))
-    bake_switch.wait_for_removals()
     for folder in found.folders.values():
         assert visible(folder) == ["manifest.json", "recording.npz", "sensor.npz"]
         assert not read_manifest(folder).has_images
@@ -217,6 +214,7 @@ def test_a_stopped_bake_leaves_the_old_one(tmp_path):
         for _ in range(steps):
             work.work(0.0)
         work.cancel()
+        assert [path.name for path in (tmp_path / "palpate-bake" / PRIVATE_FOLDER).iterdir()] == [LOCK_NAME]
         assert contents(tmp_path / "palpate-bake") == files
         assert [line for line in changes(before, dump()) if not line.startswith("Pad: settings")] == []
         assert not session_state.is_baking()
@@ -319,19 +317,46 @@ def test_files_put_beside_the_images_outlive_the_next_bake(tmp_path):
         assert {name: (folder / name).read_bytes() for name in mine} == mine
         assert sorted(path.name for path in folder.glob("tactile_0*.exr")) == [f"tactile_{i:04d}.exr" for i in images]
         assert visible(folder.parent) == ["Pad"]
-        assert [path.name for path in (folder.parent / PRIVATE_FOLDER).iterdir()] == [MARKER_NAME]
+        assert [path.name for path in (folder.parent / PRIVATE_FOLDER).iterdir()] == [LOCK_NAME]
 
     scene.frame_end = 2
     baked(scene)
     check((1, 2))
-    # a kill after the switch, before the old folder was removed
-    replaced = folder.parent / PRIVATE_FOLDER / "growing-0123456789abcdef" / "replaced" / "Pad"
-    replaced.mkdir(parents=True)
-    for name in ("manifest.json", "recording.npz"):
-        (replaced / name).write_bytes((folder / name).read_bytes())
-    (folder / "notes.txt").rename(replaced / "notes.txt")
+
+
+def test_one_bake_at_a_time(tmp_path):
+    """The second is refused and touches nothing, and later it may."""
+    scene, *_ = press(frames=3)
+    save(tmp_path)
+    first = bake(scene)
+    while not (tmp_path / "palpate-bake" / PRIVATE_FOLDER / LOCK_NAME).exists():
+        next(first)
+    with pytest.raises(FileError, match="Another bake is writing to"):
+        baked(scene)
+    run_job(first)
+    files = contents(tmp_path / "palpate-bake")
     baked(scene)
-    check((1, 2))
+    assert contents(tmp_path / "palpate-bake") == files
+
+
+def test_a_full_disk_is_one_sentence_and_the_earlier_bake_stays(tmp_path):
+    """A limit on the size of files stands for the disk."""
+    resource = pytest.importorskip("resource")
+    scene, pad, *_ = press(frames=3)
+    save(tmp_path)
+    baked(scene)
+    files = contents(tmp_path / "palpate-bake")
+    pad.palpate.k *= 2.0
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    for size in (100, 1500, 3000):
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+        try:
+            with pytest.raises(FileError, match=r"could not be written.*\(file too large\): "):
+                baked(scene)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        assert contents(tmp_path / "palpate-bake") == files
+        assert [path.name for path in (tmp_path / "palpate-bake" / PRIVATE_FOLDER).iterdir()] == [LOCK_NAME]
 
 
 @pytest.mark.parametrize("failing", [1, 2, 3, 4])
@@ -343,16 +368,17 @@ def test_a_swap_that_fails_is_taken_back(tmp_path, monkeypatch, failing):
     files = contents(tmp_path / "palpate-bake")
     before = dump()
     pad.palpate.k *= 2.0
-    rename, calls = Path.rename, []
+    rename, calls = os.replace, []
     order = ["Pad", "Pad", "Pad 2", "Pad 2"]
 
     def rename_but_one(path, target):
-        calls.append(path.name)
-        if len(calls) == failing:
+        if path.name in order:
+            calls.append(path.name)
+        if path.name in order and len(calls) == failing:
             raise PermissionError(13, "Permission denied")
         return rename(path, target)
 
-    monkeypatch.setattr(Path, "rename", rename_but_one)
+    monkeypatch.setattr(os, "replace", rename_but_one)
     with pytest.raises(FileError, match=r"^The bake could not be written to '.*palpate-bake' \(permission denied\)"):
         baked(scene)
     monkeypatch.undo()

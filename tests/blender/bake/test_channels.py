@@ -14,7 +14,6 @@ from palpate.addon.bake.bake import bake
 from palpate.addon.scene import scene_fingerprint, scene_reader
 from palpate.core.errors import PalpateError
 from palpate.core.export.registry import export
-from palpate.core.io import bake_switch
 from palpate.core.io.bake_folder import read_manifest
 from palpate.core.io.bake_reader import read_bake
 from palpate.core.io.tactile_exr import channel_layout, read_exr
@@ -24,9 +23,7 @@ from palpate.panels import sensor as panel
 
 
 def baked(scene):
-    result = run_job(bake(scene))
-    bake_switch.wait_for_removals()
-    return result
+    return run_job(bake(scene))
 
 
 def pressed_skin(frames=5, preset="uskin"):

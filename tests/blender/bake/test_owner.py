@@ -14,16 +14,13 @@ from palpate.addon.render import figure_export
 from palpate.addon.session import frame_status
 from palpate.commands import blender, export
 from palpate.core.errors import FileError, SceneError
-from palpate.core.io import bake_switch
 from palpate.core.io.bake_folder import read_manifest
 from palpate.core.io.bake_reader import read_bake
 from palpate.core.jobs.job_runner import run_job
 
 
 def baked(scene, **options):
-    result = run_job(bake(scene, **options))
-    bake_switch.wait_for_removals()
-    return result
+    return run_job(bake(scene, **options))
 
 
 @pytest.fixture

@@ -1,39 +1,32 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A .blend that is saved with its bake: both are the old ones or both the new ones, whenever the process is stopped."""
+"""A .blend that is saved with its bake: both are the old ones or both the new ones, and a kill between the two is said."""
 
 import gc
-import os
 import shutil
-from contextlib import suppress
+from contextlib import ExitStack
 
 import bpy
 import pytest
 from blender_scenes import press, press_and_drop, save, visible
+from kills import stopped_at
 
-from palpate.addon.bake import bake_files, scene_writer
+from palpate.addon.bake import scene_writer
 from palpate.addon.bake.bake import bake
-from palpate.addon.display import baked_scene
+from palpate.addon.display import bake_identity, baked_scene
 from palpate.addon.session import fcurves
 from palpate.commands import blender, main
-from palpate.core.io import bake_switch
+from palpate.core.errors import FileError
+from palpate.core.io import bake_replacement
 from palpate.core.io.bake_reader import read_bake
-from palpate.core.io.private_folder import PRIVATE_FOLDER
+from palpate.core.io.hidden_folder import LOCK_NAME, PRIVATE_FOLDER
 from palpate.core.jobs.job_runner import run_job
-
-CALLS = ("rename", "replace", "unlink", "rmdir", "mkdir", "fsync", "link")
-
-
-class Stopped(BaseException):
-    """The process was killed."""
 
 
 def bake_and_save(path, k=None):
     scene = blender.open_scene(path)
     if k is not None:
         scene.objects["Pad"].palpate.k = k
-    result = run_job(bake(scene, blend=blender.blend_to_save(path)))
-    bake_switch.wait_for_removals()
-    return result.recording.digest
+    return run_job(bake(scene, blend=blender.blend_to_save(path))).recording.digest
 
 
 @pytest.fixture
@@ -54,24 +47,6 @@ def found(path):
     return read.recording.digest
 
 
-def stop_at(patch, number):
-    """From the switch on, let the call of that number and all later ones fail; return a list for the list of calls."""
-    calls, switch = [], bake_files.BakeFiles.switch
-
-    def begin(self, blend=None):
-        calls.append(failing_calls(patch, number))
-        switch(self, blend)
-
-    patch.setattr(bake_files.BakeFiles, "switch", begin)
-    start = bake_switch.threading.Thread.start
-    patch.setattr(
-        bake_switch.threading.Thread, "start", lambda self: self.run() if self.name == "palpate-remover" else start(self)
-    )
-    patch.setattr(bake_switch, "_removals", [])
-    patch.setattr(bake_switch, "wait_for_removals", lambda: None)
-    return calls
-
-
 def test_the_first_bake_is_saved_with_the_blend(saved):
     path, digest = saved
     assert found(path) == digest
@@ -85,41 +60,51 @@ def test_the_first_bake_is_saved_with_the_blend(saved):
     assert visible(path.parent / "palpate-bake") == ["Pad"]
 
 
-def check_next_bake(path):
-    """Check that the next bake finds its way, removes what is left of the stopped one, and keeps the user's files."""
-    folder = path.parent / "palpate-bake"
-    (folder / "Pad" / "notes.txt").write_text("mine")
-    assert bake_and_save(path, k=88.0) == found(path)
-    assert sorted(item.name for item in path.parent.iterdir() if not item.name.startswith("scene.blend")) == ["palpate-bake"]
-    assert [item.name for item in (folder / PRIVATE_FOLDER).iterdir()] == ["palpate-folder.json"]
-    assert (folder / "Pad" / "notes.txt").read_text() == "mine"
+def bake_stopped(path, number):
+    """Bake and save; once all files are complete, the process is killed at a step of this number. Return all steps."""
+    replace, steps = bake_replacement.replace, []
+    with pytest.MonkeyPatch.context() as patch, ExitStack() as stack:
+
+        def begin(*arguments):
+            steps.append(stack.enter_context(stopped_at(number)))
+            replace(*arguments)
+
+        patch.setattr(bake_replacement, "replace", begin)
+        bake_and_save(path, k=77.0)
+    gc.collect()  # the lock of the stopped process
+    return steps[0]
 
 
-@pytest.mark.long("stops a bake at each of its steps")
-def test_stopped_at_every_step_of_the_switch(saved, tmp_path):
-    path, old = saved
-    digests, number = [], 1
-    while True:
+@pytest.mark.slow("bakes once for each step")
+def test_stopped_at_every_step_of_the_last_one(saved, tmp_path):
+    """Bake and .blend are the earlier ones, or the new ones, or whoever finds them says that they do not belong together."""
+    path, earlier = saved
+    digests, said, steps, number = [], 0, [""], 0
+    while len(steps) >= number:
+        number += 1
         home = tmp_path / f"copy {number}"
         home.mkdir()
         shutil.copy(path, home)
         shutil.copytree(path.parent / "palpate-bake", home / "palpate-bake")
         copy = home / path.name
-        with pytest.MonkeyPatch.context() as patch:
-            calls = stop_at(patch, number)
-            with suppress(Stopped):
-                bake_and_save(copy, k=77.0)
-        gc.collect()  # the lock of the stopped process
-        assert copy.is_file()
-        digests.append(found(copy))
-        if number % 4 == 1:
-            check_next_bake(copy)
-        if len(calls[0]) < number:
-            break
-        number += 1
-    assert number > 15
-    new = digests[-1]
-    assert new != old and digests == [old] * digests.count(old) + [new] * digests.count(new) and digests[0] == old
+        steps = bake_stopped(copy, number)
+        scene = blender.open_scene(copy)
+        try:
+            digests.append(read_bake(home / "palpate-bake").recording.digest)
+        except FileError as error:
+            assert "was interrupted" in str(error)
+            said += 1
+        if digests[-1] != scene.palpate.baked_digest:
+            assert bake_identity.other_bake(scene)
+            said += 1
+        (home / "palpate-bake" / "Pad").mkdir(exist_ok=True)
+        (home / "palpate-bake" / "Pad" / "notes.txt").write_text("mine")
+    assert number > 8 and said >= 2
+    assert digests == sorted(digests, key=lambda digest: digest != earlier) and digests[0] == earlier
+    assert bake_and_save(copy, k=88.0) == found(copy)
+    assert sorted(item.name for item in home.iterdir() if not item.name.startswith("scene.blend")) == ["palpate-bake"]
+    assert [item.name for item in (home / "palpate-bake" / PRIVATE_FOLDER).iterdir()] == [LOCK_NAME]
+    assert (home / "palpate-bake" / "Pad" / "notes.txt").read_text() == "mine"
 
 
 def test_a_link_to_a_blend_stays_a_link(saved, tmp_path):
@@ -135,42 +120,22 @@ def test_a_link_to_a_blend_stays_a_link(saved, tmp_path):
     assert found(path)
 
 
-def failing_calls(patch, number):
-    """From now on let the call of that number and all later ones fail; return the list of calls."""
-    calls = []
-
-    def failing(name, original):
-        def call(*arguments, **options):
-            calls.append(name)
-            if len(calls) >= number:
-                raise Stopped()
-            return original(*arguments, **options)
-
-        return call
-
-    for name in CALLS:
-        patch.setattr(os, name, failing(name, getattr(os, name)))
-    return calls
-
-
 def test_a_blend_that_is_saved_is_there_at_every_moment(saved):
     path, _ = saved
     blender.open_scene(path)
     for number in range(1, 100):
-        with pytest.MonkeyPatch.context() as patch:
-            calls = failing_calls(patch, number)
-            with suppress(Stopped):
-                blender.save_blend(path)
+        with stopped_at(number) as calls:
+            blender.save_blend(path)
         assert path.read_bytes().startswith(b"\x28\xb5\x2f\xfd") or path.read_bytes().startswith(b"BLENDER")
         if len(calls) < number:
             break
-    assert 3 < number < 99
+    assert 2 < number < 99
     blender.open_blend(path)
 
 
 def test_what_a_killed_save_has_left_is_removed_by_the_next_one(saved):
     path, _ = saved
-    left = [path.with_name(f".{path.name}.0123abcd.partial{end}") for end in ("", "@")]
+    left = [path.with_name(f".{path.name}.palpate-partial{end}") for end in ("", "@")]
     mine = path.with_name(f".{path.name}.notes.partial")
     for file in (*left, mine):
         file.write_text("half")

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import ball, changes, cube, dump, press, press_and_drop, save, wait_for_removal
+from blender_scenes import ball, changes, cube, dump, press, press_and_drop, save
 
 from palpate.addon.bake.bake import bake
 from palpate.addon.scene import scene_reader
@@ -45,7 +45,6 @@ def refusal(operator=None) -> str:
 
 
 def everything_in(folder):
-    wait_for_removal(folder)
     return sorted(os.path.join(where, name) for where, folders, files in os.walk(folder) for name in folders + files)
 
 
@@ -268,7 +267,6 @@ def test_a_target_deleted_while_its_bake_runs(tmp_path, steps):
     run_job(bake(scene))
     other = ball("Other")
     other.palpate.role = "TARGET"
-    wait_for_removal(tmp_path)
     files = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     work = SlicedJob(bake(scene))
     for _ in range(steps):

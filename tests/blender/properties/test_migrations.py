@@ -7,7 +7,7 @@ from blender_scenes import press, reopen, save
 
 from palpate.addon.properties import migrations
 from palpate.addon.session import session_state
-from palpate.core.io.private_folder import make_private_folder
+from palpate.core.io.hidden_folder import FolderLock
 from palpate.core.io.settings_migration import VERSION
 
 
@@ -109,5 +109,5 @@ def save_scene_with(folder, private_folder):
     press()
     (folder / "palpate").mkdir(parents=True)
     if private_folder:
-        make_private_folder(folder / "palpate")
+        FolderLock(folder / "palpate").release()
     return save(folder)

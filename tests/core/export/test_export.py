@@ -95,7 +95,7 @@ def test_a_folder_gives_all_its_sensors(bake, tmp_path):
 def test_sensors_of_two_runs_are_not_mixed(tmp_path):
     put(tmp_path, "a", grid_texels(), digest="one")
     put(tmp_path, "b", grid_texels(), digest="two")
-    with pytest.raises(FileError, match="different scenes"):
+    with pytest.raises(FileError, match="of different bakes"):
         read_bake(tmp_path)
 
 

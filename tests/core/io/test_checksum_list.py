@@ -9,9 +9,8 @@ import pytest
 from sample_bake import grid_texels, write_sensor
 
 from palpate.core.errors import FileError
-from palpate.core.io.bake_folder import IMAGE_LIST_NAME, read_manifest, write_manifest
+from palpate.core.io.bake_folder import IMAGE_LIST_NAME, checksum_line, read_checksums, read_manifest, write_manifest
 from palpate.core.io.bake_reader import read_bake
-from palpate.core.io.checksum_list import checksum_line, read_checksums
 from palpate.core.io.file_writing import file_sha256
 
 IMAGES = [f"tactile_{frame:04d}.exr" for frame in range(1, 8)]

@@ -5,12 +5,12 @@ import pytest
 
 from palpate.core.errors import FileError
 from palpate.core.io.disk_space import BLOCK, bake_bytes, recording_bytes, require_space
-from palpate.core.io.frame_rows import row_type
+from palpate.core.io.frame_table import row_type
 
 
 def test_the_estimate_of_a_recording_is_the_size_of_its_rows():
     """Apart from the bytes with which a row is filled up."""
-    kind = row_type(2, {"a": 9, "b": 16})
+    kind = row_type(2, {"a": 9, "b": 16}, {})
     assert 1000 * kind.itemsize == pytest.approx(recording_bytes(1000, 2, [9, 16]), rel=0.01)
 
 

@@ -11,9 +11,7 @@ from sample_bake import grid_texels, round_texels, write_sensor
 import palpate as pp
 from palpate.core.effects.engine.registry import effect, to_dict
 from palpate.core.errors import FileError
-from palpate.core.io.bake_folder import MANIFEST_NAME, read_manifest, write_manifest
-from palpate.core.io.bake_owner import BakeOwner
-from palpate.core.io.saved_bake import note_of
+from palpate.core.io.bake_folder import MANIFEST_NAME, UNCHANGED_NOTE, BakeOwner, read_manifest, write_manifest
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
 
 EFFECTS = [to_dict(effect("creep", amount=0.2)), to_dict(effect("noise", seed=7))]
@@ -82,7 +80,7 @@ def test_a_blend_that_was_saved_after_its_bake_has_to_say_that_it_is_unchanged(b
     os.utime(blend, (later, later))
     with pytest.raises(FileError, match="was saved after its bake in .* and may have changed: run 'palpate bake"):
         pp.sensors_from_blend(blend)
-    for note, is_good in ((note_of("cd" * 16), False), (note_of("ab" * 16), True)):
+    for note, is_good in ((UNCHANGED_NOTE + "cd" * 16, False), (UNCHANGED_NOTE + "ab" * 16, True)):
         blend.write_bytes(b"BLENDER\0" + note.encode() + b"\0")
         os.utime(blend, (later, later))
         if is_good:

@@ -9,7 +9,7 @@ from solver_scenes import pad, pressed, shape
 from trimesh.creation import icosphere
 
 from palpate.core.errors import FileError, SensorError
-from palpate.core.io.frame_rows import FrameRows
+from palpate.core.io.frame_table import FrameTable
 from palpate.core.io.recording_npz import load_recording, save_recording
 from palpate.core.io.scenario_npz import load_scenario, save_scenario
 from palpate.core.model.digest import digest_of
@@ -119,20 +119,16 @@ def test_parts_of_a_recording_keep_the_channels(run):
     assert with_clipping_warnings(recording) is recording
 
 
-def test_a_file_of_a_recording_and_one_of_growing_rows_keep_them(run, tmp_path):
+def test_a_file_of_a_recording_and_a_table_of_frames_keep_them(run, tmp_path):
     scenario, readout, recording = run
     save_recording(tmp_path / "recording.npz", recording)
-    rows = FrameRows(tmp_path / "rows", recording.body_names, {"pad": 30}, {"pad": readout.no_frames()})
-    rows.begin()
+    rows = FrameTable.of(scenario)
     for frame in recording.frames:
         rows.append(recording.at(int(frame)))
     for found in (load_recording(tmp_path / "recording.npz"), rows.recording(1e-4, "", (), "")):
         own = found.sensors["pad"].channels
         assert own.values.tobytes() == recording.sensors["pad"].channels.values.tobytes()
         np.testing.assert_array_equal(own.place, readout.skin.magnetometers.place)
-    last = rows.frame(8).sensors["pad"].channels
-    assert last.values.tobytes() == recording.sensors["pad"].channels.values[8].tobytes()
-    rows.close()
 
 
 def test_channels_of_unlike_length_are_one_sentence(run, tmp_path):

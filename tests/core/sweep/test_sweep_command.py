@@ -17,9 +17,8 @@ from small_study import run_hashes
 from study_scenes import HEAD, tiny_scene
 
 from palpate.core.errors import PalpateError
-from palpate.core.io.bake_folder import IMAGE_LIST_NAME, check_sha256, frame_file, read_manifest
+from palpate.core.io.bake_folder import IMAGE_LIST_NAME, check_sha256, frame_file, read_checksums, read_manifest
 from palpate.core.io.bake_reader import read_bake
-from palpate.core.io.checksum_list import read_checksums
 from palpate.core.io.recording_npz import load_recording
 from palpate.core.io.scenario_npz import save_scenario
 from palpate.core.io.tactile_exr import read_exr

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames in a file that grows: they come back bit for bit, after a kill as well, and no length of a run fills the memory."""
+"""The frames of a run come back bit for bit, and no length of a run fills the memory."""
 
 import zipfile
 from pathlib import Path
@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from palpate.core.errors import FileError
-from palpate.core.io import frame_rows
-from palpate.core.io.frame_rows import FrameRows, row_type
-from palpate.core.io.growing_file import GrowingFile
+from palpate.core.io import row_table
+from palpate.core.io.frame_table import FrameTable, row_type
 from palpate.core.io.recording_npz import load_recording, save_recording
 from palpate.core.model import recording as model
 from palpate.core.model.recording import SENSOR_FIELDS, Frame, Recording, SensorFrame
@@ -33,9 +32,8 @@ def frames(count, seed=3):
     ]
 
 
-def written(path, wanted):
-    rows = FrameRows(path, BODIES, TEXELS)
-    rows.begin()
+def written(folder, wanted):
+    rows = FrameTable(BODIES, TEXELS, folder=folder)
     for frame in wanted:
         rows.append(frame)
     return rows
@@ -52,13 +50,11 @@ def arrays_of(recording):
 def test_frames_come_back_bit_for_bit(tmp_path, monkeypatch, mapped):
     wanted = frames(40)
     if mapped:
-        monkeypatch.setattr(frame_rows, "IN_MEMORY_BYTES", 0)
+        monkeypatch.setattr(row_table, "IN_MEMORY_BYTES", 0)
         monkeypatch.setattr(model, "BLOCK_BYTES", 2000)  # a few frames
-    rows = written(tmp_path / "rows", wanted)
-    assert len(rows) == 40
+    rows = written(tmp_path, wanted)
     found, expected = rows.recording(1e-4, "d", ["careful"], "because"), Recording.stack(wanted, BODIES, 1e-4, "d")
-    rows.close()
-    (tmp_path / "rows").unlink()  # as at the end of a bake
+    del rows  # as at the end of a bake
     assert found.warnings == ("careful",) and found.step_reason == "because" and found.dt == 1e-4
     for name, array in arrays_of(expected).items():
         own = arrays_of(found)[name]
@@ -76,13 +72,13 @@ def test_frames_come_back_bit_for_bit(tmp_path, monkeypatch, mapped):
 
 @pytest.mark.skipif(not Path("/proc/self/smaps").exists(), reason="only Linux tells what of a file is in memory")
 def test_blocks_leave_no_file_in_memory(tmp_path, monkeypatch):
-    monkeypatch.setattr(frame_rows, "IN_MEMORY_BYTES", 0)
+    monkeypatch.setattr(row_table, "IN_MEMORY_BYTES", 0)
     monkeypatch.setattr(model, "BLOCK_BYTES", 1 << 16)
-    rows = written(tmp_path / "mapped rows", frames(3000))
+    rows = written(tmp_path, frames(3000))
     found = rows.recording(1e-4, "", (), "")
 
     def resident():
-        parts = Path("/proc/self/smaps").read_text().split("mapped rows")
+        parts = Path("/proc/self/smaps").read_text().split(f"{tmp_path}/")
         return int(parts[1].split("Rss:")[1].split()[0])
 
     assert np.isfinite(found.poses).all() and resident() > 1000  # kB: all of it was read
@@ -90,58 +86,17 @@ def test_blocks_leave_no_file_in_memory(tmp_path, monkeypatch):
     assert resident() < 200
 
 
-def test_rows_after_a_checkpoint_are_cut_off(tmp_path):
-    wanted = frames(9)
-    rows = written(tmp_path / "rows", wanted[:4])
-    vouched = rows.sha256
-    for frame in frames(3, seed=8):
-        rows.append(frame)
-    rows.close()
-    again = FrameRows(tmp_path / "rows", BODIES, TEXELS)
-    assert again.restore(4, vouched) and len(again) == 4 and again.sha256 == vouched
-    for frame in wanted[4:]:
-        again.append(frame)
-    assert again.sha256 == written(tmp_path / "whole", wanted).sha256
-    assert again.recording(1e-4, "", (), "").poses.tobytes() == Recording.stack(wanted, BODIES, 1e-4).poses.tobytes()
-    third = again.frame(2)
-    assert third.frame == 9 and third.sensors["pad"].shear.tobytes() == wanted[2].sensors["pad"].shear.tobytes()
-
-
-@pytest.mark.parametrize("damage", ["missing", "short", "other"])
-def test_rows_that_a_power_cut_has_damaged_are_refused(tmp_path, damage):
-    rows = written(tmp_path / "rows", frames(5))
-    rows.sync()
-    content, vouched = bytearray((tmp_path / "rows").read_bytes()), rows.sha256
-    rows.close()
-    content[100] ^= 1
-    (tmp_path / "rows").unlink()
-    if damage != "missing":
-        (tmp_path / "rows").write_bytes(content[:-1] if damage == "short" else content)
-    assert not FrameRows(tmp_path / "rows", BODIES, TEXELS).restore(5, vouched)
-
-
 def test_a_number_that_is_not_finite_reaches_no_file(tmp_path):
-    rows, (frame,) = written(tmp_path / "rows", []), frames(1)
+    rows, (frame,) = written(tmp_path, []), frames(1)
     frame.sensors["pad"].slip[0] = np.nan
     with pytest.raises(ValueError, match=r"sensor_1/slip' of frame 7"):
         rows.append(frame)
-    assert len(rows) == 0
 
 
 def test_numbers_in_a_row_lie_where_processors_read_them_fast():
-    kind = row_type(2, {"a": 3, "b": 5})
+    kind = row_type(2, {"a": 3, "b": 5}, {})
     assert kind.itemsize % 8 == 0
     assert all(offset % 8 == 0 for name, (_, offset, *_) in kind.fields.items() if not name.endswith("contact"))
-
-
-def test_a_growing_file_knows_its_checksum(tmp_path):
-    file = GrowingFile(tmp_path / "file")
-    file.begin()
-    file.append(b"abc")
-    assert file.length == 3 and file.sha256 == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"  # FIPS 180-2
-    file.sync()
-    assert (tmp_path / "file").read_bytes() == b"abc"
-    file.close()
 
 
 @pytest.mark.parametrize("change", ["truncated", "another checksum", "less than it says"])

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rows of one type that are added one by one: in memory while they are few, in a temporary file when they become many."""
+
+from __future__ import annotations
+
+import mmap
+import os
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+from ..errors import FileError, os_error_reason
+
+IN_MEMORY_BYTES = 1 << 24
+"""Bytes of a table that stay in memory: hours of animation of a rigid body."""
+
+
+class RowTable:
+    """A table that grows row by row, so a long scene and its bake need no more memory than a short one.
+
+    The temporary file has no name, and is gone when the table and its arrays are.
+
+    Parameters
+    ----------
+    kind : dtype
+        Of a row; that of an array is ``(float, shape)``.
+    what : str
+        What the rows are, for messages, as in "The motion of a long scene".
+    folder : Path, optional
+        Where the temporary file lies. Default: where :func:`tempfile.gettempdir` says.
+    """
+
+    def __init__(self, kind: DTypeLike, what: str, folder: Path | None = None):
+        self._kind, self._what, self._folder = np.dtype(kind), what, folder
+        self._count = 0
+        place = None if folder is None else str(folder)
+        self._file = tempfile.SpooledTemporaryFile(IN_MEMORY_BYTES, prefix="palpate-", dir=place)  # noqa: SIM115
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return self._count
+
+    @property
+    def is_in_memory(self) -> bool:
+        """Return True if the rows so far are in memory."""
+        return self._count * self._kind.itemsize <= IN_MEMORY_BYTES
+
+    def append(self, row: np.ndarray | float) -> None:
+        """Add one row; raises FileError if the temporary file cannot be written."""
+        try:
+            self._file.write(np.asarray(row, self._kind.base).tobytes())
+        except OSError as error:
+            raise self._error(error) from error
+        self._count += 1
+
+    def rows(self) -> np.ndarray:
+        """Return all rows, (rows, …) of the type; a view of the temporary file, which cannot be changed, if there is one.
+
+        Raises
+        ------
+        FileError
+            As :meth:`append`.
+        """
+        try:
+            self._file.flush()
+            if self.is_in_memory:
+                self._file.seek(0)
+                content = self._file.read()
+                self._file.seek(0, os.SEEK_END)
+                return np.frombuffer(content, self._kind).copy()
+            mapped = mmap.mmap(self._file.fileno(), 0, access=mmap.ACCESS_READ)
+        except OSError as error:
+            raise self._error(error) from error
+        return np.frombuffer(mapped, self._kind)
+
+    def _error(self, error: OSError) -> FileError:
+        place, remedy = self._folder, "choose another folder"
+        if place is None:
+            place, remedy = Path(tempfile.gettempdir()), "name another folder in the environment variable TMPDIR"
+        return FileError(
+            f"{self._what} could not be kept in '{place}' ({os_error_reason(error)}): free some space there, or {remedy}."
+        )
+
+
+def motion_table(first: np.ndarray | float) -> RowTable:
+    """Return a table for the motion of a scene, with its first row."""
+    table = RowTable((float, np.shape(first)), "The motion of a long scene")
+    table.append(first)
+    return table
