@@ -21,7 +21,8 @@ class PressedSensor(pressed_sensor.PressedSensor):
     """A sensor and one thing that presses on it, both moved by another program.
 
     ``pressed.step(sensor_pose, target_pose)`` goes on by one step and returns forces and readings of the texels, and the force
-    and torque that go back to the other program; a pose is a position (3,), m, and a quaternion (4,), (w, x, y, z).
+    and torque that go back to the other program; a pose is a position (3,), m, and a quaternion
+    (4,), (w, x, y, z), or one array (7,) of both.
 
     Parameters
     ----------
@@ -31,7 +32,8 @@ class PressedSensor(pressed_sensor.PressedSensor):
     dt : float, seconds
         Step of the other program.
     sensor_pose, target_pose : pose, optional
-        At the start. Default: those of the sensor and the body.
+        At the start. Default: it begins at rest at the poses of the first step. A target's pose alone begins with the sensor
+        where it is.
 
     Raises
     ------
@@ -50,22 +52,20 @@ class PressedSensor(pressed_sensor.PressedSensor):
         if not isinstance(sensor, SensorOnMesh):
             raise ArgumentError(f"sensor is {arguments.brief(sensor)}: give a Sensor.")
         prepare_solver()
-        own: Pose = sensor.world_pose() if isinstance(sensor, Sensor) else (sensor.position, sensor.quaternion)
-        if isinstance(target, Body):
-            super().__init__(
-                sensor, target.shape or target.mesh, dt, sensor_pose or own, target_pose or (target.position, target.quaternion)
-            )
-        elif isinstance(target, TriangleMesh | Shape) and target_pose is not None:
-            super().__init__(sensor, target, dt, sensor_pose or own, target_pose)
-        else:
+        surface = (target.shape or target.mesh) if isinstance(target, Body) else target
+        if not isinstance(surface, TriangleMesh | Shape):
             raise ArgumentError(f"target is {arguments.brief(target)}: give a Body.")
+        step = arguments.number(dt, "dt", above_zero=True)
+        if sensor_pose is None and target_pose is not None:
+            sensor_pose = sensor.world_pose() if isinstance(sensor, Sensor) else (sensor.position, sensor.quaternion)
+        super().__init__(sensor, surface, step, sensor_pose, target_pose)
 
 
 class PressedSensors(pressed_sensors.PressedSensors):
     """A sensor and one thing that presses on it in many environments, moved by another program.
 
     ``pressed.step(sensor_poses, target_poses)`` goes on by one step in all environments; poses are (E, 7): position, m, and
-    quaternion (w, x, y, z). Each environment gives the bits of a :class:`PressedSensor`.
+    quaternion (w, x, y, z), or a pair of arrays. Each environment gives the bits of a :class:`PressedSensor`.
 
     Parameters
     ----------

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
@@ -16,9 +17,9 @@ from numpy.typing import ArrayLike
 from ..core.effects.engine.registry import check, effect, from_dict
 from ..core.errors import FileError, MeshError
 from ..core.geometry.layout.grid_layout import GridLayout
-from ..core.geometry.mesh import TriangleMesh, checked_mesh, triangle_areas
+from ..core.geometry.mesh import TriangleMesh, checked_mesh
 from ..core.geometry.rotations import quaternion_product, rotation_matrices
-from ..core.geometry.texels import Texels, texels_from_region
+from ..core.geometry.texels import Texels, texels_from_region, texels_with_normals
 from ..core.io.sensor_toml import SensorModel, write_sensor
 from ..core.model.effect import Effect
 from ..core.model.sensor import Sensor as ModelSensor
@@ -29,9 +30,6 @@ from . import arguments
 from .arguments import ArgumentError
 from .bodies import Body
 from .paths import LEVEL
-
-LAYOUT_TRIES = 8
-"""Spacings that are tried to get as many texels as were asked for."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -117,7 +115,7 @@ class Sensor(SensorOnMesh):
         mesh : path, (vertices, faces) or mesh of trimesh
             STL, PLY, OBJ or OFF; metres. Texels feel what comes from the side that its faces point to.
         texels : int, optional
-            Spread so many over the region, evenly; there may be a few more or less. Default: one at each vertex.
+            Spread so many over the region, evenly, with the normals of the surface. Default: one at each vertex.
         region : (nv,) bool or (m,) int, optional
             Vertices that are sensitive, by a mask or by their numbers. Default: all.
         name, position, quaternion, body, **parameters
@@ -135,9 +133,9 @@ class Sensor(SensorOnMesh):
         if texels is None:
             made = cls._of(whole, chosen, own, parameters)
         else:
-            made = replace(
-                cls._of(_spread(whole, chosen, arguments.count(texels, "texels"), own), None, own, parameters), surface=whole
-            )
+            layout, normals = _spread(whole, chosen, arguments.count(texels, "texels"), own)
+            model = ModelSensor(own, 0, texels_with_normals(layout, normals), arguments.parameters(parameters, own))
+            made = cls(model, layout, whole)
         return made._placed(position, quaternion, body)
 
     @classmethod
@@ -329,25 +327,27 @@ def _chosen_vertices(region: ArrayLike | None, vertices: int) -> np.ndarray:
     )
 
 
-def _spread(mesh: TriangleMesh, chosen: np.ndarray, texels: int, name: str) -> TriangleMesh:
-    """Return a mesh whose vertices are so many texels, or nearly, spread evenly over the region."""
-    from ..core.geometry.sampling.poisson_disk import scatter
+def _spread(mesh: TriangleMesh, chosen: np.ndarray, texels: int, name: str) -> tuple[TriangleMesh, np.ndarray]:
+    """Return a mesh whose vertices are so many texels, spread evenly over the region, and their normals."""
+    from ..core.geometry.point_surface import triangles_between
+    from ..core.geometry.sampling.even_points import even_points
 
     inside = chosen[mesh.triangles].all(axis=1)
     if not inside.any():
         raise MeshError(f"The region of sensor '{name}' has no face: choose all corners of at least one.")
-    patch = TriangleMesh(mesh.vertices, mesh.triangles[inside])
-    spacing = float(np.sqrt(triangle_areas(patch).sum() / (0.87 * texels)))
-    best = scatter(patch, spacing)
-    for _ in range(LAYOUT_TRIES):
-        if len(best.vertices) == texels:
-            break
-        spacing *= float(np.sqrt(len(best.vertices) / texels))
-        found = scatter(patch, spacing)
-        if abs(len(found.vertices) - texels) >= abs(len(best.vertices) - texels):
-            break
-        best = found
-    return _mesh_of_faces(best.vertices, best.faces, name)
+    if texels < 3:
+        raise ArgumentError(f"texels is {texels}: a sensor has three or more.")
+    found = even_points(TriangleMesh(mesh.vertices, mesh.triangles[inside]), texels)
+    if found.without:
+        places = ", ".join("(" + ", ".join(f"{x:.3g}" for x in place) + ")" for place in found.without[:3])
+        more = f" and {len(found.without) - 3} more" if len(found.without) > 3 else ""
+        warnings.warn(
+            f"Sensor '{name}' has no texel on {len(found.without)} islands of its surface, around {places}{more} m: "
+            "ask for more texels, or choose a region.",
+            stacklevel=4,
+        )
+    faces = triangles_between(found.position, found.normal, found.island)
+    return checked_mesh(found.position, faces, name)[0], found.normal
 
 
 def _grid_words(texels: Texels) -> dict[str, Any] | None:

@@ -19,7 +19,7 @@ LONGEST_EDGE = 2.5
 The fourth is one step away in a square grid, and two along the rows of a grid whose rows are further apart."""
 
 
-def triangles_between(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def triangles_between(points: np.ndarray, normals: np.ndarray, island: np.ndarray | None = None) -> np.ndarray:
     """Return triangles that join neighbouring points of a surface.
 
     Around each point its neighbours are laid into its tangent plane, and their Delaunay triangles at this point are taken
@@ -31,6 +31,8 @@ def triangles_between(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     points : (n, 3) float, metres
     normals : (n, 3) float
         Unit vectors, out of the surface.
+    island : (n,) int, optional
+        Number of the part of the surface that each point is on: only points of one part are joined, if it has three.
 
     Returns
     -------
@@ -59,6 +61,8 @@ def triangles_between(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         found = _triangles_in_plane(points, mean, reach)
     else:
         found = _triangles_by_votes(points, normals, distance, near, reach)
+    if island is not None:
+        found = [triangle for triangle in found if len({int(island[corner]) for corner in triangle}) == 1]
     missing = sorted(set(range(count)) - {corner for triangle in found for corner in triangle})
     found += [_nearest_triangle(points, point, near[point, 1:]) for point in missing]
     triangles = np.array(sorted(set(found)))

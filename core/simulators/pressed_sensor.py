@@ -22,8 +22,10 @@ from .load_balance import LoadBalance
 from .pressed_sensors import REMEDY
 from .sensor_on_mesh import SensorOnMesh
 
-Pose = tuple[ArrayLike, ArrayLike]
-"""Position (3,) in metres and quaternion (4,), (w, x, y, z), of a frame in the world."""
+Pose = tuple[ArrayLike, ArrayLike] | np.ndarray
+"""Position (3,) in metres and quaternion (4,), (w, x, y, z), of a frame in the world: a pair, or one array (7,)."""
+LARGEST_SPEED = 20.0
+"""Metres per second of the first step after a reset. Robots and hands move below 10."""
 
 
 @dataclass(frozen=True)
@@ -87,8 +89,8 @@ class PressedSensor:
         item: SensorOnMesh,
         target: TriangleMesh | Shape | Sequence[TriangleMesh | Shape],
         dt: float,
-        sensor_pose: Pose,
-        target_pose: Pose | Sequence[Pose],
+        sensor_pose: Pose | None = None,
+        target_pose: Pose | Sequence[Pose] | None = None,
         threads: int | None = None,
     ):
         self._one_target = isinstance(target, TriangleMesh | Shape)
@@ -108,7 +110,11 @@ class PressedSensor:
         self._balance: LoadBalance | None = None
         self._jumps = JumpFinder(mounted_texels(item.sensor), targets, out)
         self.residual = np.zeros(0)
-        self.reset(sensor_pose, target_pose)
+        self._steps = 0
+        if target_pose is None or sensor_pose is None:
+            self._begins_at_first_step()
+        else:
+            self.reset(sensor_pose, target_pose)
 
     def __repr__(self) -> str:
         targets = self._out.poses.shape[1] - 1
@@ -142,6 +148,12 @@ class PressedSensor:
         self._forget_load()
         self._jumps.find()
 
+    def _begins_at_first_step(self) -> None:
+        """Begin at the poses of the first step, at rest there."""
+        self._chain = self._model.readout_chain()
+        self._out.begins[0] = True
+        self._jumps.forget(np.ones(1, bool))
+
     def step(
         self,
         sensor_pose: Pose,
@@ -169,7 +181,10 @@ class PressedSensor:
             A pose is not finite, or a quaternion is zero; or the load is none. The sensor stays at the step before. Or a target
             went through the sensor within this step; the sensor is behind it now, and goes on.
         """
+        before = self._out.poses[0, :, :3].copy()
         self._read_poses(sensor_pose, target_pose)
+        if self._steps == 0 and not self._out.begins[0]:
+            self._require_plausible_speed(before)
         if wrench is None:
             self._forget_load()
             self._press()
@@ -194,6 +209,17 @@ class PressedSensor:
         np.copyto(out.force_on_target, self._force)
         np.copyto(out.torque_on_target, self._torque)
         return out
+
+    def _require_plausible_speed(self, before: np.ndarray) -> None:
+        """Raise :class:`.ParameterError` if the first step begins where no body could have come from."""
+        way = np.linalg.norm(self._out.poses[0, :, :3] - before, axis=1)
+        speed = float(way.max()) * self._model.rate
+        if speed > LARGEST_SPEED and np.isfinite(speed):
+            self._out.poses[0, :, :3] = before
+            raise ParameterError(
+                f"The first step goes {float(way.max()):.3g} m in {1.0 / self._model.rate:.3g} s, {speed:.3g} m/s: "
+                "give the poses at the start, or none to begin at the first step."
+            )
 
     def _press(self) -> None:
         """Run one step to the poses."""
@@ -232,7 +258,7 @@ class PressedSensor:
             )
         for number, (pose, rows) in enumerate(zip(poses, self._rows, strict=True)):
             try:
-                position, quaternion = pose
+                position, quaternion = (pose[:3], pose[3:]) if len(pose) == 7 else pose
                 fits = len(position) == 3 and len(quaternion) == 4
                 rows[0][:], rows[1][:] = position, quaternion
             except (TypeError, ValueError):

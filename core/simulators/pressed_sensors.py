@@ -196,7 +196,8 @@ class PressedSensors:
         Parameters
         ----------
         sensor_poses : (E, 7) or (7,) float
-            Positions (m) and quaternions (w, x, y, z); (7,) for a sensor that stands at the same place everywhere.
+            Positions (m) and quaternions (w, x, y, z), in one array or as a pair of arrays; (7,) for a sensor that stands at
+            the same place everywhere.
         target_poses : (E, 7) float, or (E, T, 7) with several targets
         out : Contacts, optional
             To write into; by default the arrays that the next step overwrites.
@@ -237,6 +238,10 @@ class PressedSensors:
 
     def _take(self, whose: str, poses: ArrayLike, shapes: list[tuple[int, ...]], rows: np.ndarray) -> None:
         """Write poses into rows."""
+        if isinstance(poses, tuple | list) and len(poses) == 2 and np.ndim(poses[0]) == np.ndim(poses[1]) > 0:
+            position, quaternion = (np.asarray(part) for part in poses)
+            if position.shape[-1] == 3 and quaternion.shape[-1] == 4 and position.shape[:-1] == quaternion.shape[:-1]:
+                poses = np.concatenate([position, quaternion], axis=-1)
         values = np.asarray(poses)
         if values.shape not in shapes or values.dtype.kind not in "fiu":
             wanted = " or ".join(map(str, shapes))

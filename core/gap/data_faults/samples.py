@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Samples that a logger repeated, and readings at the rail of a converter.
 
-All three faults show in values that are equal to the last digit while the load changes, which noise never lets happen.
+All three faults show in values that are equal to the last digit while the load changes, which noise never lets happen. Nothing
+is looked for where all readings are those of an untouched sensor: electronics that cut off below a threshold repeat these, and
+that is a dead zone of the sensor.
 """
 
 from __future__ import annotations
@@ -23,6 +25,8 @@ LEAST_STUCK, STUCK_SAMPLES, STUCK_MOVE = 0.2, 6, 0.1
 value."""
 MOST_QUIET_REPEATS = 0.05
 """It is also stuck while the load rests, if otherwise at most this share of the samples repeats the one before."""
+UNTOUCHED = 1e-3
+"""Share of the largest load up to which nothing presses."""
 LEAST_REPEATS, MOST_STEPS = 0.08, 4.0
 """Least share of moving samples that repeat the one before. The others change by more than so many steps of the converter."""
 RAIL_RUN, RAIL_MOVE, LEAST_RAILED = 4, 0.05, 12
@@ -76,7 +80,15 @@ def _equal_rows(stimulus: Stimulus) -> tuple[np.ndarray | None, np.ndarray]:
         return None, moving
     before, after = values[:-1, alive], values[1:, alive]
     same = (before == after) | (np.isnan(before) & np.isnan(after))
-    return np.concatenate([[False], same.all(axis=1) & np.isfinite(after).any(axis=1)]), moving
+    silent = ((after == _untouched(stimulus, values)[alive]) | np.isnan(after)).all(axis=1)
+    return np.concatenate([[False], same.all(axis=1) & np.isfinite(after).any(axis=1) & ~silent]), moving
+
+
+def _untouched(stimulus: Stimulus, values: np.ndarray) -> np.ndarray:
+    """Value of each channel of `values` (T, c) where nothing presses, or where it presses least, (c,) float."""
+    load = stimulus.load.sum(axis=1)
+    free = values[load <= UNTOUCHED * float(load.max(initial=0.0))]
+    return np.nanmedian(free if len(free) else values[[int(load.argmin())]], axis=0)
 
 
 def _frozen(stimulus: Stimulus, equal: np.ndarray) -> np.ndarray:
@@ -115,7 +127,7 @@ def _rails(stimuli: Sequence[Stimulus]) -> list[DataFault]:
     least = max(RAIL_MOVE, COARSE_STEPS / max(levels, 1))
     best: tuple[int, float] | None = None
     for rail in (high, low):
-        count = sum(_railed_samples(s, rail, least) for s in recorded)
+        count = sum(_railed_samples(s, rail, least) for s, v in zip(recorded, values, strict=True) if not _rests_at(s, v, rail))
         if count >= LEAST_RAILED and (best is None or count > best[0]):
             best = (count, rail)
     if best is None:
@@ -126,6 +138,11 @@ def _rails(stimuli: Sequence[Stimulus]) -> list[DataFault]:
         f"{count} readings stay at {rail:.6g}, the {'largest' if rail == high else 'smallest'} of all, while the load changes"
     )
     return [DataFault("saturated-converter", names, said, dict.fromkeys(names, _without_value(rail)))]
+
+
+def _rests_at(stimulus: Stimulus, reading: np.ndarray, value: float) -> bool:
+    """True if most channels of an untouched sensor read a value: this is no rail, but where the sensor begins."""
+    return float((_untouched(stimulus, reading) == value).mean()) > 0.5
 
 
 def _railed_samples(stimulus: Stimulus, rail: float, least: float) -> int:

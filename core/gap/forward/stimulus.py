@@ -27,8 +27,12 @@ from ..dataset.rig import Rig
 from ..dataset.trial import Trial
 from .closed_form_contact import Contact, box_contact, sphere_contact
 
-BISECTIONS, WEIGHT_ERROR = 26, 1e-3
-"""Halvings of the height at which an indenter rests, and the largest relative error of the force that is carried there."""
+PRECISION, WEIGHT_ERROR = 1e-6, 1e-3
+"""Relative error of the force that is carried at the height at which an indenter rests: of the search, and at most."""
+FIRST_BISECTIONS, MOST_STEPS = 12, 120
+"""Steps of the search: halvings of the bracket at first, then three linear interpolations for each further halving."""
+LEAST_WEIGHT = 1e-4
+"""Forces below this share of the largest one of a recording need not rest on the sensor: a load cell's noise about zero."""
 LONGEST_SPLIT = 3.0
 """Pause between two recordings, in samples, up to which they are parts of one recording that simply goes on."""
 
@@ -319,21 +323,32 @@ def _weighted(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) 
     force = np.maximum(trial.level, 0.0)
     states, back = np.unique(np.column_stack([trial.position, trial.quaternion, force]), axis=0, return_inverse=True)
     back, wanted = back.ravel(), states[:, 7]
+    least = LEAST_WEIGHT * float(wanted.max(initial=0.0))
     size = float(np.linalg.norm(indenter.mesh.vertices, axis=1).max())
     high = np.full(len(states), float(texels.position[:, 2].max()) + size)
     low = high - 2.0 * size - rig.parameters.max_penetration - float(np.ptp(texels.position[:, 2]))
     share = np.ones(len(texels)) if rig.cover is None else rig.cover.share
     part = replace(trial, time=np.arange(float(len(states))), position=states[:, :3].copy(), quaternion=states[:, 3:7].copy())
     reach = 4.0 * (rig.parameters.max_penetration + size)
-    for _ in range(BISECTIONS):
+    excess, lack = np.zeros(len(states)), wanted.copy()  # of the force at the lower and the upper end
+    was_enough = np.zeros(len(states), bool)
+    for number in range(MOST_STEPS):
         middle = 0.5 * (low + high)
+        if number >= FIRST_BISECTIONS and number % 4:  # Illinois: linear, and an end that stays counts half
+            total = excess + lack
+            middle = high + np.divide(lack, total, out=np.full(len(states), 0.5), where=total > 0.0) * (low - high)
         assert part.position is not None
         part.position[:, 2] = middle
         depth, normal, _, _ = _contact(part, rig, texels, reach)
-        enough = rig.parameters.k * depth @ share >= wanted
-        low, high = np.where(enough, middle, low), np.where(enough, high, middle)
-    carried = depth @ share
-    (lost,) = np.nonzero((wanted > 0.0) & (np.abs(rig.parameters.k * carried - wanted) > WEIGHT_ERROR * wanted))
+        carried = depth @ share
+        over = rig.parameters.k * carried - wanted
+        if number >= FIRST_BISECTIONS and (np.abs(over) <= PRECISION * wanted)[wanted > least].all():
+            break
+        enough = over >= 0.0
+        excess = np.where(enough, over, np.where(was_enough, excess, 0.5 * excess))
+        lack = np.where(enough, np.where(was_enough, 0.5 * lack, lack), -over)
+        low, high, was_enough = np.where(enough, middle, low), np.where(enough, high, middle), enough
+    (lost,) = np.nonzero((wanted > least) & (np.abs(rig.parameters.k * carried - wanted) > WEIGHT_ERROR * wanted))
     if len(lost):
         x, y = states[lost[0], :2]
         raise SceneError(

@@ -4,9 +4,11 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from ...errors import PalpateError
 from ...io.disk_space import require_space
 from ...io.file_list import FileList
 from ...io.file_writing import atomic_write
@@ -38,8 +40,10 @@ TEXEL_BYTES = 200.0
 """Bytes of a texel in the map of errors and in the amended sensor."""
 
 
-def summary(result: Diagnosis, errors: GapErrors, experiment: PlannedExperiment | None = None) -> dict[str, Any]:
-    """Return the contents of gap.json."""
+def summary(
+    result: Diagnosis, errors: GapErrors, experiment: PlannedExperiment | None = None, notes: Sequence[str] = ()
+) -> dict[str, Any]:
+    """Return the contents of gap.json, with notes among its warnings."""
     model = with_mean_gain_moved(result)
     base_free = [item for item in result.base.free if item.effect == BASE]
     base = [one for one in result.intervals if one.effect == BASE]
@@ -79,7 +83,7 @@ def summary(result: Diagnosis, errors: GapErrors, experiment: PlannedExperiment 
             {"kind": fault.kind, "trials": list(fault.trials), "evidence": fault.evidence, "put_right": fault.put_right}
             for fault in result.faults
         ],
-        "warnings": list(result.rig.warnings) + warnings(result),
+        "warnings": [*result.rig.warnings, *warnings(result), *notes],
     }
 
 
@@ -191,11 +195,15 @@ def write_report(result: Diagnosis, folder: Path, errors: GapErrors | None = Non
         pictures = yield from part_of_job(
             draw(result, errors, new), lambda step: Progress(step.stage, 100 + 500 * step.done // step.total, 1000)
         )
-        experiment = yield from part_of_job(
-            plan_after(result), lambda step: Progress(step.stage, 600 + 300 * step.done // step.total, 1000)
-        )
+        notes: list[str] = []
+        try:
+            experiment = yield from part_of_job(
+                plan_after(result), lambda step: Progress(step.stage, 600 + 300 * step.done // step.total, 1000)
+            )
+        except PalpateError as error:  # what was found stands without a plan
+            experiment, notes = None, [f"No further recording was planned: {error}"]
         yield Progress("writing the report", 900, 1000)
-        found = summary(result, errors, experiment)
+        found = summary(result, errors, experiment, notes)
         with atomic_write(new / "report.html") as temporary:
             text = html_report(result, found, headline(result, errors), pictures, new)
             temporary.write_text(text, encoding="utf-8")

@@ -96,3 +96,51 @@ def test_bodies_know_their_shape_and_press_with_it(body):
     pressed = pp.PressedSensor(pp.Sensor.grid(3, 3, pitch=1e-3), body, dt=1e-3)
     contact = pressed.step(([0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]), ([0.0, 0.0, half - 1e-4], level))
     assert contact.texels.depth.max() == pytest.approx(1e-4, abs=1e-12)
+
+
+@pytest.mark.parametrize("made_at", [(0.0, 0.0, 0.0), (0.0, 0.0, 0.1)])
+def test_a_pressed_sensor_begins_at_its_first_step_wherever_the_body_was_made(made_at):
+    """A box 0.5 mm inside 90 of 100 texels of 1000 N/m: 45 N, at the first step and at the second."""
+    pad, level = pp.Sensor.grid(10, 10, pitch=4e-3, k=1000.0), [1.0, 0.0, 0.0, 0.0]
+    still, pose = ([0.0, 0.0, 0.0], level), ([0.01, 0.0, 0.0245], level)
+    pressed = pp.PressedSensor(pad, pp.Body.box(0.05, position=made_at), 1e-3)
+    for _ in range(2):
+        assert pressed.step(still, pose).force_on_target == pytest.approx([0.0, 0.0, 45.0], abs=1e-9)
+    joined = [np.concatenate(one) for one in (still, pose)]
+    assert pp.PressedSensor(pad, pp.Body.box(0.05), 1e-3, *joined).step(*joined).force_on_target[2] == pytest.approx(45.0)
+    many = pp.PressedSensors(pad, pp.Body.box(0.05), 1, 1e-3)
+    pairs = [tuple(np.array([part]) for part in one) for one in (still, pose)]
+    assert many.step(*pairs).wrench[0, 2] == pytest.approx(45.0)
+    far = pp.PressedSensor(pad, pp.Body.box(0.05), 1e-3, still, ([0.0, 0.0, 0.1], level))
+    with pytest.raises(pp.PalpateError, match="0.0762 m in 0.001 s, 76.2 m/s: give the poses at the start"):
+        far.step(still, pose)
+
+
+def balls(count):
+    return trimesh.util.concatenate(
+        [trimesh.creation.icosphere(2, 0.005).apply_translation((0.012 * i, 0.0, 0.0)) for i in range(count)]
+    )
+
+
+@pytest.mark.parametrize("texels", [10, 30, 35])
+def test_texels_are_spread_over_every_island_with_the_normals_of_the_surface(texels):
+    sensor = pp.Sensor.from_mesh(balls(10), texels=texels)
+    place, normal = sensor.texels.position, sensor.texels.normal
+    ball = np.round(place[:, 0] / 0.012)
+    assert len(sensor.texels) == texels and set(ball) == set(range(10))
+    radial = place - np.column_stack([0.012 * ball, 0.0 * ball, 0.0 * ball])
+    radial /= np.linalg.norm(radial, axis=1)[:, None]
+    assert (np.einsum("ij,ij->i", radial, normal) > 0.999).all()  # the facets deviate by 9 degrees
+
+
+def test_both_sides_of_a_thin_plate_have_texels_and_their_own_normals():
+    sensor = pp.Sensor.from_mesh(trimesh.creation.box((0.02, 0.02, 0.0005)), texels=40)
+    side = np.sign(sensor.texels.position[:, 2])
+    faces = np.abs(sensor.texels.normal[:, 2]) > 0.9
+    assert (faces & (side > 0)).sum() >= 15 and (faces & (side < 0)).sum() >= 15
+    assert np.allclose(sensor.texels.normal[faces, 2], side[faces])
+
+
+def test_islands_that_get_no_texel_are_named():
+    with pytest.warns(UserWarning, match=r"no texel on 7 islands of its surface, around \(.*\) and 4 more m: ask for more"):
+        pp.Sensor.from_mesh(balls(10), texels=3)

@@ -36,7 +36,7 @@ def report(monkeypatch):
     monkeypatch.setattr(summary, "draw", draw)
     monkeypatch.setattr(summary, "amended_sensor", lambda result: result)
     monkeypatch.setattr(summary, "write_sensor", lambda path, result: write_text(path, result.age))
-    monkeypatch.setattr(summary, "summary", lambda result, _errors, _experiment: result.age)
+    monkeypatch.setattr(summary, "summary", lambda result, _errors, _experiment, _notes: result.age)
 
     def plan_after(result):
         """The old diagnosis leaves a pair open."""
@@ -81,3 +81,17 @@ def test_a_full_disk_is_found_before_the_pictures_are_drawn(report, tmp_path, mo
     with pytest.raises(FileError, match="The report needs up to 50 MB"):
         report(tmp_path, "new", trials=1001 * (TRIAL,))
     assert ages(tmp_path) == before
+
+
+def test_a_plan_that_fails_takes_no_finished_result_with_it(report, tmp_path, monkeypatch):
+    told = []
+
+    def plan_after(_result):
+        raise FileError("0.1 N do not rest on the sensor.")
+        yield
+
+    monkeypatch.setattr(summary, "plan_after", plan_after)
+    monkeypatch.setattr(summary, "summary", lambda result, _errors, experiment, notes: told.append((experiment, notes)))
+    report(tmp_path, "old")
+    assert told == [(None, ["No further recording was planned: 0.1 N do not rest on the sensor."])]
+    assert (tmp_path / "gap.json").exists() and not (tmp_path / "next_experiment.csv").exists()

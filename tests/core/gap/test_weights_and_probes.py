@@ -76,6 +76,24 @@ def test_texels_share_a_weight_as_springs_do(tmp_path):
         np.testing.assert_allclose(load[i], shares(x, y, trial.level[i]), rtol=1e-3, atol=1e-4)
 
 
+@pytest.mark.parametrize("k", [80.0, 1e3, 1e6, 1e9])
+def test_weights_of_any_depth_are_carried_with_a_load_cells_noise(tmp_path, k):
+    """From millimetres to nanometres deep, with forces of both signs about zero; the load is the whole force."""
+    rng = np.random.default_rng(3)
+    lines = weighed(0).splitlines()
+    cells = [line.split(",") for line in lines[1:]]
+    for row in cells:
+        row[3] = f"{float(row[3]) + 2e-4 * rng.normal():.9g}"
+    rig = rig_of(
+        tmp_path, WEIGHTS.replace(f"k = {K}", f"k = {k}"), a="\n".join([lines[0], *map(",".join, cells)]) + "\n", b=weighed(1)
+    )
+    trial = rig.trials[0]
+    load = stimulus_of(trial, rig).load.sum(axis=1)
+    heavy = trial.level > 1e-3
+    np.testing.assert_allclose(load[heavy], trial.level[heavy], rtol=1e-9)
+    assert (load[trial.level <= 0.0] == 0.0).all()
+
+
 def test_weights_at_places_give_the_gain_of_each_texel(tmp_path):
     found = run_job(diagnose(rig_of(tmp_path, a=weighed(0), b=weighed(1))))
     assert found.verdict == "explained"

@@ -105,6 +105,25 @@ def test_a_press_that_is_felt_late_and_let_go_early_has_lost_no_samples(tmp_path
     assert not find_faults(rig, stimuli_of(rig))
 
 
+@pytest.mark.parametrize(("threshold", "rest", "kinds"), [(8.0, 0.0, []), (8.0, 40.0, []), (0.0, None, ["stuck-logger"])])
+def test_electronics_that_cut_off_below_a_threshold_are_no_stuck_logger(tmp_path, threshold, rest, kinds):
+    """Untouched, all texels read the same to the last digit; a logger that is stuck under load is one still."""
+    rng, trials = np.random.default_rng(8), []
+    for name, use in (("a", "fit"), ("b", "fit"), ("c", "check")):
+        time = np.arange(0.0, 15.0, 0.03)
+        force = 2.0 * np.clip(np.sin(time * rng.uniform(0.8, 1.2)), 0.0, None) ** 2
+        count = np.round(400.0 * force[:, None] / 4.0 * [1.0, 1.05, 0.95, 1.0] + rng.normal(0.0, 1.5, (len(time), 4)))
+        if rest is not None:
+            count = rest + np.where((count < threshold) | (force < 1e-9)[:, None], 0.0, count)
+        else:
+            count[200:240] = count[199]
+        columns = {f"texel_{i}": count[:, i] for i in range(4)}
+        trials.append((name, use, {"time": time, "force": force, **columns}))
+    pad = Recording("pad", 'grid = { rows = 2, columns = 2, pitch = 0.0034 }\nunit = "counts"', trials)
+    rig = read_rig(pad.write(tmp_path))
+    assert [fault.kind for fault in find_faults(rig, stimuli_of(rig))] == kinds
+
+
 @pytest.mark.parametrize(("sign", "kinds"), [(1.0, []), (-1.0, ["sign"])])
 def test_friction_never_drives_a_slide(tmp_path, sign, kinds):
     """Friction of 2 N takes work from the surface that slides; the cell that measures it has an offset, too."""
