@@ -102,15 +102,14 @@ def build_tree(meshes: list[TriangleMesh]) -> Tree:
 
 def _adjacent_triangles(triangles: np.ndarray) -> np.ndarray:
     """(n, 3) int: the triangle across each edge, -1 unless the edge joins exactly two of one orientation."""
-    start, end = triangles.ravel().astype(np.int64), np.roll(triangles, -1, axis=1).ravel().astype(np.int64)
-    low, high = np.minimum(start, end), np.maximum(start, end)
-    key = low * (int(triangles.max()) + 1) + high
-    order = np.argsort(key, kind="stable")
-    _, first, count = np.unique(key[order], return_index=True, return_counts=True)
-    one, other = order[first[count == 2]], order[first[count == 2] + 1]
-    turned = start[one] == end[other]  # each goes along the edge its own way
+    from trimesh.geometry import faces_to_edges
+    from trimesh.grouping import group_rows
+
+    edges = faces_to_edges(triangles)
+    one, other = group_rows(np.sort(edges, axis=1), require_count=2).reshape(-1, 2).T
+    turned = edges[one, 0] == edges[other, 1]  # each goes along the edge its own way
     one, other = one[turned], other[turned]
-    adjacent = np.full(len(key), -1)
+    adjacent = np.full(len(edges), -1)
     adjacent[one], adjacent[other] = other // 3, one // 3
     return adjacent.reshape(-1, 3)
 
