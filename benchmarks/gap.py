@@ -35,10 +35,15 @@ from typing import Any
 import numpy as np
 
 from ._hidden import cases
-from ._rows import HOUSE, MIX, ROWS, fingerprint, outcome, plan_of, results_in, sure_names
+from ._rows import HOUSE, RIGHT, ROWS, fingerprint, outcome, plan_of, results_in, sure_names
 
 FORMULAS = ("own", "other", "third")
 """Kinds of cases with one effect, by whose formula it has."""
+BARS: dict[str, tuple[float | None, float | None]] = {
+    "own": (0.95, None), "other": (0.85, 0.05), "third": (0.92, 0.02), "none": (0.98, None), "two": (0.75, None),
+    "three": (0.60, None), "outside": (0.90, None), "poor": (None, 0.0),
+}  # fmt: skip
+"""Least share that is right and largest that is wrong, of each kind."""
 FAILED: dict[str, Any] = {"outcome": "failed", "sure": [], "said": [], "verdict": "failed", "ambiguous": [], "experiment": ""}
 FAILED |= {"closed": None, "inside": []}
 """The score of a case that raised."""
@@ -252,36 +257,17 @@ def table(results: list[dict]) -> str:
 
 
 def figures(results: list[dict]) -> Iterator[dict]:
-    """Yield one figure per bar."""
-    of = {kind: [r for r in results if r["kind"] == kind] for kind in MIX}
-
-    def rate(name: str, some: list[dict], good, goal: float | None) -> Iterator[dict]:
-        if some:
-            figure = {"name": f"gap.{name}", "value": float(np.mean([bool(good(r)) for r in some])), "unit": "share"}
-            yield figure | ({"goal": goal} if goal is not None else {})
-
-    for kind, right, most in (("other", 0.85, 0.05), ("own", 0.95, None), ("third", 0.92, 0.02)):
-        yield from rate(f"{kind}.right", of[kind], lambda r: r["outcome"] == "right", right)
-        yield from rate(f"{kind}.wrong", of[kind], lambda r: r["outcome"] == "wrong", most)
-        for word in ("ambiguous", "unexplained", "no gap"):
-            yield from rate(f"{kind}.{word.replace(' ', '_')}", of[kind], lambda r, w=word: r["outcome"] == w, None)
-    by_name: dict[str, list[dict]] = {}
-    for r in of["own"]:
-        by_name.setdefault(r["answer"][0], []).append(r)
-    if by_name:
-        worst = min(by_name, key=lambda name: np.mean([r["outcome"] == "right" for r in by_name[name]]))
-        yield from rate(f"own.worst_effect.{worst}", by_name[worst], lambda r: r["outcome"] == "right", 0.85)
-    yield from rate("none.false_alarm", of["none"], lambda r: r["verdict"] != "no gap", 0.02)
-    yield from rate("two.both", of["two"], lambda r: r["outcome"] == "right", 0.75)
-    yield from rate("two.one_and_none_wrong", of["two"], lambda r: r["outcome"] in ("right", "part"), 0.90)
-    yield from rate("three.two_and_none_wrong", of["three"], lambda r: r["outcome"] == "right", 0.60)
-    yield from rate("outside.unexplained", of["outside"], lambda r: r["outcome"] == "unexplained", 0.90)
-    vague = ("ambiguous", "unexplained")
-    yield from rate("poor.open_with_experiment", of["poor"], lambda r: r["outcome"] in vague and r["experiment"], None)
-    yield from rate("poor.confident_and_wrong", of["poor"], lambda r: r["outcome"] == "wrong", 0.0)
-    for kind, goal in (("own", 0.80), ("other", 0.65), ("third", None), ("two", None), ("three", None)):
-        yield from _middle(f"{kind}.closed_on_check", [r["closed"] for r in of[kind]], "share", goal)
-    inside = [hit for r in of["own"] for _, hit in r["inside"]]
+    """Yield the shares of each kind of cases that are right and wrong, and how well gaps are closed; the table has the rest."""
+    for kind, (right, most) in BARS.items():
+        here = [r for r in results if r["kind"] == kind]
+        for what, goal in ((RIGHT.get(kind, "right"), right), ("wrong", most)):
+            if here:
+                share = float(np.mean([r["outcome"] == what for r in here]))
+                figure = {"name": f"gap.{kind}.{what.replace(' ', '_')}", "value": share, "unit": f"share of {len(here)}"}
+                yield figure | ({"goal": goal} if goal is not None else {})
+    for kind, goal in (("own", 0.80), ("other", 0.65)):
+        yield from _middle(f"{kind}.closed_on_check", [r["closed"] for r in results if r["kind"] == kind], "share", goal)
+    inside = [hit for r in results if r["kind"] == "own" for _, hit in r["inside"]]
     if inside:
         yield {"name": "gap.own.interval_coverage", "value": float(np.mean(inside)), "unit": "share", "goal": 0.95}
     yield from _middle("seconds", [r["cpu_seconds"] for r in results], "s", 30.0)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from palpate.benchmarks import gap
+from palpate.benchmarks import _rows, gap
 from palpate.benchmarks import sessions as sessions_group
 from palpate.benchmarks._hidden import cases, other, own, sessions, third, world
 from palpate.core.effects.engine.registry import effect, library, names_where
@@ -183,8 +183,8 @@ def test_outcomes():
 
 
 def test_a_whole_run_has_every_kind_and_grows_without_changing():
-    small, whole = gap.plan_of(20, 1000), gap.plan_of(sum(gap.MIX.values()), 1000)
-    assert len(whole) == 390 and {kind for kind, _ in small} == set(gap.MIX)
+    small, whole = gap.plan_of(20, 1000), gap.plan_of(sum(_rows.MIX.values()), 1000)
+    assert len(whole) == 390 and {kind for kind, _ in small} == set(_rows.MIX)
     assert set(small) <= set(whole)
 
 
