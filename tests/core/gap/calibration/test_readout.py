@@ -12,7 +12,7 @@ from palpate.core.gap.calibration.readout_methods import ForwardInverse, Gaussia
 from palpate.core.gap.dataset.rig import read_rig
 
 GAIN = np.array([1.0, -0.4, 0.7, -1.2])
-SAMPLES = 200
+SAMPLES = 120
 CURVE = np.array([0.2, 0.5, -0.3, 0.1])
 RIG = 'format = "palpate-rig/1"\n[sensor]\ngrid = { rows = 1, columns = 4, pitch = [0.01, 0.01] }\nunit = "uT"\n'
 
@@ -166,11 +166,11 @@ def test_an_estimate_has_gaps_where_readings_have(fitted):
     assert np.sqrt(np.mean((found.value[known, 0] - force[known]) ** 2)) < 0.06
     assert (found.low[known] <= found.value[known]).all() and (found.value[known] <= found.high[known]).all()
     assert found.low[known].min() >= 0.0  # a force of contact is never negative
-    with pytest.raises(pp.PalpateError, match=r"readings of the shape \(200, 3\) do not fit: give \(T, 4\)"):
+    with pytest.raises(pp.PalpateError, match=r"readings of the shape \(120, 3\) do not fit: give \(T, 4\)"):
         fitted.estimate(time, readings[:, :3])
 
 
-@pytest.mark.slow("a read-out tries all candidates, each on parts that are left out")
+@pytest.mark.long("a read-out tries all candidates, each on parts that are left out")
 def test_a_sensor_that_trails_is_remembered(tmp_path):
     recordings = [press(i, late=0.3) for i in range(4)]
     fit = pp.fit_readout(write_rig(tmp_path, recordings, ["fit", "fit", "fit", "check"]))
@@ -179,7 +179,7 @@ def test_a_sensor_that_trails_is_remembered(tmp_path):
     assert inverse.check[0] > 4.0 * fit.best.check[0]  # nothing is remembered there
 
 
-@pytest.mark.slow("two read-outs try all candidates, each on parts that are left out")
+@pytest.mark.long("two read-outs try all candidates, each on parts that are left out")
 def test_where_it_fails_is_said(tmp_path):
     recordings = [press(0), press(1), press(2), press(3, scale=14.0, offset=4.0)]
     fit = pp.fit_readout(write_rig(tmp_path, recordings, ["fit", "fit", "fit", "check"]))
@@ -204,7 +204,7 @@ def test_rigs_without_what_it_needs(tmp_path):
         pp.fit_readout(write_rig(tmp_path, [(time, force, 0 * readings + 3.0)], ["fit"]))
 
 
-@pytest.mark.slow("a read-out tries all candidates, each on parts that are left out")
+@pytest.mark.long("a read-out tries all candidates, each on parts that are left out")
 def test_the_command_prints_a_table_and_draws(tmp_path, capsys):
     rig = write_rig(tmp_path, [press(i) for i in range(3)], ["fit", "fit", "check"])
     assert main(["fit", "readout", str(rig), "--plot", str(tmp_path / "readout.png")]) == 0
