@@ -47,7 +47,7 @@ def entry(cases_there, said):
     }
 
 
-@pytest.mark.slow("draws the cases that all tests of this file share")
+@pytest.mark.long("draws a case of each of the eight kinds")
 def test_every_row_is_written_and_no_rig_tells_which(folder):
     hidden = _entry.read_hidden(folder)
     assert sorted(one.kind for one in hidden.values()) == sorted(_rows.MIX)
@@ -76,6 +76,7 @@ def test_the_page_has_the_checksums_of_the_public_part(repository):
     assert set(re.findall(r"^\| `(\w+)` \| \d+ \|", page, re.MULTILINE)) == {*_rows.MIX, *conditions.CONDITIONS}
 
 
+@pytest.mark.long("draws a case of each of the eight kinds")
 def test_a_changed_file_of_what_is_hidden_is_refused(folder, tmp_path):
     for name in (_entry.HIDDEN, _entry.CHECKSUM):
         (tmp_path / name).write_bytes((folder / name).read_bytes())
@@ -90,6 +91,7 @@ def test_a_changed_file_of_what_is_hidden_is_refused(folder, tmp_path):
         _entry.write_cases(tmp_path, 4, 20)
 
 
+@pytest.mark.long("draws a case of each of the eight kinds")
 def test_a_method_from_a_file_answers_is_resumed_and_scored(folder, tmp_path, capsys, monkeypatch):
     (tmp_path / "mine.py").write_text(METHOD, encoding="utf-8")
     (tmp_path / "beside.py").write_text('NAMES = ["creep"]\n', encoding="utf-8")

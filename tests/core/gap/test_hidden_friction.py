@@ -38,12 +38,19 @@ def sliding(change, sway):
     return cases.grid_rig(1, 1, 0.01, PARAMETERS, trials, given={"k", "mus", "mud", "x0", "ct"})
 
 
-@pytest.mark.slow("a whole diagnosis with friction")
 @pytest.mark.parametrize(
     ("name", "change"),
     [
-        ("viscous-friction", lambda force, speed: force * (1.0 + 10.0 * np.abs(speed))),
-        ("stribeck", lambda force, speed: force * (1.0 + 0.8 * np.exp(-np.sqrt(np.abs(speed) / 0.004)))),
+        pytest.param(
+            "viscous-friction",
+            lambda force, speed: force * (1.0 + 10.0 * np.abs(speed)),
+            marks=pytest.mark.slow("a whole diagnosis, the one with friction in this tier"),
+        ),
+        pytest.param(
+            "stribeck",
+            lambda force, speed: force * (1.0 + 0.8 * np.exp(-np.sqrt(np.abs(speed) / 0.004))),
+            marks=pytest.mark.long("a whole diagnosis with friction"),
+        ),
     ],
 )
 def test_friction_is_judged_by_the_forces_where_the_readings_leave_noise(name, change):
