@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.io.csv_table import RECORDINGS, read_table
+from ..core.io.csv_table import read_table
 from ..core.model.motion import Motion
 from .arguments import ArgumentError, numbers, quaternion
 
@@ -103,7 +103,7 @@ def _unit(turns: np.ndarray, argument: str) -> np.ndarray:
 
 
 def _path_in_file(file: str | os.PathLike[str], argument: str, turn: ArrayLike) -> Path:
-    table = read_table(file, RECORDINGS)
+    table = read_table(file)
     columns = dict(zip(table.names, table.values.T, strict=True))
     for name in ("time", *POSITION):
         if name not in columns:

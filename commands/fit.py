@@ -75,9 +75,14 @@ def _stiffness(arguments: argparse.Namespace) -> None:
     number = len(fit.data.compression)
     print(f"{number} measurements from '{arguments.file}', {arguments.texels} texels on {arguments.area:g} m²\n")
     print(console.text_table(rows, "<>>>"))
-    if fit.offset_is_significant and fit.offset.value < 0:
+    if fit.is_turned:
+        print("\nCompressions and loads are negative, as testing machines write them: both were turned.")
+    if fit.dead_zone > 0.0:
         print(f"\nThe foam has a dead zone of {fit.dead_zone * 1e3:.3g} mm, which the model's line")
         print("through zero does not have; add the effect dead-zone to the sensor for it.")
+    if fit.stiffens:
+        print(f"\nThe curve bends upwards: a square adds {fit.bend:.0%} to the line at its end, so that no single k is right;")
+        print("add the effect stiffening to the sensor for it.")
     print(f"\nSuggested: k = {fit.k.value:.4g} N/m, cn = {DAMPING_PER_STIFFNESS * fit.k.value:.3g} N·s/m (1 % of k)")
     if arguments.plot:
         from ..core.gap.calibration.plots import plot_stiffness

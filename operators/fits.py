@@ -106,7 +106,9 @@ class PALPATE_OT_stiffness_fit(MeasurementFit, bpy.types.Operator):
             obj.palpate.cn = DAMPING_PER_STIFFNESS * chosen.value
         self.picture(context, plot_stiffness, fit, "Palpate Stiffness Fit")
         text = f"k = {chosen.value:.4g} N/m (95 %: {chosen.low:.4g} to {chosen.high:.4g}) for {len(report.texels)} texels"
-        if fit.offset_is_significant and fit.dead_zone > 0:
+        if fit.stiffens:
+            text += "; the curve bends upwards: add the effect stiffening for it"
+        if fit.dead_zone > 0:
             text += f"; the foam has a dead zone of {fit.dead_zone * 1e3:.3g} mm: add the effect dead-zone for it"
         self.report({"INFO"}, text)
 

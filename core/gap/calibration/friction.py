@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import FileError, ParameterError
-from ...io.csv_table import read_columns
+from ...io.text_table import read_columns
 from ...laws.contact_law import contact_law
 from ...laws.friction import friction_along_path, stribeck_force
 from ...model.sensor_parameters import SensorParameters
@@ -124,7 +124,7 @@ def read_friction(path: str | os.PathLike, texels: int = 1) -> FrictionData:
     Parameters
     ----------
     path : path
-        See :mod:`.csv_table` for other units.
+        See :mod:`...io.text_table` for other units.
     texels : int
         Number of texels that shared the force; the curve of one texel is returned.
 

@@ -9,13 +9,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import FileError, ParameterError
-from ...io.csv_table import read_columns
+from ...io.text_table import read_columns
 from ..fitting.regression import Estimate, linear_estimates
 
 STANDARD_GRAVITY = 9.80665
 """Standard acceleration of gravity, which converts masses to forces, m/s²."""
 AREAS = (1e-12, 1e6)
 """Least and largest area of a sensor or of a weight, m²: beyond it the unit is wrong or numbers overflow."""
+STIFFENS = 0.05
+"""Bend from which on a curve stiffens: smaller ones are within what a straight line is used for."""
+LEAST_PRESSURE, DEAD_ZONE = 0.02, 0.02
+"""Share of the largest pressure from which on the foam is in contact; share of the largest compression from which on a curve
+begins late."""
 MOST_TEXELS = 10**9
 """Most texels that may share an area or a force."""
 
@@ -49,7 +54,11 @@ class StiffnessFit:
     offset : Estimate, Pa
         Pressure of the second line at compression zero. If it is negative, the foam has a dead zone.
     dead_zone : float, metres
-        Compression at which the second line becomes positive; zero if it is positive from the start.
+        Compression up to which the pressure is zero, by a parabola through the lower half of the curve; zero if there is none.
+    bend : float
+        Share that a square adds to the line at the largest compression; zero if its interval contains zero.
+    is_turned : bool
+        True if compressions and loads were negative, as testing machines write them, and were turned.
     """
 
     data: FoamData
@@ -59,6 +68,13 @@ class StiffnessFit:
     slope_offset: float
     offset: Estimate
     dead_zone: float
+    bend: float = 0.0
+    is_turned: bool = False
+
+    @property
+    def stiffens(self) -> bool:
+        """True if the curve bends upwards: a straight line does not describe it, and the effect stiffening does."""
+        return self.bend > STIFFENS
 
     @property
     def offset_is_significant(self) -> bool:
@@ -96,7 +112,7 @@ def read_foam(path: str | os.PathLike, weight_area: float | None = None) -> Foam
     Parameters
     ----------
     path : path
-        See :mod:`.csv_table` for other units.
+        See :mod:`...io.text_table` for other units.
     weight_area : float or None, m²
         Area on which the force or the mass rested.
 
@@ -116,7 +132,9 @@ def read_foam(path: str | os.PathLike, weight_area: float | None = None) -> Foam
     load = columns[loads[0]]
     if loads[0] != "pressure":
         if weight_area is None or not AREAS[0] <= weight_area <= AREAS[1]:
-            raise FileError(f"'{path}' has a column '{loads[0]}': say on which area it rested, in m², finite and above zero.")
+            raise FileError(
+                f"'{path}' has a column '{loads[0]}': say on which area it rested (--weight-area), in m², finite and above 0."
+            )
         load = load * (STANDARD_GRAVITY if loads[0] == "mass" else 1.0) / weight_area
     return FoamData(columns["compression"], load)
 
@@ -139,6 +157,10 @@ def fit_stiffness(data: FoamData, area: float, texels: int) -> StiffnessFit:
     """
     per_texel = texel_stiffness(1.0, area, texels, 1.0)
     x, p = np.asarray(data.compression, float), np.asarray(data.pressure, float)
+    is_turned = bool(np.median(x) < 0.0 and np.median(p) <= 0.0)
+    if is_turned:
+        x, p = -x, -p
+        data = FoamData(x, p)
     if len(np.unique(x)) < 2 or not np.any(x > 0):
         raise ParameterError("A stiffness needs measurements at two different compressions or more: add some.")
     (slope,) = linear_estimates(x[:, None], p)
@@ -152,5 +174,27 @@ def fit_stiffness(data: FoamData, area: float, texels: int) -> StiffnessFit:
         slope.value,
         slope_offset.value,
         offset,
-        max(0.0, -offset.value / slope_offset.value),
+        *_beginning_and_bend(x, p),
+        is_turned,
     )
+
+
+def _beginning_and_bend(x: np.ndarray, p: np.ndarray) -> tuple[float, float]:
+    """Return the compression at which the pressure begins, zero if it is zero from the start, and the bend of the curve."""
+    order = np.argsort(x)
+    order = order[p[order] > LEAST_PRESSURE * p.max()]
+    x, p = x[order], p[order]
+    half = len(x) // 2
+    if half < 4 or not np.ptp(x[:half]) > 0.0:
+        return 0.0, 0.0
+    start = _root_below(x[:half], p[:half])
+    start = start if start > DEAD_ZONE * x.max() else 0.0
+    steep, curved = linear_estimates(np.stack([x - start, (x - start) ** 2], axis=1), p)
+    share = curved.value * (x.max() - start) / max(steep.value, 1e-300)
+    return start, float(share) if curved.low > 0.0 or curved.high < 0.0 else 0.0
+
+
+def _root_below(x: np.ndarray, p: np.ndarray) -> float:
+    """Return where a parabola through the beginning of a curve is zero: the root that is nearest below its second point."""
+    roots = np.roots(np.polyfit(x, p, 2))
+    return max((float(root.real) for root in roots if abs(root.imag) < 1e-12 and root.real <= x[1]), default=0.0)

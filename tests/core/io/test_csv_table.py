@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from palpate.core.errors import FileError
-from palpate.core.io.csv_table import MEASUREMENTS, harmless_cell, read_columns, read_table
+from palpate.core.io.csv_table import harmless_cell, read_table
 
 
 def write(folder, text):
@@ -23,39 +23,12 @@ def test_recordings_keep_empty_cells_as_nan(tmp_path):
     np.testing.assert_array_equal(table.values, [[0, 1.5], [1, np.nan], [2, -0.03]])
 
 
-def test_measurements_have_comments_units_and_columns_of_words(tmp_path):
-    path = write(tmp_path, "# by hand\nforce_mN\tnote\tCompression [cm]\n# more\n250\tsoft\t2\n500\t\t3\n")
-    found = read_columns(path, {"compression": "m", "force": "N"})
-    assert list(found) == ["force", "compression"]
-    np.testing.assert_allclose(found["force"], [0.25, 0.5])
-    np.testing.assert_allclose(found["compression"], [0.02, 0.03])
-
-
-@pytest.mark.parametrize(
-    ("cell", "words"),
-    [("soft", "'soft' for depth"), ("inf", "inf for depth"), ("nan", "nan for depth"), ("", "'' for depth")],
-)
+@pytest.mark.parametrize("cell, words", [("soft", "'soft' for depth"), ("inf", "inf for depth"), ("nan", "nan for depth")])
 def test_complaints_name_line_and_column(tmp_path, cell, words):
-    path = write(tmp_path, f"# by hand\n\ndepth;force\n1;2\n# more\n{cell};3\n")
-    with pytest.raises(FileError, match=f"Line 6 of 'table.csv' has {words}"):
-        read_table(path, MEASUREMENTS)
-    with pytest.raises(FileError, match=f"Line 6 of 'table.csv' has {words}"):
-        read_columns(path, {"depth": "m"})
-    path = write(tmp_path, f"depth,force\n1,2\n\n{cell},3\n")
-    if cell:
-        with pytest.raises(FileError, match=f"Line 4 of 'table.csv' has {words}"):
-            read_table(path)
-    else:
-        assert np.isnan(read_table(path).values[1, 0])
-
-
-def test_a_short_line_of_measurements_is_told_only_where_a_wanted_cell_is_missing(tmp_path):
-    path = write(tmp_path, "depth,force,note\n1,2\n3\n")
-    assert list(read_columns(path, {"depth": "m"})["depth"]) == [1, 3]
-    with pytest.raises(FileError, match="Line 3 of 'table.csv' has '' for force"):
-        read_columns(path, {"force": "N"})
+    with pytest.raises(FileError, match=f"Line 4 of 'table.csv' has {words}"):
+        read_table(write(tmp_path, f"depth,force\n1,2\n\n{cell},3\n"))
     with pytest.raises(FileError, match="Line 2 of 'table.csv' has 2 cells and the header has 3"):
-        read_table(path)
+        read_table(write(tmp_path, "depth,force,note\n1,2\n3\n"))
 
 
 @pytest.mark.parametrize(

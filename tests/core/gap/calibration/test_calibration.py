@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from palpate.core.errors import FileError, ParameterError
 from palpate.core.gap.calibration.friction import FrictionData, fit_friction, friction_over_time, read_friction, steady_friction
 from palpate.core.gap.calibration.stiffness import FoamData, fit_stiffness, read_foam, texel_stiffness
-from palpate.core.io.csv_table import read_columns
+from palpate.core.io.text_table import read_columns
 from palpate.core.model.sensor_parameters import SensorParameters
 
 PAPER = SensorParameters(sigma0=1.0, sigma1=0.1, x0=0.3, ct=0.01, mus=0.435, mud=0.23)
@@ -200,3 +200,23 @@ def test_a_missing_file_and_a_picture_get_a_sentence(tmp_path):
     (tmp_path / "picture.csv").write_bytes(b"\x89PNG\r\n\xff\xfe\x00\x80")
     with pytest.raises(FileError, match="not a text file"):
         read_foam(tmp_path / "picture.csv")
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_foam_that_stiffens_has_no_dead_zone(tmp_path, sign):
+    """F = 20 x / (1 − (x/10)²) N, x in mm: it begins at zero, and bends upwards; testing machines write both below zero."""
+    x = np.linspace(0.0, 3.0, 61)
+    force = 20.0 * x / (1.0 - (x / 10.0) ** 2)
+    path = tmp_path / "foam.csv"
+    path.write_text("Extension (mm),Load (N)\n" + "".join(f"{sign * a:.4f},{sign * b:.4f}\n" for a, b in zip(x, force)))
+    fit = fit_stiffness(read_foam(path, weight_area=1e-3), 1e-3, 100)
+    assert fit.dead_zone == 0.0 and fit.stiffens and fit.is_turned == (sign < 0.0)
+    assert fit.k.value == pytest.approx(float(x @ force / (x @ x)) * 10.0, rel=1e-3)
+
+
+def test_a_foam_with_a_dead_zone_does_not_stiffen():
+    rng = np.random.default_rng(2)
+    x = np.linspace(0.0, 3e-3, 80)
+    pressure = 2e6 * np.maximum(x - 0.4e-3, 0.0) + 30.0 * rng.normal(size=80)
+    fit = fit_stiffness(FoamData(x, pressure), 1e-3, 100)
+    assert fit.dead_zone == pytest.approx(0.4e-3, rel=0.1) and not fit.stiffens

@@ -213,7 +213,7 @@ def test_a_missing_rig_and_missing_stimulus_values(tmp_path):
 def test_columns_without_meaning_are_said(tmp_path):
     rig = read_rig(write(tmp_path, press=table(names=("x", "y", "z", "humidity"))))
     assert any("humidity" in warning for warning in rig.warnings)
-    assert csv_table.RECORDINGS.largest < 10**9
+    assert csv_table.LARGEST_TABLE < 10**9
 
 
 def test_recordings_become_rigs_with_empty_cells_where_nothing_was_measured(tmp_path):
