@@ -14,6 +14,7 @@ def same(first, second):
     return first.answer == second.answer and all(np.array_equal(a, b, equal_nan=True) for a, b in pairs)
 
 
+@pytest.mark.long("draws cases of the benchmark")
 @pytest.mark.parametrize(("condition", "number"), [("missing", 10), ("mesh", 15), ("friction", 3), ("pairs", 3)])
 def test_a_case_of_a_condition_is_drawn_the_same_twice_and_its_rig_is_read(tmp_path, condition, number):
     case = conditions.draw(condition, number)
@@ -33,12 +34,14 @@ def test_a_case_of_a_condition_is_drawn_the_same_twice_and_its_rig_is_read(tmp_p
     assert not any(word in text for word in (*case.answer, "missing", "coloured", "nan"))
 
 
+@pytest.mark.long("draws cases of the benchmark")
 def test_stating_what_a_case_has_anyway_changes_no_bit():
     plain = cases.draw("none", 2)
     assert same(plain, cases.draw("none", 2, names=(), coloured=True))
     assert not same(plain, cases.draw("none", 2, coloured=False))
 
 
+@pytest.mark.long("draws cases of the benchmark")
 def test_coloured_noise_stays_from_sample_to_sample_in_readings_and_forces():
     """AR(1) with 0.9: neighbouring samples have this correlation, and the size is that of white noise."""
     case = conditions.draw("coloured", 6)

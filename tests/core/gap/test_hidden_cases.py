@@ -50,6 +50,7 @@ def test_own_forms_have_the_librarys_names_and_others_do_not():
             assert not set(foreign) & forms[name] and len(set(foreign)) == 2
 
 
+@pytest.mark.long("draws cases of the benchmark")
 def test_a_case_follows_from_kind_and_number(tmp_path):
     first, again, next_one = (cases.draw("other", number) for number in (24, 24, 44))
     files = [cases.write(case, tmp_path / name).parent for case, name in ((first, "a"), (again, "b"))]
@@ -68,6 +69,7 @@ def test_a_rig_is_read_and_does_not_tell_its_answer(tmp_path):
     assert not any(word in path.read_text(encoding="utf-8") for word in (*case.answer, case.hidden[0].form))
 
 
+@pytest.mark.long("draws cases of the benchmark")
 @pytest.mark.parametrize("kind", ["own", "other", "third"])
 @pytest.mark.parametrize("number", [3, 9, 12, 18])
 def test_what_is_hidden_has_the_size_it_is_said_to_have(kind, number):
@@ -150,6 +152,7 @@ def test_low_pass_and_relaxation_against_closed_forms():
     np.testing.assert_allclose(got, 2.0 * (t - 0.7 * -np.expm1(-t / 0.7)), atol=1e-12)
 
 
+@pytest.mark.long("draws cases of the benchmark")
 @pytest.mark.parametrize("number", range(len(cases.POOR)))
 def test_poor_recordings_are_poor(number):
     way = list(cases.POOR)[number]
