@@ -31,7 +31,7 @@ def test_a_check_refutes_only_what_can_change_what_it_measures(one, changes):
     assert quantities_changed_by(one) == changes
 
 
-@pytest.mark.slow("a whole diagnosis with net forces")
+@pytest.mark.long("a whole diagnosis with net forces")
 def test_a_stiffening_that_only_the_net_forces_show_is_named(tmp_path):
     """A saturation of the readout explains the readings of both; the contact law is left in the forces."""
     sure, verdict, found = named(47017, tmp_path)
@@ -54,7 +54,7 @@ def test_a_second_effect_is_dropped_if_a_third_does_its_work(tmp_path):
     assert "creep" not in found and found["lag"].rivals == ("creep",)
 
 
-@pytest.mark.slow("a whole diagnosis of two hidden effects")
+@pytest.mark.long("a whole diagnosis of two hidden effects")
 def test_a_kind_that_leads_clearly_is_named_although_a_number_is_at_its_bound(tmp_path):
     sure, verdict, found = named(47004, tmp_path)
     assert sure == {"drift", "stribeck"} == set(cases.answer_of("two", 47004)) and verdict == "explained"

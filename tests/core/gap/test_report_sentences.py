@@ -49,7 +49,7 @@ def test_one_odd_recording_is_told_from_several(gains, levels, odd):
     assert (found.name if found else None) == odd
 
 
-@pytest.mark.slow("a whole diagnosis of recordings of which one is shifted")
+@pytest.mark.long("a whole diagnosis of recordings of which one is shifted")
 @pytest.mark.usefixtures("quick_search")
 def test_a_shifted_recording_is_named_and_its_gap_is_that_before_it_was_shifted_back():
     count = iter(range(5))

@@ -30,7 +30,7 @@ def beneath_a_wide_cover(force, time, width=6e-3):
     return force @ (weight / weight.sum(axis=0))[inside].T
 
 
-@pytest.mark.slow("a whole diagnosis of five recordings")
+@pytest.mark.long("a whole diagnosis of five recordings")
 @pytest.mark.parametrize(
     ("change", "name", "form"),
     [(scanned, "crosstalk", "previous"), (beneath_a_wide_cover, "load-spreading", "open")],
@@ -45,7 +45,7 @@ def test_what_goes_from_texel_to_texel_is_named(change, name, form):
     assert found["share" if name == "crosstalk" else "width"] == pytest.approx(0.12 if name == "crosstalk" else 6e-3, rel=0.05)
 
 
-@pytest.mark.slow("a whole diagnosis of five recordings")
+@pytest.mark.long("a whole diagnosis of five recordings")
 def test_a_narrow_cover_and_wires_side_by_side_are_not_told_apart():
     """Where the kernel hardly reaches beyond the next texels, leaking wires and another gain give the same readings."""
     result = run_job(diagnose(cases.rig(partial(beneath_a_wide_cover, width=3e-3), seed=4)))

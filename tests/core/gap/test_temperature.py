@@ -98,7 +98,7 @@ def pad_in_rooms(kind, number, folder):
     return folder / "rig.toml"
 
 
-@pytest.mark.slow("two whole diagnoses of six recordings")
+@pytest.mark.long("two whole diagnoses of six recordings")
 @pytest.mark.parametrize("kind", ["gain", "zero"])
 def test_recordings_that_differ_by_their_temperature_do_not_differ_by_levels_and_gains_of_their_own(kind):
     sure, result = _small_pad.examined(pad_in_rooms, kind, 1)
