@@ -97,7 +97,7 @@ def parameters(words: Mapping[str, Any], sensor: str) -> SensorParameters:
 def mesh_of(value: Any, argument: str, name: str) -> TriangleMesh:
     """Return a surface from a file, from ``(vertices, faces)``, or from an object with both, as trimesh has them."""
     if isinstance(value, str | os.PathLike):
-        from ..core.io.mesh_file import load_mesh
+        from ..core.io.input_files import load_mesh
 
         return load_mesh(value)
     if isinstance(value, TriangleMesh):

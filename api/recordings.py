@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.errors import FileError, PalpateError
-from ..core.io import bake_reader, recording_file
+from ..core.io import bake_reader, recording_npz
 from ..core.model import recording as model
 from ..core.model.recording import SENSOR_FIELDS
 from . import arguments
@@ -63,7 +63,7 @@ class Recording:
         self.bake = bake
 
     @classmethod
-    def of(cls, recording: model.Recording, sensors: recording_file.Sensors) -> Recording:
+    def of(cls, recording: model.Recording, sensors: recording_npz.Sensors) -> Recording:
         """Return a recording of core with the sensors that made it."""
         bake = bake_reader.Bake(recording, {}, {}, {}, {}, {})
         for name, own in sensors.items():
@@ -255,7 +255,7 @@ class Recording:
             raise ArgumentError(f"path is '{path}': end the name with .npz.")
         bake = self.bake
         described = {name: (bake.texels[name], bake.painted[name], bake.parameters[name]) for name in bake.texels}
-        recording_file.save(path, bake.recording, described)
+        recording_npz.save_with_sensors(path, bake.recording, described)
 
     def export(
         self,
@@ -312,7 +312,7 @@ def read_recording(path: str | os.PathLike[str]) -> Recording:
     PalpateError
         There is no such file, or it is damaged or something else.
     """
-    return Recording.of(*recording_file.load(path))
+    return Recording.of(*recording_npz.load_with_sensors(path))
 
 
 def read_bake(folder: str | os.PathLike[str]) -> Recording:

@@ -141,7 +141,7 @@ def save_channels(seen: VectorReadings, folder: str | os.PathLike[str], rows: in
     PalpateError
         There are not as many magnetometers, or a file cannot be written.
     """
-    from ..core.io.vector_exr import write_vector_exrs
+    from ..core.io.tactile_exr import write_vector_exrs
 
     shape = arguments.count(rows, "rows"), arguments.count(columns, "columns")
     return write_vector_exrs(Path(folder), seen.values, shape, seen.unit)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..core.errors import FileError, PalpateError, read_errors_said
 from ..core.io.file_writing import writable_file
-from ..core.io.regular_file import open_regular, require_regular
+from ..core.io.input_files import open_regular, require_regular
 from . import console
 
 if TYPE_CHECKING:

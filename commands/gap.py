@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core.errors import SceneError
-from ..core.io.disk_space import require_space
-from ..core.io.file_writing import writable_folder
+from ..core.io.file_writing import require_space, writable_folder
 from . import blender, checks, console
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from ..core.errors import SceneError, counted
 from ..core.io.file_writing import writable_file
-from ..core.io.openrave import NUMBERS, OpenRaveSensor, openrave_xml, read_openrave, write_openrave
 from ..core.model.sensor_parameters import DEPTH_PER_THICKNESS
+from ..core.simulators.openrave_file import NUMBERS, OpenRaveSensor, openrave_xml, read_openrave, write_openrave
 from . import blender, checks, console
 
 

@@ -32,7 +32,7 @@ class PALPATE_OT_openrave_import(support.ErrorReporting, support.FileChooser, bp
         return support.poll_editable_sensor(cls, context)
 
     def run(self, context):
-        from ..core.io.openrave import read_openrave
+        from ..core.simulators.openrave_file import read_openrave
 
         obj = context.object
         found = read_openrave(self.filepath)
@@ -62,7 +62,7 @@ class PALPATE_OT_openrave_export(support.ErrorReporting, ExportHelper, bpy.types
         return support.poll_any_sensor(cls, context)
 
     def run(self, context):
-        from ..core.io.openrave import OpenRaveSensor, write_openrave
+        from ..core.simulators.openrave_file import OpenRaveSensor, write_openrave
 
         sensors = [obj for obj in context.selected_objects if obj.palpate.role == "SENSOR"]
         sensors = sensors or [obj for obj in context.scene.objects if obj.palpate.role == "SENSOR"]

@@ -12,8 +12,8 @@ import numpy as np
 from ..core.gap.calibration.friction import FrictionData, fit_friction, friction_over_time, steady_friction
 from ..core.gap.calibration.plots import plot_friction, plot_stiffness
 from ..core.gap.calibration.stiffness import STANDARD_GRAVITY, FoamData, fit_stiffness, texel_stiffness
-from ..core.io.openrave import OpenRaveSensor, openrave_xml, read_openrave
 from ..core.model.sensor_parameters import SensorParameters
+from ..core.simulators.openrave_file import OpenRaveSensor, openrave_xml, read_openrave
 from .chapter import Chapter, Picture, Row, compare
 
 AREA, TEXELS = 0.00125, 84  # m², and how many texels share it (section 3.4.1)

@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from ..core.figures.html_templates import render_html
 from ..core.io.file_writing import atomic_write
-from ..core.io.html_templates import render_html
 from .chapter import Chapter
 
 TEMPLATE = Path(__file__).parent / "templates" / "paper.html"

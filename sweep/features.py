@@ -19,12 +19,11 @@ import numpy as np
 from ..core.errors import FileError
 from ..core.geometry.layout.grid_layout import GridLayout
 from ..core.geometry.texels import Texels
-from ..core.io.bake_check import checked_parameters
 from ..core.io.bake_folder import MANIFEST_NAME, RECORDING_NAME, folder_names, read_manifest
-from ..core.io.bake_reader import Bake
+from ..core.io.bake_reader import Bake, checked_parameters
+from ..core.io.input_files import read_bytes
 from ..core.io.npz import DAMAGED
 from ..core.io.recording_npz import load_recording
-from ..core.io.regular_file import read_bytes
 from ..core.io.sensor_npz import SENSOR_NAME, load_sensor, unpack_sensor
 from ..core.model.digest import digest_of
 from ..core.model.recording import Recording, SensorRecording

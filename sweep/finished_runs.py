@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import FileError, os_error_reason
-from ..core.io.regular_file import read_bytes
+from ..core.io.input_files import read_bytes
 from ..core.model.shared_results import SharedResults
 from ..core.study.run_files import FAILED, RUNS, STUDY_NAME, done_runs, failed_runs, run_folders
 from ..core.study.run_record import RunRecord, Value, read_run_record, values_read

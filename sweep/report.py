@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import counted
+from ..core.figures.html_templates import render_html
 from ..core.io.file_writing import atomic_write
 from ..core.io.hidden_folder import temporary_folder
-from ..core.io.html_templates import render_html
 from ..core.study.study_file import Run
 from .dependencies import LEAST_RUNS, RUNS_PER_NAME, Dependency, dependencies
 from .features import by_texel, net_force_name, tactile_name

@@ -41,7 +41,6 @@ from palpate.core.io import tactile_exr
 from palpate.core.io.bake_folder import read_manifest
 from palpate.core.io.bake_reader import Bake, read_bake
 from palpate.core.io.csv_table import read_table
-from palpate.core.io.openrave import OpenRaveSensor, openrave_xml, read_openrave
 from palpate.core.io.recording_npz import load_recording
 from palpate.core.io.scenario_npz import load_scenario, save_scenario
 from palpate.core.io.sensor_npz import load_sensor
@@ -49,6 +48,7 @@ from palpate.core.io.sensor_toml import FORMAT, read_sensor
 from palpate.core.jobs.job_runner import run_job
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
+from palpate.core.simulators.openrave_file import OpenRaveSensor, openrave_xml, read_openrave
 from palpate.core.simulators.registry import export_sensors, import_sensors
 from palpate.core.simulators.sensor_format import FoundSensor
 from palpate.core.simulators.sensor_on_mesh import SensorOnMesh

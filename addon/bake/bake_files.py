@@ -29,12 +29,11 @@ from ...core.io.bake_folder import (
     read_manifest,
     write_manifest,
 )
-from ...core.io.disk_space import bake_bytes, require_space
-from ...core.io.file_writing import file_sha256, writable_folder
-from ...core.io.frame_table import FrameTable
+from ...core.io.file_writing import bake_bytes, file_sha256, require_space, writable_folder
 from ...core.io.hidden_folder import PRIVATE_FOLDER, FolderLock, is_private_folder
+from ...core.io.input_files import read_bytes
 from ...core.io.recording_npz import save_recording
-from ...core.io.regular_file import read_bytes
+from ...core.io.row_tables import FrameTable
 from ...core.io.sensor_npz import SENSOR_NAME, save_sensor
 from ...core.model.recording import Frame, Recording
 from ...core.model.scenario import Scenario

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from ...core.errors import SceneError
-from ...core.io.settings_migration import VERSION
 from ...core.model.recording import Recording
 from ..display import bake_display, baked_scene
 from ..display.baked_sensor import BakedSensor
+from ..properties.settings_migration import VERSION
 from ..scene import baked_names, moved_bodies, participants, scene_fingerprint
 from ..scene.scene_reading import SceneReading
 

@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 
 from ...core.figures import color_maps
-from ...core.io.regular_file import require_regular
+from ...core.io.input_files import require_regular
 from ..scene.display_names import UV_MAP
 
 TEXEL_UV = "palpate_uv"

@@ -17,6 +17,7 @@ __all__ = [
     "parameter_properties",
     "registration",
     "scene_units",
+    "settings_migration",
     "start_transforms",
     "study_properties",
 ]

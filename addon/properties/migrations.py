@@ -9,9 +9,9 @@ import bpy
 
 from ...core.errors import FileError
 from ...core.io.hidden_folder import PRIVATE_FOLDER, is_private_folder
-from ...core.io.settings_migration import VERSION, migrate
 from ..session import session_state
 from .scene_properties import EARLIER_FOLDER
+from .settings_migration import VERSION, migrate
 
 
 def apply(version: int = VERSION, steps=None) -> None:

@@ -13,12 +13,12 @@ from bpy.props import (
     StringProperty,
 )
 
-from ...core.io.settings_migration import VERSION
 from ..session import first_use, identity, session_state
 from . import effect_stack, laid_sensor_properties, magnetic_properties, start_transforms
 from .painted_maps import PaintedProperties
 from .parameter_properties import FIXED, DriveParameterProperties, SensorParameterProperties
 from .scene_units import in_units
+from .settings_migration import VERSION
 
 ROLES = (
     ("NONE", "None", "Not part of the simulation"),

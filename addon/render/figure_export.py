@@ -20,9 +20,8 @@ from ...core.figures.texel_numbers import MOST, texel_numbers
 from ...core.figures.time_curves import time_curves
 from ...core.io.bake_folder import file_stems
 from ...core.io.bake_reader import Bake, frame_index, read_sensors
-from ...core.io.disk_space import require_space
 from ...core.io.file_list import FileList
-from ...core.io.file_writing import writable_folder
+from ...core.io.file_writing import require_space, writable_folder
 from ...core.io.hidden_folder import temporary_folder
 from ...core.jobs.job_runner import run_job
 from ...core.jobs.progress import Job, Progress

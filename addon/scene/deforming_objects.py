@@ -14,7 +14,7 @@ import numpy as np
 from ...core.errors import SceneError
 from ...core.geometry.mesh import TriangleMesh
 from ...core.geometry.texels import DeformedTexels
-from ...core.io.row_table import RowTable, motion_table
+from ...core.io.row_tables import RowTable, motion_table
 from ...core.model.deformation import Deformation
 from ...core.model.scenario import Scenario
 from ...core.model.sensor import Sensor

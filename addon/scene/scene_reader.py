@@ -17,7 +17,7 @@ import numpy as np
 from ...core.effects.engine.sensor_effects import check_scenario
 from ...core.errors import SceneError
 from ...core.geometry.mesh import TriangleMesh, mass_properties
-from ...core.io.row_table import motion_table
+from ...core.io.row_tables import motion_table
 from ...core.jobs.progress import Progress
 from ...core.model.body import Body
 from ...core.model.motion import Motion, Signal

@@ -17,7 +17,7 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import FileError, PalpateError, SceneError
-from ...core.io.toml_file import read_toml
+from ...core.io.input_files import read_toml
 from ...core.jobs.progress import Job, Progress
 from ...core.study.run_files import STUDY_NAME, done_runs, failed_runs
 from ...core.study.study_file import FROZEN

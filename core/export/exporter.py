@@ -12,7 +12,7 @@ import numpy as np
 from ..figures.figure_style import FigureStyle
 from ..geometry.layout.grid_layout import GridLayout
 from ..io.bake_reader import Bake
-from ..io.disk_space import CHANNEL_BYTES, recording_bytes
+from ..io.file_writing import CHANNEL_BYTES, recording_bytes
 from ..jobs.progress import Job, Progress
 from ..model.recording import SENSOR_FIELDS
 from ..model.vector_readings import VectorReadings

@@ -13,9 +13,8 @@ from pathlib import Path
 from ..errors import PalpateError
 from ..figures.figure_style import FigureStyle
 from ..io.bake_reader import Bake
-from ..io.disk_space import require_space
 from ..io.file_list import FileList
-from ..io.file_writing import writable_folder
+from ..io.file_writing import require_space, writable_folder
 from ..jobs.progress import Job
 from .exporter import Exporter
 

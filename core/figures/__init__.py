@@ -11,6 +11,7 @@ __all__ = [
     "figure_canvas",
     "figure_style",
     "gel_image",
+    "html_templates",
     "picture_labels",
     "side_by_side",
     "tactile_image",

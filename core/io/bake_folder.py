@@ -29,8 +29,8 @@ from ..model.scenario import Scenario
 from ..model.sensor import Sensor
 from ..version import VERSION
 from .file_writing import atomic_write, file_sha256
+from .input_files import open_regular
 from .recording_npz import described
-from .regular_file import open_regular
 from .schema import read_json
 from .sensor_npz import SENSOR_NAME
 

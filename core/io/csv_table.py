@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FileError, read_errors_said
-from .regular_file import open_regular
+from .input_files import open_regular
 
 UNITS: dict[str, dict[str, float]] = {
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6},

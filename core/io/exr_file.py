@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileError
-from .regular_file import require_regular
+from .input_files import require_regular
 
 _MOST_PACKED = 1100
 """Bytes of pixels per byte of a file. ZIP cannot compress better, so a header that promises more is damaged."""

@@ -22,7 +22,7 @@ from typing import Any
 from ..errors import FileError, os_error_reason
 from .file_writing import atomic_write, file_sha256, require_replaceable, writable_folder
 from .hidden_folder import remove_abandoned, remove_unfinished, temporary_folder
-from .regular_file import read_bytes
+from .input_files import read_bytes
 
 LIST_NAME = ".palpate-export.json"
 LIST_FORMAT = "palpate-export/1"

@@ -4,22 +4,30 @@
 Members: ``header.npy`` (JSON text), ``frames``, ``times``, ``poses``, ``velocities`` and, for sensor number i of the
 header's list, ``sensor_<i>/normal_force`` and so on with the names of :class:`.recording.SensorRecording`. A sensor with
 several channels also has ``sensor_<i>/channels/values`` and ``…/clipped``, whose unit, names and places are in the header.
+
+A file that also has the sensors (:func:`save_with_sensors`) has ``sensor_<i>/texels/…`` as in :mod:`.sensor_npz`, and
+``sensor_<i>/parameters`` (JSON text). A program that reads recordings reads these files, too.
 """
 
 from __future__ import annotations
 
 import json
 import os
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import FileError, os_error_reason
+from ..errors import FileError, PalpateError, os_error_reason
+from ..geometry.texels import Texels
 from ..model.recording import SENSOR_FIELDS, Recording, SensorRecording, row_blocks
+from ..model.sensor_parameters import Painted, SensorParameters
 from ..model.vector_readings import CLIPPED, VALUES, VectorReadings
+from .input_files import open_regular
 from .npz import DAMAGED, open_archive, write_arrays
-from .regular_file import open_regular
+from .sensor_npz import sensor_arrays, sensor_in
+from .sensor_toml import stated_parameters
 
 RECORDING_FORMAT = "palpate-recording/2"
 
@@ -142,3 +150,64 @@ def _recording(path: str | os.PathLike, members: Any) -> Recording:
         warnings=tuple(str(warning) for warning in header["warnings"]),
         step_reason=str(header.get("step_reason", "")),
     )
+
+
+Sensors = dict[str, tuple[Texels, Painted, SensorParameters]]
+"""What belongs to the recording of each sensor, by its name."""
+
+
+def save_with_sensors(path: str | os.PathLike, recording: Recording, sensors: Sensors) -> None:
+    """Write a recording with its sensors, whole or not at all.
+
+    Raises
+    ------
+    FileError
+        The file cannot be written.
+    """
+    arrays = recording_arrays(recording)
+    for i, name in enumerate(recording.sensors):
+        if name in sensors:
+            texels, painted, parameters = sensors[name]
+            arrays |= {f"sensor_{i}/texels/{key}": values for key, values in sensor_arrays(texels, painted).items()}
+            arrays[f"sensor_{i}/parameters"] = np.array(json.dumps(asdict(parameters)))
+    write_arrays(path, arrays)
+
+
+def load_with_sensors(path: str | os.PathLike) -> tuple[Recording, Sensors]:
+    """Read what :func:`save_with_sensors` wrote, or a recording alone, which has no sensors.
+
+    Raises
+    ------
+    FileError
+        There is no such file, or it is damaged or something else.
+    """
+    recording = load_recording(path)
+    sensors: Sensors = {}
+    try:
+        with open_regular(path) as opened, open_archive(opened) as members:
+            for i, name in enumerate(recording.sensors):
+                if f"sensor_{i}/parameters" not in members.files:
+                    continue
+                texels, painted = sensor_in(_Part(members, f"sensor_{i}/texels/"))
+                parameters = SensorParameters(
+                    **stated_parameters(json.loads(str(members[f"sensor_{i}/parameters"])), f"'{name}'")
+                )
+                parameters.check(name)
+                if len(texels) != recording.sensors[name].normal_force.shape[1]:
+                    raise ValueError("its texels and its forces differ in number")
+                sensors[name] = texels, painted, parameters
+    except (*DAMAGED, PalpateError) as error:
+        raise FileError(f"'{path}' is damaged ({error}): write it again.") from error
+    return recording, sensors
+
+
+class _Part:
+    """The members of an archive whose names begin alike, without that beginning."""
+
+    def __init__(self, members: Any, start: str):
+        self._members, self._start = members, start
+        self.files = [name.removeprefix(start) for name in members.files if name.startswith(start)]
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        found: np.ndarray = self._members[self._start + name]
+        return found

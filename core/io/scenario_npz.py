@@ -33,8 +33,8 @@ from ..model.target import Target
 from ..skins.channel_readouts import LinearReadout, MagneticReadout
 from ..skins.magnetic_skin import MagneticSkin, Magnetometers, Magnets
 from ..skins.readout_matrix import ReadoutMatrix
+from .input_files import open_regular
 from .npz import DAMAGED, open_archive, write_arrays
-from .regular_file import open_regular
 
 SCENARIO_FORMAT = "palpate-scenario/1"
 

@@ -26,8 +26,7 @@ from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin, get_t
 import msgspec
 
 from ..errors import FileError, did_you_mean, os_error_reason
-from .regular_file import read_bytes
-from .toml_file import checked_name
+from .input_files import checked_name, read_bytes
 
 T = TypeVar("T")
 

@@ -16,8 +16,8 @@ from ..geometry.layout.grid_layout import GridLayout
 from ..geometry.layout.texture_maps import UVLayout
 from ..geometry.texels import Texels
 from ..model.sensor_parameters import Painted
+from .input_files import open_regular
 from .npz import DAMAGED, open_archive, write_arrays
-from .regular_file import open_regular
 
 SENSOR_FORMAT = "palpate-sensor/1"
 SENSOR_NAME = "sensor.npz"

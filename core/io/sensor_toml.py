@@ -33,8 +33,8 @@ from ..errors import FileError, PalpateError
 from ..model.effect import Effect
 from ..model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters
 from .file_writing import atomic_write
+from .input_files import checked_name, is_number, read_toml
 from .schema import Name, known_words, read_words, wanted
-from .toml_file import checked_name, is_number, read_toml
 
 FORMAT = "palpate-sensor-toml/1"
 MOST_TEXELS = 65536

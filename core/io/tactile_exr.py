@@ -5,6 +5,9 @@
 the sensor's unit, ``depth`` in metres, ``slip`` in metres per second, ``contact`` 0 or 1. All are 32-bit floats; pixels
 that show no texel are 0. Row 0 of the layout is the bottom of the picture. A sensor with several channels has the vector layer
 ``channels`` besides, which shows at each texel the channels of the nearest place where such are measured.
+
+Images of readings with three signed channels (:func:`write_vector_exrs`) have one layer with the channels X, Y and Z, which
+image programs, Blender's among them, show as one vector, in the unit of the readings.
 """
 
 from __future__ import annotations
@@ -15,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import FileError, os_error_reason
+from ..errors import FileError, ParameterError, os_error_reason
 from ..geometry.layout.grid_layout import GridLayout
 from ..geometry.layout.place_grid import grid_of_places
 from ..geometry.layout.texture_maps import UVLayout
@@ -24,7 +27,8 @@ from ..model.recording import Frame, SensorFrame
 from ..model.sensor import Sensor
 from ..model.vector_readings import VectorReadings
 from .exr_file import FormatError, read_image, write_image
-from .file_writing import atomic_write, write_file
+from .file_list import FileList
+from .file_writing import atomic_write, writable_folder, write_file
 
 CHANNELS = ("R", "G", "B", "reading", "depth", "slip", "contact")
 """Names of the channels, in the order in which :func:`read_exr` returns them."""
@@ -224,3 +228,47 @@ def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, 
     order = [name for name in CHANNELS if name in found] + [name for name in found if name not in CHANNELS]
     metadata = {key.removeprefix(_PREFIX): value for key, value in attributes.items() if key.startswith(_PREFIX)}
     return {name: found[name] for name in order}, metadata
+
+
+LAYER, AXES = "field", "XYZ"
+"""Name of the layer, and of its channels."""
+DIGITS = 4
+"""Of the number of a frame in the name of a file."""
+
+
+def write_vector_exrs(folder: Path, values: np.ndarray, shape: tuple[int, int], unit: str) -> list[Path]:
+    """Write an image for each frame, ``field_0000.exr`` and so on, in the place of those of an earlier recording.
+
+    Parameters
+    ----------
+    folder : path
+        Is made if it is not there.
+    values : (T, k, 3) float
+        Of places row by row, the row with the least y first.
+    shape : (int, int)
+        Rows and columns, of which there are k places.
+    unit : str
+        Becomes the header attribute ``palpate.unit``.
+
+    Raises
+    ------
+    ParameterError
+        There are not as many places as rows times columns, or not three channels of each.
+    FileError
+        A file cannot be written.
+    """
+    rows, columns = shape
+    if values.ndim != 3 or values.shape[1:] != (rows * columns, 3):
+        channels = int(np.prod(values.shape[1:]))
+        raise ParameterError(
+            f"An image of {rows} × {columns} places has {3 * rows * columns} channels and these readings have {channels}: "
+            "give the rows and columns of the magnetometers."
+        )
+    images = values.reshape(-1, rows, columns, 3)[:, ::-1].astype(np.float32)
+    files = FileList(writable_folder(folder, create=True))
+    with files.new_files(LAYER) as new, write_file(new / LAYER, atomic=False):
+        paths = [new / f"{LAYER}_{frame:0{DIGITS}d}.exr" for frame in range(len(images))]
+        for frame, (path, image) in enumerate(zip(paths, images)):
+            pictures = {f"{LAYER}.{axis}": image[:, :, i] for i, axis in enumerate(AXES)}
+            write_image(path, pictures, {"palpate.unit": unit, "palpate.frame": str(frame)})
+        return files.replace(new, {LAYER: paths})

@@ -21,7 +21,7 @@ import numpy as np
 
 from ..errors import FileError, read_errors_said
 from .csv_table import UNITS
-from .regular_file import open_regular
+from .input_files import open_regular
 
 LARGEST_TEXT = 512 * 2**20
 """Bytes of a file."""

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The results of a run: per frame and texel, per frame and sensor, per frame and body.
 
-The arrays of a long recording may be views of a file (:mod:`..io.frame_table`, :mod:`..io.recording_npz`). What goes through
+The arrays of a long recording may be views of a file (:mod:`..io.row_tables`, :mod:`..io.recording_npz`). What goes through
 all frames therefore goes block by block (:meth:`Recording.blocks`), and memory does not grow with the number of frames.
 """
 

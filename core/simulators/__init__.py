@@ -11,6 +11,7 @@ __all__ = [
     "baked_sensors",
     "contact_translation",
     "environment_parameters",
+    "openrave_file",
     "pressed_sensor",
     "pressed_sensors",
     "probe_list",

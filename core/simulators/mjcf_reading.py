@@ -18,8 +18,8 @@ from ..errors import FileError
 from ..geometry.mesh import checked_mesh, vertex_normals
 from ..geometry.point_surface import triangles_between
 from ..geometry.rotations import rotation_matrices
+from ..io.input_files import read_xml
 from ..io.sensor_toml import MOST_TEXELS
-from ..io.xml_file import read_xml
 from .optional_package import optional_package
 from .sensor_format import FoundSensor
 

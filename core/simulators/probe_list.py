@@ -19,10 +19,9 @@ from ..geometry.layout.texture_maps import uv_layout
 from ..geometry.mesh import TriangleMesh, checked_mesh
 from ..geometry.texels import Texels
 from ..io.file_writing import write_file
-from ..io.regular_file import read_bounded
+from ..io.input_files import checked_name, read_bounded
 from ..io.schema import known_words
 from ..io.sensor_toml import MOST_TEXELS, stated_parameters
-from ..io.toml_file import checked_name
 from ..model.sensor import Sensor
 from ..model.sensor_parameters import SENSOR_PARAMETERS, Painted, SensorParameters
 from .sensor_on_mesh import SensorOnMesh, texel_arrays

@@ -10,9 +10,8 @@ from collections.abc import Sequence
 from functools import cache
 
 from ..errors import FileError, PalpateError
-from ..io.disk_space import require_space
 from ..io.file_list import FileList
-from ..io.file_writing import writable_folder
+from ..io.file_writing import require_space, writable_folder
 from .sensor_format import FoundSensor, SensorFormat, Written
 from .sensor_on_mesh import SensorOnMesh
 

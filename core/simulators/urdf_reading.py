@@ -15,9 +15,8 @@ import numpy as np
 from ..errors import FileError, PalpateError
 from ..geometry.mesh import TriangleMesh
 from ..geometry.point_surface import triangles_between
-from ..io.mesh_file import load_mesh
+from ..io.input_files import load_mesh, read_xml
 from ..io.sensor_toml import MOST_TEXELS
-from ..io.xml_file import read_xml
 from .optional_package import optional_package
 from .sensor_format import FoundSensor
 

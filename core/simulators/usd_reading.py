@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import FileError
 from ..geometry.mesh import TriangleMesh
 from ..geometry.point_surface import triangles_between
-from ..io.regular_file import require_regular
+from ..io.input_files import require_regular
 from ..io.sensor_toml import MOST_TEXELS, stated_parameters
 from ..model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters
 from .optional_package import optional_package

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from ..io.file_writing import write_file
-from ..io.xml_file import require_xml_text
+from ..io.input_files import require_xml_text
 
 DIGITS = 9
 """Digits of a number: nine make every float32 its own, and simulators store meshes as float32."""

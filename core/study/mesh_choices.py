@@ -16,7 +16,7 @@ from typing import Any
 from ..errors import FileError, os_error_reason
 from ..geometry.mesh import TriangleMesh
 from ..io.file_writing import atomic_write, file_sha256
-from ..io.mesh_file import load_mesh
+from ..io.input_files import load_mesh
 from .design import CHOICE
 from .scene_property import is_scene_property
 

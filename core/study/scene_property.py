@@ -18,8 +18,8 @@ from typing import Any, Literal, get_args
 
 from ..errors import FileError, ParameterError
 from ..io.file_writing import atomic_write
+from ..io.input_files import read_toml
 from ..io.schema import read_json
-from ..io.toml_file import read_toml
 from ..model.parameter import Choice, ChoiceParameter, Parameter, Specification
 from .variation import Variable
 

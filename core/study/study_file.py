@@ -38,8 +38,8 @@ import numpy as np
 
 from ..errors import FileError, ParameterError, did_you_mean
 from ..geometry.mesh import TriangleMesh
+from ..io.input_files import checked_name, is_number, read_toml
 from ..io.schema import LARGEST, WORD, Name, Number, Positive, Switch, known_words, read_words, wanted
-from ..io.toml_file import checked_name, is_number, read_toml
 from ..model.parameter import Parameter, Specification, TextParameter
 from ..model.scenario import Scenario
 from .design import (

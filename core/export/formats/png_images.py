@@ -13,8 +13,7 @@ from ...figures.figure_canvas import save_pixels
 from ...figures.figure_style import FigureStyle
 from ...io.bake_folder import folder_names
 from ...io.bake_reader import Bake
-from ...io.disk_space import BLOCK
-from ...io.file_writing import atomic_write, writable_folder
+from ...io.file_writing import BLOCK, atomic_write, writable_folder
 from ...io.tactile_exr import channel_layout
 from ...jobs.progress import Job
 from ...model.recording import row_blocks

@@ -12,8 +12,8 @@ import numpy as np
 
 from ...errors import FileError
 from ...io.csv_table import UNITS
+from ...io.input_files import checked_name, is_number
 from ...io.schema import known_words
-from ...io.toml_file import checked_name, is_number
 
 QUANTITIES = {
     "time": "s",

@@ -16,9 +16,9 @@ import numpy as np
 from ...errors import FileError
 from ...geometry.layout.texture_maps import UVLayout
 from ...geometry.texels import Texels
+from ...io.input_files import is_number
 from ...io.schema import known_words
 from ...io.sensor_toml import checked_lengths
-from ...io.toml_file import is_number
 from ...skins.layer import pressure_below_point_load
 
 COVER_WORDS = {"sensors", "strips", "cover"}

@@ -17,10 +17,9 @@ from ...errors import FileError, ParameterError, SensorError
 from ...geometry.mesh import TriangleMesh, checked_mesh
 from ...geometry.texels import Texels, texels_from_region
 from ...io.csv_table import read_table
-from ...io.regular_file import require_regular
+from ...io.input_files import LONGEST_NAME, checked_name, read_toml, require_regular
 from ...io.schema import Name, known_words, read_words, wanted
 from ...io.sensor_toml import SHAPE_WORDS, checked_grid, checked_lengths, stated_parameters
-from ...io.toml_file import LONGEST_NAME, checked_name, read_toml
 from ...model.sensor_parameters import DEPTH_PER_THICKNESS, SENSOR_PARAMETERS, SensorParameters, with_dependent_defaults
 from .column_names import ColumnRule, read_column_rules, translated
 from .cover import COVER_WORDS, Cover, read_cover

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import FileError
-from ...io.toml_file import is_number
+from ...io.input_files import is_number
 from .trial import Trial
 
 ONE_CLOCK = "one clock"

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from ...errors import FileError
+from ...io.input_files import checked_name, read_toml
 from ...io.schema import WORD, Name, Number, Positive, Seconds, known_words, read_words, wanted
-from ...io.toml_file import checked_name, read_toml
 from ..dataset.column_names import QUANTITIES
 from .column_meaning import LOG_UNITS, PRESSURES
 

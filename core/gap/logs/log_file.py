@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ...errors import FileError, read_errors_said
-from ...io.regular_file import open_regular
+from ...io.input_files import open_regular
 from .log_table import LARGEST_FILE, LogFile
 from .missing_codes import without_missing_codes
 from .readers.array_files import read_hdf5, read_mat, read_npz

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import FileError, read_errors_said
-from ...io.regular_file import read_bounded
+from ...io.input_files import read_bounded
 from ..dataset.rig import Rig
 from ..selection.findings import Diagnosis
 from .comparison import nrmse

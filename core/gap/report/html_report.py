@@ -10,7 +10,7 @@ from typing import Any
 
 from ...effects.engine.registry import form_of, kind_of
 from ...errors import counted
-from ...io.html_templates import render_html
+from ...figures.html_templates import render_html
 from ...model.sensor_parameters import unit_of
 from ..fitting.least_squares import BASE
 from ..forward.contact_phases import FEATURES

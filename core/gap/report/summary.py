@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import PalpateError
-from ...io.disk_space import require_space
 from ...io.file_list import FileList
-from ...io.file_writing import atomic_write
+from ...io.file_writing import atomic_write, require_space
 from ...io.sensor_toml import write_sensor
 from ...jobs.job_runner import part_of_job
 from ...jobs.progress import Job, Progress

@@ -6,8 +6,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ...io.openrave import read_openrave
-from ...io.xml_file import read_xml
+from ...io.input_files import read_xml
+from ..openrave_file import read_openrave
 from ..sensor_format import FoundSensor, SensorFormat
 
 

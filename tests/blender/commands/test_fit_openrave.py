@@ -8,8 +8,8 @@ from blender_scenes import press, save
 
 from palpate.commands import main
 from palpate.core.gap.calibration.friction import steady_friction
-from palpate.core.io.openrave import read_openrave
 from palpate.core.model.sensor_parameters import SensorParameters
+from palpate.core.simulators.openrave_file import read_openrave
 
 
 def test_stiffness_from_foam(tmp_path, capfd):

@@ -19,7 +19,7 @@ from palpate.addon.render.figure_request import FigureRequest
 from palpate.commands import main
 from palpate.core.errors import FileError, ParameterError, SceneError
 from palpate.core.figures.figure_style import FigureStyle
-from palpate.core.io import disk_space
+from palpate.core.io import file_writing
 from palpate.core.io.file_list import LIST_NAME
 from palpate.core.io.file_writing import atomic_write
 from palpate.core.jobs.job_runner import run_job
@@ -103,7 +103,7 @@ def test_figures_take_the_place_of_earlier_ones(baked, tmp_path, monkeypatch):
 def test_a_full_disk_is_found_before_a_render(baked, tmp_path, monkeypatch):
     scene, _ = baked
     monkeypatch.setattr(figure_export.render, "render_frame", None)
-    monkeypatch.setattr(disk_space.shutil, "disk_usage", lambda _: SimpleNamespace(free=8e6))
+    monkeypatch.setattr(file_writing.shutil, "disk_usage", lambda _: SimpleNamespace(free=8e6))
     with pytest.raises(FileError, match=r"The set of figures needs up to 13 MB and the disk of .* has 8 MB left"):
         run_job(figure_export.make_figures(scene, tmp_path / "out", FigureRequest(("scene",))))
     assert not (tmp_path / "out").exists()

@@ -8,7 +8,7 @@ import pytest
 
 from palpate.core.errors import FileError
 from palpate.core.gap.report import summary
-from palpate.core.io import disk_space
+from palpate.core.io import file_writing
 from palpate.core.io.file_list import LIST_NAME
 from palpate.core.io.file_writing import atomic_write
 from palpate.core.jobs.job_runner import run_job
@@ -76,7 +76,7 @@ def test_a_full_disk_is_found_before_the_pictures_are_drawn(report, tmp_path, mo
     report(tmp_path, "old")
     before = ages(tmp_path)
     free = summary.LEAST_BYTES + summary.SAMPLE_BYTES * 1e6
-    monkeypatch.setattr(disk_space.shutil, "disk_usage", lambda _: SimpleNamespace(free=free))
+    monkeypatch.setattr(file_writing.shutil, "disk_usage", lambda _: SimpleNamespace(free=free))
     report(tmp_path, "old", trials=1000 * (TRIAL,))
     with pytest.raises(FileError, match="The report needs up to 50 MB"):
         report(tmp_path, "new", trials=1001 * (TRIAL,))

@@ -4,8 +4,8 @@
 import pytest
 
 from palpate.core.errors import FileError
-from palpate.core.io.disk_space import BLOCK, bake_bytes, recording_bytes, require_space
-from palpate.core.io.frame_table import row_type
+from palpate.core.io.file_writing import BLOCK, bake_bytes, recording_bytes, require_space
+from palpate.core.io.row_tables import row_type
 
 
 def test_the_estimate_of_a_recording_is_the_size_of_its_rows():

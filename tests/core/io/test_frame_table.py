@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from palpate.core.errors import FileError
-from palpate.core.io import row_table
-from palpate.core.io.frame_table import FrameTable, row_type
+from palpate.core.io import row_tables
 from palpate.core.io.recording_npz import load_recording, save_recording
+from palpate.core.io.row_tables import FrameTable, row_type
 from palpate.core.model import recording as model
 from palpate.core.model.recording import SENSOR_FIELDS, Frame, Recording, SensorFrame
 
@@ -50,7 +50,7 @@ def arrays_of(recording):
 def test_frames_come_back_bit_for_bit(tmp_path, monkeypatch, mapped):
     wanted = frames(40)
     if mapped:
-        monkeypatch.setattr(row_table, "IN_MEMORY_BYTES", 0)
+        monkeypatch.setattr(row_tables, "IN_MEMORY_BYTES", 0)
         monkeypatch.setattr(model, "BLOCK_BYTES", 2000)  # a few frames
     rows = written(tmp_path, wanted)
     found, expected = rows.recording(1e-4, "d", ["careful"], "because"), Recording.stack(wanted, BODIES, 1e-4, "d")
@@ -72,7 +72,7 @@ def test_frames_come_back_bit_for_bit(tmp_path, monkeypatch, mapped):
 
 @pytest.mark.skipif(not Path("/proc/self/smaps").exists(), reason="only Linux tells what of a file is in memory")
 def test_blocks_leave_no_file_in_memory(tmp_path, monkeypatch):
-    monkeypatch.setattr(row_table, "IN_MEMORY_BYTES", 0)
+    monkeypatch.setattr(row_tables, "IN_MEMORY_BYTES", 0)
     monkeypatch.setattr(model, "BLOCK_BYTES", 1 << 16)
     rows = written(tmp_path, frames(3000))
     found = rows.recording(1e-4, "", (), "")

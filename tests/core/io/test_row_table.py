@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from palpate.core.errors import FileError
-from palpate.core.io import row_table
-from palpate.core.io.row_table import motion_table
+from palpate.core.io import row_tables
+from palpate.core.io.row_tables import motion_table
 
 
 @pytest.mark.parametrize("limit", [1 << 22, 100])
 @pytest.mark.parametrize("shape", [(), (3,), (5, 3)])
 def test_rows_come_back(monkeypatch, limit, shape):
-    monkeypatch.setattr(row_table, "IN_MEMORY_BYTES", limit)
+    monkeypatch.setattr(row_tables, "IN_MEMORY_BYTES", limit)
     rows = np.random.default_rng(5).normal(size=(50, *shape))
     table = motion_table(rows[0])
     for row in rows[1:]:

@@ -6,7 +6,7 @@ import pytest
 
 from palpate.core.errors import ParameterError
 from palpate.core.io.exr_file import read_image
-from palpate.core.io.vector_exr import write_vector_exrs
+from palpate.core.io.tactile_exr import write_vector_exrs
 
 VALUES = np.random.default_rng(0).normal(size=(3, 6, 3))
 

@@ -9,8 +9,8 @@ from solver_scenes import pad, pressed, shape
 from trimesh.creation import icosphere
 
 from palpate.core.errors import FileError, SensorError
-from palpate.core.io.frame_table import FrameTable
 from palpate.core.io.recording_npz import load_recording, save_recording
+from palpate.core.io.row_tables import FrameTable
 from palpate.core.io.scenario_npz import load_scenario, save_scenario
 from palpate.core.model.digest import digest_of
 from palpate.core.model.recording import Recording

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ....errors import FileError
-from ....io.regular_file import open_regular
+from ....io.input_files import open_regular
 from ..log_table import FEWEST_ROWS, LARGEST_FILE, LogFile, LogTable, cleaned, require_size
 from .damaged_file import damage_said
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ....errors import FileError
-from ....io.regular_file import open_regular
+from ....io.input_files import open_regular
 from ..log_table import LogFile, LogTable
 from .damaged_file import damage_said, read_by
 from .message_columns import TopicColumns, is_picture

@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from ....errors import FileError
-from ....io.regular_file import require_regular
+from ....io.input_files import require_regular
 from ..log_table import LARGEST_FILE, LogFile
 from .damaged_file import damage_said, read_by
 from .mcap_log import log_of, read_mcap

@@ -14,10 +14,10 @@ from typing import Any
 from xml.etree import ElementTree
 
 from ..errors import FileError, PalpateError
+from ..io.file_writing import atomic_write
+from ..io.input_files import read_xml, require_xml_text
 from ..model.parameter import numbers_of
 from ..model.sensor_parameters import DEPTH_PER_THICKNESS, SENSOR_PARAMETERS, SensorParameters
-from .file_writing import atomic_write
-from .xml_file import read_xml, require_xml_text
 
 SENSOR_TYPE = "SimTactileSensor"
 NUMBERS = tuple(

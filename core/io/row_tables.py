@@ -1,8 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The frames of a run, one row each, from which its recording is made without a second copy of a long one."""
+"""Rows that are added one by one: in memory while they are few, in a temporary file when they become many.
+
+The motion of a scene is kept in such tables while it is read, and the frames of a run while it is computed.
+"""
 
 from __future__ import annotations
 
+import mmap
+import os
+import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,11 +16,90 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike
 
+from ..errors import FileError, os_error_reason
 from ..model.recording import SENSOR_FIELDS, Frame, Recording, SensorRecording
 from ..model.scenario import Scenario
 from ..model.vector_readings import CLIPPED, VALUES, VectorReadings
-from .row_table import RowTable
+
+IN_MEMORY_BYTES = 1 << 24
+"""Bytes of a table that stay in memory: hours of animation of a rigid body."""
+
+
+class RowTable:
+    """A table that grows row by row, so a long scene and its bake need no more memory than a short one.
+
+    The temporary file has no name, and is gone when the table and its arrays are.
+
+    Parameters
+    ----------
+    kind : dtype
+        Of a row; that of an array is ``(float, shape)``.
+    what : str
+        What the rows are, for messages, as in "The motion of a long scene".
+    folder : Path, optional
+        Where the temporary file lies. Default: where :func:`tempfile.gettempdir` says.
+    """
+
+    def __init__(self, kind: DTypeLike, what: str, folder: Path | None = None):
+        self._kind, self._what, self._folder = np.dtype(kind), what, folder
+        self._count = 0
+        place = None if folder is None else str(folder)
+        self._file = tempfile.SpooledTemporaryFile(IN_MEMORY_BYTES, prefix="palpate-", dir=place)  # noqa: SIM115
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return self._count
+
+    @property
+    def is_in_memory(self) -> bool:
+        """Return True if the rows so far are in memory."""
+        return self._count * self._kind.itemsize <= IN_MEMORY_BYTES
+
+    def append(self, row: np.ndarray | float) -> None:
+        """Add one row; raises FileError if the temporary file cannot be written."""
+        try:
+            self._file.write(np.asarray(row, self._kind.base).tobytes())
+        except OSError as error:
+            raise self._error(error) from error
+        self._count += 1
+
+    def rows(self) -> np.ndarray:
+        """Return all rows, (rows, …) of the type; a view of the temporary file, which cannot be changed, if there is one.
+
+        Raises
+        ------
+        FileError
+            As :meth:`append`.
+        """
+        try:
+            self._file.flush()
+            if self.is_in_memory:
+                self._file.seek(0)
+                content = self._file.read()
+                self._file.seek(0, os.SEEK_END)
+                return np.frombuffer(content, self._kind).copy()
+            mapped = mmap.mmap(self._file.fileno(), 0, access=mmap.ACCESS_READ)
+        except OSError as error:
+            raise self._error(error) from error
+        return np.frombuffer(mapped, self._kind)
+
+    def _error(self, error: OSError) -> FileError:
+        place, remedy = self._folder, "choose another folder"
+        if place is None:
+            place, remedy = Path(tempfile.gettempdir()), "name another folder in the environment variable TMPDIR"
+        return FileError(
+            f"{self._what} could not be kept in '{place}' ({os_error_reason(error)}): free some space there, or {remedy}."
+        )
+
+
+def motion_table(first: np.ndarray | float) -> RowTable:
+    """Return a table for the motion of a scene, with its first row."""
+    table = RowTable((float, np.shape(first)), "The motion of a long scene")
+    table.append(first)
+    return table
+
 
 _VECTORS = ("net_force", "net_torque", "centre_of_pressure")
 

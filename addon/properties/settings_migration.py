@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ..errors import FileError
+from ...core.errors import FileError
 
 VERSION = 1
 """Version of the settings that this Palpate reads and writes."""

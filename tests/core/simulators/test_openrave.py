@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from palpate.core.errors import FileError
-from palpate.core.io.openrave import OpenRaveSensor, openrave_xml, read_openrave, write_openrave
 from palpate.core.model.sensor_parameters import SensorParameters
+from palpate.core.simulators.openrave_file import OpenRaveSensor, openrave_xml, read_openrave, write_openrave
 
 TABLE_2 = """\
 <AttachedSensor>

@@ -3,8 +3,8 @@
 
 import pytest
 
+from palpate.addon.properties.settings_migration import STEPS, VERSION, migrate
 from palpate.core.errors import FileError
-from palpate.core.io.settings_migration import STEPS, VERSION, migrate
 
 
 def renamed(settings):
