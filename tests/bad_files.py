@@ -389,7 +389,7 @@ def image_files() -> Files:
     texels = grid_texels()
     frame = recording_of(texels, frames=4).sensors["pad"].at(2)
     about = {"sensor": "pad", "time": "0.1"}
-    return files_of(lambda folder: tactile_exr.write_exr(folder / "tactile.exr", texels.layout, frame, about))
+    return files_of(lambda folder: tactile_exr.write_exrs([folder / "tactile.exr"], texels.layout, [frame], [about]))
 
 
 def exported_sensor(kind: str) -> Files:

@@ -9,12 +9,16 @@ import struct
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 
+from ..errors import FileError, os_error_reason
 from .file_writing import write_file
+from .input_files import open_regular
 
 DAMAGED = (
     ValueError,
@@ -69,6 +73,29 @@ def _save(file: IO[bytes], arrays: Mapping[str, np.ndarray], compress: bool) -> 
     save(file, **{name: array.copy("C") if array.flags.fnc else array for name, array in arrays.items()})
 
 
-def open_archive(file: IO[bytes]) -> Any:
-    """Return a context that gives the arrays of an .npz file by name; each may raise what :data:`DAMAGED` lists."""
-    return np.load(file, allow_pickle=False)
+@contextmanager
+def open_arrays(path: str | os.PathLike, what: str, advice: str) -> Iterator[Any]:
+    """Give the arrays of an .npz file by name, and say in one sentence what is wrong with it.
+
+    Parameters
+    ----------
+    path : path
+    what : str
+        What the file should be, as in "recording".
+    advice : str
+        What to do if it is missing or damaged.
+
+    Raises
+    ------
+    FileError
+        There is no such file, it cannot be read, or the body of the ``with`` statement meets damage (:data:`DAMAGED`).
+    """
+    if not Path(path).exists():
+        raise FileError(f"'{path}' does not exist: {advice}, or choose another file.")
+    try:
+        with open_regular(path) as file, np.load(file, allow_pickle=False) as members:
+            yield members
+    except OSError as error:
+        raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): choose another file.") from error
+    except DAMAGED as error:
+        raise FileError(f"'{path}' is damaged or no {what} ({error}): {advice}.") from error

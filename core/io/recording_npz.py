@@ -14,18 +14,16 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import FileError, PalpateError, os_error_reason
+from ..errors import FileError, ParameterError
 from ..geometry.texels import Texels
 from ..model.recording import SENSOR_FIELDS, Recording, SensorRecording, row_blocks
 from ..model.sensor_parameters import Painted, SensorParameters
 from ..model.vector_readings import CLIPPED, VALUES, VectorReadings
-from .input_files import open_regular
-from .npz import DAMAGED, open_archive, write_arrays
+from .npz import open_arrays, write_arrays
 from .sensor_npz import sensor_arrays, sensor_in
 from .sensor_toml import stated_parameters
 
@@ -80,18 +78,10 @@ def load_recording(path: str | os.PathLike) -> Recording:
     FileError
         There is no such file, or it is damaged or something else.
     """
-    file = Path(path)
-    if not file.exists():
-        raise FileError(f"'{path}' does not exist: bake first, or choose another file.")
-    try:
-        with open_regular(file) as opened, open_archive(opened) as members:
-            if "header" not in members.files:
-                raise FileError(f"'{path}' is not a recording of Palpate: choose a recording.npz of a bake.")
-            return _recording(path, members)
-    except OSError as error:
-        raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): choose another file.") from error
-    except DAMAGED as error:
-        raise FileError(f"'{path}' is damaged or no recording ({error}): bake again.") from error
+    with open_arrays(path, "recording", "bake again") as members:
+        if "header" not in members.files:
+            raise FileError(f"'{path}' is not a recording of Palpate: choose a recording.npz of a bake.")
+        return _recording(path, members)
 
 
 def _header(recording: Recording) -> dict[str, Any]:
@@ -184,19 +174,18 @@ def load_with_sensors(path: str | os.PathLike) -> tuple[Recording, Sensors]:
     recording = load_recording(path)
     sensors: Sensors = {}
     try:
-        with open_regular(path) as opened, open_archive(opened) as members:
+        with open_arrays(path, "recording", "write it again") as members:
             for i, name in enumerate(recording.sensors):
                 if f"sensor_{i}/parameters" not in members.files:
                     continue
                 texels, painted = sensor_in(_Part(members, f"sensor_{i}/texels/"))
-                parameters = SensorParameters(
-                    **stated_parameters(json.loads(str(members[f"sensor_{i}/parameters"])), f"'{name}'")
-                )
+                words = json.loads(str(members[f"sensor_{i}/parameters"]))
+                parameters = SensorParameters(**stated_parameters(words, f"'{name}'"))
                 parameters.check(name)
                 if len(texels) != recording.sensors[name].normal_force.shape[1]:
-                    raise ValueError("its texels and its forces differ in number")
+                    raise ParameterError("its texels and its forces differ in number")
                 sensors[name] = texels, painted, parameters
-    except (*DAMAGED, PalpateError) as error:
+    except ParameterError as error:
         raise FileError(f"'{path}' is damaged ({error}): write it again.") from error
     return recording, sensors
 

@@ -10,12 +10,11 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import is_dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import FileError, os_error_reason
+from ..errors import FileError
 from ..geometry.layout.grid_layout import GridLayout
 from ..geometry.layout.texture_maps import UVLayout
 from ..geometry.mesh import TriangleMesh
@@ -33,8 +32,7 @@ from ..model.target import Target
 from ..skins.channel_readouts import LinearReadout, MagneticReadout
 from ..skins.magnetic_skin import MagneticSkin, Magnetometers, Magnets
 from ..skins.readout_matrix import ReadoutMatrix
-from .input_files import open_regular
-from .npz import DAMAGED, open_archive, write_arrays
+from .npz import open_arrays, write_arrays
 
 SCENARIO_FORMAT = "palpate-scenario/1"
 
@@ -71,21 +69,13 @@ def load_scenario(path: str | os.PathLike) -> Scenario:
     FileError
         There is no such file, it is damaged or something else, or its digest is not that of what was written.
     """
-    if not Path(path).exists():
-        raise FileError(f"There is no scenario '{path}': check its name and folder.")
-    try:
-        with open_regular(path) as opened, open_archive(opened) as members:
-            header = json.loads(str(members["header"]))
-            if header["format"] != SCENARIO_FORMAT:
-                raise FileError(
-                    f"'{path}' has the format {header['format']!r:.40}, not '{SCENARIO_FORMAT}': "
-                    "write it again with this version."
-                )
-            scenario = _unpacked(header["scenario"], members)
-    except OSError as error:
-        raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): choose another file.") from error
-    except DAMAGED as error:
-        raise FileError(f"'{path}' is damaged or no scenario ({error}): write it again.") from error
+    with open_arrays(path, "scenario", "write it again") as members:
+        header = json.loads(str(members["header"]))
+        if header["format"] != SCENARIO_FORMAT:
+            raise FileError(
+                f"'{path}' has the format {header['format']!r:.40}, not '{SCENARIO_FORMAT}': write it again with this version."
+            )
+        scenario = _unpacked(header["scenario"], members)
     if not isinstance(scenario, Scenario) or scenario.digest() != header["digest"]:
         raise FileError(f"'{path}' is damaged: its digest is not that of its content; write it again.")
     return scenario

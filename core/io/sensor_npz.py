@@ -6,18 +6,15 @@ from __future__ import annotations
 import io
 import os
 from dataclasses import fields
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import FileError, os_error_reason
 from ..geometry.layout.grid_layout import GridLayout
 from ..geometry.layout.texture_maps import UVLayout
 from ..geometry.texels import Texels
 from ..model.sensor_parameters import Painted
-from .input_files import open_regular
-from .npz import DAMAGED, open_archive, write_arrays
+from .npz import open_arrays, write_arrays
 
 SENSOR_FORMAT = "palpate-sensor/1"
 SENSOR_NAME = "sensor.npz"
@@ -58,20 +55,13 @@ def load_sensor(path: str | os.PathLike) -> tuple[Texels, Painted]:
     FileError
         There is no such file, or it is damaged or something else.
     """
-    if not Path(path).exists():
-        raise FileError(f"'{path}' does not exist: bake again with this version.")
-    try:
-        with open_regular(path) as opened, open_archive(opened) as members:
-            return sensor_in(members)
-    except OSError as error:
-        raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): choose another file.") from error
-    except DAMAGED as error:
-        raise FileError(f"'{path}' is damaged or no sensor ({error}): bake again.") from error
+    with open_arrays(path, "sensor", "bake again with this version") as members:
+        return sensor_in(members)
 
 
 def unpack_sensor(content: bytes) -> tuple[Texels, Painted]:
     """Read the content of a small file that :func:`save_sensor` wrote; raises what :data:`.npz.DAMAGED` lists."""
-    with open_archive(io.BytesIO(content)) as members:
+    with np.load(io.BytesIO(content), allow_pickle=False) as members:
         return sensor_in(members)
 
 

@@ -28,7 +28,7 @@ from ..model.sensor import Sensor
 from ..model.vector_readings import VectorReadings
 from .exr_file import FormatError, read_image, write_image
 from .file_list import FileList
-from .file_writing import atomic_write, writable_folder, write_file
+from .file_writing import writable_folder, write_file
 
 CHANNELS = ("R", "G", "B", "reading", "depth", "slip", "contact")
 """Names of the channels, in the order in which :func:`read_exr` returns them."""
@@ -104,34 +104,6 @@ def describe(sensor: Sensor, frame: Frame, digest: str) -> dict[str, str]:
     return about
 
 
-def write_exr(
-    path: str | os.PathLike,
-    layout: GridLayout | UVLayout,
-    frame: SensorFrame,
-    metadata: Mapping[str, str],
-) -> None:
-    """Write one frame of one sensor atomically.
-
-    Parameters
-    ----------
-    path : path
-    layout : GridLayout or UVLayout
-        Of the sensor's texels.
-    frame : SensorFrame
-    metadata : mapping of str to str
-        Becomes header attributes named ``palpate.<key>``, see :func:`describe`.
-
-    Raises
-    ------
-    FileError
-        The file cannot be written.
-    ValueError
-        See :func:`exr_channels`; nothing is written then.
-    """
-    with atomic_write(path) as place:
-        _write([place], layout, [frame], [metadata])
-
-
 def write_exrs(
     paths: Sequence[str | os.PathLike],
     layout: GridLayout | UVLayout,
@@ -144,31 +116,26 @@ def write_exrs(
     Parameters
     ----------
     paths : (f,) sequence of path
-    layout, frames, metadata
-        As for :func:`write_exr`, one for each path.
+    layout : GridLayout or UVLayout
+        Of the sensor's texels.
+    frames : (f,) sequence of SensorFrame
+    metadata : (f,) sequence of mapping of str to str
+        Become header attributes named ``palpate.<key>``, see :func:`describe`.
     nearest : (n,) int, optional
         Of a sensor with several channels: the place whose channels the layer shows at each texel (:func:`nearest_places`).
 
     Raises
     ------
-    FileError, ValueError
-        As :func:`write_exr`.
+    FileError
+        A file cannot be written.
+    ValueError
+        See :func:`exr_channels`; nothing is written then.
     """
-    with write_file(paths[0], atomic=False):
-        _write(paths, layout, frames, metadata, nearest)
-
-
-def _write(
-    paths: Sequence[str | os.PathLike],
-    layout: GridLayout | UVLayout,
-    frames: Sequence[SensorFrame],
-    metadata: Sequence[Mapping[str, str]],
-    nearest: np.ndarray | None = None,
-) -> None:
     names = CHANNELS if nearest is None else (*CHANNELS, *layer_names(_channels_of(frames[0])))
     pictures = _pictures(layout, frames, names, nearest)
     for path, own, about in zip(paths, pictures, metadata, strict=True):
-        write_image(path, dict(zip(names, own)), {_PREFIX + key: str(value) for key, value in about.items()})
+        with write_file(path, atomic=False):
+            write_image(path, dict(zip(names, own)), {_PREFIX + key: str(value) for key, value in about.items()})
 
 
 def layer_names(channels: VectorReadings) -> list[str]:
@@ -209,7 +176,7 @@ def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, 
     channels : dict of str to (height, width) float32
         Row 0 at the bottom; those of :data:`CHANNELS` first, others after them.
     metadata : dict of str to str
-        As given to :func:`write_exr`.
+        As given to :func:`write_exrs`.
 
     Raises
     ------

@@ -13,7 +13,7 @@ import pytest
 from palpate.core.geometry.layout.grid_layout import GridLayout
 from palpate.core.geometry.layout.texture_maps import uv_layout
 from palpate.core.io.bake_folder import frame_file
-from palpate.core.io.tactile_exr import CHANNELS, exr_channels, read_exr, write_exr
+from palpate.core.io.tactile_exr import CHANNELS, exr_channels, read_exr, write_exrs
 from palpate.core.model.recording import SensorFrame
 
 ROWS, COLUMNS = 5, 7
@@ -58,7 +58,7 @@ def as_blender_sees(image):
 
 def assert_both_read_alike(path, layout, frame):
     """Write a frame, and compare what Blender and our own reader make of it."""
-    write_exr(path, layout, frame, {"unit": "kPa"})
+    write_exrs([path], layout, [frame], [{"unit": "kPa"}])
     expected = exr_channels(layout, frame)
     image = bpy.data.images.load(str(path))
     pixels = as_blender_sees(image)
@@ -99,7 +99,7 @@ def test_both_libraries_work_after_a_render(tmp_path, scene):
 
 @pytest.mark.parametrize("first", ["OpenEXR", "bpy"])
 def test_either_library_may_come_first(tmp_path, first):
-    write_exr(tmp_path / "a.exr", grid(), tactile_frame(ROWS * COLUMNS), {})
+    write_exrs([tmp_path / "a.exr"], grid(), [tactile_frame(ROWS * COLUMNS)], [{}])
     program = (
         f"import sys, {first}\nimport bpy, OpenEXR\n"
         "image = bpy.data.images.load(sys.argv[1])\n"
@@ -112,8 +112,7 @@ def test_either_library_may_come_first(tmp_path, first):
 
 def test_sequence_of_frames_plays(tmp_path, scene):
     frames = [tactile_frame(ROWS * COLUMNS, seed) for seed in range(3)]
-    for i, frame in enumerate(frames):
-        write_exr(tmp_path / frame_file(i + 1), grid(), frame, {})
+    write_exrs([tmp_path / frame_file(i + 1) for i in range(3)], grid(), frames, [{}] * 3)
     mesh = bpy.data.meshes.new("plane")
     mesh.from_pydata([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [], [(0, 1, 2, 3)])
     mesh.uv_layers.new().data.foreach_set("uv", [0, 0, 1, 0, 1, 1, 0, 1])

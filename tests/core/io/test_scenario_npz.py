@@ -67,5 +67,5 @@ def test_a_file_that_was_cut_is_refused(tmp_path, keep):
 
 
 def test_a_missing_file_is_said():
-    with pytest.raises(FileError, match="There is no scenario"):
+    with pytest.raises(FileError, match="does not exist: write it again"):
         load_scenario("nowhere.npz")
