@@ -23,7 +23,7 @@ WEBSITE ?=
 help:
 	@echo 'make demo     set up and run the demo: a picture, tactile images and the forces, in $(DEMO_OUT)/'
 	@echo 'make env      set up all that the commands below need, without running anything'
-	@echo 'make test     before each commit: lint, types and the quick tests in bpy $(BPY45), on all cores'
+	@echo 'make test     before each commit: lint and the quick tests in bpy $(BPY45), on all cores'
 	@echo 'make test-all everything: make test, test-long, docs and test-ui (the window needs Debian and root)'
 	@echo 'make test-long  the long tests in bpy $(BPY45), and all tests of Blender in bpy $(BPY50)'
 	@echo 'make test-ui  the extension in a real Blender window (Debian, as root: it sets up a Blender of its own);'
@@ -32,7 +32,7 @@ help:
 	@echo 'make docs     the documentation as a site, in build/site/'
 	@echo 'make zip      the extension zips for every platform and Python, in dist/, checked by the rules of extensions.blender.org;'
 	@echo '              WEBSITE=https://… makes those to upload, too, in dist/upload/'
-	@echo 'make lint     ruff and mypy alone'
+	@echo 'make lint     ruff, mypy and the order of imports alone'
 	@echo 'make clean    remove build products; distclean: the environments too'
 
 # --- environments: a stamp each, renewed when what they are made from changes
@@ -66,6 +66,7 @@ lint: env
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/python tools/check_types.py
+	$(BIN)/lint-imports --no-logo
 
 compiled: env
 	$(BIN)/python tools/compile_kernels.py

@@ -46,7 +46,7 @@ class ModalJob(support.ErrorReporting):
         self._timer = manager.event_timer_add(0.01, window=context.window)
         manager.progress_begin(0.0, 1.0)
         manager.modal_handler_add(self)
-        type(self)._in_window += 1
+        type(self)._in_window += 1  # noqa: SLF001
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
@@ -88,7 +88,7 @@ class ModalJob(support.ErrorReporting):
 
     def _end(self, context):
         """Remove timer and progress."""
-        type(self)._in_window -= 1
+        type(self)._in_window -= 1  # noqa: SLF001
         self._running.cancel()
         context.window_manager.event_timer_remove(self._timer)
         context.window_manager.progress_end()

@@ -21,14 +21,6 @@ def repository() -> Path:
     return Path(__file__).resolve().parents[1]
 
 
-@pytest.fixture(scope="session")
-def imports():
-    """Return the graph of the imports of the extension, which takes seconds to read."""
-    from import_graph import Graph
-
-    return Graph.read()
-
-
 def pytest_collection_modifyitems(items):
     """Refuse a marker of a tier that says no reason."""
     for item in items:

@@ -8,28 +8,29 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-from import_graph import ROOT, Graph, module_name
+ROOT = Path(__file__).resolve().parents[1]
 
 
-def pages(graph: Graph) -> Iterator[tuple[str, str]]:
-    """Pairs of a page's name and its text, in the order of imports."""
-    docstrings = {module_name(file): ast.get_docstring(ast.parse(source)) for file, source in graph.sources.items()}
-    for package in _in_order("core", graph):
-        offered = graph.public[package] or []
-        modules = [f"{package}.{name}" for name in offered if f"{package}.{name}" not in graph.packages]
-        title = f"`palpate.{package}`"
-        blocks = [_automodule(f"palpate.{package}", members=False)]
-        for module in modules:
-            if docstrings.get(module):
-                blocks.append(f"## `{module.rpartition('.')[2]}`\n\n{_automodule(f'palpate.{module}')}")
-        yield package.replace(".", "-"), f"# {title}\n\n" + "\n\n".join(blocks) + "\n"
+def pages(package: str) -> Iterator[tuple[str, str]]:
+    """Pairs of a page's name and its text, of a package and those in it, in the order of imports."""
+    folder = ROOT.joinpath(*package.split("."))
+    names = _offered(folder)
+    blocks = [_automodule(f"palpate.{package}", members=False)]
+    for name in names:
+        if not (folder / name).is_dir() and ast.get_docstring(ast.parse((folder / f"{name}.py").read_text(encoding="utf-8"))):
+            blocks.append(f"## `{name}`\n\n{_automodule(f'palpate.{package}.{name}')}")
+    yield package.replace(".", "-"), f"# `palpate.{package}`\n\n" + "\n\n".join(blocks) + "\n"
+    for name in names:
+        if (folder / name).is_dir():
+            yield from pages(f"{package}.{name}")
 
 
-def _in_order(package: str, graph: Graph) -> Iterator[str]:
-    yield package
-    for name in graph.public[package] or ():
-        if f"{package}.{name}" in graph.packages:
-            yield from _in_order(f"{package}.{name}", graph)
+def _offered(folder: Path) -> list[str]:
+    """Return the list `__all__` of a package."""
+    for node in ast.parse((folder / "__init__.py").read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__":
+            return list(ast.literal_eval(node.value))
+    return []
 
 
 def _automodule(module: str, members: bool = True) -> str:
@@ -42,7 +43,7 @@ def write(folder: Path) -> None:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     names = []
-    for name, text in pages(Graph.read(ROOT, ("core",))):
+    for name, text in pages("core"):
         (folder / f"{name}.md").write_text(text, encoding="utf-8")
         names.append(name)
     listed = "\n".join(names)

@@ -104,6 +104,8 @@ def parameter_lines(kind) -> list[str]:
 # --- the picture
 
 ROWS, COLUMNS, PITCH = 14, 6, 0.0034
+LINE = 0.1
+"""Share of a plot's height that each line of its legend takes, above the curves."""
 
 
 def picture(path: Path) -> None:
@@ -121,32 +123,7 @@ def picture(path: Path) -> None:
         DRAWINGS[kind.drawing.over](axes, kind)
         axes.set_title(kind.title, fontsize=9.5, loc="left", color="#1c2430")
     figure.subplots_adjust(left=0.055, right=0.985, top=0.972, bottom=0.04, wspace=0.34, hspace=0.5)
-    for axes in grid.ravel()[: len(kinds)]:
-        place_legend(axes)
     save_figure(figure, path, 110)
-
-
-CORNERS = ("upper left", "upper right", "lower left", "lower right", "center right")
-"""Places of a legend, in the order in which they are tried."""
-RAISED = 1.08
-"""Factor by which the upper end of an axis is raised until a legend has room."""
-
-
-def place_legend(axes) -> None:
-    """Put the legend where it touches no curve, and raise the upper end of the y axis until there is such a place."""
-    while True:
-        low, high = axes.get_ylim()  # this also scales the axes to the curves
-        for corner in CORNERS:
-            axes.get_legend().set_loc(corner)
-            if not touches_a_curve(axes):
-                return
-        axes.set_ylim(top=low + RAISED * (high - low))
-
-
-def touches_a_curve(axes) -> bool:
-    """Return True if a curve of a plot crosses the box of its legend."""
-    box = axes.get_legend().get_window_extent()
-    return any(axes.transData.transform_path(line.get_path()).intersects_bbox(box, filled=False) for line in axes.lines)
 
 
 def _setting():
@@ -174,7 +151,9 @@ def _curves(axes, kind, x, base, of_form, xlabel, ylabel):
     tidy_axes(axes)
     axes.set_xlabel(xlabel, labelpad=1)
     axes.set_ylabel(ylabel, labelpad=1)
-    axes.legend(fontsize=8, frameon=False, handlelength=1.0, borderpad=0.1, labelspacing=0.2)
+    low, high = axes.get_ylim()
+    axes.set_ylim(top=low + (high - low) / (1.0 - LINE * len(axes.get_legend_handles_labels()[0])))
+    axes.legend(loc="best", fontsize=8, frameon=False, handlelength=1.0, borderpad=0.1, labelspacing=0.2)
 
 
 def _pressed(time, depth, slide=None):

@@ -183,7 +183,7 @@ if COMPILED:
                 self.typingctx, self.targetctx, self.py_func, args, None, flags, self.locals, library=library
             )
             key = object()
-            self.targetctx.insert_user_function(key, result.fndesc, [library, *library._linking_libraries])
+            self.targetctx.insert_user_function(key, result.fndesc, [library, *library._linking_libraries])  # noqa: SLF001
             self._linked[args] = result, key
 
     class _InterpretedKernel(KernelDispatcher):

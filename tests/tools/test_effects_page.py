@@ -30,24 +30,3 @@ def test_every_experiment_can_be_drawn():
 def test_the_picture_can_be_drawn(tmp_path):
     effects_page.picture(tmp_path / "effects.png")
     assert (tmp_path / "effects.png").stat().st_size > 100_000
-
-
-def test_no_legend_touches_a_curve(monkeypatch, tmp_path):
-    figures = []
-    monkeypatch.setattr("palpate.core.figures.figure_canvas.save_figure", lambda figure, *_: figures.append(figure))
-    effects_page.picture(tmp_path / "effects.png")
-    plots = [axes for axes in figures[0].axes if axes.get_legend()]
-    assert len(plots) == len(library())
-    assert not [axes.get_title(loc="left") for axes in plots if effects_page.touches_a_curve(axes)]
-
-
-def test_a_legend_over_a_curve_is_noticed():
-    from palpate.core.figures.figure_canvas import new_figure
-
-    axes = new_figure(2.0, 2.0).subplots()
-    axes.plot([0.0, 1.0], [0.0, 1.0], label="rises")
-    axes.get_ylim()
-    axes.legend(loc="center")
-    assert effects_page.touches_a_curve(axes)
-    effects_page.place_legend(axes)
-    assert not effects_page.touches_a_curve(axes)

@@ -156,7 +156,7 @@ def mapped_layout(
         raise ImageError(f"{known} has no area where the texels are: {remedy}.")
     layout = UVLayout(triangles, np.clip(corner_uv, 0.0, 1.0), side, side, 0, map_name, nearest, _MAP_MARGIN)
     try:
-        layout._pixels  # noqa: B018 computed once and kept
+        layout._pixels  # noqa: B018, SLF001 computed once and kept
     except OverlapError:
         raise ImageError(f"{known} lays parts of the region over one another: {remedy}.") from None
     return layout
@@ -217,7 +217,7 @@ def _flattened(position: np.ndarray, triangles: np.ndarray) -> tuple[UVLayout, n
     uv = (plane * scale + GUTTER + 1) / (width, height)
     layout = UVLayout(triangles, uv[triangles], height, width)
     try:
-        layout._pixels  # noqa: B018 computed once and kept
+        layout._pixels  # noqa: B018, SLF001 computed once and kept
     except OverlapError:
         return None
     return layout, u

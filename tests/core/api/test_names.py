@@ -18,7 +18,7 @@ HEAVY = {"bpy", "numba", "llvmlite", "scipy", "matplotlib", "trimesh", "numpy", 
 IMPORT = """
 import json, sys, time
 begin = time.perf_counter()
-import palpate
+import palpate, palpate.core
 print(json.dumps([time.perf_counter() - begin, sorted({name.partition(".")[0] for name in sys.modules})]))
 """
 
@@ -50,6 +50,19 @@ def test_import_is_quick_and_loads_nothing_heavy():
     runs = [json.loads(subprocess_output(IMPORT)) for _ in range(5)]
     assert min(seconds for seconds, _ in runs) < 0.05
     assert not HEAVY & set(runs[0][1])
+
+
+def test_no_command_loads_blender_before_it_runs():
+    """In a Python without Blender every command has its help, and says what is missing when it needs Blender."""
+    code = (
+        "import importlib, pkgutil, sys, palpate.commands as commands\n"
+        "names = [module.name for module in pkgutil.iter_modules(commands.__path__) if module.name != '__main__']\n"
+        "for name in names:\n    importlib.import_module(f'palpate.commands.{name}')\n"
+        "print(len(names), 'bpy' in sys.modules)"
+    )
+    count, has_blender = subprocess_output(code).split()
+    assert int(count) >= 12
+    assert has_blender == "False"
 
 
 def test_both_lists_of_names_agree(repository):

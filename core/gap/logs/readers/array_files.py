@@ -92,7 +92,7 @@ def _mat_size(file: Any, path: Path) -> int:
 def _members(name: str, value: Any) -> Iterator[tuple[str, tuple[np.ndarray, str]]]:
     """Yield the arrays of a variable; the fields of a structure are named after it."""
     if hasattr(value, "_fieldnames"):
-        for field in value._fieldnames:
+        for field in value._fieldnames:  # noqa: SLF001
             yield from _members(f"{name}/{field}", getattr(value, field))
     elif isinstance(value, np.ndarray) and value.dtype.kind in _NUMBERS:
         yield name, (value, "")
