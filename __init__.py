@@ -101,7 +101,7 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *_PUBLIC})
 
 
-def _rooms():
+def _rooms(window):
     """What registers, in order; each has register() and unregister()."""
     from .addon.session import dependencies
 
@@ -109,12 +109,17 @@ def _rooms():
         from .panels import missing
 
         return [missing]
-    from . import operators, panels
-    from .addon.events import handlers
+    from .addon.events import file_handlers
     from .addon.properties import registration
     from .addon.session import library_folders
 
-    return [library_folders, registration, operators, panels, handlers, _CommandLine]
+    rooms = [library_folders, registration, file_handlers]
+    if window:
+        from . import operators, panels
+        from .addon.events import handlers
+
+        rooms += [operators, panels, handlers, _CommandLine]
+    return rooms
 
 
 class _CommandLine:
@@ -144,13 +149,16 @@ class _CommandLine:
         return main(argv)
 
 
-def register():
-    """Called by Blender when the add-on is enabled; a second call changes nothing."""
+def register(window=True):
+    """Called by Blender when the add-on is enabled; a second call changes nothing.
+
+    Without `window` scenes have their settings and are read and saved as ever: no operators and panels, and nothing is played.
+    """
     if _registered:
         return
     atexit.register(unregister)  # as a Python module, Blender 4.5 hangs at exit when classes are still registered
     try:
-        for room in _rooms():
+        for room in _rooms(window):
             room.register()
             _registered.append(room)
     except BaseException:

@@ -31,7 +31,7 @@ MOST_NAMED = 5
 
 
 def start_blender() -> Any:
-    """Start Blender if it does not run yet, register the add-on, and return bpy.
+    """Start Blender if it does not run yet, register what scenes need of the add-on, and return bpy.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def start_blender() -> Any:
         console.silence_at_exit()
     if not hasattr(bpy.types.Object, "palpate"):
         # The root package: "palpate" from pip, "bl_ext.<repository>.palpate" as an extension.
-        importlib.import_module(__package__.rpartition(".")[0]).register()
+        importlib.import_module(__package__.rpartition(".")[0]).register(window=False)
     console.Interrupt.check()
     return bpy
 

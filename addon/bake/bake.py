@@ -20,7 +20,6 @@ from ..display import texel_arrows
 from ..scene import scene_fingerprint, scene_reader
 from ..scene.scene_reading import SceneReading
 from ..session import first_use, identity, session_state
-from ..timeline import playback
 from . import bake_files, scene_writer
 
 
@@ -195,7 +194,8 @@ def _show(scene, reading: SceneReading, recording: Recording, shown: _Shown) -> 
     scene.palpate.scene_id, scene.palpate.baked_id = shown.scene_id, shown.bake_id
     scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
     scene.palpate.baked_fingerprint = scene_fingerprint.fingerprint(scene)
-    playback.show_new_bake(scene, recording, shown.folders)
+    for show in session_state.when_baked:
+        show(scene, recording, shown.folders)
 
 
 def _total_steps(frame_start: int, frame_end: int) -> int:

@@ -43,6 +43,9 @@ session = Session()
 when_settings_change: list[Callable[[], None]] = []
 """Called when the user or a script has changed a setting, which Blender reports to nobody else."""
 
+when_baked: list[Callable[..., None]] = []
+"""Called with a scene, its new bake's recording and the folders of its sensors when the bake has been put into the scene."""
+
 
 def settings_changed(_settings=None, _context=None) -> None:
     """Tell those who want to know; the update function of the properties."""

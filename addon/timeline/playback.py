@@ -15,7 +15,7 @@ from ..display import baked_scene, materials, overlays
 from ..properties import start_transforms
 from ..scene import participants, scene_fingerprint
 from ..session import animation_time, first_use, frame_status, session_state
-from . import baked_frames, live_cache
+from . import baked_frames, live_cache, played_changes
 
 _errors: dict[int, str] = {}
 """By scene: why the last attempt to compute failed."""
@@ -282,28 +282,8 @@ def show_new_bake(scene, recording, folders) -> None:
     baked_frames.show(scene, participants.depsgraph_of(scene))
 
 
-# Saved files hold nothing of what playing has changed.
-
-
-def hide(scene) -> None:
-    """Undo what playing has changed in the scene; what was computed is kept.
-
-    Also for files that were written without this, as after a crash, and for changes by a run that has been dropped.
-    """
-    for obj in scene.objects:
-        settings = obj.palpate
-        if settings.is_baked or not settings.uid:
-            continue
-        if settings.has_start and obj.is_editable:
-            start_transforms.restore_start(obj)
-        if obj.type == "MESH" and obj.data.is_editable:
-            attribute = obj.data.attributes.get(materials.FORCE)
-            if attribute is not None:
-                obj.data.attributes.remove(attribute)
-
-
 def unhide(scene) -> None:
-    """Show the present frame again after :func:`hide`."""
+    """Show the present frame again after :func:`.played_changes.hide`."""
     run = live_cache.get(scene)
     if run is not None and animation_time.current_frame(scene)[0] in run.frames:
         _attempt(scene, lambda: show(scene, run))
@@ -311,7 +291,7 @@ def unhide(scene) -> None:
 
 def reset(scene) -> None:
     """Move bodies back to their start and forget what was computed."""
-    hide(scene)
+    played_changes.hide(scene)
     live_cache.drop(scene)
     overlays.clear(scene)
     frame_status.forget(scene)
