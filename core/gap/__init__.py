@@ -8,4 +8,4 @@ apart, ``selection`` finds the effects that act, ``planning`` plans the next exp
 files of other people's loggers.
 """
 
-__all__ = ["calibration", "data_faults", "dataset", "fitting", "forward", "kinds", "logs", "planning", "report", "selection"]
+__all__ = ["calibration", "data_faults", "dataset", "fitting", "forward", "logs", "planning", "report", "selection"]

@@ -6,6 +6,8 @@ has seen. ``findings`` holds the result.
 """
 
 __all__ = [
+    "base_model",
+    "candidates",
     "check_recordings",
     "confidence",
     "diagnosis",
