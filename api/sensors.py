@@ -92,7 +92,7 @@ class Sensor(SensorOnMesh):
         arguments.number(steps.min(), "pitch", above_zero=True)
         array = pad_array(*number, (float(steps[0]), float(steps[1])))
         arguments.size_checked(array.vertices, arguments.LARGEST_SENSOR, "pitch", f"sensor '{name}'")
-        return cls._of(_mesh_of_faces(array.vertices, array.faces, name), None, name, parameters)._placed(
+        return cls._of(_mesh_of_faces(array.vertices, array.faces, name), None, name, parameters)._placed(  # noqa: SLF001
             position, quaternion, body
         )
 

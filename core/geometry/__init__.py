@@ -12,6 +12,7 @@ __all__ = [
     "contact_points",
     "layout",
     "mesh",
+    "plausible_size",
     "point_surface",
     "projection",
     "rotations",
