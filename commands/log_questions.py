@@ -50,7 +50,9 @@ def _asked_column(name: str, column: ColumnAnswer, logger: LoggerAnswer, ask: Ca
     """Return what a column is after the question about it; None if it is not to be used."""
     while not column.sure:
         is_open = has_unknown(list(column.names)) or column.unit == "?"
-        shown = f"{column.names[0]}{' ' + column.unit if column.unit else ''}"
+        shown = (
+            f"{column.names[0] if column.names else column.rate or column.constant}{' ' + column.unit if column.unit else ''}"
+        )
         typed = ask(f"{name} of {logger.files[0]}: column and unit, {LEFT_OUT} for none ({column.why})\n  [{shown}] ").strip()
         if typed == LEFT_OUT:
             return None

@@ -41,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..core.gap.logs.log_table import with_distinct_names
     from ..core.gap.logs.preview import preview_rows
     from ..core.gap.logs.proposal import propose
-    from ..core.gap.logs.template import ANSWERS_NAME, PLOT_NAME
+    from ..core.gap.logs.template import ANSWERS_NAME, PLOT_NAME, write_template
 
     with console.Interrupt.raised_at_once():
         logs = with_distinct_names([read_log(path) for path in arguments.logs])
@@ -60,6 +60,8 @@ def run(arguments: argparse.Namespace) -> int:
             if sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty():
                 found = log_questions.asked(found)
             _require_complete(found, arguments.out)
+            if not (Path(arguments.out) / ANSWERS_NAME).exists():  # whatever is refused later can be corrected there
+                write_template(found, arguments.out)
         checks.outputs_are_no_inputs((Path(arguments.out) / name for name in (ANSWERS_NAME, PLOT_NAME)), arguments.logs)
         _write(logs, found, arguments.out)
     return 0

@@ -49,6 +49,8 @@ class ColumnAnswer:
         On which a pressure acts that becomes a force; 0 if it is none.
     rate : float, Hz
         Of a clock without a column; 0 if it has one.
+    constant : float or None
+        In SI units, instead of a column.
     repeated : str
         What is done where time stamps repeat.
     why : str
@@ -63,8 +65,14 @@ class ColumnAnswer:
     area: Positive = 0.0
     rate: Positive = 0.0
     repeated: Repeated = "refuse"
+    constant: Number | None = None
     why: str = ""
     sure: bool = True
+
+    @property
+    def lacks_area(self) -> bool:
+        """True if it is a pressure whose area is not known."""
+        return self.unit in PRESSURES and not self.area
 
 
 @dataclass(frozen=True)
@@ -142,11 +150,14 @@ class Answers:
                     yield f"{word} of [{where}] is {value!r}, because {self.why[word]}."
         for logger in self.loggers:
             for quantity, column in logger.columns.items():
-                if has_unknown(list(column.names)) or column.unit == UNKNOWN:
+                if quantity == "force" and column.lacks_area:
+                    yield f"area of {quantity} of '{logger.files[0]}' is not known: m² on which the pressure acts."
+                elif has_unknown(list(column.names)) or column.unit == UNKNOWN:
                     yield f"{quantity} of '{logger.files[0]}' is not known: {column.why}."
                 elif not column.sure:
                     unit = f" in {column.unit}" if column.unit else ""
-                    yield f"{quantity} is '{column.names[0] if column.names else column.rate}'{unit}, because {column.why}."
+                    given = column.rate if column.constant is None else column.constant
+                    yield f"{quantity} is '{column.names[0] if column.names else given}'{unit}, because {column.why}."
         for recording in self.recordings:
             if not recording.sure:
                 yield f"'{recording.name}': {recording.why}."
@@ -177,7 +188,8 @@ def answers_text(answers: Answers) -> str:
         lines += ["[[logger]]", f"files = {_value(list(logger.files))}", "[logger.columns]"]
         for quantity, column in logger.columns.items():
             mark = "" if column.sure else "CHECK: "
-            lines.append(f"{quantity} = {_value(_column_words(quantity, column))}  # {mark}{column.why}")
+            value = column.constant if column.constant is not None else _column_words(quantity, column)
+            lines.append(f"{quantity} = {_value(value)}  # {mark}{column.why}")
         lines.append("")
     for recording in answers.recordings:
         words: dict[str, Any] = {"name": recording.name, "files": list(recording.files), "use": recording.use}
@@ -215,6 +227,7 @@ def _column_words(quantity: str, column: ColumnAnswer) -> dict[str, Any]:
         for word, usual in (("factor", 1.0), ("zero", 0.0), ("area", 0.0))
         if getattr(column, word) != usual
     }
+    words |= {"area": UNKNOWN} if quantity == "force" and column.lacks_area else {}
     return words | ({"repeated": column.repeated} if column.repeated != "refuse" else {})
 
 
@@ -302,6 +315,8 @@ def _logger(entry: dict[str, Any], where: str) -> LoggerAnswer:
 
 
 def _column(quantity: str, words: Any, where: str) -> ColumnAnswer:
+    if isinstance(words, int | float) and not isinstance(words, bool) and quantity not in ("time", "texel"):
+        return read_words({"constant": words}, ColumnAnswer, where, names=(), unit="", why="the answers say so", sure=True)
     words = {"name": words} if isinstance(words, str) else words
     if not isinstance(words, dict):
         raise FileError(f'{where} is {words!r:.60}: write the name of the column, or {{ name = "Fz", unit = "mN" }}.')

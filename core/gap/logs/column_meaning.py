@@ -7,7 +7,9 @@ values does, and the answer is not sure: a person has to confirm it.
 
 from __future__ import annotations
 
+import math
 import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -104,6 +106,8 @@ _SINGLE = {
     "temperature": {"temperature", "temp", "temperatur", "thermistor"},
     "depth": {"depth", "indentation", "penetration", "compression", "deflection"},
 }
+MUCH_LESS = 0.3
+"""Difference of the correlations with the load from which on one family of columns is preferred whatever its name and size."""
 SINCE_1970 = 1e9
 """Seconds: larger time stamps are times of day."""
 LARGEST_METRES = 0.3
@@ -111,8 +115,9 @@ LARGEST_METRES = 0.3
 so larger numbers are millimetres."""
 LARGEST_NEWTONS = 500.0
 """Forces of a larger range are grams where no unit is known: probes press a skin with 0.1 to 100 N, and scales show grams."""
-COLDEST_KELVIN = 200.0
-"""Temperatures of a larger number are kelvins where no unit is known: nobody presses a sensor at 200 °C, or at 70 K."""
+COLDEST_KELVIN, HOTTEST_KELVIN = 200.0, 420.0
+"""Temperatures of a larger number are kelvins where no unit is known: nobody presses a sensor at 200 °C, or at 70 K. Of numbers
+above the second they are counts of a converter."""
 _BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(]\s*(?P<unit>[^\])]+?)\s*[\])]\s*$")
 
 
@@ -173,6 +178,8 @@ def meaning_of(column: str) -> Meaning:
         return _of_axis(kind_of, last, unit, 3 if kind_of else 0)
     if set(words) & _TIME_WORDS and not has["velocity"]:
         return Meaning("time", unit, 3 if words[0] in _TIME_WORDS else 2)
+    if unit in PRESSURES and {"pressure", "stress"} & set(words) and not any(word.isdigit() for word in words):
+        return Meaning("force", unit, 2)
     for quantity, known in _SINGLE.items():
         if set(words) & known or "_".join(words) in known:
             return Meaning(quantity, unit, 2)
@@ -189,35 +196,59 @@ def _of_axis(kind: str, axis: str, unit: str, weight: int) -> Meaning:
     return Meaning("")
 
 
-def texel_family(columns: list[str]) -> tuple[list[str], bool]:
-    """Return the columns that seem to be texels, in the order of their numbers, and whether their name says so.
+@dataclass(frozen=True)
+class Family:
+    """Columns that differ by their numbers alone.
 
-    A family is what differs by a number alone. The largest one whose name is a word for readings is taken, else the largest of
-    three or more.
+    Attributes
+    ----------
+    columns : tuple of str
+        In the order of their numbers.
+    is_named : bool
+        True if the name is a word for readings.
+    follows : float
+        Median correlation of the columns with what pressed; 0 if nothing is known to press.
     """
-    families: dict[str, list[tuple[int, str]]] = {}
+
+    columns: tuple[str, ...]
+    is_named: bool
+    follows: float = 0.0
+
+
+def families(columns: Sequence[str], follows: Callable[[str], float]) -> list[Family]:
+    """Return the columns that may be texels, the likeliest first: what follows the load, then what is named so, then the most.
+
+    Parameters
+    ----------
+    columns : sequence of str
+    follows : callable
+        Correlation of a column with what pressed, 0 to 1.
+    """
+    groups: dict[str, list[tuple[tuple[int, ...], str]]] = {}
     for column in columns:
         plain, unit = name_and_unit(column)
-        for found in re.finditer(r"\d+", plain):
-            key = f"{plain[: found.start()]}\0{plain[found.end() :]} {unit}"
-            families.setdefault(key, []).append((int(found[0]), column))
-    best: tuple[bool, int, list[str]] = (False, 2, [])
-    for key, members in families.items():
-        numbers = [number for number, _ in members]
-        if len(set(numbers)) != len(members) or max(numbers) - min(numbers) != len(members) - 1:
+        numbers = tuple(int(one) for one in re.findall(r"\d+", plain))
+        if numbers:
+            groups.setdefault(f"{re.sub(r'[0-9]+', '#', plain)} {unit}", []).append((numbers, column))
+    found = []
+    for key, members in groups.items():
+        ranges = [sorted(set(axis)) for axis in zip(*(numbers for numbers, _ in members))]
+        is_whole = all(one[-1] - one[0] == len(one) - 1 for one in ranges)
+        if not is_whole or len({numbers for numbers, _ in members}) != len(members) != math.prod(map(len, ranges)):
+            continue
+        if len(members) == 1:
             continue
         words = {word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", key)}
-        named = bool(words & TEXEL_WORDS) and not words & set(_AXIS_WORDS["velocity"][4:])
-        if (named, len(members)) > best[:2] and (named or len(members) > 2):
-            best = (named, len(members), [column for _, column in sorted(members)])
-    if not best[2]:
-        single = [
-            name
-            for name in columns
-            if {word.lower() for word in re.findall(r"[A-Za-z]+", name)} & TEXEL_WORDS - {"p", "v", "s", "c"}
-        ]
-        return single, bool(single)
-    return best[2], best[0]
+        is_named = bool(words & TEXEL_WORDS) and not words & set(_AXIS_WORDS["velocity"][4:])
+        if is_named or len(members) > 2:
+            own = tuple(column for _, column in sorted(members))
+            found.append(Family(own, is_named, float(np.median([follows(one) for one in own]))))
+    if not found:
+        words_of = {name: {word.lower() for word in re.findall(r"[A-Za-z]+", name)} for name in columns}
+        single = tuple(name for name in columns if words_of[name] & TEXEL_WORDS - {"p", "v", "s", "c"})
+        return [Family(single, True)] if single else []
+    best = max(one.follows for one in found)
+    return sorted(found, key=lambda one: (one.follows < best - MUCH_LESS, not one.is_named, -len(one.columns)))
 
 
 def time_unit(values: np.ndarray, stated: str) -> tuple[str, str, bool]:
@@ -259,6 +290,8 @@ def temperature_unit(values: np.ndarray, stated: str) -> tuple[str, str, bool]:
         return stated, "the file says so", True
     known = values[np.isfinite(values)]
     middle = float(np.median(known)) if len(known) else 0.0
+    if middle > HOTTEST_KELVIN or middle < -COLDEST_KELVIN:
+        return "?", f"it is about {middle:.4g}, which is no temperature: write unit, factor and zero, or remove the line", False
     if middle > COLDEST_KELVIN:
         return "K", f"it is about {middle:.4g}", False
     return "°C", f"it is about {middle:.4g}", False

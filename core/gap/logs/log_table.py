@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -18,6 +19,8 @@ MOST_VALUES = 100_000_000
 MOST_COLUMNS = 5000
 FEWEST_ROWS = 8
 """Samples of a trial, see :mod:`..dataset.rig`; shorter arrays are settings and no recordings."""
+FRAMES, MOST_FRAME_ROWS = "frames", 512
+"""Kind of a log that several files are together, and rows of a matrix that may be one of them."""
 LARGEST_NUMBER = 1e30
 """Numbers of a larger magnitude count as missing."""
 
@@ -87,13 +90,17 @@ class LogFile:
 
 
 def with_distinct_names(logs: Sequence[LogFile]) -> list[LogFile]:
-    """Return logs of which those in several folders with the same name are called ``FOLDER/NAME``.
+    """Return logs of which those in several folders with the same name are called ``FOLDER/NAME``; frames are one log.
 
     Raises
     ------
     FileError
-        Two are still called the same.
+        Two are still called the same, or one is shorter than a recording.
     """
+    logs = joined_frames(logs)
+    for log in logs:
+        if max(table.sample_count for table in log.tables) < FEWEST_ROWS and log.kind != FRAMES:
+            raise FileError(f"'{log.path.name}' has less than {FEWEST_ROWS} lines of numbers: a log needs at least 8 samples.")
     paths = [log.path for log in logs]
     names = [path.name for path in paths]
     if len(set(names)) < len(names):
@@ -103,6 +110,41 @@ def with_distinct_names(logs: Sequence[LogFile]) -> list[LogFile]:
         if names.count(one) > 1:
             raise FileError(f"Two logs are called '{one}': rename one, so that each recording has a name.")
     return list(logs)
+
+
+def joined_frames(logs: Sequence[LogFile]) -> list[LogFile]:
+    """Return logs that are matrices of one shape without names and clock as one log, a sample for each file.
+
+    The number in the name of a file, with the unit behind it, is the load; the samples are in its order.
+    """
+    shapes = {tuple(values.shape for values in log.tables[0].columns.values()) for log in logs if len(log.tables) == 1}
+    is_plain = all(len(log.tables) == 1 and re.fullmatch(r"column_1", next(iter(log.tables[0].columns))) for log in logs)
+    found = [re.search(r"(\d+(?:\.\d+)?)\s*([A-Za-z]*)$", log.path.stem) for log in logs]
+    if len(logs) < 2 or len(shapes) != 1 or not is_plain or not all(found):
+        return list(logs)
+    frames = [np.stack(list(log.tables[0].columns.values()), axis=1) for log in logs]
+    rows, columns = frames[0].shape
+    if rows > MOST_FRAME_ROWS or columns < 2 or any(_rises(column) for frame in frames for column in frame.T):
+        return list(logs)
+    loads = np.array([float(one[1]) for one in found if one])
+    order = np.argsort(loads, kind="stable")
+    unit = found[0][2] if found[0] else ""
+    texels = np.stack(frames)[order].reshape(len(frames), -1)
+    name = f"pressure ({unit})" if unit in {"psi", "Pa", "kPa", "MPa", "bar", "mbar"} else "load"
+    table = LogTable(
+        "",
+        {name: loads[order], **{f"texel_{i}": np.ascontiguousarray(one) for i, one in enumerate(texels.T)}},
+        {name: unit} if unit and name == "load" else {},
+        {"texel": (rows, columns)},
+    )
+    note = f"{len(logs)} files are taken for frames of {rows} × {columns} texels, in the order of the {name} in their names."
+    return [replace(logs[0], kind=FRAMES, tables=(table,), notes=(note, *logs[0].notes), label=f"{len(logs)} frames")]
+
+
+def _rises(values: np.ndarray) -> bool:
+    """Return True if values never fall and change, as those of a clock."""
+    steps = np.diff(values)
+    return len(steps) > 6 and bool((steps >= 0.0).all() and steps.any())
 
 
 def require_size(values: int, columns: int, path: Path) -> None:

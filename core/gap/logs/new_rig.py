@@ -25,6 +25,7 @@ from .column_meaning import LOG_UNITS, PRESSURES, READING_UNITS, SINCE_1970
 from .log_table import FEWEST_ROWS, LogFile, LogTable, with_distinct_names
 from .proposal import table_of
 from .spoiled_samples import readings_of, spoiled_samples, stimulus_residual
+from .unnamed_columns import contact_of, correlation, is_unordered
 
 RIG_NAME = "rig.toml"
 MOST_REPEATED = 0.02
@@ -33,6 +34,8 @@ LONGEST_PAUSE = 10.0
 """Pause between two samples, in usual steps, from which on it is mentioned."""
 LARGEST_MOTION, LARGEST_FORCE, SMALLEST_MOTION = 1.5, 1e4, 1e-7
 """Metres and newtons beyond which a unit must be wrong: rigs for touch move by less and press with less than a ton."""
+FOLLOWS = 0.5
+"""Correlation of a response with the stimulus from which on there is contact, however large the noise from sample to sample."""
 LEAST_CONTACT = 6.0
 """How many times the noise from sample to sample a response must rise above it. Of 1000 recordings of white noise of 20 to
 20,000 samples (evenly on a logarithmic scale) none reaches it after the mean over five samples that is taken here; the largest
@@ -154,8 +157,9 @@ def _columns_of(logs: Mapping[str, LogFile], file: str, answers: Answers, notes:
     if logger is None:
         raise FileError(f"No [[logger]] of the answers has the file '{file}': add its name to files of one.")
     tables: dict[str, tuple[LogTable, dict[str, np.ndarray]]] = {}
+    constants = {quantity: one.constant for quantity, one in logger.columns.items() if one.constant is not None}
     for quantity, answer in logger.columns.items():
-        if quantity != "time":
+        if quantity != "time" and quantity not in constants:
             for i, name in enumerate(answer.names):
                 found = table_of(log.tables, name)
                 if found is None:
@@ -169,7 +173,17 @@ def _columns_of(logs: Mapping[str, LogFile], file: str, answers: Answers, notes:
         _on_clock(columns, _clock_of(log, table, logger, columns), logger.columns.get("time"), log, notes)
         for table, columns in tables.values()
     ]
-    return _on_one_clock(parts, log, notes)
+    made = _on_one_clock(parts, log, notes)
+    made |= {quantity: np.full(len(made["time"]), value) for quantity, value in constants.items() if value is not None}
+    time = logger.columns.get("time")
+    load = next((made[one] for one in ("force", "depth", "z", "force_z") if one in made), None)
+    if time is not None and time.rate and load is not None and is_unordered(load):
+        order = np.argsort(load, kind="stable")
+        notes.append(
+            f"'{log.name}': its rows are points in no order; they were sorted by the load, and show no effect of time."
+        )
+        made = {name: column if name == "time" else column[order] for name, column in made.items()}
+    return made
 
 
 def _in_si(quantity: str, answer: ColumnAnswer, values: np.ndarray) -> np.ndarray:
@@ -484,20 +498,15 @@ def _check_contact(table: Mapping[str, np.ndarray], name: str) -> None:
         own = [table[one] for one in group if one in table]
         if own and not any(np.ptp(column[np.isfinite(column)]) > 0.0 for column in own if np.isfinite(column).any()):
             raise FileError(f"What drove the sensor does not change in '{name}': leave it out, or check which column it is.")
-    best = 0.0
-    for quantity, column in table.items():
-        if quantity.startswith(("texel_", "force_")):
-            known = column[np.isfinite(column)]
-            if len(known) < 8:
-                continue
-            noise = 1.4826 * float(np.median(np.abs(np.diff(known)))) / np.sqrt(2.0)
-            mean = np.convolve(known, np.full(5, 0.2), mode="valid")
-            span = float(np.ptp(mean))
-            best = max(best, np.inf if span > 0.0 and noise == 0.0 else span / noise if noise else 0.0)
-    if best < LEAST_CONTACT:
+    responses = [column for quantity, column in table.items() if quantity.startswith(("texel_", "force_"))]
+    best = max((contact_of(column) for column in responses), default=0.0)
+    driver = next((table[one] for one in ("force", "depth", "z") if one in table), None)
+    follows = 0.0 if driver is None else max((correlation(driver, column) for column in responses), default=0.0)
+    if best < LEAST_CONTACT and follows < FOLLOWS:
         raise FileError(
             f"'{name}' shows no contact: its readings never leave their noise ({best:.1f} times, and {LEAST_CONTACT:g} would "
-            'be contact); write use = "leave out" at its [[recording]], or check which columns the readings are.'
+            f'be contact) and follow what drove the sensor by {follows:.2f}; write use = "leave out" at its [[recording]], or '
+            "check which columns the readings are."
         )
 
 
@@ -540,6 +549,8 @@ def _taken(quantity: str, answer: ColumnAnswer) -> str:
     """Return in words what a quantity was made from."""
     if quantity == "time" and answer.rate:
         return f"time: {answer.rate:g} samples per second"
+    if answer.constant is not None:
+        return f"{quantity} = {answer.constant:g}: {answer.why}"
     names = answer.names[0] if len(answer.names) == 1 else f"{answer.names[0]} … {answer.names[-1]} ({len(answer.names)})"
     parts = [f"{quantity} = {names}", f"in {answer.unit}" if answer.unit else ""]
     parts += [f"minus {answer.zero:.6g}"] if answer.zero else []

@@ -14,27 +14,44 @@ from ...errors import FileError, counted
 from .answers import UNKNOWN, Answers, ColumnAnswer, LoggerAnswer, RecordingAnswer, Repeated, Use
 from .column_meaning import (
     READING_UNITS,
+    Family,
     Meaning,
+    families,
     force_unit,
     is_since_1970,
     length_unit,
     meaning_of,
     name_and_unit,
     temperature_unit,
-    texel_family,
     time_unit,
 )
-from .log_table import LogFile, LogTable, with_distinct_names
-from .unnamed_columns import ONE_ROW_PITCH, is_force, is_steady, is_unnamed, names_of_what_drove
+from .log_table import FEWEST_ROWS, FRAMES, LogFile, LogTable, with_distinct_names
+from .unnamed_columns import (
+    ONE_ROW_PITCH,
+    contact_of,
+    correlation,
+    is_force,
+    is_steady,
+    is_unnamed,
+    is_unordered,
+    names_of_what_drove,
+)
 
 POSE, TURN, FORCE = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("force_x", "force_y", "force_z")
 BEGINNING = 0.05
 """Share of a recording at its beginning whose median counts as the value without load."""
+AT_AN_END, AT_REST, RESTS = 0.05, 0.03, 0.05
+"""A load is zero at its beginning if that is so near to an end of its range, and so large a share (the third) of the samples is
+within so much of it."""
 ZERO_SHARE = 0.02
 """Share of its range by which a known force must be off zero without load, for a zero to be proposed."""
 SAME_COLUMNS = 0.5
 """Share of the columns of two files that both have, from which on they are of one kind: settings that were saved with them, and
 topics that were silent, differ from file to file; two loggers share no more than the name of the time."""
+ANSWERS = 6.0
+"""Texels answer if they leave their noise by so many times it."""
+FLAT = "it presses all texels alike, as a plate does: for a ball write x, y and z instead, and [indenter]"
+"""Of a depth."""
 MOST_NAMED = 12
 """Names in a sentence."""
 CHECK_EVERY = 3
@@ -156,8 +173,7 @@ class _Columns:
         self.names = [table.full_name(name) for table in self.tables for name in table.columns]
         self.units = {table.full_name(name): unit for table in self.tables for name, unit in table.units.items()}
         self.meanings = {name: self._meaning(name) for name in self.names}
-        self.texels: list[str] = []
-        self.texels_named = False
+        self.families: list[Family] = []
         self.candidates: dict[str, list[str]] = {}
         self.behaviours: dict[str, str] = {}
         """Why unnamed columns are what they are taken for."""
@@ -189,6 +205,20 @@ class _Columns:
         known = self.values(full)[np.isfinite(self.values(full))]
         return float(np.ptp(np.percentile(known, [0.1, 99.9]))) if len(known) else 0.0
 
+    def rests_at_its_beginning(self, full: str) -> bool:
+        """Return whether a load begins at an end of its range and stays there for a while, as without contact."""
+        for log in self.logs:
+            values = self.values(full, log)
+            values = values[np.isfinite(values)]
+            if not len(values):
+                continue
+            low, high = np.percentile(values, [0.5, 99.5])
+            start = float(np.median(values[: max(8, int(BEGINNING * len(values)))]))
+            is_end = min(start - low, high - start) <= AT_AN_END * (high - low)
+            if not is_end or (np.abs(values - start) <= AT_REST * (high - low)).mean() < RESTS:
+                return False
+        return True
+
     def deviation(self, full: str) -> tuple[float, float]:
         """Return the value without load, and how far the values leave it on the side on which they do so most."""
         zeros, ways = [], []
@@ -209,15 +239,41 @@ class _Columns:
                 self.candidates.setdefault(meaning.quantity, []).append(name)
         found: dict[str, ColumnAnswer] = {"time": self._time()}
         taken = {name for names in self.candidates.values() for name in names} | set(self.clocks(found["time"]))
-        self.texels, self.texels_named = texel_family([name for name in self.names if name not in taken])
+        self.families = families([name for name in self.names if name not in taken], self._follows)
         for group in (POSE, TURN, FORCE):
             found |= self._vector(group)
         for quantity in ("depth", "force", "slide_x", "slide_y", "temperature"):
             if names := self.candidates.get(quantity):
                 found[quantity] = self._one(quantity, names)
-        if self.texels and self.has_texels:
+        if self.families and self.has_texels:
             found["texel"] = self._texel()
         return found
+
+    @property
+    def texels(self) -> tuple[str, ...]:
+        """The columns that are taken for texels."""
+        return self.families[0].columns if self.families else ()
+
+    def driver(self) -> str | None:
+        """Return the column that seems to press: a force, else a depth or a height; None if no column does."""
+        for quantity in ("force", "force_z", "depth", "z"):
+            moving = [name for name in self.candidates.get(quantity, []) if self.span(name) > 0.0]
+            if moving:
+                return max(moving, key=lambda name: self.meanings[name].weight)
+        return None
+
+    def _follows(self, name: str) -> float:
+        """Return the correlation of a column with what presses, over all files, without its sign."""
+        driver = self.driver()
+        if driver is None:
+            return 0.0
+        found = []
+        for log in self.logs:
+            load, values = self.values(driver, log), self.values(name, log)
+            if len(load) > FEWEST_ROWS < len(values):  # topics have other rates
+                load = np.interp(np.linspace(0.0, 1.0, len(values)), np.linspace(0.0, 1.0, len(load)), load)
+                found.append(correlation(load, values))
+        return float(np.median(found)) if found else 0.0
 
     def _leave_out_what_has_no_clock(self) -> None:
         """Forget tables that are shorter than those with a clock and have none: settings, and results of fits.
@@ -250,6 +306,13 @@ class _Columns:
         if not rising and names:
             unit = time_unit(self.values(names[0], self.logs[0]), self.meanings[names[0]].unit)[0]
             return ColumnAnswer((names[0],), unit, why="of its name")
+        if self.logs[0].kind == FRAMES:
+            return ColumnAnswer((), rate=1.0, why="each file is a frame without a time, in the order of the load", sure=False)
+        driver = self.driver()
+        unordered = driver is not None and all(is_unordered(self.values(driver, log)) for log in self.logs)
+        if unordered and all(self._counts_rows(name) for name in rising):
+            why = "the load jumps from row to row and no column is a clock: these are points, which are sorted by the load"
+            return ColumnAnswer((), rate=1.0, why=why, sure=False)
         if not rising:
             return ColumnAnswer(
                 (UNKNOWN,), why="no column rises like a clock; write its name, or { rate = … } in Hz", sure=False
@@ -298,6 +361,12 @@ class _Columns:
             if len(steps) < 7 or (steps < 0).any() or not steps.any() or (strictly and (steps == 0).mean() > 0.3):
                 return False
         return True
+
+    def _counts_rows(self, name: str) -> bool:
+        """Return whether a column only counts the rows."""
+        return self.meanings[name].quantity != "time" and all(
+            len(self.values(name, log)) and set(np.diff(self.values(name, log))) == {1.0} for log in self.logs
+        )
 
     def _vector(self, group: Sequence[str]) -> dict[str, ColumnAnswer]:
         """Return the columns of a vector: all from one table and of one way of naming, the one that says most."""
@@ -354,11 +423,21 @@ class _Columns:
         return name.startswith("/") and self.logs[0].kind != "table of text"
 
     def _texel(self) -> ColumnAnswer:
-        units = {self.meanings[name].unit for name in self.texels}
+        best, *others = self.families
+        units = {self.meanings[name].unit for name in best.columns}
         unit = units.pop() if len(units) == 1 else ""
-        what = f"{len(self.texels)} columns differ by a number" if len(self.texels) > 1 else "its name is a word for readings"
-        what = f"the {counted(len(self.texels), 'column')} beside the clock" if self.is_unnamed_sensor else what
-        return ColumnAnswer(tuple(self.texels), unit, why=what, sure=self.texels_named or self.is_unnamed_sensor)
+        what = f"{len(best.columns)} columns differ by a number" if len(best.columns) > 1 else "its name is a word for readings"
+        what = f"the {counted(len(best.columns), 'column')} beside the clock" if self.is_unnamed_sensor else what
+        rivals = [one for one in others if len(one.columns) > 2]
+        if rivals:
+            listed_ones = ", ".join(f"{listed(one.columns)}: {one.follows:.2f}" for one in rivals[:MOST_NAMED])
+            what = f"{what}; they follow the load by {best.follows:.2f}, others that could be meant: {listed_ones}"
+        is_clear = not rivals or best.is_named and not any(one.is_named for one in rivals)
+        return ColumnAnswer(best.columns, unit, why=what, sure=(best.is_named or self.is_unnamed_sensor) and is_clear)
+
+    def answers_of(self, name: str) -> float:
+        """Return how far a column leaves its noise from sample to sample, in units of that."""
+        return max(contact_of(self.values(name, log)) for log in self.logs)
 
     def left_out(self, found: Mapping[str, ColumnAnswer]) -> list[str]:
         """Return a sentence about the columns that nothing is made of."""
@@ -404,8 +483,16 @@ def _choose_stimulus(columns: Sequence[_Columns], found: list[dict[str, ColumnAn
         own = found[i].pop("z") if "depth" not in owner else found[i]["depth"]
         _drop(found, (*POSE, *TURN))
         zero, way = columns[i].deviation(own.names[0])
+        silent = _silent_texels(columns, found, owner)
+        if "depth" not in owner and silent:
+            _press_at_a_place(found[i], replace(own, sure=False), silent, way)
+            _force_is_response(columns, found, owner)
+            _read_in_newtons(found)
+            return
         if "depth" not in owner:
-            own = replace(own, zero=zero, sure=False, why=f"{own.why}; it is one axis, taken from where it begins")
+            own = replace(own, zero=zero, sure=False, why=f"{own.why}; it is one axis, taken from where it begins; {FLAT}")
+        elif silent:
+            own = replace(own, sure=False, why=f"{own.why}; {silent} never answer, and a depth is that of all texels; {FLAT}")
         found[i]["depth"] = replace(own, factor=-1.0 if way < 0.0 else 1.0)
         _force_is_response(columns, found, owner)
     elif has_texels and ("force" in owner or "force_z" in owner):
@@ -414,15 +501,39 @@ def _choose_stimulus(columns: Sequence[_Columns], found: list[dict[str, ColumnAn
         own = found[i]["force"] if "force" in owner else found[i].pop("force_z")
         _drop(found, FORCE)
         zero, way = columns[i].deviation(own.names[0])
+        why = own.why
         if is_force(columns[i].values(own.names[0])):
             zero, way = 0.0, abs(way)  # a recording may begin under load
+        elif not columns[i].rests_at_its_beginning(own.names[0]):
+            zero, way = 0.0, float(np.nanmedian(columns[i].values(own.names[0])))
+            why = f"{why}; nothing shows it without load, so no zero is subtracted"
         is_off = abs(zero) > ZERO_SHARE * abs(way)
-        why = f"{own.why}; it is {zero:.4g} without load, which is subtracted" if is_off else own.why
+        why = f"{why}; it is {zero:.4g} without load, which is subtracted" if is_off else why
         own = replace(
             own, factor=-1.0 if way < 0.0 else 1.0, zero=zero if is_off else 0.0, why=why, sure=own.sure and not is_off
         )
         found[i]["force"] = own
     _read_in_newtons(found)
+
+
+def _silent_texels(columns: Sequence[_Columns], found: Sequence[Mapping[str, ColumnAnswer]], owner: Mapping[str, int]) -> str:
+    """Return how many texels do not answer where others do, in words; empty if that is not most of them."""
+    if "texel" not in owner:
+        return ""
+    own = columns[owner["texel"]]
+    names = found[owner["texel"]]["texel"].names
+    follow = np.array([own.answers_of(name) for name in names])
+    count = int((follow < ANSWERS).sum())
+    return f"{count} of {len(names)} texels" if (follow >= ANSWERS).any() and count > len(names) / 2 else ""
+
+
+def _press_at_a_place(own: dict[str, ColumnAnswer], axis: ColumnAnswer, silent: str, way: float) -> None:
+    """Make one axis the height of an indenter at a place, because most texels never answer."""
+    where = "of the indenter in the sensor's frame, m; a number where it does not move"
+    own["x"] = ColumnAnswer((), constant=0.0, why=where, sure=False)
+    own["y"] = ColumnAnswer((), constant=0.0, why=where, sure=False)
+    why = f"{axis.why}; it is one axis, and {silent} never answer: something smaller than the sensor presses"
+    own["z"] = replace(axis, factor=1.0 if way < 0.0 else -1.0, why=why)
 
 
 def _drop(found: list[dict[str, ColumnAnswer]], quantities: Sequence[str]) -> None:
@@ -439,7 +550,9 @@ def _force_is_response(columns: Sequence[_Columns], found: list[dict[str, Column
         _drop(found, ("force",))
     for i, own in enumerate(found):
         if "force_z" in own:
-            _, way = columns[i].deviation(own["force_z"].names[0])
+            name = own["force_z"].names[0]
+            rests = columns[i].rests_at_its_beginning(name)
+            way = columns[i].deviation(name)[1] if rests else float(np.nanmedian(columns[i].values(name)))
             if way > 0.0:
                 why = "turned: it rises under load, and the force on the sensor points down"
                 for quantity in FORCE:
@@ -485,13 +598,13 @@ def _sensor(
         unit = texels.unit
         sensor["unit"] = "N" if unit in READING_UNITS else unit or "counts"
         why["unit"] = "of the readings" if unit else "no unit is stated; any name will do"
-    if any("depth" in own and own["depth"].zero for own in found):
+    if any("depth" in own and own["depth"].zero or "x" in own and own["x"].constant is not None for own in found):
         sensor["contact_height"] = "free"
         why["contact_height"] = "where contact begins is fitted, because the motion only tells where it began"
     indenter: dict[str, Any] = {}
     if is_pose:
         indenter = {"shape": {"sphere": UNKNOWN}}
-        why["shape"] = "radius in metres; or { box = [x, y, z] }, { cylinder = [radius, height] }"
+        why["shape"] = "what presses: a ball of this radius (m); or { box = [x, y, z] }, { cylinder = [radius, height] }"
     return sensor, indenter, why, frozenset(unsure)
 
 

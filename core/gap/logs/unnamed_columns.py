@@ -19,6 +19,8 @@ ZERO, RESTS, BELOW = 0.02, 0.05, 0.05
 more than the third."""
 STEADY = 0.9999
 """Correlation with the clock from which on a column that rises counts samples or is a clock, too."""
+ORDERED = 0.5
+"""Correlation of a load with itself one sample later below which the samples are points in no order."""
 ONE_ROW_PITCH = 0.01
 """Metres between channels whose places no log has, in one row. All of them share the force, so it has no influence on it."""
 
@@ -74,3 +76,27 @@ def names_of_what_drove(columns: Mapping[str, np.ndarray]) -> dict[str, tuple[st
     if not forces and len(places) == 1:
         return {places[0]: ("z", "it is the only column that moves")}
     return {}
+
+
+def correlation(one: np.ndarray, other: np.ndarray) -> float:
+    """Return the correlation of two columns where both are known, without its sign; 0 if one does not change."""
+    known = np.isfinite(one) & np.isfinite(other)
+    if known.sum() < 8 or np.ptp(one[known]) == 0.0 or np.ptp(other[known]) == 0.0:
+        return 0.0
+    return abs(float(np.corrcoef(one[known], other[known])[0, 1]))
+
+
+def is_unordered(load: np.ndarray) -> bool:
+    """Return True if a load jumps from sample to sample, as in a table of calibration points."""
+    known = load[np.isfinite(load)]
+    return len(known) >= 16 and float(np.ptp(known)) > 0.0 and float(np.corrcoef(known[:-1], known[1:])[0, 1]) < ORDERED
+
+
+def contact_of(values: np.ndarray) -> float:
+    """Return how far values, averaged over five samples, leave their noise from sample to sample, in units of that."""
+    known = values[np.isfinite(values)]
+    if len(known) < 8:
+        return 0.0
+    noise = 1.4826 * float(np.median(np.abs(np.diff(known)))) / np.sqrt(2.0)
+    span = float(np.ptp(np.convolve(known, np.full(5, 0.2), mode="valid")))
+    return np.inf if span > 0.0 and noise == 0.0 else span / noise if noise else 0.0

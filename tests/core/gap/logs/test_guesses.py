@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a proposal guesses is said, and goes by what columns do: families, points, frames, one axis, loads without a zero."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from log_rigs import new_rig, template, write_csv
+
+from palpate.commands import main
+from palpate.core.errors import FileError
+from palpate.core.gap.dataset.rig import read_rig
+from palpate.core.gap.logs.column_meaning import families
+from palpate.core.gap.logs.log_file import read_log
+from palpate.core.gap.logs.log_table import with_distinct_names
+from palpate.core.gap.logs.proposal import propose
+
+TIME = np.arange(400) / 50.0
+LOAD = np.maximum(np.sin(1.5 * TIME), 0.0) ** 2
+RNG = np.random.default_rng(11)
+
+
+def noise(*size, level=1.0):
+    return level * RNG.normal(size=size)
+
+
+def proposal(*paths):
+    return propose([read_log(path) for path in paths])
+
+
+def columns_of(*paths):
+    return proposal(*paths).loggers[0].columns
+
+
+@pytest.mark.parametrize("pattern", ["taxel_{i}_{axis}", "B{axis}0{i}", "sensors_0.taxels_{i}.{axis}"])
+def test_of_the_axes_of_taxels_the_one_that_follows_the_load_is_proposed_and_asked(tmp_path, pattern):
+    axes = {"x": 33000.0 + 0.0 * LOAD, "y": 33000.0 + 300.0 * LOAD * noise(400), "z": 20000.0 + 9000.0 * LOAD}
+    columns = {"time": TIME, "Fz": 3.0 * LOAD}
+    columns |= {
+        pattern.format(i=i, axis=axis): values + noise(400, level=4.0) for i in range(4) for axis, values in axes.items()
+    }
+    answer = columns_of(write_csv(tmp_path / "skin.csv", columns))["texel"]
+    assert answer.names == tuple(pattern.format(i=i, axis="z") for i in range(4)) and not answer.sure
+    assert "follow the load by 1.00, others that could be meant: " in answer.why and "0.0" in answer.why
+
+
+def test_electrodes_that_follow_the_load_go_before_a_larger_family_that_does_not():
+    follow = {**{f"pac{i}": 0.2 for i in range(1, 23)}, **{f"ele{i}": 0.97 for i in range(1, 20)}}
+    first, second = families(list(follow), follow.__getitem__)
+    assert first.columns == tuple(f"ele{i}" for i in range(1, 20)) and first.follows == 0.97
+    assert len(second.columns) == 22
+
+
+def test_a_grid_of_columns_is_in_the_order_of_its_rows():
+    names = [f"r{i}c{j}" for j in range(3) for i in range(2)]
+    (found,) = families(names, lambda name: 0.0)
+    assert found.columns == ("r0c0", "r0c1", "r0c2", "r1c0", "r1c1", "r1c2")
+
+
+def test_calibration_points_in_no_order_are_sorted_by_the_load(tmp_path):
+    load = RNG.uniform(0.0, 8.0, 300)
+    columns = {"row": np.arange(300.0), "Fz": -load} | {
+        f"B{i}": 10.0 + (1 + i) * load + noise(300, level=0.02) for i in range(4)
+    }
+    log = write_csv(tmp_path / "points.csv", columns)
+    answer = columns_of(log)["time"]
+    assert answer.rate == 1.0 and not answer.sure and "these are points" in answer.why
+    (trial,) = read_rig(new_rig(tmp_path / "rig", [log], template(tmp_path, [log])).path).trials
+    np.testing.assert_allclose(trial.level, np.sort(load), atol=1e-9)
+    np.testing.assert_allclose(trial.reading[:, 1], 10.0 + 2.0 * np.sort(load), atol=0.1)
+
+
+def test_matrices_in_files_are_frames_with_the_load_of_their_names(tmp_path):
+    frames = {0.1 * i: np.round(200.0 * (i + RNG.random((8, 6)))) for i in range(12)}
+    paths = []
+    for load, frame in frames.items():
+        paths.append(tmp_path / f"mat_{load:.3f}kPa.csv")
+        paths[-1].write_text("\n".join(",".join(f"{value:03.0f}" for value in row) for row in frame) + "\n")
+    answers = proposal(*reversed(paths))
+    own = answers.loggers[0].columns
+    assert not own["time"].sure and "each file is a frame" in own["time"].why and own["force"].lacks_area
+    assert answers.sensor["grid"]["rows"] == 8 and answers.sensor["grid"]["columns"] == 6
+    assert any("area of force" in question for question in answers.open_questions())
+    path = template(tmp_path, paths, **{'area = "?"': "area = 2e-3"})
+    (trial,) = read_rig(new_rig(tmp_path / "rig", paths, path).path).trials
+    np.testing.assert_allclose(trial.level, 2.0 * np.array(list(frames)), atol=1e-9)
+    np.testing.assert_array_equal(trial.reading, np.array([frame.ravel() for frame in frames.values()]))
+
+
+def test_time_series_of_several_files_without_names_are_no_frames(tmp_path):
+    paths = [tmp_path / f"run_{i}.csv" for i in range(3)]
+    for path in paths:
+        path.write_text("\n".join(f"{i / 10},{RNG.random()},{RNG.random()}" for i in range(40)) + "\n")
+    assert len(with_distinct_names([read_log(path) for path in paths])) == 3
+    with pytest.raises(FileError, match="less than 8 lines"):
+        (tmp_path / "short.csv").write_text("1,2\n3,4\n")
+        proposal(tmp_path / "short.csv")
+
+
+def press(silent):
+    """A log of one axis over twelve texels, of which some never answer."""
+    depth = 2e-3 * LOAD
+    readings = {f"S{i}": (0.0 if i < silent else 60.0) * depth + noise(400, level=4e-4) for i in range(12)}
+    return {"time_ms": 1e3 * TIME, "probe_z_mm": 15.0 - 1e3 * depth, **readings}
+
+
+def test_one_axis_that_most_texels_do_not_feel_is_an_indenter_at_a_place(tmp_path):
+    log = write_csv(tmp_path / "run.csv", press(silent=10))
+    answers = proposal(log)
+    own = answers.loggers[0].columns
+    assert [own[axis].constant for axis in "xy"] == [0.0, 0.0] and own["z"].factor == 1.0 and "depth" not in own
+    assert "10 of 12 texels never answer" in own["z"].why and answers.indenter["shape"] == {"sphere": "?"}
+    path = template(tmp_path, [log], **{'sphere = "?"': "sphere = 0.015", "x = 0.0": "x = 0.004"})
+    (trial,) = read_rig(new_rig(tmp_path / "rig", [log], path).path).trials
+    assert trial.stimulus == "pose" and isinstance(trial.contact_height, str)
+    np.testing.assert_allclose(
+        trial.position, np.column_stack([0.004 + 0.0 * TIME, 0.0 * TIME, 0.015 - 2e-3 * LOAD]), atol=1e-9
+    )
+
+
+def test_one_axis_that_all_texels_feel_is_a_depth_and_says_what_that_means(tmp_path):
+    own = columns_of(write_csv(tmp_path / "run.csv", press(silent=0)))
+    assert (
+        own["depth"].factor == -1.0
+        and not own["depth"].sure
+        and "as a plate does: for a ball write x, y and z" in own["depth"].why
+    )
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_load_that_is_never_zero_has_no_zero_and_its_own_sign(tmp_path, sign):
+    load = 2.0 + np.sin(1.5 * TIME + 0.3)
+    columns = {"time": TIME, "fz": sign * load} | {f"taxel{i}": 400.0 * load + noise(400) for i in range(4)}
+    force = columns_of(write_csv(tmp_path / "slide.csv", columns))["force"]
+    assert force.zero == 0.0 and force.factor == sign and "nothing shows it without load" in force.why
+
+
+def test_a_load_that_rests_at_its_beginning_has_its_zero_there(tmp_path):
+    columns = {"time": TIME, "fz": 0.4 + 3.0 * np.where(TIME < 2.0, 0.0, LOAD)}
+    columns |= {f"taxel{i}": 400.0 * columns["fz"] for i in range(4)}
+    force = columns_of(write_csv(tmp_path / "press.csv", columns))["force"]
+    assert force.zero == pytest.approx(0.4) and "is subtracted" in force.why
+
+
+def test_a_number_that_is_no_temperature_is_asked(tmp_path):
+    columns = {"time": TIME, "force": LOAD, "Temp0": 757.0 + noise(400)} | {f"texel_{i}": 10.0 * LOAD for i in range(3)}
+    own = columns_of(write_csv(tmp_path / "a.csv", columns))["temperature"]
+    assert own.unit == "?" and "no temperature" in own.why
+
+
+def test_the_template_is_written_before_anything_is_refused(tmp_path, capsys):
+    columns = {"time": TIME, "force (N)": LOAD} | {f"texel_{i}": 500.0 + noise(400) for i in range(1)}
+    log = write_csv(tmp_path / "a.csv", columns)
+    assert main(["rig", "new", str(log), "--out", str(tmp_path / "rig"), "--yes"]) == 1
+    said = capsys.readouterr().err
+    assert "shows no contact" in said and "follow what drove the sensor by 0." in said
+    assert "texel_0" in (tmp_path / "rig" / "answers.toml").read_text()
+    assert not (tmp_path / "rig" / "rig.toml").exists()
+
+
+def test_readings_with_large_noise_that_follow_the_load_are_contact(tmp_path):
+    columns = {"time": TIME, "force (N)": LOAD, "texel_0": LOAD + noise(400, level=0.3)}
+    log = write_csv(tmp_path / "a.csv", columns)
+    assert new_rig(tmp_path / "rig", [log], template(tmp_path, [log])).path.exists()
