@@ -369,7 +369,7 @@ def export_sensor(sensor: SensorOnMesh | Sequence[SensorOnMesh], kind: str, fold
     ----------
     sensor : Sensor or list of Sensor
     kind : str
-        "mjcf", "urdf", "usd", "probes" or "openrave" (docs/simulators.md).
+        "mjcf", "urdf", "usd", "probes", "contact" or "openrave" (docs/simulators.md).
     folder : path
         Created if it is missing.
 

@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""OpenRAVE's XML: parameters of sensors without texels; ``palpate openrave`` writes it."""
+"""OpenRAVE's XML: parameters of sensors without texels, as ``palpate openrave`` writes them, too."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
+from ...io.bake_folder import folder_names
 from ...io.input_files import read_xml
-from ..openrave_file import read_openrave
-from ..sensor_format import FoundSensor, SensorFormat
+from ..openrave_file import OpenRaveSensor, read_openrave, write_openrave
+from ..sensor_format import FoundSensor, SensorFormat, Written
+from ..sensor_on_mesh import SensorOnMesh
 
 
 def is_openrave(path: str | os.PathLike) -> bool:
@@ -28,6 +31,20 @@ def read_definitions(path: str | os.PathLike) -> list[FoundSensor]:
     return found
 
 
+def write_definitions(sensors: Sequence[SensorOnMesh], folder: Path) -> Written:
+    """Write the parameters of each sensor into a file."""
+    files = []
+    for item, stem in zip(sensors, folder_names(item.name for item in sensors).values(), strict=True):
+        files.append(folder / f"{stem}.openrave.xml")
+        write_openrave(files[-1], [OpenRaveSensor(item.name, item.name, item.sensor.parameters)])
+    return Written(files, [f"'{item.name}': OpenRAVE's XML has parameters, and no texels or effects." for item in sensors])
+
+
 FORMAT = SensorFormat(
-    "openrave", "OpenRAVE (XML)", "Parameters of sensors, as in the paper's Table 2", read=read_definitions, holds=is_openrave
+    "openrave",
+    "OpenRAVE (XML)",
+    "Parameters of sensors, as in the paper's Table 2",
+    write_definitions,
+    read_definitions,
+    is_openrave,
 )

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 import trimesh
@@ -144,3 +146,18 @@ def test_both_sides_of_a_thin_plate_have_texels_and_their_own_normals():
 def test_islands_that_get_no_texel_are_named():
     with pytest.warns(UserWarning, match=r"no texel on 7 islands of its surface, around \(.*\) and 4 more m: ask for more"):
         pp.Sensor.from_mesh(balls(10), texels=3)
+
+
+def test_every_format_that_is_offered_is_written(tmp_path, repository):
+    """The list of the docstring, the table of docs/simulators.md and the choices of the command are the same, and all work."""
+    from palpate.core.simulators.registry import written_formats
+
+    offered = set(re.findall(r'"(\w+)"', pp.export_sensor.__doc__.partition("(docs/simulators.md)")[0]))
+    page = (repository / "docs" / "simulators.md").read_text(encoding="utf-8")
+    assert (
+        offered
+        == set(written_formats())
+        == set(re.findall(r"^\| `(\w+)` \|", page.partition("## From other")[0], re.MULTILINE))
+    )
+    for kind in offered:
+        assert pp.export_sensor(pp.Sensor.grid(3, 3, pitch=2e-3), kind, tmp_path / kind).files

@@ -27,7 +27,7 @@ def test_every_format_is_registered_once():
 
 
 def test_an_unknown_format_is_refused(tmp_path):
-    with pytest.raises(PalpateError, match="not written as 'dae': choose from contact, mjcf, probes, urdf, usd"):
+    with pytest.raises(PalpateError, match="not written as 'dae': choose from contact, mjcf, openrave, probes, urdf, usd"):
         export_sensors(SENSORS, "dae", tmp_path)
 
 
@@ -52,7 +52,8 @@ def test_a_full_disk_leaves_the_earlier_export(kind, tmp_path, monkeypatch):
     export_sensors(SENSORS, kind, tmp_path)
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     module = __import__(f"palpate.core.simulators.formats.{kind}", fromlist=["_"])
-    writer = next(name for name in ("write_xml", "write_probe_list", "write_stl", "write_file") if hasattr(module, name))
+    writers = ("write_xml", "write_probe_list", "write_stl", "write_openrave", "write_file")
+    writer = next(name for name in writers if hasattr(module, name))
     calls = []
 
     def fails_at_the_second(*given, **options):
