@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...core.errors import SensorError
-from ...core.model.channel_readout import ChannelReadout
+from ...core.model.recording import ChannelReadout
 from ...core.model.sensor import Sensor
 from ...core.skins import skin_presets
 from ...core.skins.channel_readouts import MagneticReadout, net_force_of

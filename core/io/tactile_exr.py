@@ -19,8 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FileError, ParameterError, os_error_reason
-from ..geometry.layout.grid_layout import GridLayout
-from ..geometry.layout.place_grid import grid_of_places
+from ..geometry.layout.grid_layout import GridLayout, grid_of_places
 from ..geometry.layout.texture_maps import UVLayout
 from ..geometry.texels import Texels
 from ..model.recording import Frame, SensorFrame

@@ -9,12 +9,10 @@ specifications. A :class:`.recording.Recording` holds the results.
 
 __all__ = [
     "body",
-    "channel_readout",
     "deformation",
     "digest",
     "drive",
     "effect",
-    "mode",
     "motion",
     "parameter",
     "pose_interpolation",

@@ -4,12 +4,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import IntEnum
 
 import numpy as np
 
 from .drive import Drive
-from .mode import Mode
 from .motion import Motion
+
+
+class Mode(IntEnum):
+    """What moves a body: its animation; forces; or its animation together with an actuator along an axis.
+
+    What follows from it in the solver is in :mod:`palpate.core.solver.dynamics.modes`.
+    """
+
+    KEYFRAMED = 0
+    FREE = 1
+    DRIVEN = 2
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import mmap
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -66,6 +67,19 @@ class SensorArrays:
 
 SENSOR_FIELDS = tuple(item.name for item in fields(SensorArrays) if item.name != "channels")
 """Names of the arrays that every sensor has, in the order in which files hold them."""
+
+
+class ChannelReadout(Protocol):
+    """Computes several signed channels from what happens at a sensor's texels, as those of :mod:`..skins.channel_readouts` do.
+
+    It is a dataclass of plain data.
+    """
+
+    def no_frames(self) -> VectorReadings:
+        """Return the channels of a recording without frames: their number, unit, names and places."""
+
+    def channels(self, recorded: SensorArrays) -> VectorReadings:
+        """Return the channels at the frames of a recording; a frame has the same bits in a recording of any length."""
 
 
 @dataclass

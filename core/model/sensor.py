@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from ..geometry.texels import Texels
-from .channel_readout import ChannelReadout
 from .deformation import Deformation
 from .digest import IF_GIVEN, digest_of
 from .effect import Effect
+from .recording import ChannelReadout
 from .sensor_parameters import Painted, SensorParameters
 
 

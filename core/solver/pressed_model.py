@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager
 import numpy as np
 
 from ..compiled.thread_team import helper_threads, threads_for
-from ..effects.engine.readout_chain import transducers_of
+from ..effects.engine.readout_chain import ReadoutChain, transducers_of
 from ..effects.engine.registry import in_signal_order
 from ..errors import ParameterError
 from ..geometry.mesh import TriangleMesh
@@ -20,7 +20,6 @@ from ..model.motion import Motion
 from ..model.scenario import Scenario
 from ..model.sensor import Sensor
 from ..model.target import Target
-from ..response.readings import ReadoutChain
 from .detection.detection_data import TargetShapes
 from .detection.shape_contacts import blocks_of_points
 from .model_builder import step_program

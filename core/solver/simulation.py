@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..compiled.thread_team import helper_threads
+from ..effects.engine.readout_chain import ReadoutChain
 from ..effects.engine.sensor_effects import check_scenario, mounted_texels
 from ..geometry.rotations import quaternion_product, rotation_matrices, rotation_vectors
 from ..jobs.job_runner import run_job
@@ -23,7 +24,6 @@ from ..model.pose_interpolation import poses_at
 from ..model.recording import BLOCK_BYTES, Frame, Recording, SensorRecording
 from ..model.scenario import Scenario
 from ..model.shared_results import SharedResults
-from ..response.readings import ReadoutChain
 from ..skins.channel_readouts import with_clipping_warnings
 from .detection.deformation import refit_boxes, set_moment
 from .detection.detection_data import DetectionData

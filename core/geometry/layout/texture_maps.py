@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ...errors import ImageError
-from .directions import preference, unit
+from .grid_layout import preference, unit
 from .rasterization import GUTTER, OverlapError, rasterise, rasterise_cells
 
 _PIXELS_APART = 3.0  # neighbouring texels in a flattened region, so that a bilinear look-up can tell them apart

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...compiled.kernels import inlined, kernel
 from ...geometry.rotations import project_on_axis, write_step_motion, write_twist_map, write_world_inertia
-from ...model.mode import Mode
+from ...model.body import Mode
 from ..solver_model import Pairs, SolverModel, State
 from ..workspace import Workspace
 from .actuators import place_driven, prepare_driven

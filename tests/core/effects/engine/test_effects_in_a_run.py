@@ -10,12 +10,12 @@ from solver_scenes import box, cube_on_pad, pressed, shape
 from trimesh.creation import icosphere
 
 from palpate.core.effects.engine.contact_forces import normal_forces
+from palpate.core.effects.engine.readout_chain import readings, transducers_of
 from palpate.core.effects.engine.registry import effect, library
 from palpate.core.effects.engine.sensor_effects import check_scenario, mounted_texels
 from palpate.core.errors import EffectError
 from palpate.core.model.effect import Effect
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
-from palpate.core.response.readings import respond
 from palpate.core.solver.simulation import Simulation, run
 
 
@@ -67,7 +67,8 @@ def test_readings_of_a_run_are_those_of_the_whole_signal():
     )
     recording = run(scenario)
     felt = recording.sensors["pad"]
-    whole = respond(scenario.sensors[0], recording.times, felt.normal_force)
+    sensor = scenario.sensors[0]
+    whole = readings(sensor.effects, transducers_of(sensor), recording.times, felt.normal_force)
     np.testing.assert_allclose(felt.reading, whole, atol=1e-9)
     np.testing.assert_array_equal(felt.normal_force, run(with_effects(scenario)).sensors["pad"].normal_force)
 
