@@ -1,28 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""ROS 2 messages as bytes, without ROS: their definitions, and their encoding in CDR.
-
-CDR (OMG, *Common Data Representation*, version 1, little-endian, as ``rmw`` writes it) puts each number at a multiple of its
-own size, counted from the end of a header of four bytes; a text is its length with the closing zero, and its bytes. The
-definitions are those of ``common_interfaces`` and ``geometry2`` (ROS 2 Humble to Rolling), without their comments.
-"""
+"""ROS 2 messages as bytes, without ROS: the package rosbags knows their definitions and their encoding in CDR."""
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from functools import cache
+from typing import Any
 
 import numpy as np
-
-_TIME = "int32 sec\nuint32 nanosec\n"
-_HEADER = "builtin_interfaces/Time stamp\nstring frame_id\n"
-_VECTOR = "float64 x\nfloat64 y\nfloat64 z\n"
-_QUATERNION = "float64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n"
-_POINT_FIELD = (
-    "uint8 INT8=1\nuint8 UINT8=2\nuint8 INT16=3\nuint8 UINT16=4\nuint8 INT32=5\nuint8 UINT32=6\nuint8 FLOAT32=7\n"
-    "uint8 FLOAT64=8\nstring name\nuint32 offset\nuint8 datatype\nuint32 count\n"
-)
-_STAMPED = {"std_msgs/Header": _HEADER, "builtin_interfaces/Time": _TIME}
-_TRANSFORM = "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n"
 
 POINT_CLOUD = "sensor_msgs/msg/PointCloud2"
 IMAGE = "sensor_msgs/msg/Image"
@@ -30,80 +15,39 @@ WRENCH = "geometry_msgs/msg/WrenchStamped"
 POINT = "geometry_msgs/msg/PointStamped"
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
 
-_DEFINITIONS: dict[str, tuple[str, dict[str, str]]] = {
-    POINT_CLOUD: (
-        "std_msgs/Header header\nuint32 height\nuint32 width\nsensor_msgs/PointField[] fields\nbool is_bigendian\n"
-        "uint32 point_step\nuint32 row_step\nuint8[] data\nbool is_dense\n",
-        {**_STAMPED, "sensor_msgs/PointField": _POINT_FIELD},
-    ),
-    IMAGE: (
-        "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\nuint32 step\nuint8[] data\n",
-        _STAMPED,
-    ),
-    WRENCH: (
-        "std_msgs/Header header\ngeometry_msgs/Wrench wrench\n",
-        {
-            **_STAMPED,
-            "geometry_msgs/Wrench": "geometry_msgs/Vector3 force\ngeometry_msgs/Vector3 torque\n",
-            "geometry_msgs/Vector3": _VECTOR,
-        },
-    ),
-    POINT: ("std_msgs/Header header\ngeometry_msgs/Point point\n", {**_STAMPED, "geometry_msgs/Point": _VECTOR}),
-    TRANSFORMS: (
-        "geometry_msgs/TransformStamped[] transforms\n",
-        {
-            "geometry_msgs/TransformStamped": (
-                "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform\n"
-            ),
-            **_STAMPED,
-            "geometry_msgs/Transform": _TRANSFORM,
-            "geometry_msgs/Vector3": _VECTOR,
-            "geometry_msgs/Quaternion": _QUATERNION,
-        },
-    ),
-}
-
 _UINT8, _FLOAT32 = 2, 7
 _FIELD_TYPES = {"|u1": _UINT8, "<f4": _FLOAT32}
 
 
+@cache
+def _store() -> Any:
+    """Return the messages of ROS 2 Humble, which Rolling has unchanged."""
+    from rosbags.typesys import Stores, get_typestore
+
+    return get_typestore(Stores.ROS2_HUMBLE)
+
+
 def definition(name: str) -> str:
     """Return the definition of a message with those of all messages in it, as in MCAP's schemas of encoding ``ros2msg``."""
-    text, parts = _DEFINITIONS[name]
-    return text + "".join(f"{'=' * 80}\nMSG: {part}\n{content}" for part, content in parts.items())
+    text, _ = _store().generate_msgdef(name, ros_version=2)
+    return str(text)
 
 
-class _Encoder:
-    """The bytes of one message."""
+def _part(name: str, *values: Any) -> Any:
+    return _store().types[name](*values)
 
-    def __init__(self) -> None:
-        self._bytes = bytearray(b"\x00\x01\x00\x00")  # little-endian, no options
 
-    def number(self, kind: str, *values: float) -> None:
-        """Append numbers of one kind of :mod:`struct`, the first at a multiple of their size."""
-        self._bytes += b"\0" * (-(len(self._bytes) - 4) % struct.calcsize(kind))
-        self._bytes += struct.pack(f"<{len(values)}{kind}", *values)
+def _header(time: int, frame: str) -> Any:
+    """Return a ``std_msgs/Header``; the time is in nanoseconds."""
+    return _part("std_msgs/msg/Header", _part("builtin_interfaces/msg/Time", *divmod(time, 1_000_000_000)), frame)
 
-    def text(self, text: str) -> None:
-        """Append a text."""
-        encoded = text.encode() + b"\0"
-        self.number("I", len(encoded))
-        self._bytes += encoded
 
-    def data(self, content: bytes) -> None:
-        """Append a sequence of bytes."""
-        self.number("I", len(content))
-        self._bytes += content
+def _vector(values: Iterable[float]) -> Any:
+    return _part("geometry_msgs/msg/Vector3", *map(float, values))
 
-    def header(self, time: int, frame: str) -> None:
-        """Append a ``std_msgs/Header``; the time is in nanoseconds."""
-        self.number("i", time // 1_000_000_000)
-        self.number("I", time % 1_000_000_000)
-        self.text(frame)
 
-    def message(self) -> bytes:
-        """Return the whole message."""
-        return bytes(self._bytes)
+def _message(kind: str, *values: Any) -> bytes:
+    return bytes(_store().serialize_cdr(_part(kind, *values), kind))
 
 
 def point_cloud(time: int, frame: str, points: np.ndarray) -> bytes:
@@ -116,57 +60,36 @@ def point_cloud(time: int, frame: str, points: np.ndarray) -> bytes:
     points : (n,) structured array
         Its fields, float32 or uint8, become the fields of the points; x, y and z are among them.
     """
-    encoder = _Encoder()
-    encoder.header(time, frame)
-    encoder.number("I", 1, len(points))
-    fields = points.dtype.fields or {}
-    encoder.number("I", len(fields))
-    for name, (kind, offset, *_) in fields.items():
-        encoder.text(name)
-        encoder.number("I", offset)
-        encoder.number("B", _FIELD_TYPES[kind.str])
-        encoder.number("I", 1)
-    encoder.number("?", False)
-    encoder.number("I", points.dtype.itemsize, points.nbytes)
-    encoder.data(points.tobytes())
-    encoder.number("?", True)
-    return encoder.message()
+    kinds = points.dtype.fields or {}
+    about = ((name, offset, _FIELD_TYPES[kind.str], 1) for name, (kind, offset, *_) in kinds.items())
+    fields = [_part("sensor_msgs/msg/PointField", *one) for one in about]
+    data = np.frombuffer(points.tobytes(), np.uint8)
+    return _message(
+        POINT_CLOUD, _header(time, frame), 1, len(points), fields, False, points.dtype.itemsize, points.nbytes, data, True
+    )
 
 
 def image(time: int, frame: str, pixels: np.ndarray) -> bytes:
     """Return an ``Image`` of one float32 channel (``32FC1``); `pixels` is (height, width), the top row first."""
-    encoder = _Encoder()
-    encoder.header(time, frame)
-    encoder.number("I", *pixels.shape)
-    encoder.text("32FC1")
-    encoder.number("B", 0)
-    encoder.number("I", 4 * pixels.shape[1])
-    encoder.data(np.ascontiguousarray(pixels, "<f4").tobytes())
-    return encoder.message()
+    data = np.frombuffer(np.ascontiguousarray(pixels, "<f4").tobytes(), np.uint8)
+    return _message(IMAGE, _header(time, frame), *pixels.shape, "32FC1", 0, 4 * pixels.shape[1], data)
 
 
 def wrench(time: int, frame: str, force: np.ndarray, torque: np.ndarray) -> bytes:
     """Return a ``WrenchStamped`` of a force (N) and a torque (N·m), (3,) each."""
-    encoder = _Encoder()
-    encoder.header(time, frame)
-    encoder.number("d", *force, *torque)
-    return encoder.message()
+    return _message(WRENCH, _header(time, frame), _part("geometry_msgs/msg/Wrench", _vector(force), _vector(torque)))
 
 
 def point(time: int, frame: str, position: np.ndarray) -> bytes:
     """Return a ``PointStamped`` at a position, (3,) m."""
-    encoder = _Encoder()
-    encoder.header(time, frame)
-    encoder.number("d", *position)
-    return encoder.message()
+    return _message(POINT, _header(time, frame), _part("geometry_msgs/msg/Point", *map(float, position)))
 
 
 def transforms(time: int, parent: str, children: Sequence[str], poses: np.ndarray) -> bytes:
     """Return a ``TFMessage`` with the pose of each child frame, (b, 7): origin in metres and quaternion (w, x, y, z)."""
-    encoder = _Encoder()
-    encoder.number("I", len(children))
+    stamped = []
     for child, (x, y, z, qw, qx, qy, qz) in zip(children, poses, strict=True):
-        encoder.header(time, parent)
-        encoder.text(child)
-        encoder.number("d", x, y, z, qx, qy, qz, qw)
-    return encoder.message()
+        turned = _part("geometry_msgs/msg/Quaternion", float(qx), float(qy), float(qz), float(qw))
+        pose = _part("geometry_msgs/msg/Transform", _vector((x, y, z)), turned)
+        stamped.append(_part("geometry_msgs/msg/TransformStamped", _header(time, parent), child, pose))
+    return _message(TRANSFORMS, stamped)

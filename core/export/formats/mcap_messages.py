@@ -35,9 +35,12 @@ _CHUNK_BYTES = 1 << 20
 def write_mcap(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Path]]:
     """Write ``palpate.mcap``."""
     try:
+        import rosbags  # noqa: F401 of the messages
         from mcap.writer import CompressionType, Writer
     except ImportError as error:
-        raise PalpateError("MCAP needs the package mcap, which is not installed: run 'pip install mcap'.") from error
+        raise PalpateError(
+            f"MCAP needs the package {error.name}, which is not installed: run 'pip install mcap rosbags'."
+        ) from error
     from mcap.well_known import Profile
 
     path = folder / "palpate.mcap"
@@ -187,5 +190,10 @@ def _mcap_bytes(bake: Bake) -> float:
 
 
 EXPORTER = Exporter(
-    "mcap", "MCAP", "Messages over time for Foxglove, rerun and ROS 2; needs the package mcap", 4, write_mcap, _mcap_bytes
+    "mcap",
+    "MCAP",
+    "Messages over time for Foxglove, rerun and ROS 2; needs mcap and rosbags",
+    4,
+    write_mcap,
+    _mcap_bytes,
 )
