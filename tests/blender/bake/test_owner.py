@@ -85,24 +85,6 @@ def test_a_bake_with_the_same_forces_but_other_files_is_another_one(saved, tmp_p
     assert bake_identity.other_bake(scene) == ""
 
 
-def test_another_blend_is_refused_wherever_it_lies(saved, tmp_path):
-    _, first = saved
-    before = contents(tmp_path / "palpate-bake")
-    (tmp_path / "far").mkdir()
-    bpy.ops.wm.read_homefile(use_empty=True)
-    scene, *_ = press(frames=2)
-    save(tmp_path / "far", "second.blend")
-    scene.palpate.folder = str(tmp_path / "palpate-bake")
-    for into_scene in (True, False):
-        with pytest.raises(FileError) as caught:
-            baked(scene, into_scene=into_scene)
-        assert str(caught.value) == (
-            f"'{tmp_path / 'palpate-bake' / 'Pad'}' holds the bake of '{first}': "
-            "choose another bake folder, or rename this one."
-        )
-    assert contents(tmp_path / "palpate-bake") == before
-
-
 def test_a_blend_that_was_renamed_or_moved_owns_its_bake(saved, tmp_path):
     scene, path = saved
     scene.palpate.folder = str(tmp_path / "palpate-bake")
