@@ -558,9 +558,14 @@ def _rigs() -> st.SearchStrategy[Files]:
 
 @cache
 def readers() -> dict[str, Reader]:
-    """Return a reader for each kind of file, by its name."""
+    """Return a reader for each kind of file, by its name; good files are made when the first damaged one is drawn."""
+
+    def later(make: Callable[[], Files]) -> st.SearchStrategy[Files]:
+        return st.deferred(lambda: damaged(make()))
+
     study = STUDY.format(runs=6, seed=1, more="", hold=0.0)
-    scene = files_of(lambda folder: save_scenario(folder / "pad.npz", scenario()))
+    scene = later(lambda: files_of(lambda folder: save_scenario(folder / "pad.npz", scenario())))
+    answers = st.deferred(lambda: _toml("answers.toml", ANSWERS, log_files("csv")))
     found = {
         "sensor.toml": Reader(_toml("sensor.toml", SENSOR), lambda folder: read_sensor(folder / "sensor.toml")),
         "rig": Reader(_rigs(), _read_rig),
@@ -568,23 +573,22 @@ def readers() -> dict[str, Reader]:
         "recorded table": Reader(damaged({"table.csv": TABLE}), _read_table),
         "typed table": Reader(damaged({"foam.csv": FOAM}), _read_typed),
         "study": Reader(_toml("study.toml", tomllib.loads(study)), _read_study),
-        "scenario": Reader(damaged(scene), lambda folder: load_scenario(folder / "pad.npz")),
-        "image": Reader(damaged(image_files()), lambda folder: tactile_exr.read_exr(folder / "tactile.exr")),
+        "scenario": Reader(scene, lambda folder: load_scenario(folder / "pad.npz")),
+        "image": Reader(later(image_files), lambda folder: tactile_exr.read_exr(folder / "tactile.exr")),
         "bake": Reader(st.sampled_from(["grid", "uv"]).flatmap(lambda kind: damaged(bake_files(kind))), read_whole_bake),
-        "answers": Reader(_toml("answers.toml", ANSWERS, log_files("csv")), _read_answers),
+        "answers": Reader(answers, _read_answers),
     }
     for kind in LOG_WRITERS:
-        files = log_files(kind)
-        found[f"log.{kind}"] = Reader(damaged(files), partial(rig_from_log, f"log.{kind}"))
+        found[f"log.{kind}"] = Reader(later(partial(log_files, kind)), partial(rig_from_log, f"log.{kind}"))
+    robot = later(lambda: {"robot.xml": openrave_xml(ROBOT, "hand").encode()})
     sensors = {
-        "Pad.xml": exported_sensor("mjcf"),
-        "Pad.urdf": exported_sensor("urdf"),
-        "Pad.json": exported_sensor("probes"),
-        "grid.xml": {"grid.xml": TOUCH_GRID.encode()},
-        "mesh.xml": {"mesh.xml": MESH_FILE.encode(), "meshes/m.ply": PLY},
-        "robot.xml": {"robot.xml": openrave_xml(ROBOT, "hand").encode()},
+        "Pad.xml": later(partial(exported_sensor, "mjcf")),
+        "Pad.urdf": later(partial(exported_sensor, "urdf")),
+        "Pad.json": later(partial(exported_sensor, "probes")),
+        "grid.xml": damaged({"grid.xml": TOUCH_GRID.encode()}),
+        "mesh.xml": damaged({"mesh.xml": MESH_FILE.encode(), "meshes/m.ply": PLY}),
+        "robot.xml": robot,
     }
-    for name, files in sensors.items():
-        found[f"sensor in {name}"] = Reader(damaged(files), partial(import_all, name))
-    robot = damaged(sensors["robot.xml"])
+    for name, inputs in sensors.items():
+        found[f"sensor in {name}"] = Reader(inputs, partial(import_all, name))
     return {**found, "OpenRAVE": Reader(robot, lambda folder: read_openrave(folder / "robot.xml"))}

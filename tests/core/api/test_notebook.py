@@ -30,13 +30,14 @@ def outputs_of(cells):
     return [output for cell in cells if cell.cell_type == "code" for output in cell.outputs]
 
 
-@pytest.mark.slow("executes the notebook, for all tests of this file")
+@pytest.mark.long("executes the notebook")
 def test_it_says_what_a_weight_and_a_gap_are(executed):
     texts = "".join(output.get("text", "") for output in outputs_of(executed.cells))
     assert "9.8100 N" in texts
     assert "sure" in texts
 
 
+@pytest.mark.long("executes the notebook")
 def test_every_drawing_is_shown(executed):
     found = [output.data for output in outputs_of(executed.cells) if "data" in output]
     assert sum("image/png" in one for one in found) == 4

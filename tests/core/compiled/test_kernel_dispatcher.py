@@ -76,7 +76,7 @@ def test_a_kernel_that_others_call_can_be_called_from_python_too():
     assert _add(np.array([5.0]), 1) == 11.0
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(i, marks=pytest.mark.long("more random scenes")) for i in range(1, 6))])
 def test_interpreted_kernels_give_the_same_bits_also_when_a_run_changes_over(seed):
     """200 scenes were compared by `python -m oracles.interpreted 200`: none differs."""
     assert interpreted.difference(interpreted.random_scene(seed)) == ""
@@ -107,6 +107,7 @@ def test_a_compiler_that_fails_is_said_once_and_the_numbers_are_the_same(monkeyp
     ]
 
 
+@pytest.mark.long("starts numba in processes of its own")
 def test_a_full_disk_costs_only_what_would_be_kept(tmp_path):
     expected, _ = one_kernel(NUMBA_CACHE_DIR=str(tmp_path / "first"))
     full = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n" + ONE_KERNEL
@@ -115,6 +116,7 @@ def test_a_full_disk_costs_only_what_would_be_kept(tmp_path):
     assert said.count("cannot be kept") == 1 and "NUMBA_CACHE_DIR" in said and len(said.splitlines()) == 1
 
 
+@pytest.mark.long("starts numba in processes of its own")
 def test_what_was_kept_is_used_and_an_unusable_folder_is_passed_over(tmp_path):
     expected, _ = one_kernel(NUMBA_CACHE_DIR=str(tmp_path / "cache"))
     again, said = one_kernel(NUMBA_CACHE_DIR=str(tmp_path / "cache"))
@@ -124,6 +126,7 @@ def test_what_was_kept_is_used_and_an_unusable_folder_is_passed_over(tmp_path):
     assert elsewhere[:2] == [expected[0], "False"]
 
 
+@pytest.mark.long("starts numba in processes of its own")
 @pytest.mark.parametrize(
     "environment", [{"LC_ALL": "C", "LANG": "C"}, {"LC_ALL": "none.such"}, {"NUMBA_CPU_NAME": "unknown-9000"}]
 )
@@ -142,7 +145,7 @@ def test_another_numba_gets_a_sentence_and_the_same_numbers(tmp_path):
     assert said == "Palpate computes slowly, as it was never tried with numba 9.1.0: install numba 0.68.*\n"
 
 
-@pytest.mark.slow("starts numba in four processes")
+@pytest.mark.long("starts numba in four processes")
 def test_processes_that_compile_at_once_do_not_disturb_each_other(tmp_path):
     environment = {"PYTHONPATH": os.pathsep.join(sys.path), **os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
     start = {"env": environment, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}

@@ -59,7 +59,7 @@ def value():
 """
 
 
-@pytest.mark.slow("starts numba in three processes")
+@pytest.mark.long("starts numba in three processes")
 @pytest.mark.skipif(not kernels.COMPILED, reason="without numba nothing is kept")
 def test_a_kernel_is_compiled_anew_when_one_that_it_calls_has_changed(tmp_path):
     """In another file, which numba's own check does not see. What has not changed comes from the cache."""

@@ -34,7 +34,7 @@ def test_plain_python_gives_the_same_numbers(plain_run):
         assert plain[name] == pytest.approx(numbers(scene), rel=0.0, abs=1e-12), name
 
 
-@pytest.mark.slow("the solver in plain Python, in a process of its own")
+@pytest.mark.long("the solver in plain Python, in a process of its own")
 def test_without_the_internals_of_numba_everything_runs_as_plain_python(plain_run):
     """As if a later release of numba had moved a part that is not documented."""
     plain, _ = plain_run
