@@ -24,6 +24,8 @@ from .optional_package import optional_package
 from .sensor_format import FoundSensor
 
 PLUGIN = "mujoco.sensor.touch_grid"
+SETTINGS = ("nchannel", "size", "fov", "gamma")
+"""Of the plugin, in the order in which it declares them and compiled models keep them."""
 DEEPEST = 250
 """Elements inside each other; MuJoCo reads them by recursion."""
 SINGLE = 2e-7
@@ -67,12 +69,13 @@ def read_mjcf(path: str | os.PathLike) -> list[FoundSensor]:
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     kinds, found, touch = mujoco.mjtSensor, [], []
+    instances = {plugin.name: plugin.plugin_name for plugin in spec.plugins}
     for number, item in enumerate(spec.sensors):
         kind = int(model.sensor_type[number])
         if kind == kinds.mjSENS_TACTILE:
             found.append(_tactile(path, root, model, data, number, item.name or f"tactile {number + 1}"))
-        elif kind == kinds.mjSENS_PLUGIN and item.plugin.plugin_name == PLUGIN:
-            found.append(_touch_grid(path, model, data, number, item, item.name or f"touch grid {number + 1}"))
+        elif kind == kinds.mjSENS_PLUGIN and (item.plugin.plugin_name or instances.get(item.plugin.name)) == PLUGIN:
+            found.append(_touch_grid(path, model, data, number, item.name or f"touch grid {number + 1}"))
         elif kind == kinds.mjSENS_TOUCH:
             touch.append(int(model.sensor_objid[number]))
     notes = ["MuJoCo's geoms, contact and joints were not imported; parameters have their defaults."]
@@ -196,18 +199,17 @@ def _site_normals(mujoco: Any, spec: Any, model: Any, data: Any, sites: list[int
     return found / np.linalg.norm(found, axis=1, keepdims=True)
 
 
-def _touch_grid(path: str | os.PathLike, model: Any, data: Any, number: int, item: Any, name: str) -> FoundSensor:
+def _touch_grid(path: str | os.PathLike, model: Any, data: Any, number: int, name: str) -> FoundSensor:
     """Return the sensor of a touch_grid: its bins of directions, on a sphere around the site."""
-    site, settings = int(model.sensor_objid[number]), dict(item.plugin.config)
-    missing = next((key for key in ("size", "fov") if key not in settings), None)
-    if missing:
-        raise FileError(f"Sensor '{name}' in '{path}' has no <config key=\"{missing}\">: add it.")
+    site, first = int(model.sensor_objid[number]), int(model.plugin_attradr[model.sensor_plugin[number]])
+    words = model.plugin_attr[first:].tobytes().decode("utf-8").split("\0")
+    settings = dict(zip(SETTINGS, words, strict=False))
     columns, rows = (int(float(word)) for word in settings["size"].split())
     if min(columns, rows) < 2:
         raise FileError(f"Sensor '{name}' in '{path}' has {columns} × {rows} bins: two each way are the fewest that are read.")
     _require_count(path, name, columns * rows)
     fov = [float(word) for word in settings["fov"].split()]
-    gamma = float(settings.get("gamma", 0.0))
+    gamma = float(settings["gamma"] or 0.0)
     azimuth, elevation = (_bin_middles(n, limit, gamma) for n, limit in zip((columns, rows), fov))
     y, x = np.meshgrid(elevation, azimuth, indexing="ij")
     direction = np.stack([np.cos(y) * np.sin(x), np.sin(y), -np.cos(y) * np.cos(x)], axis=-1).reshape(-1, 3)

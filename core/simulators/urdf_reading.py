@@ -21,7 +21,7 @@ from .optional_package import optional_package
 from .sensor_format import FoundSensor
 
 TEXEL_NAME = re.compile(
-    r"(?:texel|taxel|tactel|tactile(?:[_\-/]?[a-z]+)*|sensor|probe)[_\-/ ]*(\d+(?:[_\-]\d+)*)(?:[_\-]?(?:link|frame|joint))?$",
+    r"(?:texel|taxel|tactel|tactile|sensor|probe)(?:[_\-/ ]?[a-z]+)*[_\-/ ]*(\d+(?:[_\-]\d+)*)(?:[_\-]?(?:link|frame|joint))?$",
     re.IGNORECASE,
 )
 """End of the name of a link that is a texel: a word for it, and one or more numbers."""

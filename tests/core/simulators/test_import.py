@@ -212,6 +212,26 @@ def test_included_files_are_read_and_a_part_alone_says_so(tmp_path):
         import_sensors(tmp_path / "sensors.xml")
 
 
+def test_a_touch_grid_by_an_instance_is_the_same(tmp_path):
+    (plain,) = read(tmp_path, GRID.format(config=CONFIG))
+    text = GRID.format(config="").replace('plugin="mujoco.sensor.touch_grid" objtype', 'instance="one" objtype')
+    declared = f'<plugin plugin="mujoco.sensor.touch_grid"><instance name="one">{CONFIG}</instance></plugin>'
+    (found,) = read(tmp_path, text.replace('<plugin plugin="mujoco.sensor.touch_grid"/>', declared))
+    assert np.array_equal(found.position, plain.position)
+
+
+@pytest.mark.parametrize(
+    "name", ["skin_texel_{n}", "skin_taxel_{n}_link", "tip_taxel_0_{n}", "tactile_map_link{n}", "palm_sensor_pad_{n:03d}"]
+)
+def test_names_of_texels_as_robots_have_them(name, tmp_path):
+    joints = "".join(
+        JOINT.format(n=n, xyz=f"{0.001 * n} {0.001 * n * n} 0", axis="").replace(f"skin_sensor_{n}", name.format(n=n))
+        for n in range(4)
+    )
+    (found,) = read(tmp_path, ROBOT.format(joints=joints), "hand.urdf")
+    assert found.position[:, 0] == pytest.approx([0.0, 0.001, 0.002, 0.003])
+
+
 def test_touch_sites_become_texels_out_of_the_surface_of_their_body(tmp_path):
     sites = "".join(
         f'<site name="{i}" size="0.002" pos="{x} {y} -0.01"/>' for i, (x, y) in enumerate([(0, 0), (5e-3, 0), (0, 6e-3)])
