@@ -7,8 +7,6 @@ import pytest
 from blender_scenes import press, save
 
 from palpate.commands import main
-from palpate.core.gap.calibration.friction import steady_friction
-from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.simulators.openrave_file import read_openrave
 
 
@@ -24,19 +22,6 @@ def test_stiffness_from_foam(tmp_path, capfd):
     assert (tmp_path / "foam.png").read_bytes().startswith(b"\x89PNG")
     assert main(words) == 1
     assert "on which area" in capfd.readouterr().err
-
-
-def test_friction_from_a_curve(tmp_path, capfd):
-    v = np.linspace(0.01, 1.4, 30)
-    force = 84 * steady_friction(v, 0.08, SensorParameters())
-    lines = "\n".join(f"{a:.17g},{b:.17g}" for a, b in zip(v, force, strict=True))
-    (tmp_path / "friction.csv").write_text(f"velocity,force\n{lines}\n", encoding="utf-8")
-    words = ["fit", "friction", str(tmp_path / "friction.csv"), "--normal-force", "0.08", "--texels", "84"]
-    assert main([*words, "--plot", str(tmp_path / "friction.pdf")]) == 0
-    out = capfd.readouterr().out
-    for value in ("0.435", "0.23", "0.3", "0.01"):
-        assert value in out
-    assert (tmp_path / "friction.pdf").read_bytes().startswith(b"%PDF")
 
 
 def test_a_sensor_goes_out_and_comes_in_exactly(tmp_path, capfd):

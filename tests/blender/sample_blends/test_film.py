@@ -52,17 +52,3 @@ def test_all_chapters(film, scene, tmp_path):
         assert SHORTEST <= len(made.frames) / film.FPS <= LONGEST
     path = encode_video(made.frames, tmp_path / "film.mp4", film.FPS)
     assert path.read_bytes()[4:8] == b"ftyp"
-
-
-def test_the_film_lasts_as_long_whatever_is_rendered(film, tmp_path):
-    """A draft shows each of its renders longer."""
-    for every in (1, 4, 48, 100):
-        played = list(film.Film(tmp_path, every=every).play("press", range(6, 72)))
-        assert sum(seconds for seconds, *_ in played) == pytest.approx(66 / film.FPS)
-
-
-def test_words_that_are_too_long_are_noticed(film, tmp_path):
-    made = film.Film(tmp_path, height=90)
-    made.show(1.0, "1  Paint", "word " * 20, lambda figure: None)
-    with pytest.raises(AssertionError):
-        made.show(1.0, "1  Paint", "word " * 56, lambda figure: None)
