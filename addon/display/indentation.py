@@ -201,23 +201,15 @@ def _body_from_object(sensor: BakedSensor) -> np.ndarray:
 def _nodes(uid: str, name: str, play: _Play, levels: int, factor: float):
     """Return geometry nodes that look up each texel's depth, spread it smoothly over finer faces, and move them inwards."""
     group = materials.empty_node_group(f"{uid}:{MARK}", f"{name} indentation")
-    add, link, names = materials.NodeAdder(group), group.links.new, _Names(uid)
-    start = add("NodeGroupInput").outputs[0]
-    rest = _store(add, start, REST_POSITION, "FLOAT_VECTOR", add("GeometryNodeInputPosition").outputs[0])
-    depth_name = f"palpate_depth:{uid}"
-    coarse = _store(add, rest, depth_name, "FLOAT", _depth(add, names, play))
+    add, names, depth_name = materials.NodeAdder(group), _Names(uid), f"palpate_depth:{uid}"
+    rest = _stored(add, add("NodeGroupInput").outputs[0], REST_POSITION, _out(add, "GeometryNodeInputPosition"), "FLOAT_VECTOR")
+    coarse = _stored(add, rest, depth_name, _depth(add, names, play), "FLOAT")
     fine, depth = _subdivided(add, coarse, _attribute(add, depth_name, "FLOAT"), levels)
     depth = _math(add, "MAXIMUM", depth, 0.0)
-    inward = add("ShaderNodeVectorMath", operation="SCALE")
-    link(_attribute(add, names.inward, "FLOAT_VECTOR"), inward.inputs[0])
-    link(depth, inward.inputs["Scale"])
-    exaggerated = add("ShaderNodeVectorMath", operation="SCALE", label=FACTOR_LABEL)
-    link(inward.outputs["Vector"], exaggerated.inputs[0])
-    exaggerated.inputs["Scale"].default_value = factor
-    move = add("GeometryNodeSetPosition")
-    link(fine, move.inputs["Geometry"])
-    link(exaggerated.outputs["Vector"], move.inputs["Offset"])
-    link(move.outputs["Geometry"], add("NodeGroupOutput").inputs[0])
+    inward = _out(add, "ShaderNodeVectorMath", {0: _attribute(add, names.inward), "Scale": depth}, operation="SCALE")
+    moved = _out(add, "ShaderNodeVectorMath", {0: inward, "Scale": factor}, operation="SCALE", label=FACTOR_LABEL)
+    move = _out(add, "GeometryNodeSetPosition", {"Geometry": fine, "Offset": moved})
+    group.links.new(move, add("NodeGroupOutput").inputs[0])
     return group
 
 
@@ -229,79 +221,57 @@ def _subdivided(add, geometry, values, levels: int):
     """
     if not levels:
         return geometry, values
-    link, sharp = add.tree.links.new, values
+    sharp = values
     for _ in range(SHARPENINGS):
-        blur = add("GeometryNodeBlurAttribute", data_type="FLOAT")
-        blur.inputs["Iterations"].default_value, blur.inputs["Weight"].default_value = 1, NEIGHBOUR_WEIGHT
-        link(sharp, blur.inputs["Value"])
-        sharp = _math(add, "ADD", sharp, _math(add, "SUBTRACT", values, blur.outputs["Value"]))
-    place = add("ShaderNodeCombineXYZ")
-    link(sharp, place.inputs["X"])
-    graph = add("GeometryNodeSetPosition")
-    link(geometry, graph.inputs["Geometry"])
-    link(place.outputs["Vector"], graph.inputs["Position"])
-    smooth, even = add("GeometryNodeSubdivisionSurface"), add("GeometryNodeSubdivideMesh")
-    link(graph.outputs["Geometry"], smooth.inputs["Mesh"])
-    link(geometry, even.inputs["Mesh"])
-    smooth.inputs["Level"].default_value = even.inputs["Level"].default_value = levels
-    at = add("GeometryNodeSampleIndex", data_type="FLOAT_VECTOR", domain="POINT")
-    link(smooth.outputs["Mesh"], at.inputs["Geometry"])
-    link(add("GeometryNodeInputPosition").outputs[0], at.inputs["Value"])
-    link(add("GeometryNodeInputIndex").outputs[0], at.inputs["Index"])
-    value = add("ShaderNodeSeparateXYZ")
-    link(at.outputs["Value"], value.inputs[0])
-    return even.outputs["Mesh"], value.outputs["X"]
+        blurred = {"Value": sharp, "Iterations": 1, "Weight": NEIGHBOUR_WEIGHT}
+        lost = _math(add, "SUBTRACT", values, _out(add, "GeometryNodeBlurAttribute", blurred, data_type="FLOAT"))
+        sharp = _math(add, "ADD", sharp, lost)
+    place = _out(add, "ShaderNodeCombineXYZ", {"X": sharp})
+    graph = _out(add, "GeometryNodeSetPosition", {"Geometry": geometry, "Position": place})
+    smooth = _out(add, "GeometryNodeSubdivisionSurface", {"Mesh": graph, "Level": levels})
+    even = _out(add, "GeometryNodeSubdivideMesh", {"Mesh": geometry, "Level": levels})
+    position, index = _out(add, "GeometryNodeInputPosition"), _out(add, "GeometryNodeInputIndex")
+    given = {"Geometry": smooth, "Value": position, "Index": index}
+    found = _out(add, "GeometryNodeSampleIndex", given, data_type="FLOAT_VECTOR", domain="POINT")
+    return even, _out(add, "ShaderNodeSeparateXYZ", {0: found})
 
 
 def _depth(add, names: _Names, play: _Play):
     """Return the socket of the depth at each texel, metres, between two frames in between."""
-    link = add.tree.links.new
-    clamp = add("ShaderNodeClamp")
-    clamp.inputs["Min"].default_value, clamp.inputs["Max"].default_value = play.first, play.last
-    link(add("GeometryNodeInputSceneTime").outputs["Frame"], clamp.inputs["Value"])
+    frame = _out(add, "GeometryNodeInputSceneTime", output="Frame")
+    frame = _out(add, "ShaderNodeClamp", {"Value": frame, "Min": play.first, "Max": play.last})
     rows = play.image.size[1]
-    row = add("ShaderNodeMapRange", clamp=True)
     last_row = play.first + play.step * (rows - 1)
     ends = {"From Min": play.first, "From Max": max(last_row, play.first + 1), "To Min": 0.5 / rows, "To Max": 1.0 - 0.5 / rows}
-    for socket, value in ends.items():
-        row.inputs[socket].default_value = value
-    link(clamp.outputs["Result"], row.inputs["Value"])
-    column = add("ShaderNodeSeparateXYZ")
-    link(_attribute(add, names.column, "FLOAT_VECTOR"), column.inputs[0])
-    where = add("ShaderNodeCombineXYZ")
-    link(column.outputs["X"], where.inputs["X"])
-    link(row.outputs["Result"], where.inputs["Y"])
-    texture = add("GeometryNodeImageTexture", interpolation="Linear", extension="EXTEND")
-    texture.inputs["Image"].default_value = play.image
-    link(where.outputs["Vector"], texture.inputs["Vector"])
-    chosen = add("ShaderNodeVectorMath", operation="DOT_PRODUCT")
-    link(texture.outputs["Color"], chosen.inputs[0])
-    link(_attribute(add, names.channel, "FLOAT_VECTOR"), chosen.inputs[1])
-    return chosen.outputs["Value"]
+    row = _out(add, "ShaderNodeMapRange", {"Value": frame, **ends}, clamp=True)
+    column = _out(add, "ShaderNodeSeparateXYZ", {0: _attribute(add, names.column)})
+    given = {"Image": play.image, "Vector": _out(add, "ShaderNodeCombineXYZ", {"X": column, "Y": row})}
+    color = _out(add, "GeometryNodeImageTexture", given, interpolation="Linear", extension="EXTEND")
+    chosen = {0: color, 1: _attribute(add, names.channel)}
+    return _out(add, "ShaderNodeVectorMath", chosen, output="Value", operation="DOT_PRODUCT")
+
+
+def _out(add, kind: str, given: dict | None = None, output: int | str = 0, **settings):
+    """Return an output of a new node; `given` are the sockets that lead to its inputs, or their values."""
+    node = add(kind, **settings)
+    for place, value in (given or {}).items():
+        if isinstance(value, bpy.types.NodeSocket):
+            add.tree.links.new(value, node.inputs[place])
+        else:
+            node.inputs[place].default_value = value
+    return node.outputs[output]
 
 
 def _math(add, operation: str, first, second):
-    """Return the socket of a calculation with a socket and a socket or number."""
-    node = add("ShaderNodeMath", operation=operation)
-    add.tree.links.new(first, node.inputs[0])
-    if isinstance(second, float):
-        node.inputs[1].default_value = second
-    else:
-        add.tree.links.new(second, node.inputs[1])
-    return node.outputs[0]
+    return _out(add, "ShaderNodeMath", {0: first, 1: second}, operation=operation)
 
 
-def _store(add, geometry, name: str, data_type: str, value):
+def _stored(add, geometry, name: str, value, data_type: str):
     """Return the socket of a geometry with an attribute on its points."""
-    node = add("GeometryNodeStoreNamedAttribute", data_type=data_type, domain="POINT")
-    node.inputs["Name"].default_value = name
-    add.tree.links.new(geometry, node.inputs["Geometry"])
-    add.tree.links.new(value, node.inputs["Value"])
-    return node.outputs["Geometry"]
+    given = {"Geometry": geometry, "Name": name, "Value": value}
+    return _out(add, "GeometryNodeStoreNamedAttribute", given, data_type=data_type, domain="POINT")
 
 
-def _attribute(add, name: str, data_type: str):
+def _attribute(add, name: str, data_type: str = "FLOAT_VECTOR"):
     """Return the socket of a named attribute."""
-    node = add("GeometryNodeInputNamedAttribute", data_type=data_type)
-    node.inputs["Name"].default_value = name
-    return node.outputs["Attribute"]
+    return _out(add, "GeometryNodeInputNamedAttribute", {"Name": name}, data_type=data_type)
