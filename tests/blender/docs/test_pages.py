@@ -167,7 +167,7 @@ def python_blocks() -> list:
         for number, block in enumerate(blocks(page.read_text(encoding="utf-8"), "python")):
             # test_tutorial.py runs the block that needs Blender; tests/core/sweep reads a dataset by the libraries of its page
             if "bpy" not in block and page.stem != "dataset":
-                marks = LONG if "diagnose(" in block else ()
+                marks = LONG if re.search(r"\b(diagnose|find_gap|plan_experiment)\(", block) else ()
                 found.append(pytest.param(block, id=f"{page.stem}-{number}", marks=marks))
     return found
 

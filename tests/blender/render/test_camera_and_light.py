@@ -139,7 +139,13 @@ def test_a_pad_that_nothing_touches_takes_no_room(tmp_path):
 
 
 @pytest.mark.slow("two pictures by Cycles, at 4 samples")
-@pytest.mark.parametrize(("color", "background"), [(0.02, studio.LIGHT_BACKGROUND), (0.9, studio.DARK_BACKGROUND)])
+@pytest.mark.parametrize(
+    ("color", "background"),
+    [
+        (0.02, studio.LIGHT_BACKGROUND),
+        pytest.param(0.9, studio.DARK_BACKGROUND, marks=pytest.mark.long("two more pictures by Cycles")),
+    ],
+)
 def test_the_subject_stands_out_from_the_background(tmp_path, color, background):
     """The scene's own lamp is far too bright and its world green; with own light both count."""
     from matplotlib.image import imread

@@ -54,8 +54,13 @@ def loaded_pixels(scene, pad):
     return loaded, SIZE[1] - 1 - rows, columns, weights
 
 
-@pytest.mark.slow("a picture by Cycles for each kind of material")
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind",
+    [
+        pytest.param(kind, marks=(pytest.mark.slow, pytest.mark.long)[i > 0]("a picture by Cycles for each kind of material"))
+        for i, kind in enumerate(KINDS)
+    ],
+)
 def test_loaded_texels_are_seen_through_what_presses_on_them(baked, tmp_path, kind):
     """The picture there is that of a scene without the target; at the target's top it is that of a scene with it."""
     scene, pad, target, _ = baked

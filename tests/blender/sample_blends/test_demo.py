@@ -106,7 +106,7 @@ def test_the_demo_s_scene_shows_its_bake(tmp_path):
     assert all(image.filepath.startswith("//palpate-bake") for image in images)
 
 
-@pytest.mark.slow("a picture by Cycles of the demo itself")
+@pytest.mark.long("a picture by Cycles of the demo itself")
 def test_demo_renders_heat_map_and_arrow(tmp_path):
     from matplotlib.image import imread
 

@@ -88,7 +88,7 @@ def test_colours_of_the_strip_are_the_forces(tmp_path):
     assert (np.abs(pixels - expected).max(axis=1) < 0.01).sum() > 1000
 
 
-@pytest.mark.slow("draws every kind of figure at every width")
+@pytest.mark.long("draws every kind of figure at every width")
 def test_no_text_is_smaller_than_eight_points_or_leaves_the_figure(tmp_path, monkeypatch):
     from matplotlib.image import imsave
 
