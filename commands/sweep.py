@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -48,12 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     where.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help="use a running Dask scheduler, as tcp://HOST:8786; all machines need the folder, unless --own-disks is given",
-    )
-    parser.add_argument(
-        "--own-disks",
-        action="store_true",
-        help="with --scheduler or --slurm: workers do not see the folder; they get a copy of the study, and runs come back",
+        help="use a running Dask scheduler, as tcp://HOST:8786; all machines need the folder under the same path",
     )
     parser.add_argument(
         "--format",
@@ -67,8 +61,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--part",
         metavar="I/N",
         type=_part,
-        help="compute each N-th run only, beginning with the I-th, for farms without a scheduler; give the command without "
-        "--part at the end, which makes the dataset",
+        help="compute the I-th of N parts of the runs only, for farms without a scheduler; give the command without --part at "
+        "the end, which makes the dataset",
     )
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--begin", action="store_true", help="read the scenes and freeze the study, and compute no run yet")
@@ -87,26 +81,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     from ..api.study import require_studies
 
-    began = time.perf_counter()
     require_studies()
     from ..sweep import studies
 
     place = Path(arguments.study)
     folder = studies.output_folder(place, arguments.out)
     if arguments.status:
-        from ..sweep.status import status_of
-
-        print(status_of(folder))
+        print(studies.status_of(folder))
         return 0
-    from ..core.study.run_files import STUDY_NAME
+    from ..core.study.progress import STUDY_NAME
     from ..sweep import driver, exports, study_folder
 
     driver.require_dask()
     exports.require_packages(arguments.format)
-    if arguments.own_disks and not (arguments.scheduler or arguments.slurm):
-        raise PalpateError(
-            "--own-disks is for workers of other machines: give --scheduler or --slurm with it, or leave it out."
-        )
     if arguments.part is not None:
         if not place.is_dir() or arguments.begin or arguments.dry_run or arguments.list:
             raise PalpateError("--part computes runs of a study that has begun: give its folder, and --begin before that.")
@@ -122,7 +109,7 @@ def run(arguments: argparse.Namespace) -> int:
                 print(f"{counted(len(opened.runs), 'run')} begun: {opened.folder}")
                 return 0
             if arguments.dry_run:
-                return _estimate(opened, arguments, time.perf_counter() - began)
+                return _estimate(opened, arguments)
             return _compute(opened, arguments)
         finally:
             if arguments.dry_run and not was_begun:
@@ -184,11 +171,10 @@ def _slurm(arguments: argparse.Namespace) -> Callable[[], Any] | None:
     return None if arguments.slurm is None else lambda: slurm.slurm_cluster(options, arguments.slurm)
 
 
-def _estimate(opened: OpenStudy, arguments: argparse.Namespace, opening: float) -> int:
-    """Print what a study takes; it took `opening` seconds to read it."""
+def _estimate(opened: OpenStudy, arguments: argparse.Namespace) -> int:
+    """Print what a study takes."""
     from ..sweep.program import require_allowed
     from ..sweep.trial import try_runs
-    from ..sweep.worker import Limits
 
     require_allowed(opened.study, arguments.scripts)
     print(_kind_of_runs(opened))
@@ -197,9 +183,8 @@ def _estimate(opened: OpenStudy, arguments: argparse.Namespace, opening: float) 
 
         print(slurm.job_script(slurm.options_of(arguments.slurm_option)))
     workers = _workers(arguments)
-    own = None if arguments.slurm or arguments.scheduler else workers
-    found = try_runs(opened.folder, opened.runs, Limits.of(opened.study), arguments.scripts, own)
-    seconds = opening + found.seconds_of(len(opened.runs), workers)
+    found = try_runs(opened, arguments.scripts)
+    seconds = found.seconds_of(len(opened.runs), workers)
     print(f"{counted(len(opened.runs), 'run')}, {found.seconds:.3g} s and {_size(found.size)} each")
     size = _size(found.size * len(opened.runs))
     print(f"about {_duration(seconds)} with {counted(workers, 'worker')}, {size} in '{opened.folder}'")
@@ -236,7 +221,6 @@ def _duration(seconds: float) -> str:
 
 def _compute(opened: OpenStudy, arguments: argparse.Namespace) -> int:
     from ..sweep import studies
-    from ..sweep.status import status_of
 
     how = studies.Computing(
         workers=arguments.workers,
@@ -245,7 +229,6 @@ def _compute(opened: OpenStudy, arguments: argparse.Namespace) -> int:
         scripts=arguments.scripts,
         part=arguments.part or (1, 1),
         retry_failed=arguments.retry_failed,
-        own_disks=arguments.own_disks,
     )
     with console.shown_progress("sweep", "run") as show:
         failures = studies.compute_runs(opened, how, show)
@@ -255,11 +238,11 @@ def _compute(opened: OpenStudy, arguments: argparse.Namespace) -> int:
         with console.Interrupt.raised_at_once():  # all of these files are written whole or not at all
             found, written = studies.write_results(opened, arguments.format)
     else:
-        found, written = status_of(opened.folder), []
+        found, written = studies.status_of(opened.folder), []
     print(found)
     print(f"results: {opened.folder}")
     for path in written:
         print(f"export: {path}")
     if found.failed:
-        print(f"why runs failed: {opened.folder / 'failed'}; --retry-failed computes them again")
+        print(f"why runs failed: {opened.folder / 'runs.parquet'}, column message; --retry-failed computes them again")
     return 0

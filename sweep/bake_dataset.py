@@ -10,11 +10,9 @@ from ..core.export.exporter import Exporter, sensor_progress
 from ..core.figures.figure_style import FigureStyle
 from ..core.io.bake_reader import Bake
 from ..core.jobs.progress import Job
-from ..core.study.run_record import RunRecord
-from .dataset import require_pyarrow
-from .encoded_run import encode_run
 from .features import bake_frames
-from .lerobot_writer import LeRobotWriter
+from .lerobot import LeRobotWriter
+from .parts import require_pyarrow
 
 FOLDER = "lerobot"
 
@@ -24,17 +22,16 @@ def write_lerobot(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Pat
     require_pyarrow()
     first = next(iter(bake.texels))
     yield sensor_progress(bake, first)
-    frames = encode_run(bake_frames(bake))
-    scene = bake.manifests[first].scene_file
-    writer = LeRobotWriter(folder / FOLDER, frames.layout, Path(scene).stem if scene else "bake")
+    frames, scene = bake_frames(bake), bake.manifests[first].scene_file
     try:
-        writer.add(RunRecord(folder, bake.recording.digest, 0, sensors=tuple(bake.texels)), frames)
-        writer.finish()
-    except BaseException as error:
-        writer.abandon()
-        if isinstance(error, OSError):
-            raise FileError(f"'{folder}' could not be written ({os_error_reason(error)}): free some space there.") from error
-        raise
+        writer = LeRobotWriter(folder / FOLDER, frames.layout, Path(scene).stem if scene else "bake")
+        try:
+            writer.add(0, bake.recording.digest, {}, frames.columns)
+            writer.finish()
+        finally:
+            writer.close()
+    except OSError as error:
+        raise FileError(f"'{folder}' could not be written ({os_error_reason(error)}): free some space there.") from error
     return sorted(path for path in (folder / FOLDER).rglob("*") if path.is_file())
 
 

@@ -1,60 +1,66 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From the folder of runs to ``dataset/`` and ``runs.parquet``, both whole or not at all.
+"""From the parts of a study to ``runs.parquet``, ``timings.csv`` and ``dataset/``.
 
-Runs are taken in the order of the design, so that equal runs give equal bytes, in whatever order they finished.
+Runs are taken in the order of the design, so that equal runs give equal bytes, whichever were computed together.
 """
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from ..core.errors import FileError, os_error_reason
-from ..core.io.hidden_folder import remove_abandoned, temporary_folder
-from ..core.study.run_files import STUDY_NAME
-from ..core.study.study_file import Run, read_study
-from .exchange import exchange_folder, require_own
-from .finished_runs import RunOrder, StoredRuns, failures, run_order, study_name
-from .lerobot_writer import LeRobotWriter
-from .run_table import write_run_table
+from ..core.io.file_writing import atomic_write
+from ..core.io.temporary_folder import temporary_folder
+from ..core.study.study_file import Study
+from .lerobot import LeRobotWriter
+from .parts import COMPRESSION, FINISHED, Parts, frames_in
 
-DATASET_FOLDER = "dataset"
+if TYPE_CHECKING:
+    import pyarrow
+
+DATASET_FOLDER, TABLE_NAME, TIMINGS_NAME = "dataset", "runs.parquet", "timings.csv"
 DATASET_FILES = re.compile(r"(part-\d{3,}/)?(README\.md|data/chunk-\d{3,}/file-\d{3,}\.parquet|meta/.+\.(parquet|json))")
 """Names of the files of a dataset; no other file is removed with an earlier one."""
-
-MOST_FILES = 5000
+MOST_FILES = 4000
 """Files of frames that a dataset is to have at most; where 100 MB each were more, they are larger."""
+ROWS_OF_GROUP = 10_000
+UNNAMED_STUDY = "study of a tactile sensor"
+"""Name of a study whose file gives none. The name of its folder does not serve, so that equal studies give equal files."""
 
 
-def publish(folder: Path, planned: Sequence[Run] = ()) -> None:
-    """Make ``dataset/``, ``runs.parquet`` and ``timings.csv`` from the runs of a study.
+def publish(folder: Path, study: Study) -> None:
+    """Make table and dataset of the runs that are done and failed.
 
-    The dataset is written into a hidden folder and renamed into its place last; that of before is removed then. Runs whose
-    sensors or rates differ cannot share the columns of one dataset: each kind becomes one, ``dataset/part-000`` and so on.
-    The runs of a program have no sensors, and it becomes no dataset.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the study.
-    planned : sequence of Run
-        All runs of the study, which tell what varied in those that failed.
+    The dataset is written into a hidden folder and renamed into its place last. Runs whose sensors or rates differ cannot
+    share the columns of one dataset: each kind becomes one, ``dataset/part-000`` and so on. A job has no dataset.
 
     Raises
     ------
     FileError
-        There is no study, a run is damaged, pyarrow is not installed, or something cannot be written.
+        A part is damaged, pyarrow is not installed, or something cannot be written.
     """
-    require_pyarrow()
-    remove_abandoned(folder)
+    parts = Parts(folder)
     require_own(folder / DATASET_FOLDER, DATASET_FILES)
-    order = run_order(folder, planned)
     try:
-        write_run_table(folder, order, failures(folder, planned))
-        with temporary_folder(folder, "dataset") as hidden:
-            new = None if read_study(folder / STUDY_NAME).is_job else _write_parts(folder, order, hidden)
-            exchange_folder(new, folder / DATASET_FOLDER, hidden / "before", DATASET_FILES)
+        with temporary_folder(folder, "dataset") as hidden, ExitStack() as files:
+            table = _RunTable(parts, files.enter_context(atomic_write(folder / TABLE_NAME)), files)
+            timings = files.enter_context(open(files.enter_context(atomic_write(folder / TIMINGS_NAME)), "w", encoding="utf-8"))
+            timings.write("run,digest,seconds\n")
+            datasets = _Datasets(parts, hidden / "parts", study.name or UNNAMED_STUDY, files)
+            for piece in parts.pieces():
+                table.add(piece)
+                datasets.add(piece)
+                for row in piece.select(["run", "digest", "status", "seconds"]).to_pylist():
+                    if row["status"] == FINISHED:
+                        timings.write(f"{row['run']},{row['digest']},{row['seconds']:.6g}\n")
+            table.flush()
+            exchange_folder(datasets.finish(), folder / DATASET_FOLDER, hidden / "before", DATASET_FILES)
     except OSError as error:
         raise FileError(
             f"The dataset in '{folder}' could not be written ({os_error_reason(error)}): free some space or check its "
@@ -62,37 +68,117 @@ def publish(folder: Path, planned: Sequence[Run] = ()) -> None:
         ) from error
 
 
-def require_pyarrow() -> None:
-    """Raise FileError where the package pyarrow, which writes the files of a dataset, is not installed."""
-    try:
-        import pyarrow  # noqa: F401
-    except ImportError as error:
-        raise FileError(
-            "Datasets need the package pyarrow: run \"pip install '.[sweep]'\" in a checkout of Palpate."
-        ) from error
+class _RunTable:
+    """Writes the columns of parts that say something of runs as a whole, but for their times."""
+
+    def __init__(self, parts: Parts, path: Path, files: ExitStack):
+        import pyarrow
+        from pyarrow import parquet
+
+        self._schema = pyarrow.schema([item for item in parts.run_schema if item.name != "seconds"])
+        self._writer = files.enter_context(parquet.ParquetWriter(path, self._schema, **COMPRESSION))
+        self._waiting: list[pyarrow.Table] = []
+
+    def add(self, piece: pyarrow.Table) -> None:
+        """Add runs."""
+        import pyarrow
+
+        known = set(piece.column_names)
+        columns = [piece[f.name] if f.name in known else pyarrow.nulls(len(piece), f.type) for f in self._schema]
+        self._waiting.append(pyarrow.table(columns, schema=self._schema))
+        if sum(map(len, self._waiting)) >= ROWS_OF_GROUP:
+            self.flush(is_end=False)
+
+    def flush(self, is_end: bool = True) -> None:
+        """Write the runs that wait, in groups of equal size; a rest that is smaller waits for the end."""
+        import pyarrow
+
+        if not self._waiting:
+            return
+        table = pyarrow.concat_tables(self._waiting).combine_chunks()
+        size = len(table) if is_end else len(table) // ROWS_OF_GROUP * ROWS_OF_GROUP
+        self._writer.write_table(table.slice(0, size), row_group_size=ROWS_OF_GROUP)
+        self._waiting = [table.slice(size)]
 
 
-def _write_parts(folder: Path, order: RunOrder, hidden: Path) -> Path | None:
-    """Write all runs and return the folder that is to become the dataset; None if there are no runs."""
-    task = study_name(folder)
-    parts = hidden / "parts"
-    writers: dict[str, LeRobotWriter] = {}
-    runs = StoredRuns(folder)
-    file_bytes = runs.bytes_in_shards // MOST_FILES
-    try:
-        for _, digest in order:
-            run, frames = runs.run(digest)
-            writer = writers.get(frames.layout.digest)
-            if writer is None:
-                writer = LeRobotWriter(parts / f"part-{len(writers):03d}", frames.layout, task, file_bytes)
-                writers[frames.layout.digest] = writer
-            writer.add(run, frames)
-        for writer in writers.values():
+class _Datasets:
+    """A dataset for each layout of the runs of a study."""
+
+    def __init__(self, parts: Parts, folder: Path, task: str, files: ExitStack):
+        self._parts, self._folder, self._task, self._files = parts, folder, task, files
+        size = sum(path.stat().st_size for path in parts.files)
+        self._file_bytes = size // MOST_FILES
+        self._varied = {f.name.removeprefix("varied."): "string" if str(f.type) == "string" else "float64"
+                        for f in parts.run_schema if f.name.startswith("varied.")}  # fmt: skip
+        self._writers: dict[str, LeRobotWriter] = {}
+
+    def add(self, piece: pyarrow.Table) -> None:
+        """Add the frames of runs, those that failed have none."""
+        layout = self._parts.layout(piece)
+        if layout is None:
+            return
+        writer = self._writers.get(layout.digest)
+        if writer is None:
+            place = self._folder / f"part-{len(self._writers):03d}"
+            writer = LeRobotWriter(place, layout, self._task, self._varied, self._file_bytes)
+            self._files.callback(writer.close)
+            self._writers[layout.digest] = writer
+        rows = piece.select(["run", "digest", *(f"varied.{name}" for name in self._varied)]).to_pylist()
+        lengths, columns = frames_in(piece, layout)
+        ends = np.cumsum(lengths)
+        for row, begin, end in zip(rows, ends - lengths, ends, strict=True):
+            if end > begin:
+                values = {name.replace("/", "_"): value for name, value in row.items()}
+                writer.add(row["run"], row["digest"], values, {name: column[begin:end] for name, column in columns.items()})
+
+    def finish(self) -> Path | None:
+        """Complete all and return the folder that is to become the dataset; None if no run has frames."""
+        for writer in self._writers.values():
             writer.finish()
-    except BaseException:
-        for writer in writers.values():
-            writer.abandon()
+        if len(self._writers) <= 1:
+            return self._folder / "part-000" if self._writers else None
+        return self._folder
+
+
+def require_own(target: Path, files: re.Pattern[str]) -> None:
+    """Raise FileError unless a folder may be replaced: it is missing, or holds only files of these names, relative to it."""
+    if not os.path.lexists(target):
+        return
+    if target.is_symlink() or not target.is_dir():
+        raise FileError(f"'{target}' is not a folder: move it away, `palpate sweep` writes a folder of this name.")
+    for path in sorted(target.rglob("*")):
+        if (path.is_symlink() or not path.is_dir()) and not files.fullmatch(path.relative_to(target).as_posix()):
+            raise FileError(f"'{path}' was not written by `palpate sweep`: move it away, the folder '{target}' is replaced.")
+
+
+def exchange_folder(new: Path | None, target: Path, before: Path, files: re.Pattern[str]) -> None:
+    """Put a folder in its place, or remove the one there. A kill between the two renames leaves none.
+
+    Parameters
+    ----------
+    new : Path or None
+        None: there is to be no folder.
+    target : Path
+    before : Path
+        Name in a temporary folder that takes the earlier folder.
+    files : compiled regular expression
+        Of the names that the earlier folder may hold.
+
+    Raises
+    ------
+    FileError
+        As :func:`require_own`.
+    OSError
+        It cannot be renamed; the earlier folder is in its place then.
+    """
+    require_own(target, files)
+    had_one = target.exists()
+    if had_one:
+        os.rename(target, before)
+    try:
+        if new is not None:
+            os.rename(new, target)
+    except OSError:
+        if had_one:
+            os.rename(before, target)
         raise
-    if len(writers) <= 1:
-        return parts / "part-000" if writers else None
-    return parts

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -53,7 +54,7 @@ class Dependency:
         return max(abs(self.rank_correlation or 0.0), self.information) if self.probability < DETECTED else 0.0
 
 
-def dependencies(values: Mapping[str, Sequence[object]], metrics: Mapping[str, np.ndarray]) -> list[Dependency]:
+def dependencies(values: Mapping[str, Sequence[Any] | np.ndarray], metrics: Mapping[str, np.ndarray]) -> list[Dependency]:
     """Return the dependencies of all metrics on all parameters, the strongest first.
 
     Parameters
@@ -64,35 +65,29 @@ def dependencies(values: Mapping[str, Sequence[object]], metrics: Mapping[str, n
         NaN for a run in which the metric has no value.
     """
     found = []
-    for parameter, column in values.items():
+    for parameter, given in values.items():
+        is_choice = any(isinstance(value, str) for value in given)
+        column = np.asarray(given, object if is_choice else float)
+        has_value = np.array([value is not None for value in column]) if is_choice else np.isfinite(column)
         for metric, numbers in metrics.items():
-            known = np.isfinite(numbers) & np.array([value is not None for value in column], bool)
-            own = [value for value, is_known in zip(column, known) if is_known]
-            if len(own) >= LEAST_RUNS and _is_repeated(own) and len(set(own)) > 1 and np.ptp(numbers[known]) > 0:
-                found.append(_dependency(parameter, metric, own, numbers[known]))
+            known = np.isfinite(numbers) & has_value
+            kinds = len(set(column[known]))
+            is_repeated = not is_choice or RUNS_PER_NAME * kinds <= known.sum()  # else names come too seldom for a test
+            if known.sum() >= LEAST_RUNS and is_repeated and kinds > 1 and np.ptp(numbers[known]) > 0:
+                found.append(_dependency(parameter, metric, column[known], numbers[known]))
     return sorted(found, key=lambda one: (-one.strength, one.probability, one.metric, one.parameter))
 
 
-def _is_repeated(own: Sequence[object]) -> bool:
-    """Return False for names that come too seldom for a test."""
-    return not _are_names(own) or RUNS_PER_NAME * len(set(own)) <= len(own)
-
-
-def _are_names(own: Sequence[object]) -> bool:
-    return any(isinstance(value, str) for value in own)
-
-
-def _dependency(parameter: str, metric: str, own: list[object], numbers: np.ndarray) -> Dependency:
+def _dependency(parameter: str, metric: str, column: np.ndarray, numbers: np.ndarray) -> Dependency:
     from scipy.stats import chi2_contingency, spearmanr
 
-    is_text = _are_names(own)
-    cells = len(own) / RUNS_PER_CELL
-    bins = int(np.clip(cells / len(set(own)) if is_text else np.sqrt(cells), 2, MOST_BINS))
+    is_choice, count = column.dtype == object, len(column)
+    cells = count / RUNS_PER_CELL
+    bins = int(np.clip(cells / len(set(column)) if is_choice else np.sqrt(cells), 2, MOST_BINS))
     correlation, probability = None, 1.0
-    if is_text:
-        _, place = np.unique([str(value) for value in own], return_inverse=True)
+    if is_choice:
+        _, place = np.unique(column.astype(str), return_inverse=True)
     else:
-        column = np.array(own, dtype=float)
         place = _equal_bins(column, bins)
         ranked = spearmanr(column, numbers)
         correlation, probability = float(ranked.statistic), float(ranked.pvalue)
@@ -102,10 +97,10 @@ def _dependency(parameter: str, metric: str, own: list[object], numbers: np.ndar
     information = 0.0
     if min(table.shape) > 1:
         test = chi2_contingency(table, correction=False, lambda_="log-likelihood")
-        excess = max(0.0, (float(test.statistic) - float(test.dof)) / (2 * len(own)))  # nats
+        excess = max(0.0, (float(test.statistic) - float(test.dof)) / (2 * count))  # nats
         information = float(np.sqrt(1.0 - np.exp(-2.0 * excess)))
         probability = min(probability, float(test.pvalue))
-    return Dependency(parameter, metric, correlation, information, min(1.0, probability * (1 if is_text else 2)), len(own))
+    return Dependency(parameter, metric, correlation, information, min(1.0, probability * (1 if is_choice else 2)), count)
 
 
 def _equal_bins(numbers: np.ndarray, bins: int) -> np.ndarray:

@@ -1,74 +1,51 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Gives the runs of a study to Dask workers, in batches that last about two seconds, and counts what comes back."""
+"""Gives the runs of a study to Dask workers in batches, and counts what comes back."""
 
 from __future__ import annotations
 
 import logging
 import os
+import signal
 import tempfile
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, field
-from pathlib import Path
 from typing import Any
 
-from ..core.errors import FileError, PalpateError
-from ..core.study.study_file import Run
-from . import local_worker
-from .child import DONE, FAILED, UNWRITABLE
-from .scene_evaluation import REFUSE
-from .worker import Limits, compute_batch
+import numpy as np
 
-BATCH_SECONDS = 2.0
-"""Length of a batch: long beside the milliseconds that Dask needs for a task, short for who waits for Ctrl-C."""
-FIRST_BATCH, LARGEST_BATCH = 1, 500
-"""Runs of the first batches, as nobody knows how long they take, and the most of any."""
-BATCHES_AHEAD = 2
-"""Batches that wait at each worker, so that it is never idle."""
-MOST_LOSSES = 20
-"""How often a batch may be lost with its worker before the study stops; a run itself cannot end a worker."""
-LOOK = 0.2
+from ..core.errors import PalpateError
+from .parts import RunResult, write_part
+from .scene_evaluation import REFUSE
+from .study_folder import OpenStudy
+from .worker import BatchResult, compute_batch
+
+BATCH_SECONDS = 5.0
+"""Length of a batch. Dask, the part and its name take some 20 ms; a worker that is lost loses no more than a batch."""
+MOST_PARTS = 5000
+"""Parts that all runs of a study make: of a million runs, 200 at least are in a batch."""
+BATCHES_EACH = 4
+"""Batches of a short study for each worker, so that all end at about the same time."""
+RETRIES = 2
+"""How often Dask repeats a batch whose files could not be written."""
+MOST_FAILURES = 100
+"""Failed runs whose sentences the driver keeps."""
+LOOK = 0.1
 """Seconds between two looks at the keyboard."""
 
-
-@dataclass
-class Tally:
-    """What has become of the runs of a study so far.
-
-    Attributes
-    ----------
-    done, failed : int
-    seconds : float
-        Of computing, in the processes.
-    failures : list of (int, str)
-        Indices of the first failed runs and their sentences.
-    """
-
-    done: int = 0
-    failed: int = 0
-    seconds: float = 0.0
-    failures: list[tuple[int, str]] = field(default_factory=list)
-
-    @property
-    def finished(self) -> int:
-        """Runs that are done or failed."""
-        return self.done + self.failed
-
-
-@dataclass(frozen=True)
-class Way:
-    """How batches go to workers and come back.
-
-    Attributes
-    ----------
-    task : callable
-        Returns a function and its arguments for the fields of the runs of a batch.
-    answers : callable
-        Returns what became of these runs from the result of the task.
-    """
-
-    task: Callable[[list[dict[str, Any]]], tuple[Any, ...]]
-    answers: Callable[[Any], list[dict[str, Any]]]
+SETTINGS = {
+    "distributed.logging.distributed": "critical",
+    "distributed.worker.profile.enabled": False,  # it would look a hundred times a second where a worker waits
+    "distributed.worker.memory.target": False,
+    "distributed.worker.memory.spill": False,
+    "distributed.worker.memory.pause": False,
+    "distributed.worker.memory.terminate": 1.0,  # of run_memory, where there is one
+    # Values that the C library of Linux comes to by itself. With Dask's 64 kB a run of 1,024 texels and 2,000 frames took 445
+    # ms of a processor instead of 187, since every large array was new pages.
+    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 64 << 20,
+    "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 32 << 20,
+    "distributed.nanny.pre-spawn-environ.NUMBA_NUM_THREADS": 1,
+}
 
 
 def require_dask() -> None:
@@ -81,8 +58,15 @@ def require_dask() -> None:
         ) from error
 
 
+def dask_setup(_worker: Any) -> None:
+    """Leave Ctrl-C to the driver, which stops the workers; called by each worker of this machine when it starts."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
 @contextmanager
-def dask_client(scheduler: str | None, workers: int, make_cluster: Callable[[], Any] | None = None) -> Iterator[Any]:
+def dask_client(
+    scheduler: str | None, workers: int, make_cluster: Callable[[], Any] | None = None, memory: float | None = None
+) -> Iterator[Any]:
     """Connect to a scheduler, or start workers on this machine, and yield the client.
 
     Parameters
@@ -93,6 +77,8 @@ def dask_client(scheduler: str | None, workers: int, make_cluster: Callable[[], 
         Of the local cluster, one thread each.
     make_cluster : callable, optional
         Returns another cluster than that of this machine, as :func:`.slurm.slurm_cluster` does.
+    memory : float, optional
+        MB that a worker of the local cluster may hold, before Dask's nanny ends it.
 
     Raises
     ------
@@ -103,15 +89,10 @@ def dask_client(scheduler: str | None, workers: int, make_cluster: Callable[[], 
     import dask
     from distributed import Client, LocalCluster
 
-    own = [name for name in logging.root.manager.loggerDict if name.startswith("distributed.")]  # some have levels of their own
-    for name in ("distributed", "asyncio", "tornado", *own):
+    known = [name for name in logging.root.manager.loggerDict if name.startswith("distributed.")]  # some have their own levels
+    for name in ("distributed", "asyncio", "tornado", *known):
         logging.getLogger(name).setLevel(logging.CRITICAL)
-    settings = {
-        "distributed.scheduler.allowed-failures": MOST_LOSSES,
-        "distributed.logging.distributed": "critical",
-        "distributed.worker.profile.enabled": False,  # it would look a hundred times a second where a worker waits
-    }
-    with dask.config.set(settings), tempfile.TemporaryDirectory(prefix="palpate-dask-") as scratch:
+    with dask.config.set(SETTINGS), tempfile.TemporaryDirectory(prefix="palpate-dask-") as scratch:
         if scheduler is not None:
             try:
                 client = Client(scheduler, timeout=10)
@@ -122,22 +103,17 @@ def dask_client(scheduler: str | None, workers: int, make_cluster: Callable[[], 
             with _closing(client):
                 yield client
             return
-        if make_cluster is not None:
-            cluster = make_cluster()
-            with _closing(cluster, timeout=30), _closing(Client(cluster)) as client:
-                yield client
-            return
         try:
-            cluster = LocalCluster(
+            cluster = make_cluster() if make_cluster is not None else LocalCluster(
                 n_workers=workers,
                 threads_per_worker=1,
                 processes=True,
                 dashboard_address="127.0.0.1:0",  # any free port: two studies on one machine would both take 8787
-                memory_limit=0,  # the runs are computed in processes of their own
+                memory_limit=0 if memory is None else int(memory * 1e6),
                 local_directory=scratch,
                 silence_logs=logging.CRITICAL,
-                preload=[local_worker.__name__],
-            )
+                preload=[__name__],
+            )  # fmt: skip
         except (OSError, RuntimeError, TimeoutError) as error:  # Dask wraps what happened in a RuntimeError
             raise PalpateError(
                 f"The {workers} worker processes did not start ({error}): look whether something ends processes on this "
@@ -156,133 +132,121 @@ def _closing(resource: Any, **words: Any) -> Iterator[Any]:
             resource.close(**words)
 
 
-def run_study(
-    client: Any,
-    folder: Path,
-    runs: Sequence[Run],
-    limits: Limits,
-    on_progress: Callable[[Tally], object],
-    scripts: str = REFUSE,
-    way: Way | None = None,
-) -> Tally:
-    """Compute runs and return what became of them.
+def batches_of(indices: np.ndarray, total: int, seconds: float, workers: int) -> list[list[int]]:
+    """Return runs in batches of neighbours.
+
+    Parameters
+    ----------
+    indices : (n,) int
+        Of the runs.
+    total : int
+        Runs of the whole study.
+    seconds : float
+        That a run takes.
+    workers : int
+    """
+    size = min(BATCH_SECONDS / max(seconds, 1e-6), len(indices) / (BATCHES_EACH * workers))
+    size = max(1, round(size), -(-total // MOST_PARTS))
+    return [indices[at : at + size].tolist() for at in range(0, len(indices), size)]
+
+
+class Dispatch:
+    """Batches of a study at Dask workers.
+
+    A batch that takes its worker down is halved until the run is alone that does it. Such runs come last, one after the
+    other: if a worker is lost then, the run is the reason, and it has failed.
 
     Parameters
     ----------
     client : distributed.Client
-    folder : Path
-        Of the study, under the same path on all machines unless they have disks of their own.
-    runs : sequence of Run
-        Those that are not done.
-    limits : Limits
-        What a run may take.
-    on_progress : callable
-        Called several times a second. An exception that it raises, KeyboardInterrupt included, stops the study.
+    opened : OpenStudy
     scripts : str
-        What is done about the Python in a .blend, one of :data:`.scene_evaluation.SCRIPTS`.
-    way : Way, optional
-        Of batches to the workers and back, where these do not see the folder.
-
-    Raises
-    ------
-    FileError
-        Files cannot be written. What is done is kept.
-    PalpateError
-        Workers are lost again and again.
-    """
-    if way is None:
-        way = Way(lambda batch: (compute_batch, os.fspath(folder), batch, limits, scripts), list)
-    return _Dispatch(client, runs, way).run(on_progress)
-
-
-class _Dispatch:
-    """Batches at the workers and those to come.
-
-    Parameters
-    ----------
-    client : distributed.Client
-    runs : sequence of Run
-    way : Way
+        What is done about the Python in a .blend and a job.
+    on_progress : callable
+        Called several times a second with what is over. An exception that it raises, KeyboardInterrupt included, stops the
+        study; what is done is kept.
     """
 
-    def __init__(self, client: Any, runs: Sequence[Run], way: Way):
-        self.client, self.runs, self.way = client, runs, way
-        self.index_of = {run.digest: run.index for run in runs}
-        self.next = 0
-        self.batch = FIRST_BATCH
-        self.waiting: dict[Any, tuple[Sequence[Run], int]] = {}
-        self.tally = Tally()
+    def __init__(self, client: Any, opened: OpenStudy, scripts: str, on_progress: Callable[[BatchResult], object]):
+        self.client, self.opened, self.on_progress = client, opened, on_progress
+        self.words = {"folder": os.fspath(opened.folder), "scripts": scripts, "limit": opened.study.run_limit}
+        self.over = BatchResult()
+        self.suspects: list[int] = []
 
-    def run(self, on_progress: Callable[[Tally], object]) -> Tally:
-        from concurrent.futures import CancelledError
+    def run(self, indices: np.ndarray) -> BatchResult:
+        """Compute runs and return what became of them.
 
-        from distributed.comm import CommClosedError
+        Raises
+        ------
+        FileError
+            Files cannot be written.
+        PalpateError
+            The scheduler is lost.
+        """
+        workers = max(1, len(self.client.scheduler_info(n_workers=-1)["workers"]))
+        first, rest = indices[:workers], indices[workers:]
+        self._compute([[index] for index in first.tolist()])  # nobody knows how long a run takes before
+        seconds = self.over.seconds / max(1, self.over.finished)
+        self._compute(batches_of(rest, len(self.opened.runs), seconds, workers))
+        for index in self.suspects:
+            self._compute([[index]], is_last=True)
+        return self.over
 
+    def _compute(self, batches: Sequence[Sequence[int]], is_last: bool = False) -> None:
+        from distributed import as_completed
+
+        futures = self.client.map(compute_batch, batches, **self.words, pure=False, retries=RETRIES)
+        waiting = dict(zip(futures, batches, strict=True))
+        completed = as_completed(futures)
         try:
-            self._until_done(on_progress)
-            return self.tally
-        except (CommClosedError, CancelledError, RuntimeError) as error:
-            if isinstance(error, RuntimeError) and self.client.status == "running":  # a fault, not a lost connection
-                raise
-            raise _scheduler_gone() from error
+            while completed.count() or not completed.is_empty():
+                self.on_progress(self.over)
+                if self.client.status != "running":
+                    raise _scheduler_gone()
+                time.sleep(LOOK)
+                for future in completed.next_batch(block=False):
+                    halves = self._take(future, waiting.pop(future), is_last)
+                    more = self.client.map(compute_batch, halves, **self.words, pure=False, retries=RETRIES)
+                    waiting |= dict(zip(more, halves, strict=True))
+                    completed.update(more)
+            self.on_progress(self.over)
         finally:
             with suppress(Exception):  # the scheduler may be gone
-                self.client.cancel(list(self.waiting), force=True)
+                self.client.cancel(list(waiting), force=True)
 
-    def _until_done(self, on_progress: Callable[[Tally], object]) -> None:
-        from distributed import wait
-
-        while self.next < len(self.runs) or self.waiting:
-            if self.client.status != "running":
-                raise _scheduler_gone()
-            self._submit()
-            on_progress(self.tally)
-            with suppress(TimeoutError):
-                for future in wait(list(self.waiting), timeout=LOOK, return_when="FIRST_COMPLETED").done:
-                    self._take(future)
-        on_progress(self.tally)
-
-    def _submit(self) -> None:
-        workers = max(1, len(self.client.scheduler_info(n_workers=-1)["workers"]))
-        while self.next < len(self.runs) and len(self.waiting) < (1 + BATCHES_AHEAD) * workers:
-            left = len(self.runs) - self.next
-            size = max(1, min(self.batch, LARGEST_BATCH, left // ((1 + BATCHES_AHEAD) * workers)))
-            self._send(self.runs[self.next : self.next + size], 0)
-            self.next += size
-
-    def _send(self, runs: Sequence[Run], losses: int) -> None:
-        future = self.client.submit(*self.way.task([asdict(run) for run in runs]), pure=False)
-        self.waiting[future] = runs, losses
-
-    def _take(self, future: Any) -> None:
+    def _take(self, future: Any, batch: Sequence[int], is_last: bool) -> list[Sequence[int]]:
+        """Note what became of a batch; return the halves of one that took its worker down."""
         from distributed.scheduler import KilledWorker
 
-        runs, losses = self.waiting.pop(future)
-        if future.status != "finished":
-            error = future.exception() if future.status == "error" else None
-            if error is not None and not isinstance(error, KilledWorker):
-                raise error
-            if losses + 1 >= MOST_LOSSES:
-                raise PalpateError(
-                    f"Workers were lost {MOST_LOSSES} times with run {runs[0].index}: look at their logs, and give the same "
-                    "command again."
-                )
-            self._send(runs, losses + 1)
-            return
-        answers = self.way.answers(future.result())
-        for answer in answers:
-            if answer["status"] == UNWRITABLE:
-                raise FileError(answer["sentence"])
-            self.tally.seconds += answer["seconds"]
-            if answer["status"] == DONE:
-                self.tally.done += 1
-            elif answer["status"] == FAILED:
-                self.tally.failed += 1
-                if len(self.tally.failures) < 100:
-                    self.tally.failures.append((self.index_of[answer["digest"]], answer["sentence"]))
-        spent = sum(answer["seconds"] for answer in answers)
-        if spent > 0.0:
-            self.batch = max(1, round(BATCH_SECONDS * len(answers) / spent))
+        if future.status == "finished":
+            found = future.result()
+            self.over.done += found.done
+            self.over.seconds += found.seconds
+            self._note_failed(found.failed, found.failures)
+            return []
+        error = future.exception() if future.status == "error" else None
+        if error is None:  # cancelled, as all batches are when the scheduler ends
+            raise _scheduler_gone()
+        if not isinstance(error, KilledWorker):
+            raise error
+        if len(batch) > 1:
+            return [batch[: len(batch) // 2], batch[len(batch) // 2 :]]
+        if not is_last:
+            self.suspects.append(batch[0])
+            return []
+        self._note_fatal(batch[0])
+        return []
+
+    def _note_fatal(self, index: int) -> None:
+        memory = self.opened.study.run_memory
+        advice = f"raise run_memory, {memory:g} MB" if memory else "it may need more memory"
+        sentence = f"Run {index} ended its worker each time that it was computed: {advice}, or vary less widely."
+        write_part(self.opened.folder, [RunResult(self.opened.runs[index], sentence)])
+        self._note_failed(1, [(index, sentence)])
+
+    def _note_failed(self, count: int, failures: list[tuple[int, str]]) -> None:
+        self.over.failed += count
+        self.over.failures += failures[: MOST_FAILURES - len(self.over.failures)]
 
 
 def _scheduler_gone() -> PalpateError:
@@ -290,3 +254,19 @@ def _scheduler_gone() -> PalpateError:
         "The connection to the Dask scheduler is lost: start it again if it has ended, and give the same command again; what "
         "is done is kept."
     )
+
+
+def run_study(
+    client: Any, opened: OpenStudy, indices: np.ndarray, on_progress: Callable[[BatchResult], object], scripts: str = REFUSE
+) -> BatchResult:
+    """Compute runs of a study; parameters and errors as of :class:`Dispatch`."""
+    from concurrent.futures import CancelledError
+
+    from distributed.comm import CommClosedError
+
+    try:
+        return Dispatch(client, opened, scripts, on_progress).run(indices)
+    except (CommClosedError, CancelledError, RuntimeError) as error:
+        if isinstance(error, RuntimeError) and client.status == "running":  # a fault, not a lost connection
+            raise
+        raise _scheduler_gone() from error

@@ -19,9 +19,9 @@ import numpy as np
 
 from ..core.errors import FileError, os_error_reason
 from ..core.io.file_writing import atomic_write
-from ..core.io.hidden_folder import temporary_folder
-from .dataset import DATASET_FOLDER, require_pyarrow
-from .exchange import exchange_folder
+from ..core.io.temporary_folder import temporary_folder
+from .dataset import DATASET_FOLDER, exchange_folder
+from .parts import require_pyarrow
 
 EPISODE_COLUMNS = ("run", "length", "dataset_from_index", "dataset_to_index", "digest")
 ZARR_FILES = re.compile(r"(.+/)?(\.z(group|attrs|array|metadata)|[0-9.]+)")

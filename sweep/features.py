@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a dataset says of each frame: names, shapes and units, and the numbers themselves, taken from a run's recordings.
+"""What a dataset says of each frame: names, shapes and units, and the numbers themselves, taken from a run's recording.
 
 A sensor whose texels form a grid gives pictures, row 0 at the bottom and column 0 at the left as in its tactile images. Any
 other gives lists in the order of its texels, whose places are in ``meta/texels.parquet``.
@@ -7,37 +7,34 @@ other gives lists in the order of its texels, whose places are in ``meta/texels.
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from ..core.errors import FileError
+from ..core.errors import FileError, PalpateError
 from ..core.geometry.layout.grid_layout import GridLayout
 from ..core.geometry.texels import Texels
-from ..core.io.bake_folder import MANIFEST_NAME, RECORDING_NAME, folder_names, read_manifest
-from ..core.io.bake_reader import Bake, checked_parameters
-from ..core.io.input_files import read_bytes
-from ..core.io.npz import DAMAGED
-from ..core.io.recording_npz import load_recording
-from ..core.io.sensor_npz import SENSOR_NAME, load_sensor, unpack_sensor
+from ..core.io.bake_folder import folder_names
+from ..core.io.bake_reader import Bake
+from ..core.io.file_writing import atomic_write
+from ..core.io.sensor_npz import load_sensor, save_sensor
 from ..core.model.digest import digest_of
 from ..core.model.recording import Recording, SensorRecording
 from ..core.model.scenario import Scenario
 from ..core.model.sensor_parameters import Painted, SensorParameters
 from ..core.model.shared_results import SharedResults
 from ..core.response import metrics
-from ..core.study.run_record import RunRecord, values_read
 from ..core.study.study_file import Study
 
 POSE_AXES = ("x", "y", "z", "qw", "qx", "qy", "qz")
 CHANNELS = ("normal_force", "shear_x", "shear_y")
 AXES = ("x", "y", "z")
-VARIED = "varied."
+FEATURES_NAME = "features.json"
 
 
 @dataclass(frozen=True)
@@ -69,10 +66,10 @@ class Feature:
     about: str
     channels: tuple[str, ...] = ()
 
-    @property
-    def is_constant(self) -> bool:
-        """True for what is the same in all frames of a run."""
-        return self.name.startswith(VARIED)
+
+def _feature_of(row: dict[str, Any]) -> Feature:
+    """Return the feature that a row of JSON describes."""
+    return Feature(**{key: tuple(value) if isinstance(value, list) else value for key, value in row.items()})
 
 
 TIMESTAMP = Feature("timestamp", "float32", (1,), (), "s", "Time since the first frame.")
@@ -106,24 +103,13 @@ HALF_ERROR = "Rounded to 16 bits: a relative error of 2^-11 at most, and 3e-8 ab
 
 
 @dataclass(frozen=True)
-class SensorRun:
-    """One sensor in one run; without a manifest its parameters are not known."""
-
-    texels: Texels
-    painted: Painted
-    recording: Recording
-    arrays: SensorRecording
-    parameters: SensorParameters | None
-    unit: str
-
-
-@dataclass(frozen=True)
 class Layout:
-    """What the frames of all runs in one dataset have in common.
+    """What the frames of many runs have in common.
 
     Attributes
     ----------
     features : tuple of Feature
+        Time, and what changes from frame to frame.
     fps : float
     texels : dict of str to Texels
         By sensor.
@@ -136,10 +122,28 @@ class Layout:
     texels: dict[str, Texels]
     digest: str
 
-    @cached_property
-    def frame_features(self) -> tuple[Feature, ...]:
-        """Time and features that change from frame to frame, in their order."""
-        return (TIMESTAMP, *(item for item in self.features if not item.is_constant))
+    def save(self, folder: Path) -> None:
+        """Write it into a folder of its own in `folder`, unless it is there; raise FileError if that is not possible."""
+        own = folder / self.digest
+        if (own / FEATURES_NAME).exists():
+            return
+        own.mkdir(parents=True, exist_ok=True)
+        for name, texels in self.texels.items():
+            save_sensor(own / f"{name}.npz", texels)
+        content = {"fps": self.fps, "sensors": list(self.texels), "features": [asdict(item) for item in self.features]}
+        with atomic_write(own / FEATURES_NAME) as fresh:  # last: it says that all is there
+            fresh.write_text(json.dumps(content), encoding="utf-8")
+
+    @classmethod
+    def load(cls, folder: Path, digest: str) -> Layout:
+        """Return the layout that :meth:`save` wrote; raise FileError where it is missing or damaged."""
+        path = folder / digest / FEATURES_NAME
+        try:
+            content = json.loads(path.read_text(encoding="utf-8"))
+            features, fps, names = tuple(map(_feature_of, content["features"])), content["fps"], content["sensors"]
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise FileError(f"'{path}' is missing or damaged ({error}): give another folder with --out.") from error
+        return cls(features, fps, {name: load_sensor(folder / digest / f"{name}.npz")[0] for name in names}, digest)
 
 
 @dataclass(frozen=True)
@@ -150,135 +154,61 @@ class RunFrames:
     ----------
     layout : Layout
     columns : dict of str to (F, …) ndarray
-        By the names of the layout's `frame_features`.
+        By the names of the layout's features.
     """
 
     layout: Layout
     columns: dict[str, np.ndarray]
 
-    @property
-    def rows(self) -> int:
-        """Number of frames."""
-        return len(self.columns[TIMESTAMP.name])
 
+@dataclass(frozen=True)
+class _SensorRun:
+    """One sensor in one run."""
 
-def read_frames(run: RunRecord, shared: SharedResults | None = None, style: FrameStyle = PLAIN_STYLE) -> RunFrames:
-    """Read the recordings of a run.
-
-    Parameters
-    ----------
-    run : RunRecord
-    shared : SharedResults, optional
-        Of the runs that are read one after the other.
-    style : FrameStyle
-
-    Raises
-    ------
-    FileError
-        A file of it is missing or damaged, or holds a number that 32 bits cannot.
-    """
-    shared = shared or SharedResults()
-    # The names of their folders are unique and have no slash, which LeRobot does not allow in names.
-    sensors = {own: _read_sensor(run.folder / own, shared) for own in folder_names(run.sensors).values()}
-    if not sensors:
-        raise FileError(f"The run '{run.folder}' has no sensor: delete the folder and run the sweep again.")
-    too_large = f"the run '{run.folder}' is too large: delete the run and sweep again."
-    return _frames(shared, sensors, run.values, too_large, style)
+    texels: Texels
+    painted: Painted
+    arrays: SensorRecording
+    parameters: SensorParameters
 
 
 def solved_frames(
-    scenario: Scenario,
-    recording: Recording,
-    numbers: RunRecord,
-    shared: SharedResults,
-    style: FrameStyle = PLAIN_STYLE,
+    scenario: Scenario, recording: Recording, shared: SharedResults, style: FrameStyle = PLAIN_STYLE
 ) -> RunFrames:
-    """Return the frames of a run as it was solved.
-
-    Raises
-    ------
-    PalpateError
-        A number of it is too large for the bits that it gets.
-    """
-    names = folder_names(recording.sensors)
+    """Return the frames of a run as it was solved; raise :class:`PalpateError` for a number that its bits cannot hold."""
+    names = folder_names(recording.sensors)  # unique and without a slash, which LeRobot does not allow in names
     sensors = {
-        names[own.name]: SensorRun(
-            own.texels, own.painted, recording, recording.sensors[own.name], own.parameters, own.parameters.unit
-        )
+        names[own.name]: _SensorRun(own.texels, own.painted, recording.sensors[own.name], own.parameters)
         for own in scenario.sensors
         if own.readout
     }
-    advice = "leave half_precision out" if style.dtype == "float16" else "vary less widely"
-    return _frames(shared, sensors, values_read(numbers.values), f"run {numbers.index} is too large: {advice}.", style)
+    return _frames(shared, recording, sensors, style)
 
 
 def bake_frames(bake: Bake) -> RunFrames:
-    """Return the frames of a bake, as of a run of which nothing was varied.
-
-    Raises
-    ------
-    FileError
-        A number of it is too large for 32 bits.
-    """
+    """Return the frames of a bake; raise :class:`PalpateError` for a number that 32 bits cannot hold."""
     names = folder_names(bake.texels)
     sensors = {
-        names[name]: SensorRun(
-            texels,
-            bake.painted[name],
-            bake.recording,
-            bake.recording.sensors[name],
-            bake.parameters[name],
-            bake.parameters[name].unit,
-        )
+        names[name]: _SensorRun(texels, bake.painted[name], bake.recording.sensors[name], bake.parameters[name])
         for name, texels in bake.texels.items()
     }
-    return _frames(SharedResults(), sensors, {}, "the bake is too large: export it as HDF5 or NPZ.", PLAIN_STYLE)
+    return _frames(SharedResults(), bake.recording, sensors, PLAIN_STYLE)
 
 
-def _frames(
-    shared: SharedResults, sensors: dict[str, SensorRun], varied: Mapping[str, Any], too_large: str, style: FrameStyle
-) -> RunFrames:
-    """Return the frames of some sensors of one run; `too_large` ends the sentence about a number that its bits cannot hold."""
-    first = next(iter(sensors.values())).recording
-    features: list[Feature] = []
-    columns = {TIMESTAMP.name: (first.times - first.times[0]).astype(TIMESTAMP.dtype)}
+def _frames(shared: SharedResults, recording: Recording, sensors: dict[str, _SensorRun], style: FrameStyle) -> RunFrames:
+    features, columns = [TIMESTAMP], {TIMESTAMP.name: (recording.times - recording.times[0]).astype(TIMESTAMP.dtype)}
     with np.errstate(over="ignore"):  # what is too large is looked for where all is narrow
-        for feature, values in _all_features(first, sensors, style):
+        for feature, values in _all_features(recording, sensors, style):
             features.append(feature)
-            columns[feature.name] = _narrowed(too_large, feature, values)
-    features += [_varied_feature(name, value) for name, value in varied.items()]
-    fps = _frame_rate(first.times)
-    texels = {name: sensor.texels for name, sensor in sensors.items()}
-    digest = _layout_digest(tuple(features), fps, tuple(texels), tuple(shared.of(digest_of, own) for own in texels.values()))
+            columns[feature.name] = _narrowed(feature, values)
+    fps, texels = _frame_rate(recording.times), {name: sensor.texels for name, sensor in sensors.items()}
+    digests = tuple(shared.of(digest_of, own) for own in texels.values())
+    digest = _layout_digest(tuple(features), fps, tuple(texels), digests)
     return RunFrames(Layout(tuple(features), fps, texels, digest), columns)
 
 
 @lru_cache(maxsize=64)
 def _layout_digest(features: tuple[Feature, ...], fps: float, names: tuple[str, ...], texels: tuple[str, ...]) -> str:
-    return digest_of((features, fps, names, texels))
-
-
-def _read_sensor(folder: Path, shared: SharedResults) -> SensorRun:
-    recording = load_recording(folder / RECORDING_NAME)
-    texels, painted = _read_texels(folder / SENSOR_NAME, shared)
-    if len(recording.sensors) != 1 or len(recording.frames) == 0:
-        raise FileError(f"'{folder / RECORDING_NAME}' is not a recording of one sensor: delete the run and sweep again.")
-    (arrays,) = recording.sensors.values()
-    if arrays.normal_force.shape[1] != len(texels):
-        raise FileError(f"'{folder}' holds a recording and a sensor of different runs: delete the run and sweep again.")
-    parameters, unit = None, ""
-    if (folder / MANIFEST_NAME).is_file():
-        manifest = read_manifest(folder)
-        parameters, unit = checked_parameters(folder, manifest), manifest.unit
-    return SensorRun(texels, painted, recording, arrays, parameters, unit)
-
-
-def _read_texels(path: Path, shared: SharedResults) -> tuple[Texels, Painted]:
-    """Return what ``sensor.npz`` says; runs whose files are equal get the same objects."""
-    try:
-        return shared.of(unpack_sensor, read_bytes(path))
-    except (OSError, *DAMAGED):
-        return load_sensor(path)  # it says what is wrong
+    return digest_of((features, fps, names, texels))[:24]
 
 
 def _frame_rate(times: np.ndarray) -> float:
@@ -287,22 +217,26 @@ def _frame_rate(times: np.ndarray) -> float:
     return float(f"{(len(times) - 1) / span:.9g}") if len(times) > 1 and span > 0 else 1.0
 
 
-def _narrowed(too_large: str, feature: Feature, values: np.ndarray) -> np.ndarray:
+def _narrowed(feature: Feature, values: np.ndarray) -> np.ndarray:
     """Return the values in the type that the dataset stores."""
     narrow = np.ascontiguousarray(values, dtype=feature.dtype)
     if feature.dtype != "bool" and narrow.size and not math.isfinite(float(narrow.max()) - float(narrow.min())):
         bits = feature.dtype.removeprefix("float")
-        raise FileError(f"A number of '{feature.name}' has no place in {bits} bits, {too_large}")
+        advice = "leave half_precision out" if bits == "16" else "make what is simulated smaller"
+        raise PalpateError(f"A number of '{feature.name}' is too large for {bits} bits: {advice}.")
     return narrow
 
 
 def _all_features(
-    recording: Recording, sensors: dict[str, SensorRun], style: FrameStyle
+    recording: Recording, sensors: dict[str, _SensorRun], style: FrameStyle
 ) -> Iterator[tuple[Feature, np.ndarray]]:
     for name, sensor in sensors.items():
         yield from _texel_features(name, sensor, style)
         yield from _net_features(name, sensor.arrays)
-    yield from _pose_features(recording)
+    count = len(recording.body_names)  # poses of all bodies as one list, which is how LeRobot keeps the state of a robot
+    names = tuple(f"{body}.{axis}" for body in recording.body_names for axis in POSE_AXES)
+    about = "Poses of the bodies in the world: position, m, and quaternion."
+    yield Feature("observation.state", "float32", (7 * count,), names, "m, 1", about), recording.poses.reshape(-1, 7 * count)
 
 
 def tactile_name(sensor: str) -> str:
@@ -323,17 +257,13 @@ def by_texel(values: np.ndarray, texels: Texels) -> np.ndarray:
     return values[:, texels.layout.row, texels.layout.column]
 
 
-def varied_name(name: str) -> str:
+def varied_feature(name: str, dtype: str) -> Feature:
     """Return the column of what was varied; LeRobot allows no slash."""
-    return f"{VARIED}{name.replace('/', '_')}"
-
-
-def _varied_feature(name: str, value: Any) -> Feature:
     about = "Varied properties; the same in all frames of a run."
-    return Feature(varied_name(name), "string" if isinstance(value, str) else "float64", (1,), (), "", about)
+    return Feature(f"varied.{name.replace('/', '_')}", dtype, (1,), (), "", about)
 
 
-def _texel_features(name: str, sensor: SensorRun, style: FrameStyle) -> Iterator[tuple[Feature, np.ndarray]]:
+def _texel_features(name: str, sensor: _SensorRun, style: FrameStyle) -> Iterator[tuple[Feature, np.ndarray]]:
     """Yield what is recorded of each texel: forces, readings, and the truth about contact."""
     texels, arrays = sensor.texels, sensor.arrays
     layout = None if style.points or not isinstance(texels.layout, GridLayout) else texels.layout
@@ -343,7 +273,7 @@ def _texel_features(name: str, sensor: SensorRun, style: FrameStyle) -> Iterator
     def placed(dtype: str, *channels: np.ndarray) -> np.ndarray:
         """Return numbers of the texels, (F, n) each, where the dataset has them: one number, or a list of them, per place."""
         picture = np.zeros((len(channels[0]), math.prod(shape), len(channels)), dtype)
-        places = slice(None) if layout is None else _places(layout)
+        places = slice(None) if layout is None else layout.row * layout.columns + layout.column
         for number, values in enumerate(channels):
             picture[:, places, number] = values
         return picture.reshape(-1, *shape, *(len(channels),) * (len(channels) > 1))
@@ -354,19 +284,12 @@ def _texel_features(name: str, sensor: SensorRun, style: FrameStyle) -> Iterator
     yield image, placed(style.dtype, arrays.normal_force, arrays.shear[:, :, 0], arrays.shear[:, :, 1])
     about = f"Readings of the texels, in the sensor's unit.{error}"
     readings = placed(style.dtype, arrays.reading)
-    yield Feature(f"observation.reading.{name}", style.dtype, shape, names, sensor.unit, about), readings
+    yield Feature(f"observation.reading.{name}", style.dtype, shape, names, sensor.parameters.unit, about), readings
     touch = placed("bool", arrays.contact)
     yield Feature(f"contact.touch.{name}", "bool", shape, names, "1", "Which texels touch something."), touch
-    if sensor.parameters is not None:
-        slips = placed("bool", metrics.slipping(arrays, sensor.parameters, sensor.painted))
-        about = "Which texels touch, move, and are at the limit of friction."
-        yield Feature(f"contact.slip.{name}", "bool", shape, names, "1", about), slips
-
-
-def _places(layout: GridLayout) -> slice | np.ndarray:
-    """Return where the texels are among the pixels, row by row; a slice where each pixel is the texel of its number."""
-    places = layout.row * layout.columns + layout.column
-    return slice(None) if np.array_equal(places, np.arange(layout.rows * layout.columns)) else places
+    slips = placed("bool", metrics.slipping(arrays, sensor.parameters, sensor.painted))
+    about = "Which texels touch, move, and are at the limit of friction."
+    yield Feature(f"contact.slip.{name}", "bool", shape, names, "1", about), slips
 
 
 def _net_features(name: str, arrays: SensorRecording) -> Iterator[tuple[Feature, np.ndarray]]:
@@ -380,11 +303,3 @@ def _net_features(name: str, arrays: SensorRecording) -> Iterator[tuple[Feature,
 
 def _vector(name: str, unit: str, about: str) -> Feature:
     return Feature(name, "float32", (3,), AXES, unit, about)
-
-
-def _pose_features(recording: Recording) -> Iterator[tuple[Feature, np.ndarray]]:
-    """Yield the poses of all bodies as one list, which is how LeRobot keeps the state of a robot."""
-    count = len(recording.body_names)
-    names = tuple(f"{body}.{axis}" for body in recording.body_names for axis in POSE_AXES)
-    about = "Poses of the bodies in the world: position, m, and quaternion."
-    yield Feature("observation.state", "float32", (7 * count,), names, "m, 1", about), recording.poses.reshape(-1, 7 * count)

@@ -23,8 +23,6 @@ MOST_PARAMETERS, MOST_METRICS = 6, 6
 """Columns and rows of the small multiples."""
 MOST_NAMES = 12
 """Names of a choice that have room below one column."""
-MOST_LETTERS = 14
-"""Letters that have room below one column: of all names in a row, or of each upright. The end of a longer one tells more."""
 MOST_POINTS = 2000
 """Runs that are drawn as points; of more, as many are chosen evenly."""
 MEDIAN_BINS, LEAST_PER_BIN = 10, 4
@@ -43,7 +41,7 @@ class RunImage:
 
 
 def draw_small_multiples(
-    path: Path, values: Mapping[str, Sequence[object]], metrics: Mapping[str, np.ndarray], strong: set[tuple[str, str]]
+    path: Path, values: Mapping[str, Sequence[Any]], metrics: Mapping[str, np.ndarray], strong: set[tuple[str, str]]
 ) -> None:
     """Draw each metric over each parameter: a point for each run, and the median where there are enough of them.
 
@@ -56,95 +54,55 @@ def draw_small_multiples(
     strong : set of (parameter, metric)
         Pairs whose median is drawn in colour, because a dependency was detected.
     """
-    columns, rows = len(values), len(metrics)
-    has_names = any(isinstance(value, str) for own in values.values() for value in own)
-    cell_width, cell_height, left, below = 1.75, 1.3, 0.85, 1.25 if has_names else 0.55
-    width, height = left + cell_width * columns + 0.1, below + cell_height * rows + 0.1
-    figure = new_figure(width, height)
+    figure = new_figure(1.2 + 1.75 * len(values), 0.8 + 1.3 * len(metrics))
+    figure.set_layout_engine("constrained")
+    grid = figure.subplots(len(metrics), len(values), sharex="col", sharey="row", squeeze=False)
     for column, (parameter, own) in enumerate(values.items()):
         for row, (metric, numbers) in enumerate(metrics.items()):
-            x, y = left + cell_width * column, height - 0.1 - cell_height * (row + 1)
-            place = (x / width, (y + 0.12) / height, (cell_width - 0.25) / width, (cell_height - 0.22) / height)
-            axes = figure.add_axes(place)
+            axes = grid[row, column]
             tidy_axes(axes)
-            _draw_cell(axes, own, numbers, SHEAR_COLOUR if (parameter, metric) in strong else GREY)
-            _few_ticks(axes, own)
+            axes.locator_params(axis="y", nbins=3)
+            known = np.flatnonzero(np.isfinite(numbers) & np.array([value is not None for value in own], bool))
+            colour = SHEAR_COLOUR if (parameter, metric) in strong else GREY
+            if len(known) and any(isinstance(value, str) for value in own):
+                _draw_choices(axes, np.array(own, object)[known], numbers[known], colour)
+            elif len(known):
+                _draw_numbers(axes, np.array(own, object)[known].astype(float), numbers[known], colour)
             if column == 0:
                 axes.set_ylabel(_wrapped(metric), fontsize=FONT, color=INK)
-            else:
-                axes.tick_params(labelleft=False)
-            if row == rows - 1:
+            if row == len(metrics) - 1:
                 axes.set_xlabel(_wrapped(parameter), fontsize=FONT, color=INK)
-            else:
-                axes.tick_params(labelbottom=False)
     save_figure(figure, path, DPI)
 
 
 def _wrapped(name: str) -> str:
-    """Break a long name after a dot or an underscore."""
-    if len(name) <= 16:
-        return name
-    middle = len(name) // 2
-    cuts = [place + 1 for place, letter in enumerate(name[:-1]) if letter in "._ /"]
-    cut = min(cuts, key=lambda place: abs(place - middle), default=len(name))
+    """Break a long name after the dot or underscore that is nearest to its middle."""
+    cuts = [place + 1 for place, letter in enumerate(name[:-1]) if letter in "._ /"] if len(name) > 16 else []
+    cut = min(cuts, key=lambda place: abs(place - len(name) // 2), default=len(name))
     return f"{name[:cut]}\n{name[cut:]}"
 
 
-def _draw_cell(axes: Axes, own: Sequence[object], numbers: np.ndarray, colour: str) -> None:
-    known = np.isfinite(numbers) & np.array([value is not None for value in own], bool)
-    chosen = np.nonzero(known)[0]
-    if len(chosen) == 0:
-        return
-    if any(isinstance(value, str) for value in own):
-        _draw_choices(axes, own, numbers, chosen, colour)
-        return
-    column = np.array([value if isinstance(value, float | int) else np.nan for value in own], float)
-    if _is_logarithmic(column[chosen]):
+def _draw_numbers(axes: Axes, column: np.ndarray, numbers: np.ndarray, colour: str) -> None:
+    if column.min() > 0.0 and np.median(column) < 0.5 * (column.min() + column.max()) / 2:  # as of a log-uniform distribution
         axes.set_xscale("log")
-    few = chosen[np.linspace(0, len(chosen) - 1, min(len(chosen), MOST_POINTS)).round().astype(int)]
+    else:
+        axes.locator_params(axis="x", nbins=3)
+    few = np.linspace(0, len(column) - 1, min(len(column), MOST_POINTS)).round().astype(int)
     axes.plot(column[few], numbers[few], ".", ms=2.5 if len(few) > 200 else 4, color=NORMAL_COLOUR, alpha=0.45, mew=0)
-    parts = np.array_split(chosen[np.argsort(column[chosen], kind="stable")], MEDIAN_BINS)
+    parts = np.array_split(np.argsort(column, kind="stable"), MEDIAN_BINS)
     if min(map(len, parts)) >= LEAST_PER_BIN:
         x, y = [[float(np.median(of[part])) for part in parts] for of in (column, numbers)]
         axes.plot(x, y, "-", color=colour, lw=1.6)
 
 
-def _draw_choices(axes: Axes, own: Sequence[object], numbers: np.ndarray, chosen: np.ndarray, colour: str) -> None:
+def _draw_choices(axes: Axes, column: np.ndarray, numbers: np.ndarray, colour: str) -> None:
     """Draw a box for each name of a choice."""
-    names = sorted({str(own[i]) for i in chosen})
-    groups = [numbers[[i for i in chosen if str(own[i]) == name]] for name in names]
+    names = sorted(set(column))
+    groups = [numbers[column == name] for name in names]
     drawn = axes.boxplot(groups, widths=0.5, showfliers=False, medianprops={"color": colour, "lw": 1.6})
     for line in (*drawn["boxes"], *drawn["whiskers"], *drawn["caps"]):
         line.set(color=NORMAL_COLOUR, lw=0.8)
-    shown = [name if len(name) <= MOST_LETTERS else f"…{name[1 - MOST_LETTERS :]}" for name in names]
-    if len(set(shown)) < len(names):
-        shown = names
-    axes.set_xticks(range(1, len(names) + 1), shown, rotation=90 if len("".join(shown)) > MOST_LETTERS else 0)
-
-
-def _is_logarithmic(column: np.ndarray) -> bool:
-    """Return True if numbers are spread more evenly over their logarithms, as those of a log-uniform design are."""
-    if column.min() <= 0 or column.max() < 5 * column.min():
-        return False
-
-    def unevenness(of: np.ndarray) -> float:
-        even = np.linspace(of.min(), of.max(), len(of))
-        return float(np.abs(np.sort(of) - even).max() / np.ptp(of))
-
-    return unevenness(np.log(column)) < unevenness(column)
-
-
-def _few_ticks(axes: Axes, own: Sequence[object]) -> None:
-    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
-
-    axes.yaxis.set_major_locator(MaxNLocator(3))
-    if axes.get_xscale() == "log":
-        low, high = axes.get_xlim()
-        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 100 * low else (1.0,), numticks=5))
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axes.xaxis.set_minor_locator(NullLocator())
-    elif not any(isinstance(value, str) for value in own):
-        axes.xaxis.set_major_locator(MaxNLocator(3))
+    axes.set_xticks(range(1, len(names) + 1), names, rotation=90 if len("".join(names)) > 14 else 0)
 
 
 def draw_image_sheet(path: Path, images: Sequence[RunImage]) -> None:
@@ -163,20 +121,17 @@ def draw_image_sheet(path: Path, images: Sequence[RunImage]) -> None:
     views = [SensorView.of(image.texels, image.normal_force) for image in images]
     across = min(len(images), IMAGES_ACROSS)
     rows = -(-len(images) // across)
-    cell = 1.35
-    tall = float(np.clip(max(view.height / view.width for view in views) * cell, 0.5, 2.4))
-    width, height = max(across * cell, 3.4) + 0.9, rows * (tall + 0.3) + 0.1
-    figure = new_figure(width, height)
+    tall = float(np.clip(max(view.height / view.width for view in views) * 1.35, 0.5, 2.4))
+    figure = new_figure(max(across * 1.35, 3.4) + 0.9, rows * (tall + 0.3) + 0.1)
+    grid = figure.subplots(rows, across, squeeze=False)
     drawn: Any = None
-    for number, (image, view) in enumerate(zip(images, views, strict=True)):
-        row, column = divmod(number, across)
-        place = (column * cell + 0.08) / width, (height - (row + 1) * (tall + 0.3) + 0.02) / height
-        axes = figure.add_axes((*place, (cell - 0.16) / width, tall / height))
+    for axes in grid.flat[len(images) :]:
+        axes.set_axis_off()
+    for axes, image, view in zip(grid.flat, images, views, strict=False):
         drawn = view.at_size(tall / max(view.height, view.width)).draw(
             axes, image.normal_force, image.shear, shear, scale_limit(peak) if peak > 0 else 1.0, style
         )
         axes.set_title(image.label, fontsize=SMALL, color=INK, pad=2)
-    up = min(height - 0.3, 3.0)
-    bar = figure.add_axes(((width - 0.8) / width, (height - up) / 2 / height, 0.11 / width, up / height))
-    draw_colour_bar(figure, drawn, bar, style)
+    draw_colour_bar(figure, drawn, figure.add_axes((0.9, 0.25, 0.015, 0.5)), style)
+    figure.subplots_adjust(0.01, 0.01, 0.88, 1.0 - 0.2 / figure.get_figheight(), 0.1, 0.15)
     save_figure(figure, path, DPI)

@@ -18,8 +18,9 @@ from ..core.errors import SceneError
 from ..core.io.hidden_folder import temporary_folder
 from ..core.io.scenario_npz import load_scenario
 from ..core.model.scenario import Scenario
-from ..core.study.run_files import SCENES
+from ..core.study.progress import SCENES
 from ..core.study.scene_property import write_overrides
+from ..core.study.study_file import at_rate
 
 SCRIPTS = REFUSE, IGNORE, ALLOW = ("refuse", "ignore", "allow")
 """What is done about the Python in a .blend; the command line's --ignore-scripts and --allow-scripts."""
@@ -28,7 +29,7 @@ MOST_KEPT = 4
 _COMMANDS = f"{__package__.rpartition('.')[0]}.commands"
 
 
-def read_blend(blend: Path, target: Path, scripts: str, *more: str) -> None:
+def read_blend(blend: Path, target: Path, scripts: str, *more: str, limit: float | None = None) -> None:
     """Let a Blender write the scenario of a .blend.
 
     Parameters
@@ -39,20 +40,26 @@ def read_blend(blend: Path, target: Path, scripts: str, *more: str) -> None:
         One of :data:`SCRIPTS`.
     *more : str
         Further words for ``palpate bake``.
+    limit : float, optional
+        Seconds that this may take.
 
     Raises
     ------
     SceneError
-        The scene makes no run, or this Python has no Blender.
+        The scene makes no run, the limit is reached, or this Python has no Blender.
     """
     command = [sys.executable, "-P", "-m", _COMMANDS, "bake", str(blend), "--scenario", str(target), *more]
     command += [f"--{scripts}-scripts"] if scripts != REFUSE else []
-    finished = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace", check=False)
+    words: dict[str, Any] = {"stdin": subprocess.DEVNULL, "capture_output": True, "text": True, "errors": "replace"}
+    try:
+        finished = subprocess.run(command, **words, check=False, timeout=limit)
+    except subprocess.TimeoutExpired as error:
+        raise SceneError(f"Blender read '{blend.name}' for longer than the limit of {limit:g} s: raise run_limit.") from error
     if finished.returncode:
-        words = [line for line in finished.stderr.strip().splitlines() if line.strip()]
-        if finished.returncode < 0 or not words:
-            words = [f"Blender ended with status {finished.returncode} while it read '{blend.name}': open the file in Blender."]
-        raise SceneError(words[-1].removeprefix("palpate bake: "))
+        said = [line for line in finished.stderr.strip().splitlines() if line.strip()]
+        if finished.returncode < 0 or not said:
+            said = [f"Blender ended with status {finished.returncode} while it read '{blend.name}': open the file in Blender."]
+        raise SceneError(said[-1].removeprefix("palpate bake: "))
 
 
 class SceneReader:
@@ -70,8 +77,8 @@ class SceneReader:
         self._folder, self._scripts = folder, scripts
         self._kept: OrderedDict[str, Scenario] = OrderedDict()
 
-    def read(self, scene: str, values: Mapping[str, Any]) -> Scenario:
-        """Return the scenario of a scene with other values of its properties.
+    def read(self, scene: str, values: Mapping[str, Any], fps: float | None = None, limit: float | None = None) -> Scenario:
+        """Return the scenario of a scene with other values of its properties, at another frame rate if one is given.
 
         Raises
         ------
@@ -86,8 +93,8 @@ class SceneReader:
             with temporary_folder(scenes, "scene") as place:
                 overrides, target = place / "overrides.toml", place / "scene.npz"
                 write_overrides(overrides, values)
-                read_blend(scenes / f"{scene}.blend", target, self._scripts, "--overrides", str(overrides))
-                self._kept[key] = load_scenario(target)
+                read_blend(scenes / f"{scene}.blend", target, self._scripts, "--overrides", str(overrides), limit=limit)
+                self._kept[key] = at_rate(load_scenario(target), fps)
         self._kept.move_to_end(key)
         while len(self._kept) > MOST_KEPT:
             self._kept.popitem(last=False)

@@ -86,10 +86,7 @@ def _words(options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _job() -> Any:
-    """Return the class of a job in which Dask ends no worker for its memory.
-
-    The runs are computed in processes of their own, and SLURM watches over the job.
-    """
+    """Return the class of a job in which Dask ends no worker for its memory: SLURM watches over the job."""
     from dask_jobqueue.slurm import SLURMJob
 
     return type("Job", (SLURMJob,), {"worker_process_memory": 0})

@@ -5,24 +5,62 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..core.compiled.thread_team import count_of_cores
-from ..core.errors import PalpateError
+from ..core.errors import FileError, PalpateError
 from ..core.io.file_writing import writable_folder
-from ..core.io.hidden_folder import PRIVATE_FOLDER, FolderLock, is_private_folder
+from ..core.io.folder_lock import FolderLock
 from ..core.jobs.progress import Progress
-from ..core.study.run_files import done_runs, failed_runs, make_folders
-from ..core.study.study_file import Run
+from ..core.study.progress import STUDY_NAME
+from ..core.study.study_file import read_study
 from . import driver, study_folder
+from .parts import Parts, remove_unfinished_parts
 from .program import require_allowed
 from .scene_evaluation import REFUSE, read_blend
-from .status import Status, status_of
 from .study_folder import OpenStudy
-from .worker import Limits
+from .worker import BatchResult
+
+
+@dataclass(frozen=True)
+class Status:
+    """Counts of the runs of a study."""
+
+    total: int
+    done: int
+    failed: int
+
+    @property
+    def left(self) -> int:
+        """Runs that are neither done nor failed."""
+        return self.total - self.done - self.failed
+
+    def __str__(self) -> str:
+        return f"{self.total} runs: {self.done} done, {self.failed} failed, {self.left} left"
+
+
+def status_of(folder: Path) -> Status:
+    """Return how far the study in a folder is, from its files alone: no scheduler is asked, and the study may be running.
+
+    Raises
+    ------
+    FileError
+        There is no study in it.
+    """
+    if not (folder / STUDY_NAME).is_file():
+        raise FileError(f"There is no study in '{folder}': give the folder that a study was run in.")
+    study = read_study(folder / STUDY_NAME)
+    study_folder.frozen_entries(study, folder)
+    total = study.frozen.get("runs")
+    if not isinstance(total, int):
+        raise FileError(f"'{folder / STUDY_NAME}' is damaged: its table [frozen] does not say how many runs there are.")
+    parts = Parts(folder)
+    return Status(total, len(parts.done), len(parts.failed))
 
 
 @dataclass(frozen=True)
@@ -43,8 +81,6 @@ class Computing:
         Number and count: which of so many parts of the runs is computed.
     retry_failed : bool
         Compute failed runs again.
-    own_disks : bool
-        Whether workers do not see the study's folder, and runs come back from them.
     """
 
     workers: int | None = None
@@ -53,12 +89,11 @@ class Computing:
     scripts: str = REFUSE
     part: tuple[int, int] = (1, 1)
     retry_failed: bool = False
-    own_disks: bool = False
 
-    def runs_of(self, opened: OpenStudy) -> list[Run]:
-        """Return the runs of the part."""
+    def indices_of(self, runs: int) -> range:
+        """Return the indices of the part, of so many runs."""
         number, count = self.part
-        return [run for run in opened.runs if run.index % count == number - 1]
+        return range(runs * (number - 1) // count, runs * number // count)
 
 
 def output_folder(place: Path, out: Path | str | None) -> Path:
@@ -84,11 +119,9 @@ def locked_folder(place: Path, folder: Path) -> Iterator[None]:
 
 
 def _remove_unless_begun(folder: Path) -> None:
-    """Remove the folder that was made for a study which was then refused, if nothing but Palpate's own mark is in it."""
-    if [path.name for path in folder.iterdir()] == [PRIVATE_FOLDER] and is_private_folder(folder / PRIVATE_FOLDER):
-        shutil.rmtree(folder / PRIVATE_FOLDER, ignore_errors=True)
-        with suppress(OSError):
-            folder.rmdir()
+    """Remove the folder that was made for a study which was then refused, if nothing but its lock is in it."""
+    if [path.name for path in folder.iterdir()] == [".palpate"]:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def open_study(place: Path, folder: Path, scripts: str, check: Callable[[], object] = lambda: None) -> OpenStudy:
@@ -116,29 +149,21 @@ def compute_runs(opened: OpenStudy, how: Computing, show: Callable[[Progress], o
     show : callable
         Called with the progress, and may raise to stop; what is done is kept.
     """
-    make_folders(opened.folder)
-    runs = how.runs_of(opened)
-    over = done_runs(opened.folder) | (set() if how.retry_failed else failed_runs(opened.folder))
-    left = [run for run in runs if run.digest not in over]
-    if not left:
+    indices, parts = how.indices_of(len(opened.runs)), Parts(opened.folder)
+    over = parts.done if how.retry_failed else np.concatenate([parts.done, parts.failed])
+    left = np.setdiff1d(np.arange(indices.start, indices.stop), over)
+    if not len(left):
         return []
     require_allowed(opened.study, how.scripts)
 
-    def show_tally(tally: driver.Tally) -> None:
+    def show_tally(tally: BatchResult) -> None:
         stage = f"sweep, failed={tally.failed}" if tally.failed else "sweep"
-        show(Progress(stage, len(runs) - len(left) + tally.finished, len(runs)))
+        show(Progress(stage, len(indices) - len(left) + tally.finished, len(indices)))
 
-    show_tally(driver.Tally())
+    show_tally(BatchResult())
     workers = min(how.workers or count_of_cores(), len(left))
-    with driver.dask_client(how.scheduler, workers, how.make_cluster) as client:
-        limits = Limits.of(opened.study)
-        way = None
-        if how.own_disks:
-            from .own_disks import way_to
-
-            way = way_to(client, opened.folder, limits, how.scripts)
-        tally = driver.run_study(client, opened.folder, left, limits, show_tally, how.scripts, way)
-    return tally.failures
+    with driver.dask_client(how.scheduler, workers, how.make_cluster, opened.study.run_memory) as client:
+        return driver.run_study(client, opened, left, show_tally, how.scripts).failures
 
 
 def write_results(opened: OpenStudy, formats: Sequence[str] = ()) -> tuple[Status, list[Path]]:
@@ -150,9 +175,10 @@ def write_results(opened: OpenStudy, formats: Sequence[str] = ()) -> tuple[Statu
     from .exports import EXPORTS
     from .report import write_report
 
-    found, written = status_of(opened.folder), []
+    found, written = status_of(opened.folder), list[Path]()
+    remove_unfinished_parts(opened.folder)
     if found.done:
-        publish(opened.folder, opened.runs)
+        publish(opened.folder, opened.study)
         written = [path for kind in dict.fromkeys(formats) for path in EXPORTS[kind](opened.folder)]
-        write_report(opened.folder, opened.runs)
+        write_report(opened.folder, opened.study)
     return found, written

@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The output folder of a study as a driver opens it: frozen at the first command, compared at every later one."""
+"""The output folder of a study: frozen at the first command, compared at every later one.
+
+What the solver sees of a scene is in ``scenes/<scene>.npz``. Beside it are, where a study needs them, what the scene's
+properties are (``.json``), a copy of the scene to read with other values (``.blend``), the program of a study without a scene
+(``.py``), and the mesh files of targets (``meshes/``).
+"""
 
 from __future__ import annotations
 
@@ -14,22 +19,26 @@ from typing import Any
 
 from ..core.errors import FileError
 from ..core.io.bake_folder import folder_names
-from ..core.io.file_writing import atomic_write, file_sha256
+from ..core.io.file_writing import atomic_write, file_sha256, writable_folder
 from ..core.io.scenario_npz import load_scenario, save_scenario
 from ..core.model.scenario import Scenario
 from ..core.study.mesh_choices import MESHES, StudyMeshes, find_meshes, freeze_meshes
-from ..core.study.run_files import FAILED, RUNS, SCENES, STUDY_NAME, make_folders
-from ..core.study.study_file import Plan, Run, Study, differences, frozen_text, read_study, runs_of
+from ..core.study.progress import LAYOUTS, PARTS, RUNS, SCENES, STUDY_NAME
+from ..core.study.scene_property import read_properties
+from ..core.study.study_file import Plan, Runs, Study, differences, frozen_text, plan_for, plan_for_job, read_study
 from ..core.version import VERSION
 from . import program
+from .parts import FORMAT as PARTS_FORMAT
 from .scene_evaluation import REFUSE
-from .study_scenes import FROZEN_MESHES, frozen_meshes, plan_of
 
 BLEND, SCENARIO = ".blend", ".npz"
 ReadBlend = Callable[[Path, Path], None]
 """``read_blend(blend, scenario)`` writes what a .blend says to the solver into a file, and beside it what is
-needed to read the scene again where the study asks for that (:mod:`.study_scenes`)."""
-_OWN = {RUNS, FAILED, SCENES, STUDY_NAME, ".palpate"}
+needed to read the scene again where the study asks for that."""
+MADE = (PARTS, LAYOUTS, RUNS, SCENES)
+"""Folders of a study, beside its results."""
+FROZEN_MESHES = "meshes"
+"""Key of the meshes in the table [frozen]."""
 
 
 @dataclass(frozen=True)
@@ -42,13 +51,13 @@ class OpenStudy:
     study : Study
     plans : mapping of str to Plan
         By the names of the scenes.
-    runs : list of Run
+    runs : Runs
     """
 
     folder: Path
     study: Study
     plans: Mapping[str, Plan]
-    runs: list[Run]
+    runs: Runs
 
 
 def begin_study(file: Path, folder: Path, read_blend: ReadBlend, scripts: str = REFUSE) -> OpenStudy:
@@ -79,7 +88,7 @@ def begin_study(file: Path, folder: Path, read_blend: ReadBlend, scripts: str = 
         _check_sources(opened, sources, file.parent, read_blend)
         # No result depends on the limits.
         return replace(opened, study=replace(opened.study, run_limit=study.run_limit, run_memory=study.run_memory))
-    if folder.exists() and (not folder.is_dir() or {path.name for path in folder.iterdir()} - _OWN):
+    if folder.exists() and (not folder.is_dir() or {path.name for path in folder.iterdir()} - {*MADE, STUDY_NAME, ".palpate"}):
         raise FileError(f"'{folder}' holds other files and no study: give a new or empty folder with --out.")
     program.require_allowed(study, scripts)
     with _whole_or_nothing(folder):
@@ -89,15 +98,16 @@ def begin_study(file: Path, folder: Path, read_blend: ReadBlend, scripts: str = 
 def _frozen(study: Study, file: Path, folder: Path, sources: Mapping[str, Path], read_blend: ReadBlend) -> OpenStudy:
     """Freeze a study with its scenes and meshes in a folder; its own file comes last."""
     mesh_files = find_meshes(study.vary, file.parent)
-    make_folders(folder)
+    for name in (SCENES, PARTS):
+        writable_folder(folder / name, create=True)
     meshes = StudyMeshes(folder / SCENES / MESHES, freeze_meshes(mesh_files, folder / SCENES / MESHES))
     plans, entries = {}, []
     for name, source in sources.items():
         digest = _freeze_scene(source, folder / SCENES / name, read_blend)
         plans[name] = plan_of(study, folder, name, meshes)
         entries.append({"name": name, "file": source.name, "sha256": file_sha256(source), "digest": digest})
-    runs = runs_of(study, plans, _digests(plans, entries))
-    frozen: dict[str, Any] = {"version": VERSION, "runs": len(runs), "scenes": entries}
+    runs = Runs(study, plans, _digests(plans, entries))
+    frozen: dict[str, Any] = {"version": VERSION, "parts": PARTS_FORMAT, "runs": len(runs), "scenes": entries}
     if meshes:
         frozen[FROZEN_MESHES] = [{"file": name, "sha256": sha256} for name, sha256 in meshes.digests.items()]
     text = frozen_text(file.read_text(encoding="utf-8"), frozen)
@@ -109,7 +119,7 @@ def _frozen(study: Study, file: Path, folder: Path, sources: Mapping[str, Path],
 @contextmanager
 def _whole_or_nothing(folder: Path) -> Iterator[None]:
     """Remove what a beginning has written when it is refused: what was in the folder before stays."""
-    made = [folder / name for name in (RUNS, FAILED, SCENES) if not (folder / name).exists()]
+    made = [folder / name for name in MADE if not (folder / name).exists()]
     try:
         yield
     except BaseException:
@@ -121,7 +131,7 @@ def _whole_or_nothing(folder: Path) -> Iterator[None]:
 def forget_study(folder: Path) -> None:
     """Remove a study from its folder, as where it was only frozen for a trial; other files of the folder stay."""
     (folder / STUDY_NAME).unlink(missing_ok=True)  # first: without it the rest is no study
-    for name in (RUNS, FAILED, SCENES):
+    for name in MADE:
         shutil.rmtree(folder / name, ignore_errors=True)
 
 
@@ -176,6 +186,11 @@ def resume_study(folder: Path) -> OpenStudy:
         raise FileError(f"There is no study in '{folder}': give the file of a study, or the folder that it was run in.")
     study = read_study(folder / STUDY_NAME)
     version, entries = frozen_entries(study, folder)
+    if study.frozen.get("parts") != PARTS_FORMAT:
+        raise FileError(
+            f"The runs in '{folder}' are in files of an earlier version, Palpate {version}, which this one does not read: go "
+            "on with that one, or give another folder with --out."
+        )
     if version != VERSION:
         raise FileError(
             f"The study in '{folder}' was begun with Palpate {version}, and this is {VERSION}, which may compute other "
@@ -186,7 +201,30 @@ def resume_study(folder: Path) -> OpenStudy:
         if not _is_as_frozen(study, folder, entry):
             raise FileError(f"The scene '{entry['name']}' in '{folder}' is not the one that the study began with: start again.")
         plans[entry["name"]] = plan_of(study, folder, entry["name"], meshes)
-    return OpenStudy(folder, study, plans, runs_of(study, plans, _digests(plans, entries)))
+    return OpenStudy(folder, study, plans, Runs(study, plans, _digests(plans, entries)))
+
+
+def plan_of(study: Study, folder: Path, scene: str, meshes: StudyMeshes) -> Plan:
+    """Return what a study means on one of its scenes; raise PalpateError where a file is damaged or does not fit."""
+    if study.is_job:
+        return plan_for_job(study)
+    start = folder / SCENES / scene
+    properties = read_properties(_with(start, ".json"))
+    return plan_for(study, load_scenario(_with(start, SCENARIO)), properties, meshes)
+
+
+def frozen_meshes(study: Study, folder: Path) -> StudyMeshes:
+    """Return the meshes of a frozen study; raise :class:`FileError` where its file is damaged."""
+    entries = study.frozen.get(FROZEN_MESHES, [])
+    _check_entries(entries, ("file", "sha256"), folder)
+    return StudyMeshes(folder / SCENES / MESHES, entries)
+
+
+def _check_entries(entries: Any, words: tuple[str, ...], folder: Path) -> None:
+    if not isinstance(entries, list) or not all(
+        isinstance(entry, dict) and all(isinstance(entry.get(word), str) for word in words) for entry in entries
+    ):
+        raise FileError(f"'{folder / STUDY_NAME}' is damaged: its table [frozen] is cut; start again.")
 
 
 def _is_as_frozen(study: Study, folder: Path, entry: Mapping[str, str]) -> bool:
@@ -213,11 +251,9 @@ def _digests(plans: Mapping[str, Plan], entries: list[dict[str, Any]]) -> dict[s
 def frozen_entries(study: Study, folder: Path) -> tuple[str, list[dict[str, Any]]]:
     """Return version and scenes of a frozen study; raise :class:`FileError` when they are missing."""
     version, entries = study.frozen.get("version"), study.frozen.get("scenes")
-    words = ("name", "file", "sha256", "digest")
     if not isinstance(version, str) or not isinstance(entries, list) or not entries:
         raise FileError(f"'{folder / STUDY_NAME}' is not the study of an output folder: its table [frozen] is missing or cut.")
-    if not all(isinstance(entry, dict) and all(isinstance(entry.get(word), str) for word in words) for entry in entries):
-        raise FileError(f"'{folder / STUDY_NAME}' is damaged: a scene of its table [frozen] is cut; start again.")
+    _check_entries(entries, ("name", "file", "sha256", "digest"), folder)
     return version, entries
 
 

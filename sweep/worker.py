@@ -1,301 +1,273 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a Dask worker does: it passes runs to a process of its own and writes down which of them ended it.
-
-A process that dies or hangs is an ordinary failure here. If it took the worker with it, Dask would give up the whole
-batch after a few times.
-"""
+"""What a Dask worker does: it computes a batch of runs and writes them into a part."""
 
 from __future__ import annotations
 
-import atexit
-import json
+import errno
 import os
-import queue
-import signal
-import subprocess
-import sys
+import shutil
 import threading
 import time
-from collections.abc import Sequence
-from contextlib import suppress
-from dataclasses import dataclass
+import traceback
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import FileError, PalpateError
-from ..core.study.run_files import RUNS, run_batch, write_failure
-from ..core.study.run_record import RUN_NAME
-from ..core.study.run_shards import KnownRuns
-from ..core.study.study_file import Study
-from .child import DONE, FAILED, UNWRITABLE
-from .scene_evaluation import REFUSE
+from ..core.errors import FileError, PalpateError, os_error_reason
+from ..core.jobs.job_runner import run_job
+from ..core.model.recording import Recording
+from ..core.model.scenario import Scenario
+from ..core.model.shared_results import SharedResults
+from ..core.study.metrics import metrics_of
+from ..core.study.progress import RUNS, STUDY_NAME
+from ..core.study.run_folder import write_run_folder
+from ..core.study.scene_property import is_scene_property, scene_values
+from ..core.study.study_file import SCENE, Run
+from ..core.study.variation import PRESS, varied_scenario
+from .features import FrameStyle, solved_frames
+from .parts import RunResult, write_part
+from .program import Program, frozen_program, require_allowed
+from .scene_evaluation import REFUSE, SceneReader
+from .study_folder import OpenStudy, resume_study
 
-MOST_DEATHS = 3
-"""How often a process may die on a run before the run counts as failed: once may be an accident or an administrator."""
-START_LIMIT = 900.0
-"""Seconds that a process may take to start; the first one on a machine compiles the solver, about half a minute."""
-GROUP_SECONDS = 2.0
-"""After this time the runs that are written are brought onto the disk. A power cut loses no more; one wait for the disk, some
-milliseconds, is little beside it."""
-LOOK = 0.1
-"""Seconds between two looks at the memory of a run, in which it grows by less than what a machine should have left."""
-
-ONE_THREAD = {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-FREED_MEMORY_IS_KEPT = {"MALLOC_MMAP_THRESHOLD_": str(32 << 20), "MALLOC_TRIM_THRESHOLD_": str(64 << 20)}
-"""For the C library of Linux: the largest values that it comes to by itself. Dask sets 64 kB for its workers, with which a
-run of 1,024 texels and 2,000 frames took 445 ms of a processor instead of 187, since every large array was new pages."""
+PART_BYTES = 256 << 20
+"""Numbers of frames from which on a batch writes what it has into a part and goes on with another, as they are in memory."""
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 
 
-@dataclass(frozen=True)
-class Limits:
-    """What a run may take.
+@dataclass
+class BatchResult:
+    """What has become of a batch.
 
     Attributes
     ----------
-    seconds : float or None
-    memory : float or None
-        MB that the process of the run holds, and a Blender that it has started.
+    done, failed : int
+        Runs.
+    seconds : float
+        That all of them took.
+    failures : list of (int, str)
+        Indices of failed runs and their sentences.
     """
 
-    seconds: float | None = None
-    memory: float | None = None
-
-    @classmethod
-    def of(cls, study: Study) -> Limits:
-        """Return those that a study's file gives."""
-        return cls(study.run_limit, study.run_memory)
-
-
-NO_LIMITS = Limits()
-
-
-class LimitReached(PalpateError):
-    """A run has reached its limit of time or memory; the message goes on from "Run N"."""
-
-
-class MemoryReached(LimitReached):
-    """It was that of memory."""
-
-
-class Child:
-    """A process that computes runs of one study.
-
-    Attributes
-    ----------
-    begun : int
-        Runs that it was given.
-    """
-
-    def __init__(self, folder: str, scripts: str = REFUSE):
-        environment = {**os.environ, **ONE_THREAD, **FREED_MEMORY_IS_KEPT}
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", f"{__package__}.child", folder, scripts],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-            encoding="utf-8",
-            env=environment,
-            start_new_session=True,  # Ctrl-C in a terminal reaches the driver alone, which stops the others
-        )
-        self._answers: queue.Queue[str] = queue.Queue()
-        threading.Thread(target=self._read, daemon=True).start()
-        self.begun = 0
-        first = self._answer(Limits(START_LIMIT))
-        if first is None or first["status"] != "ready":
-            self.kill()
-            raise FileError("A process for runs did not start" + (f": {first['sentence']}" if first else "."))
-
-    def _read(self) -> None:
-        assert self._process.stdout is not None
-        for line in self._process.stdout:
-            self._answers.put(line)
-        self._answers.put("")
-
-    def _answer(self, limits: Limits) -> dict[str, Any] | None:
-        """Return the next answer, None when the process has died; raises :class:`LimitReached`."""
-        until = None if limits.seconds is None else time.monotonic() + limits.seconds
-        while True:
-            left = None if until is None else max(0.0, until - time.monotonic())
-            wait = left if limits.memory is None else LOOK if left is None else min(LOOK, left)
-            try:
-                line = self._answers.get(timeout=wait)
-            except queue.Empty:
-                if until is not None and time.monotonic() >= until:
-                    raise LimitReached(f"was ended after its limit of {limits.seconds:g} s: raise run_limit") from None
-                if limits.memory is not None and self.memory() > limits.memory * 1e6:
-                    raise MemoryReached(
-                        f"was ended because it held more than its limit of {limits.memory:g} MB: raise run_memory"
-                    ) from None
-            else:
-                return json.loads(line) if line else None
-
-    def memory(self) -> int:
-        """Return the bytes of memory that the process and those that it has started hold; 0 when it has ended."""
-        import psutil  # of Dask
-
-        held = 0
-        with suppress(psutil.Error):
-            own = psutil.Process(self._process.pid)
-            for process in (own, *own.children(recursive=True)):
-                with suppress(psutil.Error):
-                    held += process.memory_info().rss
-        return held
+    done: int = 0
+    failed: int = 0
+    seconds: float = 0.0
+    failures: list[tuple[int, str]] = field(default_factory=list)
 
     @property
-    def process_id(self) -> int:
-        """Number of the process."""
-        return self._process.pid
-
-    @property
-    def is_alive(self) -> bool:
-        """Whether it can take a run."""
-        return self._process.poll() is None
-
-    def compute(self, words: dict[str, Any], place: Path, limits: Limits = NO_LIMITS) -> dict[str, Any] | None:
-        """Compute a run into the folder of a batch; return the answer, None if the process died.
-
-        Raises :class:`LimitReached` at a limit.
-        """
-        assert self._process.stdin is not None
-        self.begun += 1
-        try:
-            self._process.stdin.write(json.dumps({**words, "place": os.fspath(place)}) + "\n")
-            self._process.stdin.flush()
-        except OSError:
-            return None
-        return self._answer(limits)
-
-    def kill(self) -> int:
-        """End the process, and a Blender that it has started, and return its exit status."""
-        with suppress(OSError):
-            if hasattr(os, "killpg"):
-                os.killpg(self._process.pid, signal.SIGKILL)  # it leads a session of its own
-            self._process.kill()
-        with suppress(OSError):
-            assert self._process.stdin is not None
-            self._process.stdin.close()
-        return self._process.wait()
+    def finished(self) -> int:
+        """Runs that are done or failed."""
+        return self.done + self.failed
 
 
-_children: dict[tuple[str, str], Child] = {}
+class TimeLimit(PalpateError):
+    """A run has reached its limit of time."""
 
 
-def _child_for(folder: str, scripts: str) -> Child:
-    """Return the process for a study; those for other studies are ended."""
-    key = folder, scripts
-    for other in [one for one in _children if one != key or not _children[one].is_alive]:
-        _children.pop(other).kill()
-    if key not in _children:
-        _children[key] = Child(folder, scripts)
-    return _children[key]
-
-
-@atexit.register
-def end_children() -> None:
-    """End the processes of this worker."""
-    while _children:
-        _children.popitem()[1].kill()
-
-
-def compute_batch(
-    folder: str, runs: Sequence[dict[str, Any]], limits: Limits = NO_LIMITS, scripts: str = REFUSE
-) -> list[dict[str, Any]]:
-    """Compute runs of a study that are not done yet; called by Dask.
+class RunComputer:
+    """Computes runs of a study one after the other, in one thread.
 
     Parameters
     ----------
+    opened : OpenStudy
+    scripts : str
+        What is done about the Python in a .blend and a job, one of :data:`.scene_evaluation.SCRIPTS`.
+    """
+
+    def __init__(self, opened: OpenStudy, scripts: str = REFUSE):
+        from ..core.solver import precompile
+
+        require_allowed(opened.study, scripts)
+        self.opened = opened
+        self._reader = SceneReader(opened.folder, scripts)
+        self._programs: dict[str, Program] = {}
+        self._style = FrameStyle.of(opened.study)
+        self._shared = SharedResults()
+        if not opened.study.is_job:
+            precompile.compile_solver()  # loads what was compiled, so that the first run is as fast as the others
+
+    def result(self, index: int, limit: float | None = None) -> RunResult:
+        """Compute a run.
+
+        Parameters
+        ----------
+        index : int
+        limit : float, optional
+            Seconds that it may take, asked for between frames.
+
+        Raises
+        ------
+        FileError
+            Its files cannot be written, so no run can be computed.
+        """
+        run, began, details = self.opened.runs[index], time.perf_counter(), ""
+        try:
+            found = self._by_program(run, limit) if self.opened.study.is_job else self._solved(run, limit)
+            return replace(found, seconds=time.perf_counter() - began)
+        except FileError:
+            raise
+        except PalpateError as error:
+            message = str(error)
+        except MemoryError:
+            message = "There is not enough memory for this run: use fewer workers."
+        except Exception as error:
+            message, details = f"A fault of the program: {type(error).__name__}: {error}", traceback.format_exc()
+        return RunResult(run, message, details, time.perf_counter() - began)
+
+    def _solved(self, run: Run, limit: float | None) -> RunResult:
+        study, press = self.opened.study, self.opened.plans[run.scene].press
+        values = {**self.opened.plans[run.scene].fixed, **{key: value for key, value in run.values.items() if key != SCENE}}
+        scenario = self.scenario(run.scene, values, limit)
+        recording = self._recording(scenario, run.index, limit)
+        if press is not None:
+            own: dict[str, Any] = {
+                key.removeprefix(f"{PRESS}."): value for key, value in values.items() if key.startswith(f"{PRESS}.")
+            }
+            press = replace(press, **own)
+        metrics = metrics_of(scenario, recording, press)
+        frames = solved_frames(scenario, recording, self._shared, self._style)
+        if study.has_folders:
+            with _run_folder(self.opened.folder, run) as folder:
+                write_run_folder(folder, scenario, recording, study.images)
+        return RunResult(run, metrics=metrics, frames=frames)
+
+    def scenario(self, scene: str, values: Mapping[str, Any], limit: float | None = None) -> Scenario:
+        """Return the scenario of a scene with the values of a run; it is read again where they have properties of the scene."""
+        plan, read_with = self.opened.plans[scene], scene_values(values)
+        assert plan.scenario is not None  # but for a program
+        scenario = self._reader.read(scene, read_with, self.opened.study.fps, limit) if read_with else plan.scenario
+        rest = {name: value for name, value in values.items() if not is_scene_property(name)}
+        return varied_scenario(scenario, rest, plan.press, plan.meshes, self._shared)
+
+    def _recording(self, scenario: Scenario, index: int, limit: float | None) -> Recording:
+        from ..core.solver.simulation import Simulation, solve
+
+        simulation = Simulation(scenario, threads=1, shared=self._shared)
+        if (
+            limit is None
+        ):  # many frames are computed in one call; only the files of a recording say the digest of their scenario
+            return simulation.advance_all(with_digest=self.opened.study.has_folders)
+        until = time.monotonic() + limit
+
+        def ask(_progress: object) -> None:
+            if time.monotonic() > until:
+                raise TimeLimit(f"Run {index} was ended after its limit of {limit:g} s: raise run_limit, or vary less widely.")
+
+        return run_job(solve(scenario, simulation), ask)
+
+    def _by_program(self, run: Run, limit: float | None) -> RunResult:
+        """Compute a run by the program of a study that has no scene; nothing can end it before it returns."""
+        if run.scene not in self._programs:
+            self._programs[run.scene] = frozen_program(self.opened.study, self.opened.folder, run.scene)
+        began, program = time.monotonic(), self._programs[run.scene]
+        values = {**self.opened.plans[run.scene].fixed, **run.values}
+        with _run_folder(self.opened.folder, run) as folder:
+            metrics = _checked_metrics(_called(program.run, values, folder), run)
+            if limit is not None and time.monotonic() - began > limit:
+                raise TimeLimit(f"Run {run.index} took longer than its limit of {limit:g} s: raise run_limit.")
+        return RunResult(run, metrics=metrics)
+
+
+@contextmanager
+def _run_folder(folder: Path, run: Run) -> Iterator[Path]:
+    """Yield a hidden folder for the files of a run, which gets its name when the body ends, or goes when it raises."""
+    target = folder / RUNS / run.digest
+    hidden = target.with_name(f".{run.digest}")
+    try:
+        shutil.rmtree(hidden, ignore_errors=True)
+        hidden.mkdir(parents=True)
+        yield hidden
+        shutil.rmtree(target, ignore_errors=True)  # of a run that was computed, and whose part was not yet written
+        os.replace(hidden, target)
+    except OSError as error:
+        raise FileError(
+            f"Run {run.index} could not be written to '{target.parent}' ({os_error_reason(error)}): free some space or check "
+            "the permissions, and give the same command again."
+        ) from error
+    finally:
+        shutil.rmtree(hidden, ignore_errors=True)
+
+
+def _called(function: Callable[..., Any], values: dict[str, Any], folder: Path) -> Any:
+    try:
+        return function(values, folder)
+    except OSError as error:
+        if error.errno in _NO_ROOM:
+            raise
+        raise RuntimeError(f"{type(error).__name__}: {error}") from error  # its own fault: the study's folder is well
+
+
+def _checked_metrics(metrics: Any, run: Run) -> dict[str, float]:
+    """Return metrics as numbers; those that are None are left out."""
+    if not isinstance(metrics, Mapping):
+        raise PalpateError(f"The job gave {metrics!r:.60} for run {run.index}: let its run() return metrics by name.")
+    found = {}
+    for name, value in metrics.items():
+        if value is None:
+            continue
+        try:
+            number = float(value)
+        except (TypeError, ValueError, OverflowError):
+            number = float("nan")
+        if not isinstance(name, str) or not isfinite(number):
+            raise PalpateError(f"Metric {name!r:.60} of run {run.index} is {value!r:.60}: give finite numbers, or None.")
+        found[name] = number
+    return found
+
+
+_kept = threading.local()
+"""The computer of runs of each thread of a worker, and the study that it is for."""
+
+
+def _computer_for(folder: Path, scripts: str) -> RunComputer:
+    written = (folder / STUDY_NAME).stat()
+    key = folder, scripts, written.st_ino, written.st_mtime_ns
+    if getattr(_kept, "key", None) != key:
+        _kept.computer, _kept.key = RunComputer(resume_study(folder), scripts), key
+    found: RunComputer = _kept.computer
+    return found
+
+
+def compute_batch(indices: Sequence[int], folder: str, scripts: str = REFUSE, limit: float | None = None) -> BatchResult:
+    """Compute runs of a study and write them into a part; called by Dask.
+
+    Parameters
+    ----------
+    indices : sequence of int
     folder : str
         Of the study, as this machine sees it.
-    runs : sequence of dict
-        Fields of :class:`.Run`.
-    limits : Limits
-        What each may take.
     scripts : str
-        What is done about the Python in a .blend, one of :data:`.scene_evaluation.SCRIPTS`.
+        What is done about the Python in a .blend and a job.
+    limit : float, optional
+        Seconds that a run may take.
 
-    Returns
-    -------
-    list of dict
-        For each run its digest, a status (:data:`.child.DONE`, ``FAILED`` or ``UNWRITABLE``), seconds, and the sentence of a
-        failure. After an unwritable run the others are left out.
+    Raises
+    ------
+    FileError
+        Files cannot be written or read.
+    PalpateError
+        The study cannot be opened.
     """
-    answers: list[dict[str, Any]] = []
-    done: set[str] | None = None
-    while len(answers) < len(runs):
-        left = runs[len(answers) :]
-        try:
-            if done is None:
-                done = _done_before(folder, [str(words["digest"]) for words in runs])
-            answers += _computed_group(folder, left, done, limits, scripts)
-        except FileError as error:
-            answers.append({"digest": left[0]["digest"], "status": UNWRITABLE, "sentence": str(error), "seconds": 0.0})
-        if answers[-1]["status"] == UNWRITABLE:
-            break
-    return answers
+    place, batch, waiting = Path(folder), BatchResult(), list[RunResult]()
+    computer = _computer_for(place, scripts)
+    for index in indices:
+        result = computer.result(index, limit)
+        batch.seconds += result.seconds
+        batch.done += not result.message
+        if result.message:
+            batch.failed += 1
+            batch.failures.append((index, result.message))
+        if sum(one.size for one in waiting) > PART_BYTES or not _same_layout(waiting, result):
+            write_part(place, waiting)
+            waiting = []
+        waiting.append(result)
+    write_part(place, waiting)
+    return batch
 
 
-_known: dict[str, KnownRuns] = {}
-"""Runs in the shards of the study at which this worker is."""
-
-
-def _done_before(folder: str, digests: list[str]) -> set[str]:
-    """Return the runs of a batch that are done: by a worker that Dask had lost."""
-    runs = Path(folder) / RUNS
-    if folder not in _known:
-        _known.clear()
-        _known[folder] = KnownRuns(runs)
-    return _known[folder].among(digests) | {digest for digest in digests if (runs / digest / RUN_NAME).is_file()}
-
-
-def _computed_group(
-    folder: str, runs: Sequence[dict[str, Any]], done: set[str], limits: Limits, scripts: str
-) -> list[dict[str, Any]]:
-    """Compute runs until it is time to bring them onto the disk; return what became of them when they are there.
-
-    Their files are put into place by this process, so that one that dies on a run takes none of the earlier ones with it.
-    """
-    answers: list[dict[str, Any]] = []
-    until = time.monotonic() + GROUP_SECONDS
-    with run_batch(Path(folder)) as batch:
-        for words in runs:
-            if words["digest"] in done:
-                answers.append({"digest": words["digest"], "status": DONE, "seconds": 0.0})
-                continue
-            answers.append(_computed(folder, words, batch.place, limits, scripts))
-            if answers[-1]["status"] == DONE:
-                batch.add(words["digest"])
-            if answers[-1]["status"] == UNWRITABLE or time.monotonic() >= until:
-                break
-    return answers
-
-
-def _computed(folder: str, words: dict[str, Any], place: Path, limits: Limits, scripts: str) -> dict[str, Any]:
-    """Return what became of a run; the process is started again where it dies."""
-    sentence = ""
-    began = time.monotonic()
-    for _ in range(MOST_DEATHS):
-        try:
-            child = _child_for(folder, scripts)
-            answer = child.compute(words, place, limits)
-        except LimitReached as reached:
-            _children.pop((folder, scripts)).kill()
-            if isinstance(reached, MemoryReached) and child.begun > 1:
-                continue  # earlier runs of the process may have left something; it fails only by what it needs itself
-            sentence = f"Run {words['index']} {reached}, or vary less widely."
-            break
-        except FileError as error:
-            return {"digest": words["digest"], "status": UNWRITABLE, "sentence": str(error), "seconds": 0.0}
-        if answer is not None:
-            return answer
-        status = _children.pop((folder, scripts)).kill()
-        reason = f"signal {-status}" if status < 0 else f"exit status {status}"
-        sentence = (
-            f"The process that computed run {words['index']} ended {MOST_DEATHS} times ({reason}): it may need more memory."
-        )
-    answer = {"digest": words["digest"], "status": FAILED, "sentence": sentence, "seconds": time.monotonic() - began}
-    try:
-        write_failure(Path(folder), words["digest"], sentence)
-    except FileError as error:
-        answer |= {"status": UNWRITABLE, "sentence": str(error)}
-    return answer
+def _same_layout(waiting: Sequence[RunResult], result: RunResult) -> bool:
+    known = next((one.frames.layout.digest for one in waiting if one.frames is not None), None)
+    return known is None or result.frames is None or result.frames.layout.digest == known

@@ -19,7 +19,7 @@ import bpy
 from ...core.errors import FileError, PalpateError, SceneError
 from ...core.io.input_files import read_toml
 from ...core.jobs.progress import Job, Progress
-from ...core.study.run_files import STUDY_NAME, done_runs, failed_runs
+from ...core.study.progress import STUDY_NAME, counted_runs
 from ...core.study.study_file import FROZEN
 from ..properties.study_properties import command_in_preferences
 from ..session import session_state
@@ -146,10 +146,9 @@ def _counted(folder: Path) -> Progress:
         total = read_toml(folder / STUDY_NAME, "study").get(FROZEN, {}).get("runs", 0)
     if not isinstance(total, int) or total < 1:
         return Progress("Reading the scene", 0, 1)
-    done = done_runs(folder)
-    failed = len(failed_runs(folder) - done)
-    text = f"Study: {len(done)} of {total} runs" + (f", {failed} failed" if failed else "")
-    return Progress(text, min(total, len(done) + failed), total)
+    done, failed = counted_runs(folder)
+    text = f"Study: {min(total, done)} of {total} runs" + (f", {failed} failed" if failed else "")
+    return Progress(text, min(total, done + failed), total)
 
 
 def report_of(file: Path) -> Path:

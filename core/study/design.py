@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 
@@ -21,7 +21,7 @@ DesignKind = Literal["grid", "random", "latin-hypercube", "sobol"]
 GRID, RANDOM, LATIN_HYPERCUBE, SOBOL = DESIGNS = get_args(DesignKind)
 UNIFORM, LOG_UNIFORM, NORMAL, CHOICE = DISTRIBUTIONS = ("uniform", "log-uniform", "normal", "choice")
 MOST_RUNS = 1_000_000
-"""Most runs of a study. The driver holds the values of all runs, 8 bytes each, and a folder has an entry for each run."""
+"""Most runs of a study, whose values are in memory, 8 bytes each."""
 DEFAULT_LEVELS = 5
 """Values of a number in a grid, where the study does not say how many."""
 
@@ -56,32 +56,35 @@ class Distribution:
         """Number of values in a grid."""
         return len(self.words) if self.kind == CHOICE else self.levels
 
-    def grid_values(self) -> list[Value]:
+    def grid_values(self) -> np.ndarray:
         """Return the values of a grid; a normal distribution gives the middles of parts of equal probability."""
         if self.kind == CHOICE:
-            return list(self.words)
+            return self._choices
         share = (np.arange(self.levels) + 0.5) / self.levels
         if self.kind != NORMAL and self.levels > 1:
             share = np.arange(self.levels) / (self.levels - 1)
         return self.values(share)
 
-    def values(self, share: np.ndarray) -> list[Value]:
-        """Return the values at (n,) cumulative probabilities from 0 to 1."""
+    @property
+    def _choices(self) -> np.ndarray:
+        found = np.empty(len(self.words), dtype=object)
+        found[:] = self.words
+        return found
+
+    def values(self, share: np.ndarray) -> np.ndarray:
+        """Return the values at (n,) cumulative probabilities from 0 to 1: (n,) float, or objects for a choice."""
         if self.kind == CHOICE:
-            index = np.minimum((share * len(self.words)).astype(int), len(self.words) - 1)
-            return [self.words[i] for i in index]
+            return self._choices[np.minimum((share * len(self.words)).astype(int), len(self.words) - 1)]
         first, second = float(self.words[0]), float(self.words[1])
         if self.kind == NORMAL:
             from scipy.special import ndtr, ndtri
 
             begin, end = ndtr((self.low - first) / second), ndtr((self.high - first) / second)
-            found = np.clip(first + second * ndtri(begin + share * (end - begin)), self.low, self.high)
-        elif self.kind == LOG_UNIFORM:
+            return np.clip(first + second * ndtri(begin + share * (end - begin)), self.low, self.high)
+        if self.kind == LOG_UNIFORM:
             found = np.exp(math.log(first) + share * (math.log(second) - math.log(first)))
-            found = np.clip(found, first, second)  # rounding
-        else:
-            found = first + share * (second - first)
-        return [float(value) for value in found]
+            return np.clip(found, first, second)  # rounding
+        return first + share * (second - first)
 
 
 @dataclass(frozen=True)
@@ -117,8 +120,28 @@ def check_count(count: int) -> None:
         )
 
 
-def points_of(design: Design, varied: Mapping[str, Distribution]) -> list[dict[str, Value]]:
-    """Return the values of every point by the names of the varied numbers, in order.
+class Points(Sequence[dict[str, Value]]):
+    """The values of every point of a design by the names of the varied numbers, as a column for each number.
+
+    Parameters
+    ----------
+    columns : mapping of str to (count,) ndarray
+    count : int
+    """
+
+    def __init__(self, columns: Mapping[str, np.ndarray], count: int):
+        self._columns, self._count = columns, count
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, at: Any) -> Any:
+        found = {name: column[at] for name, column in self._columns.items()}
+        return {name: float(value) if isinstance(value, np.floating) else value for name, value in found.items()}
+
+
+def points_of(design: Design, varied: Mapping[str, Distribution]) -> Points:
+    """Return the values of every point, in order.
 
     Parameters
     ----------
@@ -132,25 +155,17 @@ def points_of(design: Design, varied: Mapping[str, Distribution]) -> list[dict[s
     """
     count = design.count(varied)
     check_count(count)
-    if not varied:
-        return [{} for _ in range(count)]
-    if design.kind == GRID:
-        columns = _grid_columns([distribution.grid_values() for distribution in varied.values()], count)
-    else:
+    columns: dict[str, np.ndarray] = {}
+    if varied and design.kind == GRID:
+        repeat = count
+        for name, distribution in varied.items():  # the last one changes fastest
+            own = distribution.grid_values()
+            repeat //= len(own)
+            columns[name] = np.tile(np.repeat(own, repeat), count // (repeat * len(own)))
+    elif varied:
         cube = _unit_points(design, len(varied))
-        columns = [distribution.values(cube[:, axis]) for axis, distribution in enumerate(varied.values())]
-    names = list(varied)
-    return [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)]
-
-
-def _grid_columns(values: Sequence[list[Value]], count: int) -> list[list[Value]]:
-    """Return the values of each axis at all points of a grid; the last axis changes fastest."""
-    columns, repeat = [], count
-    for own in values:
-        repeat //= len(own)
-        times = count // (repeat * len(own))
-        columns.append([value for value in own for _ in range(repeat)] * times)
-    return columns
+        columns = {name: one.values(cube[:, axis]) for axis, (name, one) in enumerate(varied.items())}
+    return Points(columns, count)
 
 
 def _unit_points(design: Design, axes: int) -> np.ndarray:

@@ -29,7 +29,7 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -99,7 +99,7 @@ class Study:
     images : bool
         Whether runs have tactile images.
     recordings : bool
-        Whether runs have files of their own, as a bake has; with images they do in any case.
+        True if runs have files of their own, as a bake has; with images they do in any case.
     points : bool
         Whether the dataset has the texels of a grid as a list, too, and not as a picture.
     half_precision : bool
@@ -127,7 +127,7 @@ class Study:
 
     @property
     def has_folders(self) -> bool:
-        """Whether each run has a folder of its own, and not a place in a shard with others."""
+        """True if each run has a folder of its own beside its row in a part."""
         return self.images or self.recordings or self.is_job
 
 
@@ -180,7 +180,7 @@ class Run:
     values : dict of str to value
         What varies.
     digest : str
-        Name of its folder: a hash of the scenario of the scene, of what the study fixes, of `index` and `values`.
+        A hash of the scenario of the scene, of what the study fixes, of `index` and `values`; the name of its folder.
     """
 
     index: int
@@ -446,8 +446,8 @@ def _distribution(found: Variable, entry: Mapping[str, Any]) -> Distribution:
     return Distribution(kind, (found.read(first), found.read(second)), words.levels, low, high)
 
 
-def runs_of(study: Study, plans: Mapping[str, Plan], digests: Mapping[str, str]) -> list[Run]:
-    """Return all runs of a study in order.
+class Runs(Sequence[Run]):
+    """All runs of a study in order, each made when it is asked for: a million of them take 8 bytes for each varied number.
 
     Parameters
     ----------
@@ -462,28 +462,42 @@ def runs_of(study: Study, plans: Mapping[str, Plan], digests: Mapping[str, str])
     ParameterError
         There are too many.
     """
-    check_count(sum(study.design.count(plan.varied) for plan in plans.values()))
-    runs: list[Run] = []
-    for scene, plan in plans.items():
-        fps = None if plan.scenario is None else plan.scenario.fps
-        fixed = dict(plan.fixed)
-        same: dict[str, Any] = {"scene": digests[scene], "fixed": fixed, "fps": fps, "press": _words_of(plan.press)}
-        if isinstance(plan.meshes, StudyMeshes) and plan.meshes:
-            same["meshes"] = plan.meshes.digests
-        if plan.tied:
-            same["tied"] = dict(plan.tied)
-        start = hashlib.sha256(json.dumps(same, sort_keys=True).encode())
-        for values in points_of(study.design, plan.varied):
-            own = start.copy()
-            own.update(json.dumps([len(runs), values]).encode())
-            values = plan.with_tied(values)
-            named = {SCENE: scene, **values} if len(plans) > 1 else values
-            runs.append(Run(len(runs), scene, named, own.hexdigest()[:24]))
-    return runs
+
+    def __init__(self, study: Study, plans: Mapping[str, Plan], digests: Mapping[str, str]):
+        check_count(sum(study.design.count(plan.varied) for plan in plans.values()))
+        self._plans = plans
+        self._points = {scene: points_of(study.design, plan.varied) for scene, plan in plans.items()}
+        self._hashes = {scene: _hash_of(plan, digests[scene]) for scene, plan in plans.items()}
+
+    def __len__(self) -> int:
+        return sum(map(len, self._points.values()))
+
+    def __getitem__(self, at: Any) -> Any:
+        if isinstance(at, slice):
+            return [self[i] for i in range(*at.indices(len(self)))]
+        index = at = range(len(self))[at]
+        for scene, points in self._points.items():
+            if index < len(points):
+                return self._run(at, scene, points[index])
+            index -= len(points)
+        raise IndexError(at)
+
+    def _run(self, index: int, scene: str, values: dict[str, Value]) -> Run:
+        own = self._hashes[scene].copy()
+        own.update(json.dumps([index, values]).encode())
+        values = self._plans[scene].with_tied(values)
+        named = {SCENE: scene, **values} if len(self._plans) > 1 else values
+        return Run(index, scene, named, own.hexdigest()[:24])
 
 
-def _words_of(press: Press | None) -> list[Any]:
-    return [] if press is None else [press.sensor, press.target]
+def _hash_of(plan: Plan, digest: str) -> hashlib._Hash:
+    """Return a hash of what all runs of a scene have in common."""
+    fps = None if plan.scenario is None else plan.scenario.fps
+    press = [] if plan.press is None else [plan.press.sensor, plan.press.target]
+    same: dict[str, Any] = {"scene": digest, "fixed": dict(plan.fixed), "fps": fps, "press": press, "tied": dict(plan.tied)}
+    if isinstance(plan.meshes, StudyMeshes):
+        same["meshes"] = plan.meshes.digests
+    return hashlib.sha256(json.dumps(same, sort_keys=True).encode())
 
 
 def frozen_text(text: str, frozen: Mapping[str, Any]) -> str:

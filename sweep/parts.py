@@ -1,0 +1,247 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Parts: Parquet files with a row for each run of a batch. A run is done when a part has it.
+
+Columns: ``run``, ``digest``, ``status``, ``message``, ``traceback``, ``seconds``, ``varied.<name>``, ``metric.<name>``, and for
+each feature of a frame the numbers of all frames, one behind the other. All runs of a part have the same layout of frames.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..core.errors import FileError
+from ..core.io.file_writing import atomic_write
+from ..core.study.progress import LAYOUTS, PARTS, part_files, part_name
+from ..core.study.study_file import Run
+from .features import Layout, RunFrames
+
+if TYPE_CHECKING:
+    import pyarrow
+
+FORMAT = "palpate-parts/1"
+COMPRESSION: dict[str, Any] = {"compression": "zstd", "compression_level": 3}
+GROUP_BYTES = 8 << 20
+"""Numbers of frames from which on runs become a group of rows."""
+GROUPS_KEPT = 4
+"""Groups of rows that are in memory: neighbours of the design are in few parts, except after many interruptions."""
+FINISHED, FAILED = "finished", "failed"
+
+
+def require_pyarrow() -> None:
+    """Raise FileError where pyarrow is not installed."""
+    try:
+        import pyarrow  # noqa: F401
+    except ImportError as error:
+        raise FileError(
+            "Datasets need the package pyarrow: run \"pip install '.[sweep]'\" in a checkout of Palpate."
+        ) from error
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """What has become of a run.
+
+    Attributes
+    ----------
+    run : Run
+    message : str
+        Why it failed, in one sentence; empty where it is done.
+    traceback : str
+        Of a fault of the program.
+    seconds : float
+        That computing took. No result depends on it.
+    metrics : dict of str to float
+    frames : RunFrames or None
+    """
+
+    run: Run
+    message: str = ""
+    traceback: str = ""
+    seconds: float = 0.0
+    metrics: Mapping[str, float] = field(default_factory=dict)
+    frames: RunFrames | None = None
+
+    @property
+    def size(self) -> int:
+        """Bytes of the frames."""
+        return 0 if self.frames is None else sum(column.nbytes for column in self.frames.columns.values())
+
+
+def write_part(folder: Path, results: Sequence[RunResult]) -> None:
+    """Write runs that have one layout into a part of a study.
+
+    Raises
+    ------
+    FileError
+        The file cannot be written.
+    """
+    from pyarrow import parquet
+
+    if not results:
+        return
+    layout = next((one.frames.layout for one in results if one.frames is not None), None)
+    if layout is not None:
+        layout.save(folder / LAYOUTS)
+    content = hashlib.sha256(repr([one.run.digest for one in results]).encode()).hexdigest()[:16]
+    failed = sum(bool(one.message) for one in results)
+    rows = max(1, GROUP_BYTES * len(results) // max(1, sum(one.size for one in results)))
+    with atomic_write(folder / PARTS / part_name(results[0].run.index, content, len(results) - failed, failed)) as fresh:
+        parquet.write_table(_table(results, layout), fresh, row_group_size=rows, **COMPRESSION)
+
+
+def _table(results: Sequence[RunResult], layout: Layout | None) -> pyarrow.Table:
+    import pyarrow
+
+    columns: dict[str, Any] = {
+        "run": pyarrow.array([one.run.index for one in results], pyarrow.int64()),
+        "digest": [one.run.digest for one in results],
+        "status": [FAILED if one.message else FINISHED for one in results],
+        "message": [one.message for one in results],
+        "traceback": [one.traceback for one in results],
+        "seconds": [float(f"{one.seconds:.6g}") for one in results],
+    }
+    for name in dict.fromkeys(name for one in results for name in one.run.values):
+        values = [one.run.values.get(name) for one in results]
+        columns[f"varied.{name}"] = [float(v) if isinstance(v, bool | int) else v for v in values]
+    for name in sorted({name for one in results for name in one.metrics}):
+        columns[f"metric.{name}"] = pyarrow.array([one.metrics.get(name) for one in results], pyarrow.float64())
+    for feature in layout.features if layout is not None else ():
+        none = np.zeros(0, feature.dtype)
+        own = [none if one.frames is None else one.frames.columns[feature.name].reshape(-1) for one in results]
+        numbers = np.concatenate(own)
+        ends = np.cumsum([0, *map(len, own)], dtype=np.int64)
+        columns[feature.name] = pyarrow.LargeListArray.from_arrays(ends, pyarrow.array(numbers))
+    note = {"palpate": FORMAT, "layout": layout.digest if layout is not None else ""}
+    return pyarrow.table(columns).replace_schema_metadata(note)
+
+
+class Parts:
+    """The runs that the parts of a study have.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the study.
+
+    Raises
+    ------
+    FileError
+        A part is damaged, or of another version.
+    """
+
+    def __init__(self, folder: Path):
+        require_pyarrow()
+        self._folder = folder
+        self.files = part_files(folder)
+        found = [self._places(number, path) for number, path in enumerate(self.files)]
+        rows = np.concatenate(found) if found else np.zeros((0, 5), np.int64)
+        rows = rows[
+            np.lexsort((-rows[:, 2], rows[:, 1], rows[:, 0]))
+        ]  # of a run that is there twice, one that is done is first
+        is_first = np.ones(len(rows), bool)
+        is_first[1:] = rows[1:, 0] != rows[:-1, 0]
+        self._rows = rows[is_first]
+        self._group = lru_cache(maxsize=GROUPS_KEPT)(self._read_group)
+        self._layout = lru_cache(maxsize=GROUPS_KEPT)(Layout.load)
+
+    def _places(self, number: int, path: Path) -> np.ndarray:
+        """Return (n, 5) int: index of each run of a part, 1 for one that failed, number of the part, group and row in it."""
+        from pyarrow import parquet
+
+        with _damage_as_sentence(path), parquet.ParquetFile(path) as file:
+            if (file.schema_arrow.metadata or {}).get(b"palpate") != FORMAT.encode():
+                raise FileError(f"'{path}' is not of the format {FORMAT}: give another folder with --out.")
+            sizes = [file.metadata.row_group(group).num_rows for group in range(file.num_row_groups)]
+            table = file.read(columns=["run", "status"])
+        is_failed = np.array(table["status"].to_pylist(), object) == FAILED
+        row = np.concatenate([np.arange(size) for size in sizes])
+        part, group = np.full(len(row), number), np.repeat(np.arange(len(sizes)), sizes)
+        return np.stack([table["run"].to_numpy(), is_failed, part, group, row], axis=1).astype(np.int64)
+
+    @property
+    def done(self) -> np.ndarray:
+        """Indices of the runs that are done, in order."""
+        return self._rows[self._rows[:, 1] == 0, 0]
+
+    @property
+    def failed(self) -> np.ndarray:
+        """Indices of the runs that failed, in order."""
+        return self._rows[self._rows[:, 1] == 1, 0]
+
+    @cached_property
+    def run_schema(self) -> pyarrow.Schema:
+        """The columns that say something of a run as a whole, of all parts, metrics in the order of their names."""
+        import pyarrow
+        from pyarrow import parquet
+
+        fields: dict[str, pyarrow.Field] = {}
+        for path in self.files:
+            with _damage_as_sentence(path):
+                schema = parquet.read_schema(path)
+            own = [item for item in schema if not pyarrow.types.is_large_list(item.type)]
+            fields = {item.name: item for item in own} | fields
+        return pyarrow.schema(sorted(fields.values(), key=lambda item: item.name if item.name.startswith("metric.") else ""))
+
+    def pieces(self) -> Iterator[pyarrow.Table]:
+        """Yield all runs in the order of the design, as tables of runs that are neighbours in a part."""
+        rows = self._rows
+        same = np.all(np.diff(rows[:, 2:], axis=0) == [0, 0, 1], axis=1)
+        cuts = [0, *(np.flatnonzero(~same) + 1).tolist(), len(rows)]
+        for begin, end in zip(cuts, cuts[1:]):
+            if end > begin:
+                yield self._group(*rows[begin, 2:4].tolist()).slice(rows[begin, 4], end - begin)
+
+    def run(self, index: int) -> pyarrow.Table:
+        """Return a run as a table of one row."""
+        (_, _, part, group, row) = self._rows[np.searchsorted(self._rows[:, 0], index)].tolist()
+        return self._group(part, group).slice(row, 1)
+
+    def layout(self, table: pyarrow.Table) -> Layout | None:
+        """Return the layout of the frames of a table; None where its runs have none."""
+        digest = table.schema.metadata[b"layout"].decode()
+        return self._layout(self._folder / LAYOUTS, digest) if digest else None
+
+    def _read_group(self, part: int, group: int) -> pyarrow.Table:
+        from pyarrow import parquet
+
+        with _damage_as_sentence(self.files[part]), parquet.ParquetFile(self.files[part]) as file:
+            return file.read_row_group(group)
+
+
+@contextmanager
+def _damage_as_sentence(path: Path) -> Iterator[None]:
+    """Turn what pyarrow raises about a file into a sentence."""
+    try:
+        yield
+    except (OSError, ValueError, LookupError) as error:  # pyarrow's errors are of these
+        raise FileError(
+            f"'{path}' is damaged ({str(error).splitlines()[0]:.100}): delete it and give the same command again, which "
+            "computes its runs once more."
+        ) from error
+
+
+def frames_in(table: pyarrow.Table, layout: Layout) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Return the number of frames of each run, and the (F, …) numbers of each feature for all of them."""
+    columns = {}
+    for feature in layout.features:
+        own = table[feature.name].combine_chunks()
+        columns[feature.name] = own.flatten().to_numpy(zero_copy_only=False).reshape(-1, *feature.shape)
+        lengths = own.value_lengths().to_numpy() // int(np.prod(feature.shape))
+    return lengths, columns
+
+
+def remove_unfinished_parts(folder: Path) -> None:
+    """Remove what killed processes have left of parts that they were writing."""
+    for name in os.listdir(folder / PARTS):
+        if name.startswith(".") and ".partial" in name:
+            with suppress(OSError):
+                (folder / PARTS / name).unlink()
