@@ -29,7 +29,7 @@ DATASET_FILES = re.compile(r"(part-\d{3,}/)?(README\.md|data/chunk-\d{3,}/file-\
 """Names of the files of a dataset; no other file is removed with an earlier one."""
 MOST_FILES = 4000
 """Files of frames that a dataset is to have at most; where 100 MB each were more, they are larger."""
-ROWS_OF_GROUP = 10_000
+ROWS_OF_GROUP = 1000
 UNNAMED_STUDY = "study of a tactile sensor"
 """Name of a study whose file gives none. The name of its folder does not serve, so that equal studies give equal files."""
 

@@ -29,7 +29,7 @@ DATA_PATH = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 EPISODES_PATH = "meta/episodes/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 GROUP_BYTES = 8 << 20
 """Numbers that wait in memory until they become a group of rows: whole runs, so that equal runs give equal bytes."""
-EPISODES_OF_GROUP = 10_000
+EPISODES_OF_GROUP = 1000
 PLACE_COLUMNS = ("frame_index", "episode_index", "index", "task_index")
 """Whole numbers that LeRobot expects in every dataset, and that tell the place of a frame in it."""
 

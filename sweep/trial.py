@@ -7,6 +7,7 @@ import os
 import shutil
 import tempfile
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -37,8 +38,8 @@ class Estimate:
         Sentences of the runs that failed.
     tried : int
         Number of runs that were computed.
-    closing : float
-        Seconds that dataset and report take for the runs that were tried.
+    closing, closing_each : float
+        Seconds that dataset and report take, and for each run.
     """
 
     seconds: float
@@ -46,11 +47,11 @@ class Estimate:
     failures: list[str]
     tried: int
     closing: float
+    closing_each: float
 
     def seconds_of(self, runs: int, workers: int) -> float:
         """Return the seconds of a study from the command to the report."""
-        each = self.closing / max(1, self.tried)
-        return START_SECONDS + self.seconds * runs / min(workers, runs) + min(self.closing, each * runs)
+        return START_SECONDS + self.seconds * runs / min(workers, runs) + self.closing + self.closing_each * runs
 
 
 def try_runs(opened: OpenStudy, scripts: str = REFUSE) -> Estimate:
@@ -69,15 +70,21 @@ def try_runs(opened: OpenStudy, scripts: str = REFUSE) -> Estimate:
         shutil.copy(opened.folder / STUDY_NAME, trial)
         shutil.copytree(opened.folder / SCENES, trial / SCENES)
         compute_batch([0], name, scripts, limit)  # the first run loads what was compiled
+        first = _seconds_of(lambda: publish(trial, opened.study)) + _seconds_of(lambda: write_report(trial, opened.study))
+        one = _seconds_of(lambda: publish(trial, opened.study))
         tried = range(total)[:: max(1, total // RUNS_TRIED)][:RUNS_TRIED]
         found = compute_batch(tried, name, scripts, limit)
         if found.seconds < QUICK_SECONDS:
             tried = range(total)[:: max(1, total // QUICK_RUNS)][:QUICK_RUNS]
             found = compute_batch(tried, name, scripts, limit)
-        began = time.perf_counter()
-        publish(trial, opened.study)
-        write_report(trial, opened.study)
-        closing = time.perf_counter() - began
+        each = max(0.0, _seconds_of(lambda: publish(trial, opened.study)) - one) / len(tried)
         written = sum(os.stat(path).st_size for place in (PARTS, RUNS, "dataset") for path in (trial / place).rglob("*"))
     failures = [sentence for _, sentence in found.failures]
-    return Estimate(found.seconds / len(tried), written / max(1, found.done), failures, len(tried), closing)
+    return Estimate(found.seconds / len(tried), written / max(1, found.done), failures, len(tried), first, each)
+
+
+def _seconds_of(work: Callable[[], object]) -> float:
+    """Return the seconds of the processor that work takes: what other programs take would be multiplied by the runs."""
+    began = time.process_time()
+    work()
+    return time.process_time() - began

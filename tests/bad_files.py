@@ -52,7 +52,7 @@ from palpate.core.simulators.openrave_file import OpenRaveSensor, openrave_xml, 
 from palpate.core.simulators.registry import export_sensors, import_sensors
 from palpate.core.simulators.sensor_format import FoundSensor
 from palpate.core.simulators.sensor_on_mesh import SensorOnMesh
-from palpate.core.study.study_file import plan_for, read_study, runs_of
+from palpate.core.study.study_file import Runs, plan_for, read_study
 
 Files = dict[str, bytes]
 """Contents of files by their paths."""
@@ -498,7 +498,7 @@ def _read_rig(folder: Path) -> None:
 
 def _read_study(folder: Path) -> None:
     study = read_study(folder / "study.toml")
-    runs = runs_of(study, {"pad": plan_for(study, scenario())}, {"pad": "d"})
+    runs = Runs(study, {"pad": plan_for(study, scenario())}, {"pad": "d"})
     assert all(np.isfinite(value) for run in runs for value in run.values.values() if isinstance(value, float))
 
 

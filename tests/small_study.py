@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A study of presses that take milliseconds, and hashes of its folder that two equal studies share."""
+"""A study of presses that take milliseconds, and what two equal studies share."""
 
 from __future__ import annotations
 
 import hashlib
-import json
-from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -20,9 +19,9 @@ from palpate.core.model.scenario import Scenario
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.model.target import Target
-from palpate.core.study.run_files import RUNS
-from palpate.core.study.run_shards import ShardIndex, digests_in
-from palpate.sweep.finished_runs import StoredRuns
+from palpate.sweep.parts import Parts
+from palpate.sweep.scene_evaluation import ALLOW
+from palpate.sweep.study_folder import OpenStudy, begin_study
 
 STUDY = """format = "palpate-sweep/1"
 name = "small presses"
@@ -61,18 +60,15 @@ def write_study(folder: Path, runs: int, seed: int = 1, fails: bool = False, mor
     return file
 
 
-def run_hashes(folder: Path) -> dict[str, str]:
-    """Return a hash of each run in the shards of a study, wherever it stands there; the seconds that it took are left out."""
-    shards = ShardIndex(folder / RUNS)
-    found = {}
-    runs = StoredRuns(folder)
-    for digest in digests_in(folder / RUNS):
-        record, frames = runs.record(digest), shards.read(digest)
-        about = asdict(record) | {"folder": "", "seconds": 0.0}
-        words, at = json.dumps(about, sort_keys=True).encode(), 8 + int.from_bytes(frames[:4], "little")
-        layout = shards.common(json.loads(frames[8:at])["layout"])
-        found[digest] = hashlib.sha256(b"".join((words, frames[at:], layout))).hexdigest()
-    return found
+def begun(file: Path) -> OpenStudy:
+    """Open a study in the folder ``out`` beside its file."""
+    return begin_study(file, file.parent / "out", lambda blend, target: None, ALLOW)
+
+
+def rows_of(folder: Path) -> list[dict[str, Any]]:
+    """Return the runs that the parts of a study have, with all their numbers, in the order of the design; without times."""
+    rows = [row for piece in Parts(folder).pieces() for row in piece.to_pylist()]
+    return [{name: value for name, value in row.items() if name != "seconds" and value is not None} for row in rows]
 
 
 def tree(folder: Path) -> dict[str, str]:

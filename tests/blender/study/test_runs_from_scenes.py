@@ -18,7 +18,7 @@ from palpate.core.solver.simulation import run
 from palpate.core.study.variation import varied_scenario
 from palpate.sweep.scene_evaluation import read_blend
 from palpate.sweep.study_folder import begin_study, resume_study
-from palpate.sweep.worker import compute_batch, end_children
+from palpate.sweep.worker import compute_batch
 
 SCALE = 'bpy.data.objects["Ball"].scale[2]'
 STUDY = f"""format = "palpate-sweep/1"
@@ -39,21 +39,14 @@ def begun(folder, text=STUDY):
     return begin_study(study, folder / "out", lambda blend, target: read_blend(blend, target, "refuse", "--study", str(study)))
 
 
-@pytest.fixture(autouse=True)
-def _no_children_left():
-    yield
-    end_children()
-
-
 def computed(opened):
-    words = [{"index": r.index, "scene": r.scene, "values": dict(r.values), "digest": r.digest} for r in opened.runs]
-    return compute_batch(str(opened.folder), words)
+    return compute_batch(range(len(opened.runs)), str(opened.folder))
 
 
 @pytest.mark.slow("a study that reads its runs from a scene, in processes of its own")
 def test_a_run_is_what_the_scene_gives_with_these_values(tmp_path):
     opened = begun(tmp_path)
-    assert [answer["status"] for answer in computed(opened)] == ["done"] * 4
+    assert computed(opened).done == 4
     scene = bpy.context.scene
     for one in opened.runs:
         bpy.data.objects["Ball"].scale[2] = one.values[SCALE]
@@ -70,10 +63,11 @@ def test_a_run_is_what_the_scene_gives_with_these_values(tmp_path):
 @pytest.mark.long("a study that reads its runs from a scene, in processes of its own")
 def test_a_run_that_the_scene_cannot_make_fails_alone(tmp_path):
     opened = begun(tmp_path, STUDY.replace("[1.0, 1.2]", "[0.0, 1.0]").replace("[50.0, 80.0]", "[50.0]"))
-    first, second = computed(opened)
-    assert (first["status"], second["status"]) == ("failed", "done")
-    assert "'Ball'" in first["sentence"]
-    assert "\n" not in first["sentence"]
+    found = computed(opened)
+    ((index, sentence),) = found.failures
+    assert (found.done, index) == (1, 0)
+    assert "'Ball'" in sentence
+    assert "\n" not in sentence
 
 
 @pytest.mark.slow("opens a scene in processes of their own")

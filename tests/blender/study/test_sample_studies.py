@@ -1,21 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sample studies, each with a few runs instead of hundreds."""
 
-from dataclasses import asdict
-
 import pytest
+from small_study import rows_of
 from solver_scenes import GRAVITY
 
-from palpate.sweep.finished_runs import StoredRuns
 from palpate.sweep.scene_evaluation import read_blend
 from palpate.sweep.study_folder import begin_study
-from palpate.sweep.worker import compute_batch, end_children
-
-
-@pytest.fixture(autouse=True)
-def _no_children_left():
-    yield
-    end_children()
+from palpate.sweep.worker import compute_batch
 
 
 def finished(folder, tmp_path, name: str, order, count: int) -> list[dict]:
@@ -23,11 +15,16 @@ def finished(folder, tmp_path, name: str, order, count: int) -> list[dict]:
     file = folder / f"{name}.toml"
     opened = begin_study(file, tmp_path / name, lambda blend, target: read_blend(blend, target, "refuse", "--study", str(file)))
     ordered = sorted(opened.runs, key=lambda run: order(run.values))
-    chosen = [*ordered[:count], *ordered[-count:]]
-    words = [{"index": r.index, "scene": r.scene, "values": dict(r.values), "digest": r.digest} for r in chosen]
-    assert [answer["status"] for answer in compute_batch(str(opened.folder), words)] == ["done"] * 2 * count
-    stored = StoredRuns(opened.folder)
-    return [asdict(stored.record(run.digest)) for run in chosen]
+    chosen = [run.index for run in (*ordered[:count], *ordered[-count:])]
+    assert compute_batch(chosen, str(opened.folder)).done == 2 * count
+    rows = {row["run"]: row for row in rows_of(opened.folder)}
+    return [
+        {kind: named(rows[index], word) for kind, word in (("values", "varied."), ("metrics", "metric."))} for index in chosen
+    ]
+
+
+def named(row: dict, start: str) -> dict:
+    return {name.removeprefix(start): value for name, value in row.items() if name.startswith(start)}
 
 
 @pytest.mark.long("computes runs of a sample study")

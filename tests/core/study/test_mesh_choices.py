@@ -11,7 +11,7 @@ from palpate.core.geometry.mesh import mass_properties
 from palpate.core.io.input_files import load_mesh
 from palpate.core.study.design import points_of
 from palpate.core.study.mesh_choices import StudyMeshes, find_meshes, freeze_meshes
-from palpate.core.study.study_file import plan_for, read_study, runs_of
+from palpate.core.study.study_file import Runs, plan_for, read_study
 from palpate.core.study.variation import varied_scenario
 
 STUDY = HEAD + 'design = "grid"\n[vary]\n"Ball.mesh" = { choice = ["shapes/*.stl", "cone.ply"] }\n'
@@ -56,10 +56,10 @@ def test_a_free_body_gets_the_mass_properties_of_its_shape(folder):
 
 def test_another_content_makes_other_runs(folder):
     study, plan = plan_in(folder)
-    before = [run.digest for run in runs_of(study, {"tiny": plan}, {"tiny": "0"})]
+    before = [run.digest for run in Runs(study, {"tiny": plan}, {"tiny": "0"})]
     trimesh.creation.box((0.01, 0.02, 0.02)).export(folder / "shapes" / "box.stl")
     study, plan = plan_in(folder)
-    assert not set(before) & {run.digest for run in runs_of(study, {"tiny": plan}, {"tiny": "0"})}
+    assert not set(before) & {run.digest for run in Runs(study, {"tiny": plan}, {"tiny": "0"})}
 
 
 @pytest.mark.parametrize(

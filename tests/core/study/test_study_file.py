@@ -7,7 +7,7 @@ import pytest
 from study_scenes import HEAD, tiny_scene
 
 from palpate.core.errors import PalpateError
-from palpate.core.study.study_file import differences, frozen_text, plan_for, runs_of, study_of
+from palpate.core.study.study_file import Runs, differences, frozen_text, plan_for, study_of
 
 RANDOM = HEAD + 'design = "random"\nsamples = 4\n'
 
@@ -79,10 +79,10 @@ def test_the_frozen_text_is_the_study_again():
 
 def test_runs_have_different_digests_and_the_same_every_time():
     text = HEAD + "design = 'grid'\n[vary]\n'Pad.k' = { choice = [1, 1, 2] }"
-    runs = [runs_of(study(text), {"tiny": plan(text)}, {"tiny": "abc"}) for _ in range(2)]
+    runs = [list(Runs(study(text), {"tiny": plan(text)}, {"tiny": "abc"})) for _ in range(2)]
     assert runs[0] == runs[1]
     assert len({run.digest for run in runs[0]}) == 3
-    assert {run.digest for run in runs_of(study(text), {"tiny": plan(text)}, {"tiny": "abd"})}.isdisjoint(
+    assert {run.digest for run in Runs(study(text), {"tiny": plan(text)}, {"tiny": "abd"})}.isdisjoint(
         run.digest for run in runs[0]
     )
 
@@ -90,7 +90,7 @@ def test_runs_have_different_digests_and_the_same_every_time():
 def test_several_scenes_have_a_column():
     text = RANDOM + "[vary]\n'Pad.k' = { uniform = [1, 2] }"
     plans = {"one": plan(text), "two": plan(text)}
-    runs = runs_of(study(text), plans, {"one": "a", "two": "b"})
+    runs = Runs(study(text), plans, {"one": "a", "two": "b"})
     assert [run.values["scene"] for run in runs] == ["one"] * 4 + ["two"] * 4
 
 
@@ -100,11 +100,11 @@ TIED = RANDOM + "[vary]\n'Pad.mus' = { uniform = [0.3, 0.9] }\n'Pad.mud' = { sam
 def test_a_number_that_follows_another_has_its_values_and_adds_no_axis():
     read = study(TIED)
     found = plan(TIED)
-    runs = runs_of(read, {"tiny": found}, {"tiny": "0"})
+    runs = Runs(read, {"tiny": found}, {"tiny": "0"})
     assert list(found.varied) == ["Pad.mus"]
     for run in runs:
         assert run.values["Pad.mud"] == 0.5 * run.values["Pad.mus"]
-    other = runs_of(study(TIED.replace("0.5", "0.4")), {"tiny": plan(TIED.replace("0.5", "0.4"))}, {"tiny": "0"})
+    other = Runs(study(TIED.replace("0.5", "0.4")), {"tiny": plan(TIED.replace("0.5", "0.4"))}, {"tiny": "0"})
     assert not {run.digest for run in runs} & {run.digest for run in other}
 
 

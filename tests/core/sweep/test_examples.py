@@ -12,9 +12,7 @@ import sys
 
 import numpy as np
 import pytest
-from sweep_runs import new_study, write_press
-
-from palpate.sweep.dataset import publish
+from sweep_runs import new_study, published, solved_press
 
 parquet = pytest.importorskip("pyarrow.parquet")
 
@@ -23,10 +21,7 @@ parquet = pytest.importorskip("pyarrow.parquet")
 def test_contact_is_learnt_from_presses(tmp_path, repository):
     """Seventy-five runs place a contact of an unseen run better than always answering the mean."""
     pytest.importorskip("sklearn", exc_type=ImportError)
-    study = new_study(tmp_path / "study")
-    for index in range(100):
-        write_press(study, index)
-    publish(study)
+    study = published(new_study(tmp_path / "study"), [solved_press(index)[0] for index in range(100)])
     script = repository / "examples" / "train_contact.py"
     found = subprocess.run([sys.executable, script, study], capture_output=True, text=True, check=True, env=dict(os.environ))
     errors = [float(x) for x in re.findall(r"position +([\d.]+) mm", found.stdout)]
@@ -37,10 +32,7 @@ def test_contact_is_learnt_from_presses(tmp_path, repository):
 @pytest.mark.slow("opens the data set in a library that is loaded for it")
 def test_a_batch_is_drawn(tmp_path, repository):
     """Of a pad whose texels form a picture; the forces in the titles are those of the frames."""
-    study = new_study(tmp_path / "study")
-    for index in range(4):
-        write_press(study, index)
-    publish(study)
+    study = published(new_study(tmp_path / "study"), [solved_press(index)[0] for index in range(4)])
     script = repository / "examples" / "plot_batch.py"
     found = subprocess.run([sys.executable, script, study], capture_output=True, text=True, check=True, env=dict(os.environ))
     assert re.match(r"12 of \d+ frames with contact: ", found.stdout)
@@ -49,9 +41,7 @@ def test_a_batch_is_drawn(tmp_path, repository):
 
 def test_texels_of_a_picture_are_where_they_are(tmp_path, repository):
     """Row by row, as the picture is: each texel's force stands at its own place."""
-    study = new_study(tmp_path / "study")
-    write_press(study, 0)
-    publish(study)
+    study = published(new_study(tmp_path / "study"), [solved_press(0)[0]])
     example = runpy.run_path(str(repository / "examples" / "plot_batch.py"))
     features = json.loads((study / "dataset" / "meta" / "info.json").read_text(encoding="utf-8"))["features"]
     shape = features["observation.tactile.pad"]["shape"]

@@ -7,11 +7,9 @@ import json
 
 import numpy as np
 import pytest
-from sample_bake import grid_texels, recording_of
-from sweep_runs import new_study, unit_sensor, write_run
+from sweep_runs import made_up, new_study, published
 
 from palpate.core.errors import FileError
-from palpate.sweep.dataset import publish
 from palpate.sweep.exports import EXPORTS, export_hdf5, export_zarr
 
 parquet = pytest.importorskip("pyarrow.parquet")
@@ -22,11 +20,7 @@ IMAGE = "observation.tactile.pad"
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
     folder = new_study(tmp_path_factory.mktemp("exports") / "study")
-    for index in range(3):
-        recording = recording_of(grid_texels(), 6 + index)
-        write_run(folder, index, [unit_sensor("pad", grid_texels())], recording, {"mass": 1.0 + index, "shape": "ball"})
-    publish(folder)
-    return folder
+    return published(folder, [made_up(index, {"mass": 1.0 + index, "shape": "ball"}) for index in range(1, 4)])
 
 
 def assert_same_arrays(study, arrays, episodes):
@@ -42,7 +36,7 @@ def assert_same_arrays(study, arrays, episodes):
         else:
             np.testing.assert_array_equal(found, expected)
             assert found.dtype == feature["dtype"]
-    np.testing.assert_array_equal(episodes("run"), [0, 1, 2])
+    np.testing.assert_array_equal(episodes("run"), [1, 2, 3])
     np.testing.assert_array_equal(episodes("dataset_to_index"), [6, 13, 21])
 
 
@@ -77,7 +71,7 @@ def test_without_a_dataset_there_is_nothing_to_export(tmp_path, name):
 def test_pandas_opens_the_dataset(study):
     pandas = pytest.importorskip("pandas", exc_type=ImportError)
     frames, runs = pandas.read_parquet(study / "dataset" / "data"), pandas.read_parquet(study / "runs.parquet")
-    assert len(frames) == 6 + 7 + 8 and list(runs["varied.mass"]) == [1.0, 2.0, 3.0]
+    assert len(frames) == 6 + 7 + 8 and list(runs["varied.mass"]) == [2.0, 3.0, 4.0]
     assert pandas.read_parquet(study / "dataset" / "meta" / "tasks.parquet").index[0] == "presses"
 
 

@@ -8,14 +8,15 @@ import sys
 from pathlib import Path
 
 import pytest
+from small_study import begun, rows_of
 
 from palpate.benchmarks import _rows, gap
 from palpate.core.errors import PalpateError
-from palpate.core.study.run_files import done_runs, run_batch
 from palpate.core.study.study_file import Run, study_of
-from palpate.sweep.child import DONE, Scenes, answer_to
+from palpate.sweep.parts import Parts
 from palpate.sweep.scene_evaluation import ALLOW, REFUSE
-from palpate.sweep.study_folder import OpenStudy, begin_study, resume_study
+from palpate.sweep.study_folder import OpenStudy, resume_study
+from palpate.sweep.worker import BatchResult, RunComputer, compute_batch
 
 pytest.importorskip("distributed")
 parquet = pytest.importorskip("pyarrow.parquet")
@@ -57,19 +58,8 @@ def sweep(*words) -> subprocess.CompletedProcess:
     return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
 
 
-def begun(file: Path) -> OpenStudy:
-    return begin_study(file, file.parent / "out", lambda blend, target: None, ALLOW)
-
-
-def answers_of(opened: OpenStudy) -> list[dict]:
-    scenes = Scenes(opened.folder, ALLOW)
-    answers = []
-    with run_batch(opened.folder) as batch:
-        for run in opened.runs:
-            answers.append(answer_to(scenes, run, batch.place))
-            if answers[-1]["status"] == DONE:
-                batch.add(run.digest)
-    return answers
+def computed(opened: OpenStudy) -> BatchResult:
+    return compute_batch(range(len(opened.runs)), str(opened.folder), ALLOW)
 
 
 @pytest.mark.slow("the one study of a job from the command line in this tier")
@@ -110,7 +100,7 @@ def test_a_job_needs_permission_and_nothing_of_it_is_run_before(tmp_path):
     assert not Path("mine").exists()
     folder = begun(write(tmp_path)).folder
     with pytest.raises(PalpateError, match="--allow-scripts"):
-        Scenes(folder, REFUSE)
+        RunComputer(resume_study(folder), REFUSE)
 
 
 @pytest.mark.parametrize(
@@ -125,11 +115,17 @@ def test_a_job_needs_permission_and_nothing_of_it_is_run_before(tmp_path):
 )
 def test_what_a_job_does_wrong_is_a_failed_run(tmp_path, returned, sentence):
     opened = begun(write(tmp_path, job=f"def run(values, folder):\n    return {returned}\n"))
-    answers = answers_of(opened)
-    assert {answer["status"] for answer in answers} == {"failed"}
-    assert answers[0]["sentence"].startswith(sentence)
-    assert not done_runs(opened.folder)
+    found = computed(opened)
+    assert (found.done, found.failed) == (0, 6)
+    assert found.failures[0][1].startswith(sentence)
+    assert not len(Parts(opened.folder).done)
     assert not list((opened.folder / "runs").iterdir())
+
+
+def test_a_job_that_takes_longer_than_its_limit_has_failed(tmp_path):
+    opened = begun(write(tmp_path, job=JOB))
+    found = compute_batch([0], str(opened.folder), ALLOW, limit=1e-9)
+    assert found.failures == [(0, "Run 0 took longer than its limit of 1e-09 s: raise run_limit.")]
 
 
 def test_a_job_that_is_none_begins_nothing(tmp_path):
@@ -142,7 +138,7 @@ def test_a_job_that_is_none_begins_nothing(tmp_path):
 def test_a_changed_job_is_refused(tmp_path):
     file = write(tmp_path)
     opened = begun(file)
-    assert resume_study(opened.folder).runs == begun(file).runs == opened.runs
+    assert list(resume_study(opened.folder).runs) == list(begun(file).runs) == list(opened.runs)
     write(tmp_path, job=JOB.replace("Three", "3"))
     with pytest.raises(PalpateError, match=r"count.py' has changed since the study"):
         begun(file)
@@ -155,11 +151,10 @@ def test_what_a_job_calls_may_not_change_either(tmp_path):
     (tmp_path / "state").write_text("1")
     job = JOB.replace('"as it was"', f"open({str(tmp_path / 'state')!r}).read()")
     opened = begun(write(tmp_path, job=job))
-    assert answers_of(opened)[0]["status"] == "done"
+    assert compute_batch([0], str(opened.folder), ALLOW).done == 1
     (tmp_path / "state").write_text("2")
-    answer = answer_to(Scenes(opened.folder, ALLOW), opened.runs[1], tmp_path)
-    assert answer["status"] == "unwritable"  # no other run can be, so the study stops
-    assert answer["sentence"].startswith("What the job 'count.py' computes with is not what the study in ")
+    with pytest.raises(PalpateError, match="What the job 'count.py' computes with is not what the study in "):
+        RunComputer(opened, ALLOW).result(1)  # no other run can be computed, so the study stops
 
 
 def test_words_of_scenes_mean_nothing_to_a_job():
@@ -190,7 +185,7 @@ def test_hidden_effects_as_a_study_say_what_the_benchmark_says(repository, tmp_p
     (tmp_path / "hidden_effects.py").write_bytes((folder / "hidden_effects.py").read_bytes())
     (tmp_path / "study.toml").write_text(module.STUDY.format(cases=names), encoding="utf-8")
     opened = begun(tmp_path / "study.toml")
-    assert [answer["status"] for answer in answers_of(opened)] == ["done", "done"]
+    assert computed(opened).done == 2
     kept = {(one["kind"], one["number"]): one for one in _rows.results_in(opened.folder)}
     expected = [gap.examine(kind, number) for kind, number in plan]
     for one in expected:
@@ -203,9 +198,9 @@ def test_hidden_effects_as_a_study_say_what_the_benchmark_says(repository, tmp_p
         one["cpu_seconds"] = kept[one["kind"], one["number"]]["cpu_seconds"] = cpu
     assert gap.table([kept[entry] for entry in plan]) == gap.table(expected)
     run: Run = opened.runs[0]
-    record = json.loads((opened.folder / "runs" / run.digest / "run.json").read_text())
-    assert record["values"] == {"case": "other 14"}
-    assert record["metrics"]["right"] == record["metrics"]["right.other"] == 1.0
+    row = rows_of(opened.folder)[0]
+    assert (row["digest"], row["varied.case"]) == (run.digest, "other 14")
+    assert row["metric.right"] == row["metric.right.other"] == 1.0
 
 
 @pytest.mark.parametrize(("kind", "outcome"), [("none", "no gap"), ("outside", "unexplained"), ("two", "right")])

@@ -8,83 +8,72 @@ import re
 
 import numpy as np
 import pytest
-from sample_bake import grid_texels, recording_of, round_texels
-from sweep_runs import new_study, unit_sensor, write_failure, write_run
+from sample_bake import round_texels
+from sweep_runs import failed, made_up, new_study, published
 
-from palpate.core.errors import FileError
+from palpate.core.study.study_file import read_study
 from palpate.sweep.dependencies import Dependency, dependencies
 from palpate.sweep.report import StudyColumns, _metric_row, _strongest_sentence, write_report
-from palpate.sweep.report_figures import draw_small_multiples
+
+pytest.importorskip("pyarrow")
 
 
-def study_of(tmp_path, runs=40):
-    """A study whose only metric that varies follows the load, which is 1 to 2."""
-    study = new_study(tmp_path / "study", "a <b>bold</b> name")
-    texels = grid_texels()
+def report_of(folder, results):
+    """The page of a study of these runs."""
+    study = published(folder, results)
+    write_report(study, read_study(study / "study.toml"))
+    return (study / "report.html").read_text(encoding="utf-8")
+
+
+def loads(runs=40, **more):
+    """Runs whose only metric follows the load, which is 1 to 2."""
     for index in range(runs):
-        recording = recording_of(texels)
-        recording.sensors["pad"].net_force = recording.sensors["pad"].net_force + [0.0, 0.0, -1.0 - index / runs]
-        values = {"load": 1.0 + index / runs, "other": float(np.random.default_rng(index).random()), "shape": "ball"}
-        write_run(study, index, [unit_sensor("pad", texels)], recording, values)
-    return study
+        load = 1.0 + index / runs
+        values = {"load": load, "other": float(np.random.default_rng(index).random()), "shape": "ball"}
+        yield made_up(index, {**values, **{name: value(index) for name, value in more.items()}}, load=load)
 
 
+@pytest.mark.slow("draws two pages")
 def test_the_page_says_what_depends_on_what(tmp_path):
-    study = study_of(tmp_path)
-    write_failure(study, 100, "The mesh <cube> has no faces.")
-    write_report(study)
-    page = (study / "report.html").read_text(encoding="utf-8")
-    assert "The strongest dependency is that of largest_force on load." in page
+    study = new_study(tmp_path / "study")
+    file = study / "study.toml"
+    file.write_text(file.read_text().replace("presses", "a <b>bold</b> name"))
+    runs = [*loads(), failed(100, "The mesh <cube> has no faces.")]
+    page = report_of(study, runs)
+    assert "The strongest dependency is that of load on load." in page
     assert "40 runs finished, 1 failed." in page
     assert "The mesh &lt;cube&gt; has no faces." in page and "<b>bold" not in page
     assert not re.search(r'(src|href)="(?!data:)', page), "nothing outside the page"
     pictures = [base64.b64decode(data) for data in re.findall(r"base64,([^\"]+)", page)]
     assert len(pictures) == 2 and all(picture.startswith(b"\x89PNG") for picture in pictures)
-    before = page
-    write_report(study)
-    assert (study / "report.html").read_text(encoding="utf-8") == before
+    assert report_of(study, []) == page
     assert not list(study.glob(".palpate*"))
 
 
 def test_failures_that_differ_in_numbers_are_one_row(tmp_path):
-    study = study_of(tmp_path)
-    for index, number in enumerate((0.21, 1e-5, 0.20, 3)):
-        write_failure(study, 100 + index, f"mud of 'Pad 2' is larger than mus ({number:g}).")
-    write_failure(study, 200, "mud of 'Pad' is larger than mus (0.2).")
-    write_report(study)
-    page = (study / "report.html").read_text(encoding="utf-8")
+    lost = [failed(100 + i, f"mud of 'Pad 2' is larger than mus ({x:g}).") for i, x in enumerate((0.21, 1e-5, 0.20, 3))]
+    page = report_of(new_study(tmp_path / "study"), [*loads(4), *lost, failed(200, "mud of 'Pad' is larger than mus (0.2).")])
     rows = re.findall(r"<td>(mud of [^<]*)</td><td[^>]*>(\d+)</td>", page)
     assert sorted((row[0].count("Pad 2"), row[1]) for row in rows) == [(0, "1"), (1, "4")]
+
+
+def test_what_failing_depends_on_is_said(tmp_path):
+    runs = [one for one in loads(60) if one.run.values["load"] < 1.5]
+    lost = [failed(one.run.index, "Too much load.", one.run.values) for one in loads(60) if one.run.values["load"] >= 1.5]
+    page = report_of(new_study(tmp_path / "study"), [*runs, *lost])
+    assert "What failing depends on:</p>" in page and "<td>load</td>" in page.partition("What failing depends on")[2]
 
 
 def test_where_a_press_was_is_not_the_headline():
     """Its place follows the numbers that chose it, and says nothing of the sensor."""
     place, force = (Dependency("press.place", "press.y", 0.98, 0.9, 0.0, 9), Dependency("Pad.k", "force", 0.6, 0.5, 0.0, 9))
-    columns = StudyColumns({}, {}, 1.0)
-    assert _strongest_sentence([place, force], columns, 9) == "The strongest dependency is that of force on Pad.k."
-    assert _strongest_sentence([place], columns, 9) == "The strongest dependency is that of press.y on press.place."
-
-
-def test_a_study_of_failures_alone_has_a_report(tmp_path):
-    study = new_study(tmp_path / "study")
-    write_failure(study, 1, "Nothing touches the sensor.")
-    write_report(study)
-    assert "No run finished, 1 failed." in (study / "report.html").read_text(encoding="utf-8")
+    columns = StudyColumns({}, {}, [""] * 9)
+    assert _strongest_sentence([place, force], columns) == "The strongest dependency is that of force on Pad.k."
+    assert _strongest_sentence([place], columns) == "The strongest dependency is that of press.y on press.place."
 
 
 def test_texels_without_rows_are_drawn(tmp_path):
-    study = new_study(tmp_path / "study")
-    write_run(study, 0, [unit_sensor("pad", round_texels())], recording_of(round_texels()), {"mass": 1.0})
-    write_report(study)
-    assert "base64," in (study / "report.html").read_text(encoding="utf-8")
-
-
-def test_a_damaged_run_is_named(tmp_path):
-    study = study_of(tmp_path, runs=1)
-    path = next((study / "runs").glob("*/run.json"))
-    path.write_text('{"format": "palpate-run/1"}', encoding="utf-8")
-    with pytest.raises(FileError, match="run.json' is damaged"):
-        write_report(study)
+    assert "base64," in report_of(new_study(tmp_path / "study"), [made_up(0, {"mass": 1.0}, {"cap": round_texels()})])
 
 
 def test_dependencies_are_found_and_chance_is_not():
@@ -121,23 +110,17 @@ def test_missing_values_count_as_missing():
 
 
 def test_a_choice_that_names_each_run_is_neither_drawn_nor_judged(tmp_path):
-    study = new_study(tmp_path / "study", "cases")
-    texels = grid_texels()
-    for index in range(40):
-        recording = recording_of(texels)
-        recording.sensors["pad"].net_force = recording.sensors["pad"].net_force + [0.0, 0.0, -1.0 - index / 40]
-        write_run(study, index, [unit_sensor("pad", texels)], recording, {"case": f"case {index}"})
-    write_report(study)
-    page = (study / "report.html").read_text(encoding="utf-8")
+    runs = [made_up(index, {"case": f"case {index}"}, load=1.0 + index / 40) for index in range(40)]
+    page = report_of(new_study(tmp_path / "study"), runs)
     assert "Metrics over each parameter" not in page and "1 choice of more than 12 names" in page
     assert "No dependency of a metric on a parameter was looked for" in page and "Strongest dependencies" not in page
 
 
 def test_what_was_not_judged_is_not_said_to_matter_little():
     random = np.random.default_rng(3)
-    values = {"case": [f"case {number}" for number in range(40)], "load": list(random.random(40))}
+    values = {"case": np.array([f"case {number}" for number in range(40)], object), "load": random.random(40)}
     metrics = {"slip": random.random(40)}
-    sentence = _strongest_sentence(dependencies(values, metrics), StudyColumns(values, metrics, 0.0), 40)
+    sentence = _strongest_sentence(dependencies(values, metrics), StudyColumns(values, metrics, [""] * 40))
     assert sentence == "No metric depends on load as far as 40 runs can tell."
 
 
@@ -158,13 +141,3 @@ def test_means_of_metrics_are_given():
     """Of the runs that have a value; the mean of uneven ones is no median."""
     assert _metric_row("slip", np.array([1.0, 1.0, 7.0])) == ["slip", "3", "1", "1", "7", "3"]
     assert _metric_row("slip", np.array([])) == ["slip", "", "", "", "", "0"]
-
-
-def test_names_that_would_be_cut_to_the_same_stay_whole(tmp_path):
-    names = ["left/a-long-shape.stl", "right/a-long-shape.stl"]
-    drawn = []
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("palpate.sweep.report_figures.save_figure", lambda figure, *_: drawn.append(figure))
-        draw_small_multiples(tmp_path / "a.png", {"mesh": names * 20}, {"slip": np.arange(40.0)}, set())
-    (axes,) = drawn[0].axes
-    assert [label.get_text() for label in axes.get_xticklabels()] == names

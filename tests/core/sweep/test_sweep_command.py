@@ -1,19 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``palpate sweep`` from the command line: what is done stays done, whatever is killed, and mistakes are one sentence."""
+"""``palpate sweep`` from the command line: what comes out, and mistakes that are one sentence."""
 
 import json
-import os
 import shutil
-import signal
 import subprocess
 import sys
-import time
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 import pytest
-from small_study import run_hashes
+from small_study import begun, rows_of, write_study
 from study_scenes import HEAD, tiny_scene
 
 from palpate.core.errors import PalpateError
@@ -22,12 +18,13 @@ from palpate.core.io.bake_reader import read_bake
 from palpate.core.io.recording_npz import load_recording
 from palpate.core.io.scenario_npz import save_scenario
 from palpate.core.io.tactile_exr import read_exr
-from palpate.core.study.run_files import SCENES, done_runs, make_folders, run_batch, write_failure
-from palpate.core.study.run_shards import RUN, ShardScan
+from palpate.core.study.progress import part_files
+from palpate.sweep import driver
 from palpate.sweep.driver import dask_client
-from palpate.sweep.finished_runs import StoredRuns
-from palpate.sweep.study_folder import begin_study
-from palpate.sweep.worker import Child, Limits, compute_batch, end_children
+from palpate.sweep.parts import Parts, RunResult, write_part
+from palpate.sweep.study_folder import begin_study, resume_study
+from palpate.sweep.trial import START_SECONDS, Estimate, try_runs
+from palpate.sweep.worker import compute_batch
 
 pytest.importorskip("distributed")
 parquet = pytest.importorskip("pyarrow.parquet")
@@ -49,7 +46,7 @@ LONGEST = 300
 """Seconds until a command counts as hanging; a busy machine may have to compile the solver first."""
 
 
-def command(*words, **options):
+def command(*words):
     return [sys.executable, "-m", "palpate.commands", "sweep", *map(str, words)]
 
 
@@ -57,12 +54,7 @@ def sweep(*words):
     return subprocess.run(command(*words), capture_output=True, text=True, timeout=LONGEST, check=False)
 
 
-def names(table: np.ndarray) -> list[str]:
-    """The digests of the runs in a group of a shard."""
-    return [row["name"].tobytes().hex() for row in table if row["kind"] == RUN]
-
-
-def write_study(folder: Path, text: str = STUDY) -> Path:
+def write(folder: Path, text: str = STUDY) -> Path:
     save_scenario(folder / "tiny.npz", tiny_scene())
     (folder / "study.toml").write_text(text, encoding="utf-8")
     return folder / "study.toml"
@@ -72,7 +64,7 @@ def write_study(folder: Path, text: str = STUDY) -> Path:
 def undisturbed(tmp_path_factory):
     """The output folder of the study, computed in one go."""
     folder = tmp_path_factory.mktemp("undisturbed")
-    finished = sweep(write_study(folder), "--out", folder / "out", "--workers", 2)
+    finished = sweep(write(folder), "--out", folder / "out", "--workers", 2)
     assert (finished.returncode, finished.stderr) == (0, "")
     assert "24 runs: 24 done, 0 failed, 0 left" in finished.stdout
     return folder / "out"
@@ -81,28 +73,19 @@ def undisturbed(tmp_path_factory):
 @pytest.mark.slow("computes the study that the tests of this file share")
 def test_a_run_holds_what_it_promises(undisturbed, tmp_path):
     """With recordings it has a folder as a bake has, and the same numbers as without."""
-    study = write_study(tmp_path, STUDY.replace("fps = 200", "fps = 200\nrecordings = true"))
-    opened = begin_study(study, tmp_path / "out", lambda blend, target: None)
-    (one,) = [run for run in opened.runs if run.index == 5]
-    words = {"index": one.index, "scene": one.scene, "values": dict(one.values), "digest": one.digest}
-    try:
-        assert compute_batch(str(opened.folder), [words])[0]["status"] == "done"
-    finally:
-        end_children()
-    place = opened.folder / "runs" / one.digest
-    run = json.loads((place / "run.json").read_bytes())
+    opened = begun(write(tmp_path, STUDY.replace("fps = 200", "fps = 200\nrecordings = true")))
+    compute_batch([5], str(opened.folder))
+    (row,) = rows_of(opened.folder)
+    place = opened.folder / "runs" / row["digest"]
     recording = load_recording(place / "Pad" / "recording.npz")
-    assert run["digest"] == place.name
-    assert run["frames"] == len(recording.frames)
-    assert run["metrics"]["max_normal_force"] == recording.sensors["Pad"].normal_force.sum(axis=1).max() > 0
-    assert run["metrics"]["max_depth"] <= run["values"]["press.depth"]
+    assert row["metric.max_normal_force"] == recording.sensors["Pad"].normal_force.sum(axis=1).max() > 0
+    assert row["metric.max_depth"] <= row["varied.press.depth"]
     baked = read_bake(place)  # a run is read like a bake
-    assert baked.parameters["Pad"].k == run["values"]["Pad.k"]
-    assert baked.manifests["Pad"].unit == baked.parameters["Pad"].unit == "N"
-    runs = StoredRuns(undisturbed)
-    assert asdict(runs.record(one.digest))["metrics"] == run["metrics"]
-    own, kept = StoredRuns(opened.folder).run(one.digest)[1], runs.run(one.digest)[1]
-    assert [bytes(column.content) for column in own.columns] == [bytes(column.content) for column in kept.columns]
+    assert baked.parameters["Pad"].k == row["varied.Pad.k"] and baked.manifests["Pad"].unit == "N"
+    expected = rows_of(undisturbed)[5]
+    assert {name: value for name, value in row.items() if name != "digest"} == {
+        name: value for name, value in expected.items() if name != "digest"
+    }
 
 
 def test_the_dataset_of_a_study_knows_units_and_slip(undisturbed):
@@ -127,55 +110,26 @@ def test_a_finished_study_is_exported(undisturbed):
 
 @pytest.mark.long("computes a study twice")
 def test_failed_runs_are_left_alone_until_they_are_asked_for(undisturbed, tmp_path):
-    study, folder = write_study(tmp_path), tmp_path / "study"
-    lost = [run.digest for run in begin_study(study, folder, lambda blend, target: None).runs[::20]]
-    for digest in lost:
-        write_failure(folder, digest, "The lamp went out.")
+    folder = tmp_path / "study"
+    opened = begin_study(write(tmp_path), folder, lambda blend, target: None)
+    write_part(folder, [RunResult(run, "The lamp went out.") for run in opened.runs[::20]])
     finished = sweep(folder, "--workers", 1)
     assert (finished.returncode, finished.stderr) == (0, "")
     assert "24 runs: 22 done, 2 failed, 0 left" in finished.stdout and "--retry-failed computes them again" in finished.stdout
     table = parquet.read_table(folder / "runs.parquet").to_pylist()
-    expected = {row["run"]: row for row in parquet.read_table(undisturbed / "runs.parquet").to_pylist()}
-    failed = [row for row in table if row["status"] == "failed"]
-    assert {row["digest"] for row in failed} == set(lost) and {row["message"] for row in failed} == {"The lamp went out."}
-    for row in failed:  # a failure's file has only its digest; the table says which run it was
+    expected = parquet.read_table(undisturbed / "runs.parquet").to_pylist()
+    for row in (table[0], table[20]):
+        assert (row["status"], row["message"]) == ("failed", "The lamp went out.")
         assert all(row[name] == expected[row["run"]][name] for name in row if name.startswith("varied.") or name == "digest")
     again = sweep(folder, "--workers", 1, "--retry-failed")
     assert "24 runs: 24 done, 0 failed, 0 left" in again.stdout
-    assert run_hashes(folder) == run_hashes(undisturbed)
+    assert rows_of(folder) == rows_of(undisturbed)
     assert (folder / "runs.parquet").read_bytes() == (undisturbed / "runs.parquet").read_bytes()
-
-
-@pytest.mark.long("kills a study and computes it again")
-@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
-def test_a_stopped_study_goes_on_where_it_was(undisturbed, tmp_path, number):
-    study = write_study(tmp_path)
-    process = subprocess.Popen(command(study, "--workers", 2), stderr=subprocess.PIPE, text=True, start_new_session=True)
-    folder, began = tmp_path / "study", time.monotonic()
-    while len(done_runs(folder)) < 3 and process.poll() is None and time.monotonic() < began + LONGEST:
-        time.sleep(0.02)
-    os.killpg(process.pid, number) if number == signal.SIGINT else process.kill()  # a terminal's Ctrl-C reaches the group
-    stderr = process.communicate(timeout=LONGEST)[1]
-    assert process.returncode == (130 if number == signal.SIGINT else -9), stderr
-    if number == signal.SIGINT:
-        assert stderr.splitlines()[-1] == "palpate sweep: stopped; the same command continues.", stderr
-        assert "Traceback" not in stderr
-    earlier = done_runs(folder)
-    before = {path: path.read_bytes() for path in (folder / "runs").glob("*.shard")}
-    finished = sweep(folder, "--workers", 2)
-    assert (finished.returncode, finished.stderr) == (0, "")
-    assert run_hashes(folder) == run_hashes(undisturbed)
-    assert earlier and all(path.read_bytes().startswith(content) for path, content in before.items())
-    found = [digest for _, _, table in ShardScan(folder / "runs").new_groups() for digest in names(table)]
-    assert all(found.count(digest) == 1 for digest in earlier), "it was computed again"
-    assert not list((folder / "runs").glob(".*"))
 
 
 @pytest.mark.slow("starts the command twice")
 def test_another_study_in_the_same_folder_is_refused(undisturbed, tmp_path):
-    study = write_study(tmp_path, STUDY.replace("24", "25").replace("2e-3", "3e-3"))
-    refused = sweep(study, "--out", undisturbed)
+    refused = sweep(write(tmp_path, STUDY.replace("24", "25").replace("2e-3", "3e-3")), "--out", undisturbed)
     assert refused.returncode == 1
     (line,) = refused.stderr.splitlines()
     assert "samples was 24 and is 25" in line
@@ -183,15 +137,23 @@ def test_another_study_in_the_same_folder_is_refused(undisturbed, tmp_path):
     assert sweep(undisturbed, "--status").stdout == "24 runs: 24 done, 0 failed, 0 left\n"
 
 
-def test_a_misspelt_name_is_one_line_and_begins_nothing(tmp_path):
-    refused = sweep(write_study(tmp_path, STUDY.replace("Pad.k", "Pad.kk")))
+def test_a_folder_of_an_earlier_version_is_one_sentence(undisturbed, tmp_path):
+    shutil.copytree(undisturbed, tmp_path / "out")
+    frozen = tmp_path / "out" / "study.toml"
+    frozen.write_text("".join(line for line in frozen.read_text().splitlines(True) if not line.startswith("parts =")))
+    with pytest.raises(PalpateError, match="in files of an earlier version.*give another folder with --out"):
+        resume_study(tmp_path / "out")
+
+
+def test_mistakes_are_one_line_and_begin_nothing(tmp_path):
+    refused = sweep(write(tmp_path, STUDY.replace("Pad.k", "Pad.kk")))
     assert refused.returncode == 1
     assert refused.stderr == "palpate sweep: There is no 'Pad.kk' to vary in 'tiny': did you mean 'Pad.k'?\n"
     assert not (tmp_path / "study").exists()
 
 
 def test_names_are_listed_for_a_study_with_a_wrong_one_and_for_a_scene(tmp_path):
-    study = write_study(tmp_path, STUDY.replace("Pad.k", "Pad.kk"))
+    study = write(tmp_path, STUDY.replace("Pad.k", "Pad.kk"))
     for place in (study, tmp_path / "tiny.npz"):
         listed = sweep(place, "--list")
         assert (listed.returncode, listed.stderr) == (0, "")
@@ -204,7 +166,7 @@ def test_a_study_may_change_after_a_dry_run_and_a_folder_named_as_the_package_do
     """A bake leaves a folder `palpate` beside its .blend, and Python looks in its working folder first."""
     (tmp_path / "palpate").mkdir()
     (tmp_path / "palpate" / "__init__.py").write_text("raise ImportError('this is a bake')\n", encoding="utf-8")
-    study = write_study(tmp_path)
+    study = write(tmp_path)
     script = "from palpate.commands import run_process; run_process()"
     words = [sys.executable, "-P", "-c", script, "sweep", study.name]
     options = {"cwd": tmp_path, "capture_output": True, "text": True, "timeout": LONGEST, "check": False}
@@ -212,18 +174,25 @@ def test_a_study_may_change_after_a_dry_run_and_a_folder_named_as_the_package_do
     assert (tried.returncode, tried.stderr) == (0, "")
     assert "24 runs, " in tried.stdout
     assert not (tmp_path / "study").exists()
-    write_study(tmp_path, STUDY.replace("samples = 24", "samples = 2"))
+    write(tmp_path, STUDY.replace("samples = 24", "samples = 2"))
     done = subprocess.run([*words, "--workers", "1"], **options)
     assert (done.returncode, done.stderr) == (0, "")
     assert "2 runs: 2 done, 0 failed, 0 left" in done.stdout
 
 
-def test_a_study_of_a_billion_runs_is_one_line_and_begins_nothing(tmp_path):
-    refused = sweep(write_study(tmp_path, STUDY.replace("samples = 24", "samples = 1000000000")), "--out", tmp_path / "out")
-    assert refused.returncode == 1
-    (line,) = refused.stderr.splitlines()
-    assert "asks for 1e+09 runs, at most 1000000 are possible" in line
-    assert not (tmp_path / "out").exists()
+def test_the_time_of_a_study_counts_start_and_report():
+    found = Estimate(seconds=0.5, size=1.0, failures=[], tried=5, closing=2.0, closing_each=0.01)
+    assert found.seconds_of(1, 8) == pytest.approx(START_SECONDS + 0.5 + 2.01)  # seven of the workers have nothing to do
+    assert found.seconds_of(101, 2) == pytest.approx(START_SECONDS + 25.25 + 2.0 + 1.01)
+
+
+@pytest.mark.slow("computes some runs and a report")
+def test_a_trial_counts_what_fails(tmp_path):
+    opened = begun(write_study(tmp_path, 30, fails=True))
+    found = try_runs(opened)
+    assert found.tried in (5, 30) and 0 < len(found.failures) < found.tried
+    assert found.size > 0.0 and found.closing > found.seconds > 0.0
+    assert not part_files(opened.folder)
 
 
 def test_workers_that_do_not_start_are_one_sentence(monkeypatch):
@@ -242,107 +211,36 @@ def test_other_limits_hold_for_the_same_study(undisturbed, tmp_path):
     """No result depends on them, and the message of a run that was too slow or too large advises to raise one."""
     folder = tmp_path / "out"
     shutil.copytree(undisturbed, folder)
-    file = write_study(tmp_path, STUDY.replace("fps = 200", "fps = 200\nrun_limit = 77\nrun_memory = 999"))
+    file = write(tmp_path, STUDY.replace("fps = 200", "fps = 200\nrun_limit = 77\nrun_memory = 999"))
     study = begin_study(file, folder, lambda blend, target: None).study
     assert (study.run_limit, study.run_memory) == (77.0, 999.0)
-
-
-@pytest.fixture
-def by_hand(tmp_path):
-    """A folder of a study with three runs, the second of which cannot be computed."""
-    text = STUDY.replace('design = "latin-hypercube"\nsamples = 24', 'design = "random"\nsamples = 3')
-    make_folders(tmp_path)
-    write_study(tmp_path, text)
-    save_scenario(tmp_path / SCENES / "tiny.npz", tiny_scene())
-    yield tmp_path
-    end_children()
-
-
-def words_of(index: int, **values) -> dict:
-    return {"index": index, "scene": "tiny", "values": values, "digest": f"{index:024x}"}
-
-
-def test_a_run_that_fails_leaves_the_others_alone(by_hand):
-    runs = [words_of(0), words_of(1, **{"Pad.mus": 0.0}), words_of(2)]
-    assert [answer["status"] for answer in compute_batch(str(by_hand), runs)] == ["done", "failed", "done"]
-    assert done_runs(by_hand) == {runs[0]["digest"], runs[2]["digest"]}
-    said = (by_hand / "failed" / f"{runs[1]['digest']}.txt").read_text(encoding="utf-8")
-    assert said.startswith("mud of sensor 'Pad' (0.23) is larger than mus (0)")
-    assert said.count("\n") == 1
-
-
-@pytest.mark.slow("computes until its limit of five seconds")
-def test_a_run_that_never_ends_is_ended(by_hand):
-    slow = words_of(1, **{"press.speed": 1e-9})  # frames for weeks
-    answers = compute_batch(str(by_hand), [slow, words_of(2)], Limits(5.0))
-    assert [answer["status"] for answer in answers] == ["failed", "done"]
-    assert "ended after its limit of 5 s" in answers[0]["sentence"]
-
-
-@pytest.mark.long("fills memory until its limit")
-def test_a_run_that_eats_memory_is_ended(by_hand):
-    """It gets a second, fresh process, since the first one has computed another run before; the worker goes on."""
-    hungry = words_of(1, **{"press.speed": 1e-9})  # its frames fill some 40 MB a second
-    child = Child(str(by_hand))
-    try:
-        with run_batch(by_hand) as batch:
-            child.compute(words_of(0), batch.place)
-        limit = round(child.memory() / 1e6) + 60
-    finally:
-        child.kill()
-    answers = compute_batch(str(by_hand), [words_of(3), hungry, words_of(2)], Limits(LONGEST, limit))
-    assert [answer["status"] for answer in answers] == ["done", "failed", "done"]
-    said = (by_hand / "failed" / f"{hungry['digest']}.txt").read_text(encoding="utf-8")
-    assert said == (
-        f"Run 1 was ended because it held more than its limit of {limit} MB: raise run_memory, or vary less widely.\n"
-    )
-
-
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="how Linux chooses what it ends")
-def test_the_system_ends_a_run_before_its_worker(by_hand):
-    child = Child(str(by_hand))
-    try:
-        own, worker = (int(Path(f"/proc/{name}/oom_score_adj").read_text()) for name in (child.process_id, "self"))
-    finally:
-        child.kill()
-    assert own > worker
-
-
-def test_a_run_that_is_done_is_not_computed_again(by_hand):
-    write_failure(by_hand, words_of(0)["digest"], "An earlier failure.")
-    compute_batch(str(by_hand), [words_of(0)])
-    assert not list((by_hand / "failed").iterdir())
-    before = {path: path.read_bytes() for path in (by_hand / "runs").iterdir()}
-    assert compute_batch(str(by_hand), [words_of(0)])[0]["status"] == "done"
-    assert {path: path.read_bytes() for path in (by_hand / "runs").iterdir()} == before
 
 
 @pytest.mark.long("computes a study in five commands")
 def test_parts_make_the_whole(undisturbed, tmp_path):
     """As on a farm: the study is begun, its parts are computed by themselves, and a last command makes the dataset."""
-    study, out = write_study(tmp_path), tmp_path / "out"
+    study, out = write(tmp_path), tmp_path / "out"
     refused = sweep(study, "--out", out, "--part", "1/2")
     assert (refused.returncode, refused.stderr.count("\n")) == (1, 1)
     assert "--begin" in refused.stderr
-    begun = sweep(study, "--out", out, "--begin")
-    assert (begun.returncode, begun.stderr) == (0, "")
-    assert not done_runs(out)
+    begin = sweep(study, "--out", out, "--begin")
+    assert (begin.returncode, begin.stderr) == (0, "")
     for part, count in (("2/2", 12), ("1/2", 24)):
         finished = sweep(out, "--part", part, "--workers", 1)
         assert (finished.returncode, finished.stderr) == (0, "")
-        assert len(done_runs(out)) == count
+        assert len(Parts(out).done) == count
     assert not (out / "dataset").exists()
     finished = sweep(out)
     assert (finished.returncode, finished.stderr) == (0, "")
-    assert run_hashes(out) == run_hashes(undisturbed)
+    assert rows_of(out) == rows_of(undisturbed)
     assert (out / "dataset").is_dir()
 
 
-def test_runs_have_images_where_the_study_asks_for_them(by_hand):
-    text = (by_hand / "study.toml").read_text(encoding="utf-8")
-    (by_hand / "study.toml").write_text(text.replace("fps = 200", "fps = 200\nimages = true"), encoding="utf-8")
-    assert compute_batch(str(by_hand), [words_of(0)])[0]["status"] == "done"
-    folder = by_hand / "runs" / words_of(0)["digest"] / "Pad"
+@pytest.mark.slow("bakes the images of a run")
+def test_runs_have_images_where_the_study_asks_for_them(tmp_path):
+    opened = begun(write(tmp_path, STUDY.replace("fps = 200", "fps = 200\nimages = true")))
+    assert compute_batch([0], str(opened.folder)).done == 1
+    folder = opened.folder / "runs" / opened.runs[0].digest / "Pad"
     assert read_manifest(folder).has_images
     for name, sha256 in read_checksums(folder / IMAGE_LIST_NAME):
         check_sha256(folder / name, sha256)
@@ -352,3 +250,13 @@ def test_runs_have_images_where_the_study_asks_for_them(by_hand):
     total = recording.at(frame).sensors["Pad"].normal_force.sum()
     assert channels["R"].sum() == pytest.approx(total, rel=1e-6) and total > 0.0  # images have 32 bits
     assert len(list(folder.glob("*.exr"))) == len(recording.frames)
+
+
+@pytest.mark.parametrize(
+    ("total", "seconds", "size"), [(1_000_000, 5.0, 200), (1000, 5.0, 1), (100_000, 0.005, 1000), (40, 1e-3, 5)]
+)
+def test_a_million_runs_make_some_thousand_parts(total, seconds, size):
+    """Neither does a batch of a short study keep the other workers waiting, nor does one of long runs lose hours."""
+    batches = driver.batches_of(np.arange(total), total, seconds, 2)
+    assert len(batches[0]) == size and len(batches) <= max(driver.MOST_PARTS, 1000)
+    assert [index for batch in batches for index in batch] == list(range(total))

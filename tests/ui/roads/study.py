@@ -11,12 +11,14 @@ RUNS = 1000
 STANDS_FOR_SWEEP = f"""#!/bin/sh
 # called as: sweep FILE --out DIR
 trap 'exit 130' INT
-mkdir -p "$4/runs"
+mkdir -p "$4/parts"
 printf 'format = "palpate-sweep/1"\\n[frozen]\\nruns = {RUNS}\\n' > "$4/study.toml"
-i=$(ls "$4/runs" | wc -l)
+i=$(ls "$4/parts" | wc -l)
 pause=0.3
 [ $i -gt 0 ] && pause=0
-while [ $i -lt {RUNS} ]; do mkdir "$4/runs/$(printf '%024x' $i)"; i=$((i + 1)); [ $pause = 0 ] || sleep $pause; done
+while [ $i -lt {RUNS} ]; do
+    touch "$4/parts/$(printf '%07d-%016x-1-0.parquet' $i $i)"; i=$((i + 1)); [ $pause = 0 ] || sleep $pause
+done
 touch "$4/report.html"
 echo "{RUNS} runs: {RUNS} done, 0 failed, 0 left"
 """
@@ -76,7 +78,7 @@ def road(ui):
     yield from ui.screenshot("3-running")
     yield from ui.key("ESC")
     yield from ui.wait_until(lambda: progress() is None, "ESC stops the study")
-    done = len(list((ui.out / "stiffness" / "runs").iterdir()))
+    done = len(list((ui.out / "stiffness" / "parts").iterdir()))
     ui.check(2 < done < RUNS, "the study is stopped in its middle")
     yield from ui.press("palpate.study_run")
     yield from ui.wait_until(lambda: (ui.out / "stiffness" / "report.html").exists(), "the study is done", timeout=60)

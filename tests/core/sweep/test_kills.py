@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A study whose driver, scheduler and workers are killed at random ends with the table of an undisturbed one."""
+
+import os
+import random
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
+from pathlib import Path
+
+import pytest
+from small_study import begun, rows_of, tree, write_study
+
+from palpate.core.study.progress import counted_runs
+from palpate.sweep.parts import Parts
+from palpate.sweep.worker import compute_batch
+
+pytest.importorskip("distributed")
+pytest.importorskip("pyarrow")
+psutil = pytest.importorskip("psutil")
+
+KILLS, SEED = 20, 41
+RUNS = 400
+LONGEST = 300.0
+"""Seconds until a wait counts as hanging; a busy machine may have to compile the solver first."""
+FATAL = """
+import os
+def run(values, folder):
+    if values["number"] == 3:
+        os._exit(9)
+    return {"double": 2.0 * values["number"]}
+"""
+HUNGRY = FATAL.replace("os._exit(9)", "kept = []\n        while True:\n            kept.append(bytearray(1 << 22))")
+JOB = 'format = "palpate-sweep/1"\njob = "job.py"\ndesign = "grid"\n{more}[vary]\nnumber = {{ choice = [{numbers}] }}\n'
+
+
+def processes_of(process: subprocess.Popen) -> list:
+    """The process and all that it has started, the last ones first."""
+    with suppress(psutil.Error):
+        own = psutil.Process(process.pid)
+        return [*reversed(own.children(recursive=True)), own]
+    return []
+
+
+def lose(process: subprocess.Popen) -> None:
+    """Kill a process and all that it has started, as if its machine was gone."""
+    for one in processes_of(process):
+        with suppress(psutil.Error):
+            one.kill()
+
+
+@contextmanager
+def started(*words: str) -> Iterator[subprocess.Popen]:
+    """A process that is killed with all that it has started when the body ends."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", *words], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+    try:
+        yield process
+    finally:
+        lose(process)
+        process.communicate()
+
+
+def until(condition: Callable[[], bool], what: str) -> None:
+    end = time.monotonic() + LONGEST
+    while not condition():
+        assert time.monotonic() < end, f"{what} takes longer than {LONGEST:.0f} s"
+        time.sleep(0.02)
+
+
+def has_moved(out: Path, before: tuple[int, int], driver: subprocess.Popen) -> bool:
+    return counted_runs(out) != before or driver.poll() is not None
+
+
+def free_port() -> str:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return str(probe.getsockname()[1])
+
+
+@pytest.fixture
+def expected(tmp_path):
+    """The rows of the study, computed in this process, and hashes of its dataset."""
+    from palpate.sweep.dataset import publish
+
+    opened = begun(write_study(tmp_path / "expected", RUNS, fails=True, hold=0.5))
+    compute_batch(range(RUNS), str(opened.folder))
+    publish(opened.folder, opened.study)
+    return rows_of(opened.folder), tree(opened.folder / "dataset")
+
+
+@pytest.mark.long("kills a study twenty times and computes it again")
+def test_a_study_killed_twenty_times_has_the_table_of_an_undisturbed_one(tmp_path, expected):
+    """Of a scheduler and two workers that were started by hand, and the command, one is killed at a random moment."""
+    study, out, dice, killed = (
+        write_study(tmp_path / "own", RUNS, fails=True, hold=0.5),
+        tmp_path / "out",
+        random.Random(SEED),
+        [],
+    )
+    with ExitStack() as files:
+        alive: dict[str, subprocess.Popen] = {}
+
+        def start(name: str, *words: str) -> None:
+            if name not in alive or alive[name].poll() is not None:
+                alive[name] = files.enter_context(started(*words))
+
+        port = free_port()
+        while len(killed) < KILLS:
+            if "scheduler" not in alive or alive["scheduler"].poll() is not None:
+                port = free_port()
+                start("scheduler", "dask", "scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard")
+            address = f"tcp://127.0.0.1:{port}"
+            for name in ("worker 1", "worker 2"):
+                more = ("--nworkers", "1", "--nthreads", "1", "--no-dashboard", "--local-directory", str(tmp_path / name))
+                start(name, "dask", "worker", address, *more)
+            before = counted_runs(out)
+            start("driver", "palpate.commands", "sweep", str(study), "--out", str(out), "--scheduler", address)
+            driver = alive["driver"]
+            until(partial(has_moved, out, before, driver), "the next part")
+            if sum(counted_runs(out)) >= RUNS:
+                break
+            time.sleep(dice.uniform(0.0, 0.5))
+            name = dice.choice(sorted(alive))
+            lose(alive[name])
+            killed.append(name)
+            if name == "scheduler":
+                assert driver.wait(LONGEST) == 1
+    finished = subprocess.run(
+        [sys.executable, "-m", "palpate.commands", "sweep", str(study), "--out", str(out), "--workers", "2"],
+        capture_output=True, text=True, timeout=LONGEST, check=False,
+    )  # fmt: skip
+    assert (finished.returncode, finished.stderr) == (0, "")
+    print(f"{len(killed)} kills: {killed}; runs in {len(Parts(out).files)} parts")
+    assert len(killed) == KILLS, f"the study was over after {len(killed)} kills: give it more runs"
+    assert rows_of(out) == expected[0] and tree(out / "dataset") == expected[1]
+
+
+@pytest.mark.long("stops a study and computes it again")
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+def test_a_stopped_study_goes_on_where_it_was(tmp_path, expected, number):
+    """A terminal's Ctrl-C reaches the whole group; what is done is not computed again."""
+    study, out = write_study(tmp_path / "own", RUNS, fails=True, hold=0.5), tmp_path / "out"
+    command = [sys.executable, "-m", "palpate.commands", "sweep", str(study), "--out", str(out), "--workers", "2"]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    until(lambda: sum(counted_runs(out)) >= 10 or process.poll() is not None, "the first part")
+    os.killpg(process.pid, number) if number == signal.SIGINT else process.kill()
+    stderr = process.communicate(timeout=LONGEST)[1]
+    assert process.returncode == (130 if number == signal.SIGINT else -9), stderr
+    if number == signal.SIGINT:
+        assert stderr.splitlines()[-1] == "palpate sweep: stopped; the same command continues.", stderr
+        assert "Traceback" not in stderr
+    before = {path: path.read_bytes() for path in Parts(out).files}
+    finished = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST, check=False)
+    assert (finished.returncode, finished.stderr) == (0, "")
+    assert before and all(path.read_bytes() == content for path, content in before.items())
+    assert sum(counted_runs(out)) == RUNS, "a run was computed twice"
+    assert rows_of(out) == expected[0]
+
+
+@pytest.mark.long("starts the command twice, each with workers")
+def test_two_commands_at_once(tmp_path):
+    study, out = write_study(tmp_path, 300), tmp_path / "out"
+    command = ("palpate.commands", "sweep", str(study), "--out", str(out), "--workers", "1")
+    with started(*command) as first:
+        until(lambda: sum(counted_runs(out)) > 0 or first.poll() is not None, "the first part")
+        with started(*command) as second:
+            said = second.communicate(timeout=LONGEST)[0]
+        assert second.returncode == 1 and "Another sweep is writing to" in said
+        assert "300 runs: 300 done, 0 failed, 0 left" in first.communicate(timeout=LONGEST)[0]
+
+
+@pytest.mark.long("a run that ends its worker four times for each half of its batch")
+@pytest.mark.parametrize(("job", "more"), [(FATAL, ""), (HUNGRY, "run_memory = 600\n")])
+def test_a_run_that_ends_its_worker_fails_alone(tmp_path, job, more):
+    (tmp_path / "job.py").write_text(job, encoding="utf-8")
+    study = tmp_path / "study.toml"
+    study.write_text(JOB.format(more=more, numbers=", ".join(map(str, range(30)))), encoding="utf-8")
+    command = ["palpate.commands", "sweep", str(study), "--out", str(tmp_path / "out"), "--workers", "2", "--allow-scripts"]
+    finished = subprocess.run([sys.executable, "-m", *command], capture_output=True, text=True, timeout=LONGEST, check=False)
+    assert (finished.returncode, finished.stderr) == (0, "")
+    assert "30 runs: 29 done, 1 failed, 0 left" in finished.stdout
+    (row,) = [row for row in rows_of(tmp_path / "out") if row["status"] == "failed"]
+    advice = "raise run_memory, 600 MB" if more else "it may need more memory"
+    assert row["message"] == f"Run 3 ended its worker each time that it was computed: {advice}, or vary less widely."
