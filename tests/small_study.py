@@ -66,9 +66,9 @@ def begun(file: Path) -> OpenStudy:
 
 
 def rows_of(folder: Path) -> list[dict[str, Any]]:
-    """Return the runs that the parts of a study have, with all their numbers, in the order of the design; without times."""
+    """Return the runs that the parts of a study have, with all their numbers, in the order of the design, but for times."""
     rows = [row for piece in Parts(folder).pieces() for row in piece.to_pylist()]
-    return [{name: value for name, value in row.items() if name != "seconds" and value is not None} for row in rows]
+    return [{name: value for name, value in row.items() if name != "seconds" and value not in (None, [])} for row in rows]
 
 
 def tree(folder: Path) -> dict[str, str]:
