@@ -16,7 +16,7 @@ import numpy as np
 
 from ..core.errors import FileError, os_error_reason
 from ..core.io.file_writing import atomic_write
-from ..core.io.temporary_folder import temporary_folder
+from ..core.io.hidden_folder import temporary_folder
 from ..core.study.study_file import Study
 from .lerobot import LeRobotWriter
 from .parts import COMPRESSION, FINISHED, Parts, frames_in

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..core.errors import FileError, os_error_reason
 from ..core.io.file_writing import atomic_write
-from ..core.io.temporary_folder import temporary_folder
+from ..core.io.hidden_folder import temporary_folder
 from .dataset import DATASET_FOLDER, exchange_folder
 from .parts import require_pyarrow
 

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import counted
+from ..core.figures.html_templates import render_html
 from ..core.io.file_writing import atomic_write
-from ..core.io.html_templates import render_html
-from ..core.io.temporary_folder import temporary_folder
+from ..core.io.hidden_folder import temporary_folder
 from ..core.study.study_file import Study
 from .dataset import TABLE_NAME, TIMINGS_NAME, UNNAMED_STUDY
 from .dependencies import LEAST_RUNS, RUNS_PER_NAME, Dependency, dependencies

@@ -18,8 +18,6 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-from palpate.core.io import group_sync
-
 KILL, EXIT, DONE = "KILL", "EXIT", "DONE"
 KINDS = ("ENOSPC", "EIO", "EACCES", "ESTALE", DONE, KILL)
 """Errors by their names. KILL: this operation and all later ones do not happen, as if the process had been killed. DONE: the
@@ -65,7 +63,6 @@ class Injector:
         self._wrap(os, "fsync", self._fsync)
         if hasattr(os, "sync"):
             self._wrap(os, "sync", lambda _: self._operation("sync", self._root, lambda: None))
-        self._wrap(group_sync, "sync_file_system", lambda *_: self._operation("syncfs", self._root, lambda: None))
         self._wrap(os, "open", self._os_open)
         self._wrap(io, "open", self._open)
         self._wrap(builtins, "open", self._open)

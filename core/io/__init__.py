@@ -14,7 +14,6 @@ __all__ = [
     "exr_file",
     "file_list",
     "file_writing",
-    "group_sync",
     "hidden_folder",
     "input_files",
     "npz",

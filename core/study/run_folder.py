@@ -7,11 +7,17 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
-from ..io.bake_folder import IMAGE_LIST_NAME, RECORDING_NAME, folder_names, frame_file, write_manifest
-from ..io.checksum_list import checksum_line
+from ..io.bake_folder import (
+    IMAGE_LIST_NAME,
+    RECORDING_NAME,
+    checksum_line,
+    folder_names,
+    frame_file,
+    manifest_of,
+    write_manifest,
+)
 from ..io.file_writing import file_sha256
 from ..io.recording_npz import save_recording
-from ..io.sensor_manifest import manifest_of
 from ..io.sensor_npz import SENSOR_NAME, save_sensor
 from ..io.tactile_exr import describe, nearest_places, write_exrs
 from ..model.recording import Recording
@@ -53,7 +59,7 @@ def write_run_folder(folder: Path, scenario: Scenario, recording: Recording, ima
             _write_images(own, sensor, recording)
             files.append(IMAGE_LIST_NAME)  # it lists the images
         digests = {name: file_sha256(own / name) for name in files}
-        write_manifest(own, manifest_of(scenario, sensor, recording, digests), atomic=False)
+        write_manifest(own, manifest_of(scenario, sensor, recording, digests))
 
 
 def _write_images(folder: Path, sensor: Sensor, recording: Recording) -> None:
