@@ -1,9 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A finished dataset in other formats: HDF5 and Zarr.
-
-Both hold the same arrays: one for each feature, with all frames along its first axis, and under ``episodes`` a value for each
-run. Units and meanings are attributes. They are made from ``dataset/`` alone, group of rows by group of rows, so that memory
-does not grow with the dataset.
+"""A finished dataset in other formats, HDF5 and Zarr: an array for each feature over all frames, and ``episodes`` with a value for
+each run, with units and meanings as attributes. They are made group of rows by group of rows, so memory does not grow.
 """
 
 from __future__ import annotations
@@ -21,13 +18,25 @@ from ..core.errors import FileError, os_error_reason
 from ..core.io.file_writing import atomic_write
 from ..core.io.hidden_folder import temporary_folder
 from .dataset import DATASET_FOLDER, exchange_folder
-from .parts import require_pyarrow
 
 EPISODE_COLUMNS = ("run", "length", "dataset_from_index", "dataset_to_index", "digest")
 ZARR_FILES = re.compile(r"(.+/)?(\.z(group|attrs|array|metadata)|[0-9.]+)")
 """Names of the files of a Zarr store of format 2."""
 CHUNK_BYTES = 1 << 20
 """Numbers of an array that are compressed together."""
+PACKAGES = {"hdf5": "h5py", "zarr": "zarr"}
+"""What each export needs, by the name that the command takes."""
+
+
+def require_packages(formats: Sequence[str]) -> None:
+    """Raise FileError where a package for one of the formats is not installed."""
+    for name in formats:
+        try:
+            importlib.import_module(PACKAGES[name])
+        except ImportError as error:
+            raise FileError(
+                f"--format {name} needs the package {PACKAGES[name]}: install it with 'pip install {PACKAGES[name]}'."
+            ) from error
 
 
 def export_hdf5(folder: Path) -> list[Path]:
@@ -44,12 +53,11 @@ def export_hdf5(folder: Path) -> list[Path]:
     written = []
     for part, stem in _parts(folder):
         target = folder / f"{stem}.h5"
-        # atomic_write holds the lock on the file already
         with atomic_write(target) as temporary, h5py.File(temporary, "w", libver="latest", locking=False) as file:
 
-            def create(name: str, shape: tuple[int, ...], kind: Any, chunks: tuple[int, ...], file: Any = file) -> Any:
+            def create(name: str, shape: tuple[int, ...], kind: str, rows: int, file: Any = file) -> Any:
+                packed = {"compression": "gzip", "shuffle": True, "chunks": (rows, *shape[1:])} if shape[0] else {}
                 kind = h5py.string_dtype() if kind == "string" else kind
-                packed = {"compression": "gzip", "compression_opts": 4, "shuffle": True, "chunks": chunks} if shape[0] else {}
                 return file.create_dataset(name, shape, kind, track_times=False, **packed)
 
             _fill(part, create, file.attrs)
@@ -58,15 +66,7 @@ def export_hdf5(folder: Path) -> list[Path]:
 
 
 def export_zarr(folder: Path) -> list[Path]:
-    """Write ``dataset.zarr`` beside the dataset of a study; each part becomes one. Return what was written.
-
-    The folder is written under a hidden name and renamed into its place.
-
-    Raises
-    ------
-    FileError
-        As :func:`export_hdf5`.
-    """
+    """Write ``dataset.zarr`` beside the dataset of a study, as :func:`export_hdf5`; a folder that is renamed into its place."""
     require_packages(["zarr"])
     import zarr
 
@@ -77,9 +77,10 @@ def export_zarr(folder: Path) -> list[Path]:
             with temporary_folder(folder, "zarr") as hidden:
                 group = zarr.open_group(hidden / "new", mode="w", zarr_format=2)  # what the most readers know
 
-                def create(name: str, shape: tuple[int, ...], kind: Any, chunks: tuple[int, ...], group: Any = group) -> Any:
-                    kind = "U64" if kind == "string" else kind
-                    return group.create_array(name, shape=shape, dtype=kind, chunks=chunks)
+                def create(name: str, shape: tuple[int, ...], kind: str, rows: int, group: Any = group) -> Any:
+                    return group.create_array(
+                        name, shape=shape, dtype="U64" if kind == "string" else kind, chunks=(rows, *shape[1:])
+                    )
 
                 _fill(part, create, group.attrs)
                 exchange_folder(hidden / "new", target, hidden / "before", ZARR_FILES)
@@ -90,64 +91,40 @@ def export_zarr(folder: Path) -> list[Path]:
 
 
 EXPORTS: dict[str, Callable[[Path], list[Path]]] = {"hdf5": export_hdf5, "zarr": export_zarr}
-"""Exports of a finished dataset, by the name that the command takes."""
-PACKAGES = {"hdf5": "h5py", "zarr": "zarr"}
-"""What each of them needs."""
-
-
-def require_packages(formats: Sequence[str]) -> None:
-    """Raise FileError where a package for one of the formats is not installed."""
-    for name in formats:
-        package = PACKAGES[name]
-        try:
-            importlib.import_module(package)
-        except ImportError as error:
-            raise FileError(f"--format {name} needs the package {package}: install it with 'pip install {package}'.") from error
 
 
 def _parts(folder: Path) -> list[tuple[Path, str]]:
     """Return the datasets of a study and the names of their exports without the ending."""
-    require_pyarrow()
-    dataset = folder / DATASET_FOLDER
-    if (dataset / "meta" / "info.json").is_file():
-        return [(dataset, "dataset")]
-    parts = sorted(path for path in dataset.glob("part-*") if (path / "meta" / "info.json").is_file())
-    if not parts:
+    found = sorted(path.parents[1] for path in (folder / DATASET_FOLDER).rglob("meta/info.json"))
+    if not found:
         raise FileError(f"'{folder}' has no dataset: let `palpate sweep` finish first.")
-    return [(part, f"dataset-{part.name}") for part in parts]
+    return [(part, "dataset" if part.name == DATASET_FOLDER else f"dataset-{part.name}") for part in found]
 
 
 def _fill(part: Path, create: Callable[..., Any], attributes: Any) -> None:
-    """Create all arrays with `create(name, shape, kind, chunks)` and fill them."""
+    """Create all arrays with `create(name, shape, kind, rows of a chunk)` and fill them."""
     info = json.loads((part / "meta" / "info.json").read_text(encoding="utf-8"))
     attributes["fps"] = info["fps"]
-    features, total = info["features"], info["total_frames"]
-    arrays = {}
-    for name, feature in features.items():
+    arrays, at = {}, 0
+    for name, feature in info["features"].items():
         shape = () if feature["shape"] == [1] else tuple(feature["shape"])
-        size = max(1, int(np.prod(shape))) * (8 if feature["dtype"] == "string" else np.dtype(feature["dtype"]).itemsize)
-        rows = int(np.clip(CHUNK_BYTES // size, 1, max(total, 1)))
-        arrays[name] = create(name, (total, *shape), feature["dtype"], (rows, *shape))
-        arrays[name].attrs.update(_attributes(feature))
-    at = 0
+        size = int(np.prod(shape)) * (8 if feature["dtype"] == "string" else np.dtype(feature["dtype"]).itemsize)
+        rows = int(np.clip(CHUNK_BYTES // size, 1, max(info["total_frames"], 1)))
+        arrays[name] = create(name, (info["total_frames"], *shape), feature["dtype"], rows)
+        about = feature.get("palpate", {})
+        words = {"names": feature.get("names"), "channels": about.get("channels")}
+        arrays[name].attrs.update({"unit": about.get("unit", ""), "about": about.get("about", "")})
+        arrays[name].attrs.update({key: list(value) for key, value in words.items() if value})
     for table in _row_groups(part / "data"):
-        for name, feature in features.items():
-            arrays[name][at : at + len(table)] = _dense(table.column(name), feature)
+        for name, feature in info["features"].items():
+            arrays[name][at : at + len(table)] = _dense(table.column(name), feature["shape"])
         at += len(table)
     episodes = [table.select(EPISODE_COLUMNS) for table in _row_groups(part / "meta" / "episodes")]
     for name in EPISODE_COLUMNS:
         values = [value for table in episodes for value in table.column(name).to_pylist()]
-        array = create(f"episodes/{name}", (len(values),), "string" if name == "digest" else "int64", (max(1, len(values)),))
+        kind = "string" if name == "digest" else "int64"
+        array = create(f"episodes/{name}", (len(values),), kind, max(1, len(values)))
         array[:] = np.array(values, dtype=object if name == "digest" else np.int64)
-
-
-def _attributes(feature: dict[str, Any]) -> dict[str, Any]:
-    own = feature.get("palpate", {})
-    found = {"unit": own.get("unit", ""), "about": own.get("about", "")}
-    for key, names in (("names", feature.get("names")), ("channels", own.get("channels"))):
-        if names:
-            found[key] = list(names)
-    return found
 
 
 def _row_groups(folder: Path) -> Iterator[Any]:
@@ -159,11 +136,10 @@ def _row_groups(folder: Path) -> Iterator[Any]:
                 yield file.read_row_group(number)
 
 
-def _dense(column: Any, feature: dict[str, Any]) -> np.ndarray:
+def _dense(column: Any, shape: list[int]) -> np.ndarray:
     """Return a column of lists of lists as one array, without a Python object for each of them."""
     array = column.combine_chunks()
-    if feature["shape"] == [1]:
-        return array.to_numpy(zero_copy_only=False)
-    for _ in feature["shape"]:
+    for _ in shape if shape != [1] else ():
         array = array.flatten()
-    return array.to_numpy(zero_copy_only=False).reshape(len(column), *feature["shape"])
+    dense: np.ndarray = array.to_numpy(zero_copy_only=False).reshape(len(column), *(shape if shape != [1] else ()))
+    return dense

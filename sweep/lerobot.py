@@ -27,7 +27,7 @@ FILE_MEGABYTES, FILES_PER_CHUNK = 100, 1000
 """Size from which on a file is followed by the next, and files in a folder: LeRobot's own."""
 DATA_PATH = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 EPISODES_PATH = "meta/episodes/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
-GROUP_BYTES = 8 << 20
+GROUP_BYTES = 4 << 20
 """Numbers that wait in memory until they become a group of rows: whole runs, so that equal runs give equal bytes."""
 EPISODES_OF_GROUP = 1000
 PLACE_COLUMNS = ("frame_index", "episode_index", "index", "task_index")

@@ -8,6 +8,7 @@ with the command.
 from __future__ import annotations
 
 import difflib
+import shutil
 from collections.abc import Mapping
 from typing import Any
 
@@ -52,7 +53,9 @@ def options_of(words: list[str]) -> dict[str, Any]:
 def job_script(options: Mapping[str, Any]) -> str:
     """Return the script that SLURM would get for each job; ``SCHEDULER`` stands for the driver's address."""
     _require()
-    return str(_job()(scheduler="SCHEDULER", name="palpate", **_words(options)).job_script())
+    from dask_jobqueue.slurm import SLURMJob
+
+    return str(SLURMJob(scheduler="SCHEDULER", name="palpate", **_words(options)).job_script())
 
 
 def slurm_cluster(options: Mapping[str, Any], jobs: int) -> Any:
@@ -63,14 +66,12 @@ def slurm_cluster(options: Mapping[str, Any], jobs: int) -> Any:
     PalpateError
         dask-jobqueue is missing, or this machine has no SLURM.
     """
-    import shutil
-
     _require()
     if shutil.which("sbatch") is None:
         raise PalpateError("This machine has no sbatch: give the command on a login node of the cluster, or leave --slurm out.")
     from dask_jobqueue import SLURMCluster
 
-    cluster = SLURMCluster(job_cls=_job(), scheduler_options={"dashboard_address": None}, **_words(options))
+    cluster = SLURMCluster(scheduler_options={"dashboard_address": None}, **_words(options))
     cluster.scale(jobs=jobs)
     return cluster
 
@@ -81,15 +82,7 @@ def _words(options: Mapping[str, Any]) -> dict[str, Any]:
 
     known = dask.config.get("jobqueue.slurm", {}) or {}
     merged = {name: value for name, value in DEFAULTS.items() if known.get(name) is None} | dict(options)
-    cores = merged.get("cores", known.get("cores"))
-    return {"job_name": "palpate", "processes": cores, **merged}
-
-
-def _job() -> Any:
-    """Return the class of a job in which Dask ends no worker for its memory: SLURM watches over the job."""
-    from dask_jobqueue.slurm import SLURMJob
-
-    return type("Job", (SLURMJob,), {"worker_process_memory": 0})
+    return {"job_name": "palpate", "processes": merged.get("cores", known.get("cores")), **merged}
 
 
 def _require() -> None:
