@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A finished dataset in other formats, HDF5 and Zarr: an array for each feature over all frames, and ``episodes`` with a value for
-each run, with units and meanings as attributes. They are made group of rows by group of rows, so memory does not grow.
+"""A finished dataset in other formats, HDF5 and Zarr.
+
+Both have an array for each feature over all frames, and under ``episodes`` a value for each run; units and meanings are
+attributes. They are made group of rows by group of rows, so that memory does not grow with the dataset.
 """
 
 from __future__ import annotations
