@@ -34,34 +34,12 @@ PRESSURES = {**UNITS["Pa"], "hPa": 1e2, "mbar": 1e2, "bar": 1e5, "psi": 6894.757
 """Pressures: a force follows with the area on which they act."""
 READING_UNITS = {**LOG_UNITS["N"]}
 """Units of readings that become newtons. Readings in any other unit keep it."""
-KNOWN_UNITS = (
-    {unit for units in LOG_UNITS.values() for unit in units}
-    | set(PRESSURES)
-    | {
-        *(
-            "counts",
-            "count",
-            "V",
-            "mV",
-            "ohm",
-            "kohm",
-            "Ohm",
-            "kOhm",
-            "Ω",
-            "kΩ",
-            "F",
-            "pF",
-            "raw",
-            "LSB",
-            "ADC",
-            "deg",
-            "rad",
-            "%",
-        ),
-    }
+KNOWN_UNITS = {unit for units in LOG_UNITS.values() for unit in units} | set(PRESSURES)
+KNOWN_UNITS |= set(
+    ["counts", "count", "V", "mV", "ohm", "kohm", "Ohm", "kOhm", "Ω", "kΩ", "F", "pF", "raw", "LSB", "ADC", "deg", "rad", "%"]
 )
-TEXEL_WORDS = {
-    *(
+TEXEL_WORDS = set(
+    [
         "texel",
         "taxel",
         "tactel",
@@ -75,12 +53,25 @@ TEXEL_WORDS = {
         "reading",
         "readings",
         "raw",
-    ),
-    *("resistance", "capacitance", "voltage", "ch", "channel", "r", "c", "s", "p", "v", "value", "values", "signal", "hall"),
-}
+        "resistance",
+        "capacitance",
+        "voltage",
+        "ch",
+        "channel",
+        "r",
+        "c",
+        "s",
+        "p",
+        "v",
+        "value",
+        "values",
+        "signal",
+        "hall",
+    ]
+)
 """Words in the names of columns that hold the sensor's response."""
 _AXIS_WORDS = {
-    "position": (
+    "position": [
         "position",
         "pos",
         "pose",
@@ -94,11 +85,11 @@ _AXIS_WORDS = {
         "motion",
         "p",
         "robot",
-    ),
-    "force": ("force", "f", "wrench", "load", "ft"),
-    "torque": ("torque", "moment", "t", "m", "tau"),
-    "rotation": ("orientation", "rotation", "quaternion", "quat", "q", "rot"),
-    "velocity": ("velocity", "vel", "v", "speed", "acceleration", "accel", "acc", "jerk", "gyro", "angular", "twist", "twists"),
+    ],
+    "force": ["force", "f", "wrench", "load", "ft"],
+    "torque": ["torque", "moment", "t", "m", "tau"],
+    "rotation": ["orientation", "rotation", "quaternion", "quat", "q", "rot"],
+    "velocity": ["velocity", "vel", "v", "speed", "acceleration", "accel", "acc", "jerk", "gyro", "angular", "twist", "twists"],
 }
 _TIME_WORDS = {"time", "t", "timestamp", "stamp", "sec", "secs", "seconds", "elapsed", "clock", "tim", "tim2", "zeit"}
 _SINGLE = {
