@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A real Blender with the extension installed, for roads played in its window (see README.md)."""
+"""A real Blender with the extension installed, whose window plays all roads that are asked for (see README.md)."""
 
 from __future__ import annotations
 
@@ -16,13 +16,24 @@ import pytest
 
 SCREEN = (1600, 1000)
 # Folders of the repository and where the Blender inside sees them
-WORK, HERE = "/palpate-work", "/palpate-ui"
+WORK, HERE, RIG = "/palpate-work", "/palpate-ui", "/palpate-rig"
+ALONE = "early_end"
+"""The road that closes Blender by itself, so that another Blender plays the others."""
+PREFERENCES = """
+import bpy
+preferences = bpy.context.preferences
+preferences.view.show_splash = False  # it would take the first click
+preferences.view.smooth_view = 0
+preferences.system.viewport_aa = "OFF"  # a processor draws: each view would be drawn eight times
+bpy.ops.wm.save_userpref()
+"""
+LONGEST = 3600.0
+"""Seconds after which a window that hangs is closed, beyond the minutes that it is used on purpose."""
 
 
 def pytest_addoption(parser):
     versions = list(provision_blender.DEBIAN)
     parser.addoption("--blender", choices=versions, default=provision_blender.DEFAULT, help="which Blender opens its window")
-    parser.addoption("--long", action="store_true", help="measure three first images with machine code and three without")
     parser.addoption("--minutes", type=float, default=0.0, help="how long the window is used at least, beyond five rounds")
 
 
@@ -32,37 +43,26 @@ class RealBlender:
 
     root: Path
     work: Path
-    here: Path
+    rig: Path
 
-    def run(self, command: list[str], log: Path, timeout: float) -> int:
+    def run(self, command: list[str], log: Path, timeout: float, **environment: object) -> int:
         """Run a command inside, output into a log; return its status."""
-        environment = ["env", f"BLENDER_USER_RESOURCES={WORK}/user", "LIBGL_ALWAYS_SOFTWARE=1"]
-        folders = {self.work: WORK, self.here: HERE}
-        inside = provision_blender.inside([*environment, *command], self.root, binds=folders)
+        known = {"BLENDER_USER_RESOURCES": f"{WORK}/user", "LIBGL_ALWAYS_SOFTWARE": 1, **environment}
+        folders = {self.work: WORK, Path(__file__).parent: HERE, self.rig: RIG}
+        words = ["env", *(f"{key}={value}" for key, value in known.items()), *command]
+        inside = provision_blender.inside(words, self.root, binds=folders)
         with log.open("w", encoding="utf-8") as out:
             return subprocess.run(
                 inside, stdout=out, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, timeout=timeout
             ).returncode
 
-    @classmethod
-    def fresh(cls, root: Path, work: Path) -> RealBlender:
-        """Return a Blender whose user folder is empty."""
-        shutil.rmtree(work, ignore_errors=True)
-        work.mkdir(parents=True)
-        blender = cls(root, work, Path(__file__).parent)
-        blender.give_brushes()
-        return blender
-
-    def install(self, zip_path: Path, *, enable: bool = True) -> None:
+    def install(self, zip_path: Path) -> None:
         """Install a zip by Blender's own command, as a user would, and enable it."""
         log = self.work / "install.log"
         shutil.copy(zip_path, self.work / "palpate.zip")
-        enabling = ["--enable"] if enable else []
-        install = ["extension", "install-file", "--repo", "user_default", *enabling, f"{WORK}/palpate.zip"]
-        # the splash screen would take the first click
-        quiet = "import bpy; bpy.context.preferences.view.show_splash = False; bpy.ops.wm.save_userpref()"
-        for command in (["--command", *install], ["--background", "--python-exit-code", "1", "--python-expr", quiet]):
-            code = self.run(["blender", *command], log, timeout=180)
+        install = ["extension", "install-file", "--repo", "user_default", "--enable", f"{WORK}/palpate.zip"]
+        for command in (["--command", *install], ["--background", "--python-exit-code", "1", "--python-expr", PREFERENCES]):
+            code = self.run(["blender", *command], log, timeout=LONGEST)
             text = log.read_text(encoding="utf-8", errors="replace")
             if code != 0 or "Traceback" in text:
                 raise RuntimeError(f"Installing {zip_path.name} failed with status {code}:\n{text}")
@@ -75,33 +75,38 @@ class RealBlender:
             assets = next(Path(spec.submodule_search_locations[0]).glob("*/datafiles/assets"))
             shutil.copytree(assets, there, dirs_exist_ok=True)
 
-    def play(self, road: Path, out: Path, timeout: float) -> dict:
-        """Play a road in a window on a virtual screen; return its results.
+    def play(self, roads: list[str], minutes: float = 0.0) -> dict[str, dict]:
+        """Play roads in one window on a virtual screen; return their results by name, in which `faults` says what went wrong.
 
-        Fails if the road broke off or a check did not hold, if Blender crashed, took too long or printed a
-        traceback (a panel that cannot draw says so only there), or if a screenshot is empty.
+        A road is at fault if it broke off or a check did not hold, if Blender crashed, hung or printed a traceback meanwhile (a
+        panel that cannot draw says so only there), or if a screenshot is empty.
         """
-        out.mkdir(parents=True)
-        log = out / "blender.log"
-        inner = f"{WORK}/{out.relative_to(self.work)}"
+        log = self.work / f"{roads[0]}.log"
         script = f"""
             mkfifo /tmp/display
             Xvfb -displayfd 3 -screen 0 {SCREEN[0]}x{SCREEN[1]}x24 +extension GLX -nolisten tcp 3>/tmp/display &
             read -r number </tmp/display
             DISPLAY=:$number; export DISPLAY
             blender --enable-event-simulate -noaudio --window-geometry 0 0 {SCREEN[0]} {SCREEN[1]} \\
-                --python-exit-code 1 --python {HERE}/driver.py -- {HERE}/roads/{road.name} {inner}
+                --python-exit-code 1 --python {HERE}/driver.py -- {WORK} {" ".join(f"{HERE}/roads/{road}.py" for road in roads)}
             sleep 1
             ! grep -ls 'precompile_proces[s]' /proc/[0-9]*/cmdline  # nothing that Blender started outlives it
         """
         try:
-            code: int | str = self.run(["sh", "-euc", script], log, timeout)
+            code: int | str = self.run(["sh", "-euc", script], log, LONGEST + 120 * minutes, PALPATE_MINUTES=minutes)
         except subprocess.TimeoutExpired:
-            code = f"none, after {timeout:g} s"
+            code = f"none, after {LONGEST:g} s"
         said = log.read_text(encoding="utf-8", errors="replace")
-        results = out / "results.json"
-        result = json.loads(results.read_text(encoding="utf-8")) if results.is_file() else {"error": "no results"}
+        results = {}
+        for road in roads:
+            file = self.work / road / "results.json"
+            result = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {"error": "It was not played."}
+            printed = said.partition(f"road {road}\n")[2].partition("\nroad ")[0]
+            results[road] = result | {"faults": self._faults(road, result, printed, code if road == roads[-1] else 0)}
+        return results
 
+    def _faults(self, road: str, result: dict, printed: str, code: int | str) -> str:
+        """Return what went wrong in a road, with its steps and the end of what Blender printed; empty where nothing did."""
         faults = [f"not so: {check['what']}" for check in result.get("checks", []) if not check["passed"]]
         if result["error"]:
             faults.append(result["error"])
@@ -111,17 +116,13 @@ class RealBlender:
             faults.append("the road checked nothing")
         if code != 0:
             faults.append(f"Blender's exit status: {code}")
-        if "Traceback (most recent call last)" in said:
+        if "Traceback (most recent call last)" in printed:
             faults.append("Blender printed a traceback")
-        for name in result.get("screenshots", []):
-            if blank(out / name):
-                faults.append(f"the screenshot {name} is empty")
-        if faults:
-            steps = "\n".join(result.get("steps", []))
-            tail = "\n".join(said.splitlines()[-40:])
-            text = "\n".join(faults)
-            pytest.fail(f"{road.name}:\n{text}\n--- steps\n{steps}\n--- {log}\n{tail}", pytrace=False)
-        return result
+        faults += [
+            f"the screenshot {name} is empty" for name in result.get("screenshots", []) if blank(self.work / road / name)
+        ]
+        steps, tail = "\n".join(result.get("steps", [])), "\n".join(printed.splitlines()[-40:])
+        return "\n".join([*faults, "--- steps", steps, "--- printed", tail]) if faults else ""
 
 
 def blank(picture: Path) -> bool:
@@ -134,90 +135,30 @@ def blank(picture: Path) -> bool:
 
 
 @pytest.fixture(scope="session")
-def blender_version(request):
-    """Return which Blender opens its window, as in "4.3"."""
-    return request.config.getoption("--blender")
+def real_blender(request, repository):
+    """Return a real Blender with the zip of this very work tree installed. A second run in this repository waits for the first.
 
-
-@pytest.fixture(scope="session")
-def one_at_a_time(repository):
-    """Hold the lock of this repository's Blenders: a second run waits for the first."""
+    The zip carries no machine code: the first road watches the compiler at work.
+    """
+    version = request.config.getoption("--blender")
     with provision_blender.locked(repository / "build" / "ui.lock"):
-        yield
+        made = {"blender_range": ("4.2.0", None), "suffix": "-local", "with_machine_code": False}
+        python = provision_blender.DEBIAN[version].python
+        zip_path = build_zip.build("linux-x64", python, repository / "build" / "ui-zip" / version, **made)
+        work = repository / "build" / "ui" / version
+        shutil.rmtree(work, ignore_errors=True)
+        work.mkdir(parents=True)
+        blender = RealBlender(provision_blender.provision(version), work, repository / "docs" / "sample-rig")
+        blender.give_brushes()
+        blender.install(zip_path)
+        yield blender
 
 
 @pytest.fixture(scope="session")
-def build_local_zip(blender_version):
-    """Return a function that builds the zip of this very work tree for the Blender, into a folder."""
-
-    def build(out: Path, with_machine_code: bool) -> Path:
-        python = provision_blender.DEBIAN[blender_version].python
-        made = {"blender_range": ("4.2.0", None), "suffix": "-local", "with_machine_code": with_machine_code}
-        return build_zip.build("linux-x64", python, out, **made)
-
-    return build
-
-
-@pytest.fixture(scope="session")
-def local_zip(repository, blender_version, build_local_zip, one_at_a_time):
-    """Return the zip that roads install, without machine code: some of them watch the compiler at work."""
-    return build_local_zip(repository / "build" / "ui-zip" / blender_version, with_machine_code=False)
-
-
-@pytest.fixture(scope="session")
-def real_blender(repository, blender_version, local_zip):
-    """Return a real Blender with the extension installed, the same for all roads: the first of them compiles the solver."""
-    root = provision_blender.provision(blender_version)
-    blender = RealBlender.fresh(root, repository / "build" / "ui" / blender_version)
-    blender.install(local_zip)
-    return blender
-
-
-@pytest.fixture
-def unseen_blender(blender_version, repository, one_at_a_time):
-    """Return a function that makes a Blender whose profile has never seen Palpate, in a folder of a name."""
-
-    def make(name: str) -> RealBlender:
-        work = repository / "build" / "ui-unseen" / blender_version / name
-        return RealBlender.fresh(provision_blender.provision(blender_version), work)
-
-    return make
-
-
-@pytest.fixture
-def play_in(repository, blender_version):
-    """Return a function that plays a road by name in a Blender and copies its pictures to build/ui-screenshots."""
-
-    def play(blender: RealBlender, name: str, timeout: float) -> dict:
-        out = blender.work / name
-        try:
-            return blender.play(Path(__file__).parent / "roads" / f"{name}.py", out, timeout)
-        finally:
-            shots = repository / "build" / "ui-screenshots" / blender_version
-            shots.mkdir(parents=True, exist_ok=True)
-            for picture in out.glob("*.png"):
-                shutil.copy(picture, shots / f"{name}-{picture.name}")
-
-    return play
-
-
-@pytest.fixture
-def play_road(real_blender, play_in):
-    """Return a function that plays a road by name in the Blender that all roads share, and returns its results."""
-
-    def play(name: str, timeout: float = 300.0) -> dict:
-        return play_in(real_blender, name, timeout)
-
-    return play
-
-
-@pytest.fixture
-def play_unseen(unseen_blender, local_zip, play_in):
-    """Return a function that plays a road by name in a Blender of its own that has never compiled the solver."""
-
-    def play(name: str, timeout: float = 300.0) -> dict:
-        blender = unseen_blender(name)
-        blender.install(local_zip)
-        return play_in(blender, name, timeout)
-
-    return play
+def played(request, real_blender):
+    """Return the results of all roads that the chosen tests ask for, by name."""
+    params = [getattr(getattr(item, "callspec", None), "params", {}) for item in request.session.items]
+    roads = list(dict.fromkeys(one["road"] for one in params if "road" in one))
+    results = real_blender.play([ALONE]) if ALONE in roads else {}
+    others = [road for road in roads if road != ALONE]
+    return results | (real_blender.play(others, request.config.getoption("--minutes")) if others else {})

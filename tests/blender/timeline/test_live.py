@@ -104,7 +104,7 @@ def test_a_jump_ahead_is_computed_with_progress(tmp_path):
 
 
 def test_hands_come_before_frames_that_nobody_asked_for():
-    """Played with real events in tests/ui/roads/press.py."""
+    """Played with real events in tests/ui/roads/bake.py."""
     events = {("G", "PRESS"): True, ("LEFTMOUSE", "PRESS"): True, ("G", "RELEASE"): False, ("MOUSEMOVE", "NOTHING"): False}
     events |= {("ESC", "PRESS"): False, ("TIMER", "NOTHING"): False}
     for (kind, value), expected in events.items():

@@ -1,51 +1,71 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ways of making a sensor in the window: a pad from the Add menu, texels laid on a surface, a problem and its button."""
+"""Ways of making a sensor: the Add menu, the sidebar, a problem and its button, F3, fields, Edit Mode and undo."""
 
 import bpy
-from tutorial import add, adjust
-
-
-def sensor_of(name):
-    return bpy.data.objects[name]
+from steps import add, adjust, empty, obj, over_view, palpate, undo
 
 
 def road(ui):
-    view = ui.area("VIEW_3D")
-    yield from ui.move(*ui.centre(view))
+    # A pad, its texels numbered in the view, a stiffness in a closed panel
+    yield from over_view(ui)
     yield from ui.key("DEL")
-    # A pad
     yield from add(ui, "tactile pad")
-    pad = bpy.context.object
-    ui.check(
-        pad.palpate.role == "SENSOR" and len(pad.data.vertices) == 84, "Add › Mesh › Tactile Pad makes a sensor of 84 texels"
-    )
+    ui.check(obj("Tactile Pad").palpate.role == "SENSOR", "Add › Mesh › Tactile Pad makes a sensor")
     yield from adjust(ui, 10, 8, None, None, 0.02)  # rows, columns, and the radius of the bend
-    ui.check(len(bpy.context.object.data.vertices) == 80, "rows and columns can be changed in the box")
+    ui.check(len(obj("Tactile Pad").data.vertices) == 80, "rows and columns can be changed in the box")
     yield from ui.tab("PHYSICS")
-    yield from ui.move(*ui.centre(view))
+    yield from over_view(ui)
     yield from ui.key("NUMPAD_PERIOD")
     yield from ui.press("palpate.show_numbers")
     yield 1.0
     yield from ui.screenshot("pad")
     yield from ui.press("palpate.show_numbers")
+    yield from ui.filter("Stiffness k")
+    yield from ui.fill("palpate.k", "1234.5")
+    ui.check(abs(obj("Tactile Pad").palpate.k - 1234.5) < 1e-3, "a field takes a number")
+    yield from ui.filter("e")  # opens the panels
+    yield from ui.screenshot("panels")
+    yield from ui.filter("")
+    yield from undo(ui)
+    ui.check(obj("Tactile Pad").palpate.role == "SENSOR", "the first Ctrl Z takes back the stiffness only")
+    ui.check(abs(obj("Tactile Pad").palpate.k - 1234.5) > 1.0, "which is as before")
+    yield from ui.search("preset weiss")
+    ui.check(obj("Tactile Pad").palpate.k == 1000.0, "F3 finds presets")
+
+    # The selection in Edit Mode
+    empty()
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=20, y_subdivisions=20, size=0.04)
+    with ui.context(ui.area("VIEW_3D")):
+        bpy.ops.view3d.view_axis(type="TOP")
+        bpy.ops.view3d.view_selected()
+    yield 1.5
+    yield from ui.tab("PHYSICS")
+    yield from over_view(ui)
+    yield from ui.key("TAB")
+    yield 0.5
+    yield from ui.key("A", alt=True)
+    yield from ui.key("B")
+    yield from ui.drag(ui.at((-0.0005, -0.0215, 0)), ui.at((0.0215, 0.0215, 0)))
+    yield 0.5
+    yield from ui.press("palpate.sensor_add()")
+    ui.check(
+        (obj("Grid").mode, obj("Grid").palpate.region) == ("OBJECT", "GROUP"), "Make Sensor takes the selection, as a group"
+    )
+    report = palpate("addon.authoring.sensor_report").fresh_report(obj("Grid"), bpy.context.scene)
+    ui.check(len(report.texels) == 21 * 11, "of 21 by 11 vertices")
 
     # Texels on a fingertip, from the sidebar
-    with ui.context(view):
-        bpy.ops.object.select_all(action="SELECT")
-        bpy.ops.object.delete()
-        finger = fingertip()
-    yield from ui.move(*ui.centre(view))
+    empty()
+    view, finger = ui.area("VIEW_3D"), fingertip()
+    yield from over_view(ui)
     yield from ui.key("NUMPAD_PERIOD")
     yield from ui.key("N")
     yield 0.5
     ui.region(view, "UI").active_panel_category = "Palpate"
     yield 1.0
-    yield from ui.screenshot("sidebar")
     yield from ui.press("palpate.skin_add()", view, "UI")
     skin = bpy.context.object
     ui.check(skin.parent == finger and skin.palpate.role == "SENSOR", "Lay Texels in the sidebar lays them")
-    ui.value("texels", len(skin.data.vertices))
-    yield 1.0
     yield from ui.screenshot("laid")
 
     # A problem, and its button
@@ -58,41 +78,22 @@ def road(ui):
     yield from ui.press("palpate.fix", view, "UI")
     yield from ui.wait_until(lambda: kinds(skin) == [], "one click puts them right")
 
-    # F3 finds it, undo takes it back
-    yield from ui.search("add probe")
-    ui.check("Probe" in bpy.data.objects, "F3 finds Add Probe")
-    yield from ui.move(*ui.centre(view))
-    yield from ui.key("Z", ctrl=True)
-    yield 0.5
-    ui.check("Probe" not in bpy.data.objects, "Ctrl Z takes the probe away")
 
-    # Effects
-    with ui.context(view):
-        bpy.context.view_layer.objects.active = bpy.data.objects["Fingertip Skin"]
-        for effect in ("creep", "crosstalk"):
-            bpy.ops.palpate.effect_add(effect=effect)
-    yield from ui.filter("Creep")
-    yield from ui.screenshot("effects")
-    yield from ui.filter("")
-
-
-def kinds(obj):
-    from bl_ext.user_default.palpate.addon.authoring import sensor_report
-
-    report = sensor_report.known_report(obj, bpy.context.scene)
+def kinds(thing):
+    report = palpate("addon.authoring.sensor_report").known_report(thing, bpy.context.scene)
     return [problem.kind for problem in report.problems] if report else None
 
 
 def fingertip():
     """A capsule of 16 mm, its upper part painted."""
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.008, segments=48, ring_count=32)
-    obj = bpy.context.object
-    obj.name = "Fingertip"
-    for vertex in obj.data.vertices:
+    finger = bpy.context.object
+    finger.name = "Fingertip"
+    for vertex in finger.data.vertices:
         if vertex.co.x < 0:
             vertex.co.x *= 2.5
-    group = obj.vertex_groups.new(name="Tip")
-    group.add([v.index for v in obj.data.vertices if v.co.z > 0.001 and v.co.x > -0.012], 1.0, "REPLACE")
-    obj.palpate.role, obj.palpate.region, obj.palpate.vertex_group = "SENSOR", "GROUP", "Tip"
-    obj.palpate.max_penetration = 0.004
-    return obj
+    group = finger.vertex_groups.new(name="Tip")
+    group.add([v.index for v in finger.data.vertices if v.co.z > 0.001 and v.co.x > -0.012], 1.0, "REPLACE")
+    finger.palpate.role, finger.palpate.region, finger.palpate.vertex_group = "SENSOR", "GROUP", "Tip"
+    finger.palpate.max_penetration = 0.004
+    return finger

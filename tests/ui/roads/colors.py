@@ -4,25 +4,18 @@
 A plate presses three pads of different stiffness evenly, so that each pad has one colour all over.
 """
 
-import importlib
-
 import bpy
-import solver
 from mathutils import Quaternion
+from steps import empty, over_view, palpate, solver, status
 
 PADS = {"Stiff": (-1.2, 400.0), "Middle": (0.0, 200.0), "Soft": (1.2, 40.0)}
 BESIDE = (0.27, 0.27)  # from a pad's middle, where its arrow is not
 BELOW, ABOVE = Quaternion((0.0, 1.0, 0.0, 0.0)), Quaternion((1.0, 0.0, 0.0, 0.0))
 
 
-def addon(name):
-    return importlib.import_module(f"bl_ext.user_default.palpate.addon.{name}")
-
-
 def build(folder):
     """Three pads beneath a plate that covers them all, pressed down evenly from the second frame on."""
-    for thing in list(bpy.data.objects):
-        bpy.data.objects.remove(thing)
+    empty()
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, 3
     scene.unit_settings.scale_length = 0.01
@@ -57,7 +50,7 @@ class FakePainter:
 
 def inset_spots(region, shares):
     """Return (x, y, share) in the tactile images and along the colour bar."""
-    inset = addon("display.inset")
+    inset = palpate("addon.display.inset")
     content = inset._contents[bpy.context.scene.session_uid]
     painter = FakePainter(bpy.context.preferences.system.ui_scale)
     inset._draw_content(content, painter, 20.0 * painter.scale, 20.0 * painter.scale + inset._height(content, painter.scale))
@@ -71,8 +64,8 @@ def inset_spots(region, shares):
 def shares_now():
     """Return each pad's force over the force that is written at the end of the colour bar."""
     scene = bpy.context.scene
-    readings = addon("session.frame_status").status_of(scene).frame.sensors
-    end = float(addon("display.inset")._contents[scene.session_uid].end.removesuffix(" N"))
+    readings = status().frame.sensors
+    end = float(palpate("addon.display.inset")._contents[scene.session_uid].end.removesuffix(" N"))
     return {name: float(readings[name].normal_force.max()) / end for name in PADS}
 
 
@@ -102,14 +95,13 @@ def views(ui, kind):
     look(view, BELOW)
     shading.type = "SOLID"
     yield from picture(ui, f"{kind}-solid", with_inset=True)
-    shading.type = "MATERIAL"
-    yield from picture(ui, f"{kind}-material", 6.0)
     shading.type = "RENDERED"
     yield from picture(ui, f"{kind}-eevee", 6.0)  # the engine of a new file, whose name depends on the Blender
-    eevee, scene.render.engine = scene.render.engine, "BLENDER_WORKBENCH"
-    yield from picture(ui, f"{kind}-workbench")
-    scene.render.engine = eevee
-    if kind == "baked":  # where no view transform changes colours, Rendered shows the bake's own material
+    if kind == "baked":
+        eevee, scene.render.engine = scene.render.engine, "BLENDER_WORKBENCH"
+        yield from picture(ui, f"{kind}-workbench")
+        scene.render.engine = eevee
+        # where no view transform changes colours, Rendered shows the bake's own material
         scene.view_settings.view_transform = "Standard"
         scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
         yield from picture(ui, f"{kind}-standard-eevee", 6.0)
@@ -126,13 +118,13 @@ def road(ui):
     build(ui.out)
     scene, view = bpy.context.scene, ui.area("VIEW_3D")
     yield from ui.tab("PHYSICS")
-    yield from solver.wait(ui)
+    yield from solver(ui)
     look(view, BELOW)
-    yield from ui.move(*ui.centre(view))
+    yield from over_view(ui)
     yield from ui.key("RIGHT_ARROW")
-    yield from ui.becomes(lambda: scene.frame_current == 2 and addon("session.frame_status").status_of(scene).frame, "frame 2")
+    yield from ui.becomes(lambda: scene.frame_current == 2 and status().frame, "frame 2")
     yield from views(ui, "live")
     yield from ui.press("palpate.bake()")
-    yield from ui.wait_until(lambda: bpy.data.objects["Soft"].palpate.is_baked, "the bake is done", timeout=120.0)
+    yield from ui.wait_until(lambda: bpy.data.objects["Soft"].palpate.is_baked, "the bake is done")
     scene.frame_set(2)
     yield from views(ui, "baked")

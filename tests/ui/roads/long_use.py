@@ -2,12 +2,12 @@
 """One plays, scrubs, changes a number, bakes, undoes and saves, again and again; the memory of Blender is written down."""
 
 import gc
+import os
 import time
 from pathlib import Path
 
 import bpy
-import press
-import solver
+from steps import obj, over_view, press_scene, solver, undo
 
 LEAST_ROUNDS = 5
 """In Solid view and Material Preview in turn: two of each can be compared after Material Preview was first shown."""
@@ -21,7 +21,7 @@ def resident():
 
 
 def play_a_while(ui, seconds):
-    yield from ui.move(*ui.centre(ui.area("VIEW_3D")))
+    yield from over_view(ui)
     yield from ui.key("SPACE")
     yield seconds
     yield from ui.key("SPACE")
@@ -31,36 +31,35 @@ def play_a_while(ui, seconds):
 
 def bake_and_undo(ui):
     yield from ui.press("palpate.bake()")
-    yield from ui.wait_until(lambda: press.obj("Pad").palpate.is_baked, "the bake is done", timeout=300.0)
-    yield from ui.move(*ui.centre(ui.area("VIEW_3D")))
-    yield from ui.key("Z", ctrl=True)
-    yield from ui.wait_until(lambda: not press.obj("Pad").palpate.is_baked, "Ctrl Z takes the bake away")
-    yield from ui.key("Z", ctrl=True, shift=True)
-    yield from ui.wait_until(lambda: press.obj("Pad").palpate.is_baked, "Ctrl Shift Z brings it back")
-    yield from play_a_while(ui, 3.0)
+    yield from ui.wait_until(lambda: obj("Pad").palpate.is_baked, "the bake is done")
+    yield from undo(ui)
+    yield from ui.wait_until(lambda: not obj("Pad").palpate.is_baked, "Ctrl Z takes the bake away")
+    yield from undo(ui, shift=True)
+    yield from ui.wait_until(lambda: obj("Pad").palpate.is_baked, "Ctrl Shift Z brings it back")
+    yield from play_a_while(ui, 1.0)
     yield from ui.press("palpate.bake_clear")
-    yield from ui.wait_until(lambda: not press.obj("Pad").palpate.is_baked, "Clear Bake clears it")
+    yield from ui.wait_until(lambda: not obj("Pad").palpate.is_baked, "Clear Bake clears it")
 
 
 def road(ui):
-    minutes = float((ui.out.parent / "minutes.txt").read_text())
-    press.build(ui.out)
-    press.obj("Pad").palpate.role = "SENSOR"
+    minutes = float(os.environ["PALPATE_MINUTES"])
+    yield from press_scene(ui)
+    obj("Pad").palpate.role = "SENSOR"
     yield from ui.tab("PHYSICS")
-    yield from solver.wait(ui)
+    yield from solver(ui)
     end = time.monotonic() + 60 * minutes
     began, rounds = time.monotonic(), []
     while time.monotonic() < end or len(rounds) < LEAST_ROUNDS:
-        yield from play_a_while(ui, 8.0)
-        press.obj("Pad").palpate.k = 900.0 + 10 * (len(rounds) % 20)
+        yield from play_a_while(ui, 2.0)
+        obj("Pad").palpate.k = 900.0 + 10 * (len(rounds) % 20)
         bpy.ops.ed.undo_push(message="Stiffness")
         yield 1.0
         shading = ("SOLID", "MATERIAL")[len(rounds) % 2]
         ui.area("VIEW_3D").spaces.active.shading.type = shading
         with ui.context(ui.area("PROPERTIES")):  # what a click leaves active
-            bpy.context.view_layer.objects.active = press.obj("Pad")
+            bpy.context.view_layer.objects.active = obj("Pad")
         yield from bake_and_undo(ui)
-        yield from ui.move(*ui.centre(ui.area("VIEW_3D")))
+        yield from over_view(ui)
         yield from ui.key("S", ctrl=True)
         blocks = {kind: len(getattr(bpy.data, kind)) for kind in KINDS}
         gc.collect()
@@ -68,5 +67,4 @@ def road(ui):
         rounds.append(now | {"Python objects": len(gc.get_objects())} | blocks)
         ui.value("rounds", rounds)
         ui.say(f"round {len(rounds)}: {resident():.0f} MB")
-    yield from ui.screenshot("after")
     ui.check({kind: rounds[-1][kind] for kind in KINDS} == {kind: rounds[0][kind] for kind in KINDS}, "no data is left behind")
