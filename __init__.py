@@ -111,9 +111,8 @@ def _rooms(window):
         return [missing]
     from .addon.events import file_handlers
     from .addon.properties import registration
-    from .addon.session import library_folders
 
-    rooms = [library_folders, registration, file_handlers]
+    rooms = [dependencies, registration, file_handlers]
     if window:
         from . import operators, panels
         from .addon.events import handlers

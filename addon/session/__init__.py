@@ -12,7 +12,6 @@ __all__ = [
     "first_use",
     "frame_status",
     "identity",
-    "library_folders",
     "redraw",
     "session_state",
     "transforms",

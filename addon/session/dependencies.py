@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which of the packages that Palpate needs are installed, and how the solver is loaded.
+"""Which of the packages that Palpate needs are installed, and where they keep files: an extension may write nowhere else.
 
 Modules are looked up without importing them, because enabling the add-on must stay instant.
 """
@@ -66,3 +66,29 @@ def choose_numba_cache() -> None:
     import bpy
 
     os.environ["NUMBA_CACHE_DIR"] = bpy.utils.extension_path_user(package, path="numba", create=True)
+
+
+_FONTS = "MPLCONFIGDIR"
+_fonts_folder: str | None = None
+
+
+def register() -> None:
+    """Name the folder in which matplotlib keeps its list of fonts, which by default lies in the user's home.
+
+    Nothing is done if somebody has named one, matplotlib is loaded already, or Palpate is no extension here.
+    """
+    global _fonts_folder
+    package = root_package()
+    if _FONTS in os.environ or "matplotlib" in sys.modules or not package.startswith("bl_ext."):
+        return
+    import bpy
+
+    _fonts_folder = os.environ[_FONTS] = bpy.utils.extension_path_user(package, path="matplotlib")
+
+
+def unregister() -> None:
+    """Forget the folder, if it is still the one that was named."""
+    global _fonts_folder
+    if _fonts_folder is not None and os.environ.get(_FONTS) == _fonts_folder:
+        del os.environ[_FONTS]
+    _fonts_folder = None
