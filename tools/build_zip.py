@@ -10,6 +10,7 @@ sources and wheels give the same bytes. Each zip is validated by Blender's own t
 
     python tools/build_zip.py                                            all platforms and Pythons, into dist/
     python tools/build_zip.py --platform linux-x64 --python-version 3.11
+    python tools/build_zip.py --website https://…                        for extensions.blender.org, into dist/upload/
     python tools/build_zip.py --local --python-version 3.13 --blender-min 4.2.0
                                                     for a distribution's Blender, which runs on its own Python
 """
@@ -88,11 +89,11 @@ def package_files() -> list[Path]:
     return files
 
 
-def wheel_list(python: str) -> list[str]:
-    """Return the wheels of a Python as ``name==version``; pip would judge the markers by the Python that runs it."""
+def wheel_list(platform_name: str, python: str) -> list[str]:
+    """Return the wheels of a platform and Python as ``name==version``; pip would judge the markers by its own Python."""
     lines = [line.split("#")[0].strip() for line in WHEEL_LIST.read_text(encoding="utf-8").splitlines()]
     wanted = [Requirement(line) for line in lines if line]
-    environment = {"python_version": python, "python_full_version": f"{python}.0"}
+    environment = {**MARKERS[platform_name], "python_version": python, "python_full_version": f"{python}.0"}
     return [f"{one.name}{one.specifier}" for one in wanted if one.marker is None or one.marker.evaluate(environment)]
 
 
@@ -108,7 +109,7 @@ def wheels_for(platform_name: str, python: str) -> list[Path]:
         command += ["--implementation", "cp", "--python-version", python, "--dest", str(folder)]
         for tag in PLATFORMS[platform_name]:
             command += ["--platform", tag]
-        run = subprocess.run([*command, *wheel_list(python)], capture_output=True, text=True)
+        run = subprocess.run([*command, *wheel_list(platform_name, python)], capture_output=True, text=True)
         if run.returncode != 0:
             raise BuildError(
                 f"The wheels for {platform_name} and Python {python} could not be fetched; check the network "
@@ -191,13 +192,19 @@ def check_complete(wheels: list[Path], platform_name: str, python: str) -> None:
                 )
 
 
-def manifest_for(platform_name: str, wheels: list[Path], blender_min: str, blender_max: str | None) -> bytes:
+def manifest_for(
+    platform_name: str, wheels: list[Path], blender_range: tuple[str, str | None], upload: dict[str, str]
+) -> bytes:
     """Manifest of one zip: the repository's, with what holds for this zip only."""
+    blender_min, blender_max = blender_range
     manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
     tables = {key: manifest.pop(key) for key in list(manifest) if isinstance(manifest[key], dict)}
     manifest["blender_version_min"] = blender_min
     if blender_max is not None:
         manifest["blender_version_max"] = blender_max
+    if upload:
+        manifest["website"] = upload["website"]
+        manifest["version"] += f"+{upload['python']}"
     manifest["platforms"] = [platform_name]
     manifest["wheels"] = [f"./wheels/{wheel.name}" for wheel in wheels]
     return tomli_w.dumps(manifest | tables).encode()
@@ -230,6 +237,7 @@ def build(
     blender_range: tuple[str, str | None] | None = None,
     suffix: str = "",
     with_machine_code: bool = True,
+    website: str = "",
 ) -> Path:
     """Build and validate one zip.
 
@@ -247,6 +255,10 @@ def build(
         Added to the file's name.
     with_machine_code : bool
         Whether the zip carries the kernels' machine code, where it can be made here (:func:`machine_code`).
+    website : str
+        Address of documentation, source and support: the zip is for extensions.blender.org. The platform wants it in the
+        manifest, source that can be reviewed, so no machine code, and for each platform one zip per version, so that the
+        version names the Python, as in 0.2.0+cp313.
 
     Returns
     -------
@@ -266,14 +278,17 @@ def build(
     check_complete(wheels, platform_name, python)
     entries = {f"wheels/{wheel.name}": wheel.read_bytes() for wheel in wheels}
     entries |= {file.as_posix(): (ROOT / file).read_bytes() for file in package_files()}
-    code = machine_code(platform_name, python, wheels) if with_machine_code else None
+    short = f"cp{python.replace('.', '')}"
+    code = machine_code(platform_name, python, wheels) if with_machine_code and not website else None
     if code is not None:
         entries[MACHINE_CODE] = code
-    entries["blender_manifest.toml"] = manifest_for(platform_name, wheels, *blender_range)
+    entries["blender_manifest.toml"] = manifest_for(
+        platform_name, wheels, blender_range, {"website": website, "python": short} if website else {}
+    )
 
     version = tomllib.loads(entries["blender_manifest.toml"].decode())["version"]
     out.mkdir(parents=True, exist_ok=True)
-    target = out / f"palpate-{version}-{platform_name}-cp{python.replace('.', '')}{suffix}.zip"
+    target = out / f"palpate-{version}-{platform_name}-{short}{suffix}.zip"
     partial = target.with_suffix(".partial.zip")
     write_zip(partial, entries)
     try:
@@ -322,19 +337,20 @@ def main(argv: list[str] | None = None) -> int:
     add("--local", action="store_true", help="for a distribution's Blender, whatever its Python")
     add("--blender-min", default="4.2.0", metavar="X.Y.Z", help="with --local: first Blender it fits")
     add("--no-machine-code", action="store_true", help="let the solver be compiled at first use, which takes half a minute")
-    add("--out", type=Path, default=ROOT / "dist", metavar="DIR", help="folder for the zips (default: dist/)")
+    add("--website", default="", metavar="URL", help="address of documentation and support: for extensions.blender.org")
+    add("--out", type=Path, metavar="DIR", help="folder for the zips (default: dist/, with --website dist/upload/)")
     args = parser.parse_args(argv)
     if args.local and not args.python_version:
         parser.error("--local needs --python-version: the Python that the distribution's Blender runs on")
     pythons = [args.python_version] if args.python_version else list(BLENDER_RANGE)
     blender_range = (args.blender_min, None) if args.local else None
-    suffix = "-local" if args.local else ""
+    out = args.out or ROOT / "dist" / ("upload" if args.website else "")
+    made = {"blender_range": blender_range, "suffix": "-local" if args.local else "", "website": args.website}
     try:
         platforms = [local_platform()] if args.local else list(PLATFORMS)
         for name in [args.platform] if args.platform else platforms:
             for python in pythons:
-                code = not args.no_machine_code
-                path = build(name, python, args.out, blender_range=blender_range, suffix=suffix, with_machine_code=code)
+                path = build(name, python, out, with_machine_code=not args.no_machine_code, **made)
                 print(f"{path}  {path.stat().st_size / 1e6:.0f} MB", flush=True)
     except BuildError as error:
         print(error, file=sys.stderr)
