@@ -31,7 +31,6 @@ def road(ui):
 
     settings.kinds = {"SCENE"}
     yield from ui.press("palpate.figures_make()")
-    yield from ui.wait_until(lambda: ui.works("palpate.figures_make"), "it is at work again")
+    yield from ui.becomes(lambda: list(place.glob("scene*.png")), "the figures of the scene are there")
     yield from ui.wait_until(lambda: not ui.works("palpate.figures_make"), "all is made")
-    ui.check(list(place.glob("scene*.png")), "the figures of the scene are there")
     ui.check(scene.frame_current == 12 and scene.camera.name == camera, "the scene is as before")
