@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 import struct
 import tokenize
@@ -12,7 +11,7 @@ import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
@@ -39,7 +38,7 @@ DAMAGED = (
 """Exceptions that reading a damaged archive may raise."""
 
 
-def write_arrays(path: str | os.PathLike, arrays: Mapping[str, np.ndarray], atomic: bool = True, compress: bool = True) -> None:
+def write_arrays(path: str | os.PathLike, arrays: Mapping[str, np.ndarray], atomic: bool = True) -> None:
     """Write arrays as .npz, as :func:`.write_file` does; equal arrays give equal bytes.
 
     Parameters
@@ -47,30 +46,16 @@ def write_arrays(path: str | os.PathLike, arrays: Mapping[str, np.ndarray], atom
     path : path
     arrays : mapping of str to ndarray
     atomic : bool
-    compress : bool
-        False is quicker, for files that do not stay.
 
     Raises
     ------
     FileError
         The file cannot be written.
     """
-    with write_file(path, atomic) as temporary, open(temporary, "wb") as file:
-        _save(file, arrays, compress)
-
-
-def pack_arrays(arrays: Mapping[str, np.ndarray]) -> bytes:
-    """Return the bytes of the file that :func:`write_arrays` writes."""
-    with io.BytesIO() as file:
-        _save(file, arrays, compress=True)
-        return file.getvalue()
-
-
-def _save(file: IO[bytes], arrays: Mapping[str, np.ndarray], compress: bool) -> None:
     if any(array.dtype.hasobject for array in arrays.values()):
         raise ValueError("objects are not written: reading them would run code")
-    save = np.savez_compressed if compress else np.savez
-    save(file, **{name: array.copy("C") if array.flags.fnc else array for name, array in arrays.items()})
+    with write_file(path, atomic) as temporary, open(temporary, "wb") as file:
+        np.savez_compressed(file, **{name: array.copy("C") if array.flags.fnc else array for name, array in arrays.items()})
 
 
 @contextmanager

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 from dataclasses import fields
 from typing import Any
@@ -56,12 +55,6 @@ def load_sensor(path: str | os.PathLike) -> tuple[Texels, Painted]:
         There is no such file, or it is damaged or something else.
     """
     with open_arrays(path, "sensor", "bake again with this version") as members:
-        return sensor_in(members)
-
-
-def unpack_sensor(content: bytes) -> tuple[Texels, Painted]:
-    """Read the content of a small file that :func:`save_sensor` wrote; raises what :data:`.npz.DAMAGED` lists."""
-    with np.load(io.BytesIO(content), allow_pickle=False) as members:
         return sensor_in(members)
 
 
