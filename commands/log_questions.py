@@ -58,10 +58,20 @@ def _asked_column(name: str, column: ColumnAnswer, logger: LoggerAnswer, ask: Ca
             return None
         if not typed and is_open:
             continue
-        if typed:
+        if typed and column.constant is not None and _is_number(typed):
+            column = replace(column, constant=float(typed), why="typed at the terminal")
+        elif typed:
             source, _, unit = typed.rpartition(" ") if column.unit and " " in typed else (typed, "", column.unit)
-            column = replace(column, names=(source,), unit=unit, why="typed at the terminal")
+            column = replace(column, names=(source,), unit=unit, constant=None, rate=0.0, why="typed at the terminal")
             if has_unknown(list(column.names)) or column.unit == "?":
                 continue
         column = replace(column, sure=True)
     return column
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
