@@ -14,8 +14,7 @@ from ..core.geometry.mesh import TriangleMesh
 from ..core.geometry.shapes import Shape
 from ..core.simulators.environment_parameters import Columns
 from ..core.simulators.sensor_on_mesh import SensorOnMesh
-from .engines import require_engine
-from .torch_sensors import TorchSensors, TouchData, sensor_of, wp
+from .engine_sensors import EngineSensors, TouchData, require_engine, sensor_of
 
 require_engine("isaaclab", "isaaclab", (0, 0))  # its version in a checkout is not that of the release
 
@@ -44,7 +43,7 @@ class TouchSensor(SensorBase):
     @property
     def data(self) -> TouchData:
         """What the sensor measures."""
-        return self._touch.data
+        return self._results
 
     def reset(self, env_ids: Any = None, env_mask: Any = None) -> None:
         """Let environments begin again with their next step: by index, by a mask of Warp, or all."""
@@ -77,8 +76,8 @@ class TouchSensor(SensorBase):
                     f"'{path}' is found {view.count} times in {self._num_envs} environments: name one in each."
                 )
         options = self._num_envs, self._device, cfg.single, cfg.parameters
-        self._touch = TorchSensors(cfg.prim_path, cfg.sensor, list(cfg.targets.values()), self._sim_physics_dt, *options)
-        self._poses = wp.to_torch(self._touch.sensors.poses)
+        self._touch = EngineSensors(cfg.prim_path, cfg.sensor, list(cfg.targets.values()), self._sim_physics_dt, *options)
+        self._results, self._poses = self._touch.data(), self._touch.tensor(self._touch.sensors.poses)
 
     def _update_buffers_impl(self, env_mask: Any) -> None:
         for column, view in enumerate(self._views):

@@ -10,11 +10,10 @@ import numpy as np
 
 from ..core.errors import ParameterError
 from ..core.geometry.mesh import TriangleMesh
-from ..core.geometry.shapes import Shape, box, capsule, plane, sphere
+from ..core.geometry.shapes import Shape
 from ..core.simulators.environment_parameters import Columns
 from ..core.simulators.sensor_on_mesh import SensorOnMesh
-from .engines import require_engine
-from .torch_sensors import TorchSensors, TouchData, sensor_of, wp
+from .engine_sensors import EngineSensors, TouchData, require_engine, sensor_of, target_of
 
 require_engine("mjlab", "mjlab", (1, 6))
 
@@ -78,14 +77,14 @@ class TouchSensor(Sensor[TouchData]):
         """
         body = _index(mj_model, mujoco.mjtObj.mjOBJ_BODY, "body", self.cfg.body)
         geoms = [_index(mj_model, mujoco.mjtObj.mjOBJ_GEOM, "geom", name) for name in self.cfg.geoms]
-        targets = [_shape(mj_model, geom) for geom in geoms]
+        targets = [_target(mj_model, geom) for geom in geoms]
         cfg, step = self.cfg, float(mj_model.opt.timestep)
         sensor = sensor_of(cfg.name, cfg.sensor)
-        self._touch = TorchSensors(cfg.name, sensor, targets, step, int(data.nworld), device, cfg.single, cfg.parameters)
-        self._sensors = self._touch.sensors
+        self._touch = EngineSensors(cfg.name, sensor, targets, step, int(data.nworld), device, cfg.single, cfg.parameters)
+        self._results = self._touch.data()
         self._data, self._body = getattr(data, "struct", data), body
-        self._geoms = wp.array(geoms, dtype=int, device=device)
-        self._bodies = wp.array([int(mj_model.geom_bodyid[geom]) for geom in geoms], dtype=int, device=device)
+        self._geoms = self._touch.indices(geoms)
+        self._bodies = self._touch.indices([int(mj_model.geom_bodyid[geom]) for geom in geoms])
 
     def reset(self, env_ids: Any = None) -> None:
         """Let environments begin again with their next step."""
@@ -102,19 +101,19 @@ class TouchSensor(Sensor[TouchData]):
         """
         super().update(dt)
         self._touch.check_step(dt)
-        from . import mjlab_kernels as kernels
+        from . import engine_kernels as kernels
 
-        d, e = self._data, len(self._sensors)
-        place = [self._body, self._geoms]
-        poses = [d.xpos, d.xquat, d.geom_xpos, d.geom_xmat, self._sensors.poses]
-        wp.launch(kernels.write_poses, dim=(e, 1 + len(self._geoms)), inputs=[*place, *poses], device=self._sensors.device)
-        self._sensors.step()
+        d, touch, sensors, body = self._data, self._touch, self._touch.sensors, self._body
+        threads = len(sensors), 1 + len(self._geoms)
+        frames = d.xpos, d.xquat, d.geom_xpos, d.geom_xmat
+        touch.launch(kernels.write_mujoco_poses, threads, body, self._geoms, *frames, sensors.poses)
+        sensors.step()
         if self.cfg.apply:
-            inputs = [self._body, self._bodies, d.xipos, self._sensors.poses, self._sensors.wrench, d.xfrc_applied]
-            wp.launch(kernels.write_wrenches, dim=e, inputs=inputs, device=self._sensors.device)
+            wrenches = sensors.poses, sensors.wrench, d.xfrc_applied
+            touch.launch(kernels.write_mujoco_wrenches, len(sensors), body, self._bodies, d.xipos, *wrenches)
 
     def _compute_data(self) -> TouchData:
-        return self._touch.data
+        return self._results
 
 
 def _index(mj_model: Any, kind: Any, what: str, name: str) -> int:
@@ -126,21 +125,14 @@ def _index(mj_model: Any, kind: Any, what: str, name: str) -> int:
     return int(found)
 
 
-def _shape(mj_model: Any, geom: int) -> TriangleMesh | Shape:
+def _target(mj_model: Any, geom: int) -> TriangleMesh | Shape:
     """Return a geom as a target."""
-    kind, size = mujoco.mjtGeom(mj_model.geom_type[geom]), mj_model.geom_size[geom].astype(float)
-    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
-        return sphere(size[0])
-    if kind == mujoco.mjtGeom.mjGEOM_BOX:
-        return box(tuple(2.0 * size))
-    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
-        return capsule(size[0], 2.0 * size[1])
-    if kind == mujoco.mjtGeom.mjGEOM_PLANE:
-        return plane()
-    if kind == mujoco.mjtGeom.mjGEOM_MESH:
-        mesh = mj_model.geom_dataid[geom]
-        vertex, face = mj_model.mesh_vertadr[mesh], mj_model.mesh_faceadr[mesh]
-        vertices = mj_model.mesh_vert[vertex : vertex + mj_model.mesh_vertnum[mesh]]
-        faces = mj_model.mesh_face[face : face + mj_model.mesh_facenum[mesh]]
-        return TriangleMesh(np.array(vertices, float), np.array(faces, np.int64))
-    raise ParameterError(f"Geom {geom} is a {kind.name}: take planes, spheres, capsules, boxes and meshes.")
+
+    def mesh() -> tuple[np.ndarray, np.ndarray]:
+        one = mj_model.geom_dataid[geom]
+        vertex, face = mj_model.mesh_vertadr[one], mj_model.mesh_faceadr[one]
+        vertices = mj_model.mesh_vert[vertex : vertex + mj_model.mesh_vertnum[one]]
+        return vertices, mj_model.mesh_face[face : face + mj_model.mesh_facenum[one]]
+
+    kind = mujoco.mjtGeom(mj_model.geom_type[geom]).name.removeprefix("mjGEOM_").lower()
+    return target_of(f"Geom {geom}", kind, mj_model.geom_size[geom].astype(float), mesh)

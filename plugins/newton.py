@@ -12,12 +12,11 @@ import numpy as np
 
 from ..core.errors import ParameterError
 from ..core.geometry.mesh import TriangleMesh
-from ..core.geometry.shapes import Shape, box, capsule, plane, sphere
+from ..core.geometry.shapes import Shape
 from ..core.simulators.contact_translation import NewtonContact
 from ..core.simulators.environment_parameters import Columns
 from ..core.simulators.sensor_on_mesh import SensorOnMesh
-from ..core.simulators.warp.warp_sensors import WarpSensors
-from .engines import require_engine
+from .engine_sensors import EngineSensors, require_engine, target_of
 
 Labels = str | Sequence[str] | re.Pattern[str] | Sequence[int]
 """Shapes of a model: a glob pattern, several of them, a compiled regular expression, or indices."""
@@ -89,16 +88,13 @@ class SensorTouch:
                     f"The counterparts of shape '{model.shape_label[row]}' differ from those in the first world: "
                     "let counterpart_shapes name as many shapes, of equal sizes, in every world."
                 )
-        self._sensors = WarpSensors(sensor, targets[0], dt, len(targets), str(model.device), single, parameters)
-        self.texels, self.readings, self.contact = self._sensors.texels, self._sensors.readings, self._sensors.contact
-        self.wrench, self.too_deep, self.valid = self._sensors.wrench, self._sensors.too_deep, self._sensors.valid
-        import warp
-
-        from . import newton_kernels
-
+        options = dt, len(targets), model.device, single, parameters
+        self._touch = EngineSensors("SensorTouch", sensor, targets[0], *options)
+        sensors = self._sensors = self._touch.sensors
+        self.texels, self.readings, self.contact = sensors.texels, sensors.readings, sensors.contact
+        self.wrench, self.too_deep, self.valid = sensors.wrench, sensors.too_deep, sensors.valid
         rows = zip(self.sensing_indices, self.counterpart_indices, strict=True)
-        self._warp, self._kernels = warp, newton_kernels
-        self._indices = warp.array([[row, *others] for row, others in rows], dtype=int, device=model.device)
+        self._indices = self._touch.indices([[row, *others] for row, others in rows])
 
     def __repr__(self) -> str:
         return f"<SensorTouch: {len(self.sensing_indices)} × {self._sensors!r}>"
@@ -112,18 +108,15 @@ class SensorTouch:
         ----------
         state : newton.State
         """
-        model, (rows, columns) = self._model, self._indices.shape
-        places = [self._indices, model.shape_body]
-        self._warp.launch(
-            self._kernels.write_poses, dim=(rows, columns), device=model.device,
-            inputs=[*places, model.shape_transform, state.body_q, self._sensors.poses],
-        )  # fmt: skip
+        from . import engine_kernels as kernels
+
+        model, poses, (rows, columns) = self._model, self._sensors.poses, self._indices.shape
+        places = self._indices, model.shape_body
+        self._touch.launch(kernels.write_newton_poses, (rows, columns), *places, model.shape_transform, state.body_q, poses)
         self._sensors.step()
         if self._apply:
-            self._warp.launch(
-                self._kernels.add_wrenches, dim=(rows, columns - 1), device=model.device,
-                inputs=[*places, model.body_com, state.body_q, self._sensors.poses, self.wrench, state.body_f],
-            )  # fmt: skip
+            inputs = model.body_com, state.body_q, poses, self.wrench, state.body_f
+            self._touch.launch(kernels.add_newton_wrenches, (rows, columns - 1), *places, *inputs)
 
     def reset(self, mask: Any = None) -> None:
         """Let rows begin again with their next update (see :meth:`.WarpSensors.reset`)."""
@@ -187,24 +180,16 @@ def _shapes(newton: Any, model: Any, indices: list[int]) -> list[TriangleMesh | 
     kinds, scales = model.shape_type.numpy(), model.shape_scale.numpy().astype(float)
     found: list[TriangleMesh | Shape] = []
     for index in indices:
-        kind, scale = newton.GeoType(int(kinds[index])), scales[index]
-        if kind == newton.GeoType.SPHERE:
-            found.append(sphere(scale[0]))
-        elif kind == newton.GeoType.BOX:
-            found.append(box(tuple(2.0 * scale)))
-        elif kind == newton.GeoType.CAPSULE:
-            found.append(capsule(scale[0], 2.0 * scale[1]))
-        elif kind == newton.GeoType.PLANE and not scale[:2].any():
-            found.append(plane())
-        elif kind in (newton.GeoType.MESH, newton.GeoType.CONVEX_MESH):
-            mesh = model.shape_source[index]
-            vertices = np.array(mesh.vertices, float) * scale
-            found.append(TriangleMesh(vertices, np.array(mesh.indices, np.int64).reshape(-1, 3)))
-        else:
-            raise ParameterError(
-                f"Shape '{model.shape_label[index]}' is a {kind.name.lower()}: "
-                "take infinite planes, spheres, capsules, boxes and meshes, or give it a mesh."
+        kind, scale = newton.GeoType(int(kinds[index])).name.lower(), scales[index]
+        kind = "finite plane" if kind == "plane" and scale[:2].any() else kind
+        mesh = model.shape_source[index]
+        found.append(
+            target_of(
+                f"Shape '{model.shape_label[index]}'", kind, scale, lambda mesh=mesh, scale=scale: (
+                    np.array(mesh.vertices, float) * scale, mesh.indices
+                ),
             )
+        )  # fmt: skip
     return found
 
 

@@ -30,8 +30,8 @@ class SensorArrays(NamedTuple):
         Share of a texel's force that one of its contact points has.
     pulls : int
         Whether effects can make the normal force negative.
-    frame : (N, 12) float
-        See :attr:`.Points.frame`.
+    frame : (12, N) float
+        See :attr:`.Points.frame`; by columns, which neighbouring threads of a GPU read together.
     first_point : (n + 1,) int
         Where the contact points of each texel begin.
     multipliers : (N, 2) float
@@ -104,11 +104,8 @@ class Worlds(NamedTuple):
         It began with the last step.
     valid : (E,) bool
         Its poses are poses.
-    position, quaternion, rotation : (E, 1 + T, 3), (E, 1 + T, 4), (E, 1 + T, 3, 3) float
-        Of each body; before a step at its beginning, then at its end.
-    next_position, next_quaternion : like position and quaternion
-    velocity, step_motion : (E, 1 + T, 6), (E, 1 + T, 12) float
-        See :func:`.write_step_motion`.
+    position, quaternion : (E, 1 + T, 3), (E, 1 + T, 4) float
+        Of each body at the step's beginning.
     pose : (E, T, 12) float
         Rotation (row by row) and position of the sensor in each target's frame, at the step's end.
     motion, end_motion, past_motion : (E, T, 12) float
@@ -122,11 +119,6 @@ class Worlds(NamedTuple):
     valid: BoolArray
     position: np.ndarray
     quaternion: np.ndarray
-    rotation: np.ndarray
-    next_position: np.ndarray
-    next_quaternion: np.ndarray
-    velocity: np.ndarray
-    step_motion: np.ndarray
     pose: np.ndarray
     motion: np.ndarray
     end_motion: np.ndarray
@@ -135,12 +127,9 @@ class Worlds(NamedTuple):
     @classmethod
     def zero(cls, e: int, targets: int) -> Worlds:
         """Return room for environments that all begin with their first step."""
-        b, t = 1 + targets, targets
-        shapes = ((3,), (4,), (3, 3), (3,), (4,), (6,), (12,))
-        bodies = [np.zeros((e, b, *shape)) for shape in shapes]
-        pairs = [np.zeros((e, t, 12)) for _ in range(4)]
-        flags = np.ones(e, np.bool_), np.ones(e, np.bool_), np.ones(e, np.bool_)
-        return cls(np.zeros((e, b, 7)), *flags, *bodies, *pairs)
+        b, flags = 1 + targets, (np.ones(e, np.bool_), np.ones(e, np.bool_), np.ones(e, np.bool_))
+        pairs = [np.zeros((e, targets, 12)) for _ in range(4)]
+        return cls(np.zeros((e, b, 7)), *flags, np.zeros((e, b, 3)), np.zeros((e, b, 4)), *pairs)
 
 
 class Slots(NamedTuple):
@@ -153,8 +142,8 @@ class Slots(NamedTuple):
     triangle : (E, T, N) int
         Of a mesh, the one that was met last.
     depth : (E, T, N) float, metres
-    normal, point, bristle : (E, T, N, 3) float
-        Outward normal of the target, contact point and bristle deflection (m), in the sensor's frame.
+    normal, bristle : (E, T, N, 3) float
+        Outward normal of the target and bristle deflection (m), in the sensor's frame.
     force : (E, T, N, 3) float, N
         On the sensor, in its frame.
     memory : (E, N, laws, c) float
@@ -167,7 +156,6 @@ class Slots(NamedTuple):
     triangle: IntArray
     depth: np.ndarray
     normal: np.ndarray
-    point: np.ndarray
     bristle: np.ndarray
     force: np.ndarray
     memory: np.ndarray
@@ -176,10 +164,10 @@ class Slots(NamedTuple):
     @classmethod
     def zero(cls, e: int, t: int, points: int, texels: int, laws: tuple[int, int], reading_laws: tuple[int, int]) -> Slots:
         """Allocate them; `laws` says how many laws there are, and how much each of them remembers at the most."""
-        numbers, vectors = np.zeros((e, t, points)), np.zeros((4, e, t, points, 3))
+        numbers, vectors = np.zeros((e, t, points)), np.zeros((3, e, t, points, 3))
         memory = np.zeros((e, points, *laws)), np.zeros((e, texels, *reading_laws))
         triangle = np.full(numbers.shape, -1, np.int32)
-        return cls(numbers - 1.0, triangle, numbers, vectors[0], vectors[1], vectors[2], vectors[3], memory[0], memory[1])
+        return cls(numbers - 1.0, triangle, numbers, vectors[0], vectors[1], vectors[2], memory[0], memory[1])
 
 
 class Results(NamedTuple):

@@ -35,6 +35,7 @@ from ...solver.dynamics.contact_assembly import LinearContact, Tangent, linearis
 from ...solver.dynamics.effect_kernels import NOW, STEP
 from ...solver.dynamics.relative_kinematics import relative_motion, velocity_at
 from ...solver.jumps import crosses_texel, meets_sphere
+from .block import block_sum, wait_for_block
 from .effect_functions import force_with_effects, friction_with_effects, reading_with_effects
 from .press_arrays import BoolArray, Jumps, Results, SensorArrays, Slots, TargetArrays, Worlds
 
@@ -86,39 +87,39 @@ class Sliding(NamedTuple):
 # --- where the bodies are
 
 
-def move_world(world: int, sensor: SensorArrays, worlds: Worlds) -> None:
-    """Bring the bodies of an environment to the step's end, and write how targets moved relative to the sensor."""
-    valid = are_poses(worlds.poses[world])
-    worlds.valid[world] = valid
-    if not valid:
-        worlds.begins[world] = True
-        return
-    begins, dt = worlds.begins[world], sensor.dt
-    worlds.fresh[world] = begins
-    worlds.begins[world] = False
-    for body in range(worlds.poses.shape[1]):
-        place_next(worlds.poses[world, body], worlds.next_position[world, body], worlds.next_quaternion[world, body])
-        if begins:
-            copy_row(worlds.next_position[world, body], worlds.position[world, body])
-            copy_row(worlds.next_quaternion[world, body], worlds.quaternion[world, body])
-        write_velocity(
-            worlds.position[world, body], worlds.quaternion[world, body],
-            worlds.next_position[world, body], worlds.next_quaternion[world, body], dt, worlds.velocity[world, body],
-        )  # fmt: skip
-        write_rotation(worlds.quaternion[world, body], worlds.rotation[world, body])
-        write_step_motion(worlds.velocity[world, body], dt, worlds.step_motion[world, body])
-    for target in range(worlds.pose.shape[1]):
-        _write_motion(world, 1 + target, worlds, worlds.motion[world, target])
-        _turn_motion(dt, worlds.step_motion[world, 0], worlds.rotation[world, 0], worlds.motion[world, target],
-                     worlds.end_motion[world, target])  # fmt: skip
-    for body in range(worlds.poses.shape[1]):
-        copy_row(worlds.next_position[world, body], worlds.position[world, body])
-        copy_row(worlds.next_quaternion[world, body], worlds.quaternion[world, body])
-        write_rotation(worlds.quaternion[world, body], worlds.rotation[world, body])
-        write_backward_step_motion(worlds.velocity[world, body], dt, worlds.step_motion[world, body])
-    for target in range(worlds.pose.shape[1]):
-        _write_motion(world, 1 + target, worlds, worlds.past_motion[world, target])
-        write_pose(worlds.position[world], worlds.rotation[world], 1 + target, worlds.pose[world, target])
+def move_target(world: int, target: int, sensor: SensorArrays, worlds: Worlds) -> None:
+    """Write how a target of an environment moves relative to the sensor over a step, whose end is at its poses."""
+    valid, begins, dt = are_poses(worlds.poses[world]), worlds.begins[world], sensor.dt
+    if target == 0:
+        worlds.valid[world] = valid
+    if valid:
+        if target == 0:
+            worlds.fresh[world] = begins
+        at, turned = np.zeros((2, 3)), np.zeros((2, 4))  # of sensor and target, where the step begins
+        to, turned_to = np.zeros((2, 3)), np.zeros((2, 4))
+        velocity, step_motion, rotation = np.zeros((2, 6)), np.zeros((2, 12)), np.zeros((2, 3, 3))
+        motion, turned_motion = np.zeros(12), np.zeros(12)
+        for side in range(2):
+            body = side * (1 + target)
+            place_next(worlds.poses[world, body], to[side], turned_to[side])
+            for i in range(3):
+                at[side, i] = to[side, i] if begins else worlds.position[world, body, i]
+            for i in range(4):
+                turned[side, i] = turned_to[side, i] if begins else worlds.quaternion[world, body, i]
+            write_velocity(at[side], turned[side], to[side], turned_to[side], dt, velocity[side])
+            write_rotation(turned[side], rotation[side])
+            write_step_motion(velocity[side], dt, step_motion[side])
+        relative_motion(0, 1, step_motion, at, rotation, motion)
+        _write_row(motion, worlds.motion[world, target])
+        _turn_motion(dt, step_motion[0], rotation[0], motion, turned_motion)
+        _write_row(turned_motion, worlds.end_motion[world, target])
+        for side in range(2):
+            write_rotation(turned_to[side], rotation[side])
+            write_backward_step_motion(velocity[side], dt, step_motion[side])
+        relative_motion(0, 1, step_motion, to, rotation, motion)
+        _write_row(motion, worlds.past_motion[world, target])
+        write_pose(to, rotation, 1, motion)
+        _write_row(motion, worlds.pose[world, target])
 
 
 def are_poses(poses: np.ndarray) -> bool:
@@ -145,15 +146,10 @@ def place_next(pose: np.ndarray, position: np.ndarray, quaternion: np.ndarray) -
         quaternion[i] = pose[3 + i] / length
 
 
-def copy_row(values: np.ndarray, out: np.ndarray) -> None:
-    """Copy the entries of a row."""
-    for i in range(values.shape[0]):
+def _write_row(values: np.ndarray, out: np.ndarray) -> None:
+    """Write twelve numbers."""
+    for i in range(12):
         out[i] = values[i]
-
-
-def _write_motion(world: int, body: int, worlds: Worlds, motion: np.ndarray) -> None:
-    """Write the motion of a body relative to the sensor, as the present step motions say it."""
-    relative_motion(0, body, worlds.step_motion[world], worlds.position[world], worlds.rotation[world], motion)
 
 
 def _turn_motion(dt: float, step_motion: np.ndarray, rotation: np.ndarray, motion: np.ndarray, out: np.ndarray) -> None:
@@ -205,7 +201,7 @@ def press_points(
     count = targets.kind.shape[0]
     if worlds.valid[world]:
         for point in range(sensor.first_point[texel], sensor.first_point[texel + 1]):
-            law = read_law(sensor.law, world % sensor.law.shape[0])
+            law = read_law(sensor.law, min(world, sensor.law.shape[0] - 1))
             if worlds.fresh[world]:
                 begin_point(world, point, slots)
                 if HAS_EFFECTS == 1:  # which remember the depth at rest
@@ -222,8 +218,8 @@ def press_points(
                         slots.force[world, target, point, 2],
                     )
                     force += fn
-                    along_x += fx * sensor.frame[point, 6] + fy * sensor.frame[point, 7] + fz * sensor.frame[point, 8]
-                    along_y += fx * sensor.frame[point, 9] + fy * sensor.frame[point, 10] + fz * sensor.frame[point, 11]
+                    along_x += fx * sensor.frame[6, point] + fy * sensor.frame[7, point] + fz * sensor.frame[8, point]
+                    along_y += fx * sensor.frame[9, point] + fy * sensor.frame[10, point] + fz * sensor.frame[11, point]
                     touched = True
     out.texels[world, texel, 0] = force
     out.texels[world, texel, 1] = along_x
@@ -235,7 +231,8 @@ def write_reading(world: int, texel: int, sensor: SensorArrays, worlds: Worlds, 
     """Write down the reading for the force of a texel."""
     reading = 0.0
     if worlds.valid[world]:
-        row = (world * (sensor.first_point.shape[0] - 1) + texel) % sensor.conversion.shape[0]
+        n = sensor.first_point.shape[0] - 1
+        row = texel if sensor.conversion.shape[0] == n else world * n + texel
         zero, scale = sensor.conversion[row, 0], sensor.conversion[row, 1]
         when = 0 if worlds.fresh[world] else 1
         if worlds.fresh[world]:
@@ -277,8 +274,9 @@ def _advance_point(world: int, point: int, law: ContactLaw, sensor: SensorArrays
     deepest, deepest_rate, deepest_slide = 0.0, 0.0, 0.0
     for target in range(slots.pressed.shape[1]):
         if slots.pressed[world, target, point] >= 0.0:
-            p, n = slots.point[world, target, point], slots.normal[world, target, point]
-            px, py, pz, nx, ny, nz = p[0], p[1], p[2], n[0], n[1], n[2]
+            n = slots.normal[world, target, point]
+            px, py, pz = contact_point(point, slots.pressed[world, target, point], sensor)
+            nx, ny, nz = n[0], n[1], n[2]
             moved = _sliding_at(px, py, pz, nx, ny, nz, worlds.motion[world, target])
             square = moved.x * moved.x + moved.y * moved.y + moved.z * moved.z
             end = slots.depth[world, target, point] + sensor.dt * moved.rate
@@ -330,17 +328,24 @@ def _move_bristle(contact: LinearContact, v: Sliding, z: np.ndarray) -> None:
     z[0], z[1], z[2] = scale * zx, scale * zy, scale * zz
 
 
+def contact_point(point: int, pressed: float, sensor: SensorArrays) -> tuple[float, float, float]:
+    """Return where a contact point touches, given the share of the maximum penetration that is pressed in, in metres."""
+    way, f = pressed * sensor.reach, sensor.frame
+    return f[0, point] - way * f[3, point], f[1, point] - way * f[4, point], f[2, point] - way * f[5, point]
+
+
 def find_contact(
     world: int, target: int, point: int, sensor: SensorArrays, targets: TargetArrays, tree: Tree, worlds: Worlds, slots: Slots
 ) -> None:
     """Find where a contact point touches a target now, and write it down; a bristle is zero where nothing touches."""
-    m, f, reach = worlds.pose[world, target], sensor.frame[point], sensor.reach
-    tx = m[9] + m[0] * f[0] + m[1] * f[1] + m[2] * f[2]
-    ty = m[10] + m[3] * f[0] + m[4] * f[1] + m[5] * f[2]
-    tz = m[11] + m[6] * f[0] + m[7] * f[1] + m[8] * f[2]
-    dx = reach * (m[0] * f[3] + m[1] * f[4] + m[2] * f[5])
-    dy = reach * (m[3] * f[3] + m[4] * f[4] + m[5] * f[5])
-    dz = reach * (m[6] * f[3] + m[7] * f[4] + m[8] * f[5])
+    m, f, reach = worlds.pose[world, target], sensor.frame, sensor.reach
+    px, py, pz, ax, ay, az = f[0, point], f[1, point], f[2, point], f[3, point], f[4, point], f[5, point]
+    tx = m[9] + m[0] * px + m[1] * py + m[2] * pz
+    ty = m[10] + m[3] * px + m[4] * py + m[5] * pz
+    tz = m[11] + m[6] * px + m[7] * py + m[8] * pz
+    dx = reach * (m[0] * ax + m[1] * ay + m[2] * az)
+    dy = reach * (m[3] * ax + m[4] * ay + m[5] * az)
+    dz = reach * (m[6] * ax + m[7] * ay + m[8] * az)
     segment, before = Segment(tx - dx, ty - dy, tz - dz, dx, dy, dz), slots.pressed[world, target, point]
     found = _entry(segment, target, before, slots.triangle[world, target, point], reach, targets, tree)
     slots.triangle[world, target, point] = found.triangle
@@ -350,13 +355,12 @@ def find_contact(
             slots.bristle[world, target, point, i] = 0.0
             slots.force[world, target, point, i] = 0.0
         return
-    pressed, n, p = 1.0 - found.t, slots.normal[world, target, point], slots.point[world, target, point]
+    pressed, n = 1.0 - found.t, slots.normal[world, target, point]
     slots.pressed[world, target, point] = pressed
     slots.depth[world, target, point] = pressed * abs(dx * found.nx + dy * found.ny + dz * found.nz)
     z = slots.bristle[world, target, point]
     for i in range(3):
         n[i] = m[i] * found.nx + m[3 + i] * found.ny + m[6 + i] * found.nz
-        p[i] = f[i] - pressed * reach * f[3 + i]
     zx, zy, zz = turned_into_plane((z[0], z[1], z[2]), (n[0], n[1], n[2]))
     z[0], z[1], z[2] = zx, zy, zz
 
@@ -415,8 +419,9 @@ def _write_force(
     """Write the force of a contact on the sensor, and return its normal part (N)."""
     stiff, scale = sensor.multipliers[point, 0], sensor.multipliers[point, 1]
     painted, depth = scaled_law(law, stiff, scale), slots.depth[world, target, point]
-    p, n, z = slots.point[world, target, point], slots.normal[world, target, point], slots.bristle[world, target, point]
-    v = _sliding_at(p[0], p[1], p[2], n[0], n[1], n[2], worlds.past_motion[world, target])
+    n, z = slots.normal[world, target, point], slots.bristle[world, target, point]
+    px, py, pz = contact_point(point, slots.pressed[world, target, point], sensor)
+    v = _sliding_at(px, py, pz, n[0], n[1], n[2], worlds.past_motion[world, target])
     square = v.x * v.x + v.y * v.y + v.z * v.z
     fn = normal_force(depth, v.rate, painted)
     factor, viscosity = 1.0, 0.0
@@ -444,56 +449,95 @@ def _write_force(
 # --- wrenches
 
 
-def sum_world(world: int, worlds: Worlds, slots: Slots, out: Results) -> None:
+def finish_world(
+    world: int, lane: int, lanes: int, sensor: SensorArrays, worlds: Worlds, slots: Slots, jumps: Jumps, out: Results
+) -> None:
+    """End the step of an environment, for which its texels have been pressed; this and what it calls take a block of threads.
+
+    The threads share the contact points: each begins with that of its number, `lane`, and goes on by `lanes`.
+    """
+    sum_world(world, lane, lanes, sensor, worlds, slots, out)
+    mark_jumps(world, lane, lanes, worlds, jumps, out)
+    if lane == 0:
+        end_step(world, worlds)
+
+
+def sum_world(world: int, lane: int, lanes: int, sensor: SensorArrays, worlds: Worlds, slots: Slots, out: Results) -> None:
     """Sum up the wrench on each target of an environment, in the world about the target's origin."""
-    too_deep = 0
+    too_deep = 0.0
     for target in range(out.wrench.shape[1]):
         fx, fy, fz, mx, my, mz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         if worlds.valid[world]:
-            for point in range(slots.pressed.shape[2]):
-                if slots.pressed[world, target, point] == TOO_DEEP:
-                    too_deep += 1
-                if slots.pressed[world, target, point] >= 0.0:
-                    p, f = slots.point[world, target, point], slots.force[world, target, point]
+            for point in range(lane, slots.pressed.shape[2], lanes):
+                pressed = slots.pressed[world, target, point]
+                if pressed == TOO_DEEP:
+                    too_deep += 1.0
+                if pressed >= 0.0:
+                    f = slots.force[world, target, point]
+                    px, py, pz = contact_point(point, pressed, sensor)
                     fx, fy, fz = fx + f[0], fy + f[1], fz + f[2]
-                    mx += p[1] * f[2] - p[2] * f[1]
-                    my += p[2] * f[0] - p[0] * f[2]
-                    mz += p[0] * f[1] - p[1] * f[0]
-        w = out.wrench[world, target]
+                    mx += py * f[2] - pz * f[1]
+                    my += pz * f[0] - px * f[2]
+                    mz += px * f[1] - py * f[0]
+        fx, fy, fz = block_sum(fx), block_sum(fy), block_sum(fz)
+        mx, my, mz = block_sum(mx), block_sum(my), block_sum(mz)
+        if lane == 0:
+            _write_wrench((fx, fy, fz), (mx, my, mz), worlds.valid[world], worlds.poses[world], 1 + target,
+                          out.wrench[world, target])  # fmt: skip
+    too_deep = block_sum(too_deep)
+    if lane == 0:
+        out.too_deep[world] = int(too_deep)
+
+
+def _write_wrench(force: Vector, torque: Vector, valid: bool, poses: np.ndarray, body: int, wrench: np.ndarray) -> None:
+    """Write what a body exerts on the sensor, given about its origin in its frame, as the wrench (6,) on the body."""
+    for i in range(6):
+        wrench[i] = 0.0
+    if valid:
+        at, quaternion, rotation = np.zeros(3), np.zeros(4), np.zeros((3, 3))
+        place_next(poses[0], at, quaternion)
+        write_rotation(quaternion, rotation)
         for i in range(3):
-            w[i] = -(worlds.rotation[world, 0, i, 0] * fx + worlds.rotation[world, 0, i, 1] * fy
-                     + worlds.rotation[world, 0, i, 2] * fz)  # fmt: skip
-            w[3 + i] = -(worlds.rotation[world, 0, i, 0] * mx + worlds.rotation[world, 0, i, 1] * my
-                         + worlds.rotation[world, 0, i, 2] * mz)  # fmt: skip
-        x = worlds.position[world, 0, 0] - worlds.position[world, 1 + target, 0]
-        y = worlds.position[world, 0, 1] - worlds.position[world, 1 + target, 1]
-        z = worlds.position[world, 0, 2] - worlds.position[world, 1 + target, 2]
-        w[3] += y * w[2] - z * w[1]
-        w[4] += z * w[0] - x * w[2]
-        w[5] += x * w[1] - y * w[0]
-    out.too_deep[world] = too_deep
+            wrench[i] = -(rotation[i, 0] * force[0] + rotation[i, 1] * force[1] + rotation[i, 2] * force[2])
+            wrench[3 + i] = -(rotation[i, 0] * torque[0] + rotation[i, 1] * torque[1] + rotation[i, 2] * torque[2])
+        x, y, z = at[0] - poses[body, 0], at[1] - poses[body, 1], at[2] - poses[body, 2]
+        wrench[3] += y * wrench[2] - z * wrench[1]
+        wrench[4] += z * wrench[0] - x * wrench[2]
+        wrench[5] += x * wrench[1] - y * wrench[0]
 
 
-def mark_jumps(world: int, worlds: Worlds, jumps: Jumps, out: Results) -> None:
+def mark_jumps(world: int, lane: int, lanes: int, worlds: Worlds, jumps: Jumps, out: Results) -> None:
     """Write down whether a target of an environment went through the sensor, and where targets are now."""
-    crossed, measures = False, out.too_deep[world] > 0
+    crossed, measures = 0.0, 0.0
     for target in range(jumps.sphere.shape[0]):
         pose, sphere, old = worlds.pose[world, target], jumps.sphere[target], jumps.centre[world, target]
+        sx, sy, sz, b = old[0], old[1], old[2], jumps.bound
         dx, dy, dz = sphere[0] - pose[9], sphere[1] - pose[10], sphere[2] - pose[11]
         x = pose[0] * dx + pose[3] * dy + pose[6] * dz
         y = pose[1] * dx + pose[4] * dy + pose[7] * dz
         z = pose[2] * dx + pose[5] * dy + pose[8] * dz
         if worlds.valid[world] and not worlds.fresh[world]:
-            sx, sy, sz, b = old[0], old[1], old[2], jumps.bound
             if meets_sphere((sx, sy, sz), (x, y, z), sphere[3] + b[3], (b[0], b[1], b[2])):
-                for texel in range(jumps.frame.shape[0]):
+                for texel in range(lane, jumps.frame.shape[0], lanes):
                     f = jumps.frame[texel]
                     if crosses_texel((sx, sy, sz), (x, y, z), sphere[3], (f[0], f[1], f[2]), (f[3], f[4], f[5])):
-                        crossed = True
+                        crossed = 1.0
                     if out.contact[world, texel]:
-                        measures = True
-        old[0], old[1], old[2] = x, y, z
-    jumps.jumped[world] = crossed and not measures
+                        measures = 1.0
+        wait_for_block()  # before one of the threads writes where the target is
+        if lane == 0:
+            old[0], old[1], old[2] = x, y, z
+    crossed, measures = block_sum(crossed), block_sum(measures)
+    if lane == 0:
+        jumps.jumped[world] = crossed > 0.0 and not (measures > 0.0 or out.too_deep[world] > 0)
+
+
+def end_step(world: int, worlds: Worlds) -> None:
+    """Let the next step of an environment begin where this one ends."""
+    worlds.begins[world] = not worlds.valid[world]
+    if worlds.valid[world]:
+        for body in range(worlds.poses.shape[1]):
+            place_next(worlds.poses[world, body], worlds.position[world, body], worlds.quaternion[world, body])
 
 
 def reset_worlds(world: int, mask: BoolArray, worlds: Worlds) -> None:

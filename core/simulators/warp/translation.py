@@ -7,6 +7,7 @@ language with strict types. The rewriting changes no arithmetic, so that both gi
 * literals and constants of a module get the type of the numbers, or become 32-bit integers;
 * ``math.sqrt`` becomes ``wp.sqrt``, and so on; `min` and `max` of several numbers are nested;
 * loops over constant tuples are unrolled, their entries put in, tuples are taken apart, named tuples become structs;
+* ``np.zeros`` becomes an array of one thread, whose shape is constant;
 * a function that is called is translated too.
 
 An array has as many axes as the source has indices for it.
@@ -19,13 +20,14 @@ import inspect
 import linecache
 import math
 import textwrap
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import GenericAlias, ModuleType
 from typing import Any
 
 import numpy as np
 
 from ...compiled.kernels import plain
+from .block import IN_CUDA
 
 REAL, INTEGER, BOOLEAN, OTHER = "real", "integer", "boolean", "other"
 """Kinds of values, as far as the rewriting has to tell them apart."""
@@ -51,7 +53,7 @@ def fields_of(kind: type) -> dict[str, str]:
 
 
 class Translation:
-    """Functions and structs of one Warp module, for numbers of one type.
+    """Functions, structs and kernels of Warp, for numbers of one type.
 
     Parameters
     ----------
@@ -59,7 +61,7 @@ class Translation:
     real : type
         ``warp.float64`` or ``warp.float32``.
     name : str
-        Of the Warp module; it is compiled once, and again only when its source changes.
+        Part of the names of the Warp modules; each is compiled once, and again only when its source changes.
     instead : mapping, optional
         Functions and numbers by the names for which they stand in every source.
     """
@@ -70,23 +72,39 @@ class Translation:
         self._functions: dict[Any, Any] = {}
         self.structs: dict[type, Any] = {}
         self._kernels: dict[Callable[..., Any], Any] = {}
-        options = {"enable_backward": False, "fuse_fp": False, "optimization_level": 3}
-        warp.set_module_options(options, module=warp.get_module(self.name))
 
     def function(self, function: Callable[..., Any]) -> Any:
         """Return a function of plain Python, or a kernel of numba, as a function of Warp."""
         source = plain(function)
         if source not in self._functions:
             name = f"{source.__module__.rpartition('.')[2]}_{source.__name__.strip('_')}"
-            self._functions[source] = self._compiled(source, name, self.warp.func, None)
+            if source in IN_CUDA:
+                arguments = list(inspect.signature(source).parameters)
+                alone = f"return {arguments[0]};" if arguments else ""
+                self._functions[source] = self._native(name, arguments, IN_CUDA[source], alone)
+            else:
+                self._functions[source] = self._compiled(source, name, self.warp.func, None)
         return self._functions[source]
 
-    def kernel(self, function: Callable[..., Any], threads: int) -> Any:
-        """Return a function whose first `threads` arguments are the index of a thread as a kernel of Warp."""
+    def kernel(self, function: Callable[..., Any], threads: int, registers: int | None = None) -> Any:
+        """Return a function as a kernel of Warp; those of one Python module are compiled together.
+
+        Parameters
+        ----------
+        function : callable
+        threads : int
+            How many of its arguments, from the first, are the index of a thread.
+        registers : int, optional
+            Most registers of a thread on a GPU; fewer let more threads run at a time.
+        """
         if function not in self._kernels:
-            name = function.__name__.strip("_")
-            decorate = self.warp.kernel(enable_backward=False)
-            self._kernels[function] = self._compiled(function, name, decorate, threads)
+            module = self.warp.get_module(f"{self.name}_{function.__module__.rpartition('.')[2]}")
+            options = {"enable_backward": False, "fuse_fp": False, "optimization_level": 3}
+            self.warp.set_module_options(options, module=module)
+            decorate = self.warp.kernel(
+                enable_backward=False, module=module, grid_stride=False, cuda_max_registers=registers
+            )  # fmt: skip
+            self._kernels[function] = self._compiled(function, function.__name__.strip("_"), decorate, threads)
         return self._kernels[function]
 
     def struct(self, kind: type, example: Any = None) -> Any:
@@ -103,6 +121,19 @@ class Translation:
         for name, value in zip(type(example)._fields, example, strict=True):
             setattr(made, name, self.array(value, device) if isinstance(value, np.ndarray) else value)
         return made
+
+    def room(self, example: Any, count: int, device: str) -> Any:
+        """Return the arrays of many environments as a value of their struct, given those of one, each full of one number."""
+        made = self.struct(type(example), example)()
+        for name, values in zip(type(example)._fields, example, strict=True):
+            shape, kind = (count, *values.shape[1:]), self.type_of(values)
+            setattr(made, name, self.warp.full(shape, values.item(0), dtype=kind, device=device))
+        return made
+
+    def bytes_of(self, *parts: Any) -> int:
+        """Return how much memory of a device the arrays of named tuples take."""
+        size = self.warp.types.type_size_in_bytes
+        return sum(one.size * size(self.type_of(one)) for part in parts for one in part if isinstance(one, np.ndarray))
 
     def array(self, values: np.ndarray, device: str) -> Any:
         """Return a copy of an array on a device, with numbers of this translation's types."""
@@ -132,12 +163,16 @@ class Translation:
     def native(self, name: str) -> Any:
         """Return a function of C as a function of Warp."""
         if name not in self._functions:
-            header = ", ".join(f"{one}: real" for one in NATIVE[name].split(", "))
             calls = (f"return {prefix}{name}({NATIVE[name]});" for prefix in ("::", "__builtin_"))
-            snippet = "#ifdef __CUDA_ARCH__\n{}\n#else\n{}\n#endif\n".format(*calls)
-            text = f"@wp.func_native(snippet)\ndef {name}({header}) -> real: ...\n"
-            self._functions[name] = self._executed(text, name, {"snippet": snippet})
+            self._functions[name] = self._native(name, NATIVE[name].split(", "), *calls)
         return self._functions[name]
+
+    def _native(self, name: str, arguments: Sequence[str], in_cuda: str, in_c: str) -> Any:
+        """Return a function of real numbers as a function of Warp, given its body for a GPU and for a processor."""
+        snippet = f"#ifdef __CUDA_ARCH__\n{in_cuda}\n#else\n{in_c}\n#endif\n"
+        header, result = ", ".join(f"{one}: real" for one in arguments), " -> real" if arguments else ""
+        text = f"@wp.func_native(snippet)\ndef {name}({header}){result}: ...\n"
+        return self._executed(text, name, {"snippet": snippet})
 
     def _field(self, text: str, name: str, example: Any) -> Any:
         if text in ARRAYS:
@@ -317,6 +352,8 @@ class _Rewriter:
 
     def _kind_of_call(self, node: ast.Call) -> str:
         name = node.func.id if isinstance(node.func, ast.Name) else ""
+        if _is_new_array(node):
+            return OTHER
         if name in ("int", "len"):
             return INTEGER
         if name in ("min", "max", "abs"):
@@ -448,6 +485,8 @@ class _Rewriter:
         array = value.value if isinstance(value, ast.Subscript) else value
         if isinstance(array, ast.Attribute) and self._struct_of(array.value) is not None and self._is_array(array):
             self._arrays.setdefault(name, self._field_array(array)[0])
+        if _is_new_array(value):
+            self._arrays[name] = REAL
         if isinstance(value, ast.Call) and isinstance(value.func, ast.Name):
             callee = self._outside.get(value.func.id)
             if isinstance(callee, type):
@@ -536,6 +575,10 @@ class _Rewriter:
     def _call(self, node: ast.Call) -> ast.expr:
         if isinstance(node.func, ast.Attribute) and isinstance(node.func.value, ast.Name) and node.func.value.id == "math":
             return self._math(node.func.attr, [self._as(REAL, one) for one in node.args])
+        if _is_new_array(node):
+            shape = ast.keyword("shape", node.args[0])
+            return ast.Call(ast.Attribute(ast.Name("wp", ast.Load()), "zeros", ast.Load()), [],
+                            [shape, ast.keyword("dtype", ast.Name("real", ast.Load()))])  # fmt: skip
         assert isinstance(node.func, ast.Name)
         name = node.func.id
         if name in ("min", "max"):
@@ -587,6 +630,11 @@ class _Rewriter:
         name = f"vector_{length}"
         self.scope[name] = self._translation.warp.types.vector(length=length, dtype=self._translation.real)
         return ast.Call(ast.Name(name, ast.Load()), [self._as(REAL, one) for one in node.elts], [])
+
+
+def _is_new_array(node: ast.expr) -> bool:
+    """Whether an expression makes an array of zeros, which in a kernel belongs to one thread and has a constant shape."""
+    return isinstance(node, ast.Call) and ast.unparse(node.func) == "np.zeros"
 
 
 def _tuple_of_choices(value: ast.expr) -> ast.expr:

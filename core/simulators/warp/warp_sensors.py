@@ -11,7 +11,7 @@ import numpy as np
 
 from ...effects.engine.readout_chain import transducers_of
 from ...effects.engine.sensor_effects import check_scenario, mounted_texels
-from ...errors import ParameterError
+from ...errors import PalpateError, ParameterError
 from ...geometry.bvh import build_tree
 from ...geometry.contact_points import ContactPoints, contact_points
 from ...geometry.mesh import TriangleMesh
@@ -31,7 +31,8 @@ from ..sensor_on_mesh import SensorOnMesh
 from . import balance_kernels, press_kernels
 from .balance_kernels import Beginning
 from .effect_functions import EffectFunctions, functions_of
-from .engine import require_warp
+from .block import THREADS
+from .engine import require_device, require_warp
 from .press_arrays import Jumps, Results, SensorArrays, Slots, TargetArrays, Worlds
 from .translation import Translation
 
@@ -105,20 +106,21 @@ class WarpSensors:
         warp = require_warp()
         targets = [target] if isinstance(target, TriangleMesh | Shape) else list(target)
         _check(item.sensor, targets, dt, environments)
-        self._warp, self.device = warp, _device(warp, device)
+        self._warp, self.device = warp, require_device(warp, device, single)
+        self._on_gpu = bool(warp.get_device(self.device).is_cuda)
         self._environments, sensor = environments, item.sensor
         points = contact_points(sensor.texels, sensor.parameters.points_per_texel)
         sensors = sensors_of(sensor, parameters, environments) if parameters else [sensor]
         effects = functions_of(sensors, dt)
         e, n, t, p = environments, len(sensor.texels), len(targets), len(points.texel)
         self._size, self._of_slots = (e, n, t), (t, p, n, effects.laws, effects.reading_laws)
-        self._check_memory(Slots.zero(1, *self._of_slots), Worlds.zero(1, t), Results.zero(1, n, t))
         tree = build_tree([one for one in targets if isinstance(one, TriangleMesh)] or [_NO_MESH])
         translation = self._translation = _translation(warp, single, effects, sensor)
-        slots = Slots.zero(e, *self._of_slots)
-        parts = _sensor_arrays(sensors, points, effects, dt, e), _target_arrays(targets), tree, Worlds.zero(e, t), slots
-        values = [translation.value(part, self.device) for part in (*parts, Results.zero(e, n, t))]
-        self._sensor, self._targets, self._tree, self._worlds, self._slots, out = values
+        shared = _sensor_arrays(sensors, points, effects, dt, e), _target_arrays(targets), tree
+        self._sensor, self._targets, self._tree = (translation.value(part, self.device) for part in shared)
+        examples = Worlds.zero(1, t), Slots.zero(1, *self._of_slots), Results.zero(1, n, t)
+        self.bytes_per_environment = translation.bytes_of(*examples)
+        self._worlds, self._slots, out = self._room(*examples)
         self._out = out
         self.texels, self.readings, self.contact = out.texels, out.readings, out.contact
         self.wrench, self.too_deep, self.valid, self.poses = out.wrench, out.too_deep, self._worlds.valid, self._worlds.poses
@@ -129,9 +131,9 @@ class WarpSensors:
         self.residual: Any = None
         self.displacement: Any = None
         kernels = press_kernels
-        self._move, self._sum = translation.kernel(kernels.move_world, 1), translation.kernel(kernels.sum_world, 1)
-        self._press, self._reset = translation.kernel(kernels.press_texel, 2), translation.kernel(kernels.reset_worlds, 1)
-        self._mark = translation.kernel(kernels.mark_jumps, 1)
+        self._move = translation.kernel(kernels.move_target, 2)
+        self._press = translation.kernel(kernels.press_texel, 2, PRESS_REGISTERS)
+        self._finish, self._reset = translation.kernel(kernels.finish_world, 2), translation.kernel(kernels.reset_worlds, 1)
 
     def __len__(self) -> int:
         """Return the number of environments."""
@@ -140,11 +142,18 @@ class WarpSensors:
     def __repr__(self) -> str:
         return f"<WarpSensors: {self._size[0]} environments, {self._size[1]} texels, {self._size[2]} targets, on {self.device}>"
 
-    def _check_memory(self, *parts: Any) -> None:
-        """Raise :class:`.ParameterError` where arrays of all environments, given those of one, are more than is free."""
-        device = self._warp.get_device(self.device)
-        free = float(device.free_memory) if device.is_cuda else available_memory()
-        check_memory(len(self), COPIES * sum(array.nbytes for part in parts for array in part), free)
+    def _room(self, *examples: Any) -> list[Any]:
+        """Return the arrays of all environments, given those of one; raise :class:`.ParameterError` where memory is short."""
+        device, size = self._warp.get_device(self.device), self._translation.bytes_of(*examples)
+        free = float(device.free_memory) if self._on_gpu else available_memory()
+        check_memory(len(self), size, free)
+        try:
+            return [self._translation.room(one, len(self), self.device) for one in examples]
+        except RuntimeError as error:
+            raise ParameterError(
+                f"{self.device} has no {len(self) * size / 2**30:.1f} GiB of memory in one piece for {len(self)} environments: "
+                "ask for fewer."
+            ) from error
 
     def step(self, sensor_poses: Any = None, target_poses: Any = None, wrench: Any = None) -> WarpSensors:
         """Go on by one step, to these poses; the results are in the arrays of this object.
@@ -165,19 +174,29 @@ class WarpSensors:
         """
         if sensor_poses is not None or target_poses is not None:
             self._take(sensor_poses, target_poses)
-        e, n, _ = self._size
-        launch, device = self._warp.launch, self.device
-        arrays = [self._sensor, self._targets, self._tree, self._worlds, self._slots, self._out]
+        (e, n, t), sensor, worlds = self._size, self._sensor, self._worlds
+        touching = sensor, self._targets, self._tree, worlds, self._slots
         if wrench is not None:
-            inputs = [self._take_loads(wrench), *arrays, *self._balance]
-            launch(self._kernel_of_load, dim=e, inputs=inputs, device=device)
+            degrees = self._take_loads(wrench)
+            lanes = LOAD_LANES if self._on_gpu else 1
+            inputs = lanes, degrees, *touching, self._jumps, self._out, *self._balance
+            self._launch(self._kernel_of_load, (e, lanes), inputs, lanes)
         else:
             self._forget_loads()
-            launch(self._move, dim=e, inputs=[self._sensor, self._worlds], device=device)
-            launch(self._press, dim=(e, n), inputs=arrays, device=device)
-            launch(self._sum, dim=e, inputs=[self._worlds, self._slots, self._out], device=device)
-        launch(self._mark, dim=e, inputs=[self._worlds, self._jumps, self._out], device=device)
+            lanes = THREADS if self._on_gpu else 1
+            self._launch(self._move, (e, t), (sensor, worlds))
+            self._launch(self._press, (e, n), (*touching, self._out))
+            self._launch(self._finish, (e, lanes), (lanes, sensor, worlds, self._slots, self._jumps, self._out))
         return self
+
+    def _launch(self, kernel: Any, threads: tuple[int, ...], inputs: Sequence[Any], block: int = THREADS) -> None:
+        """Run a kernel with so many threads, in blocks of `block`; a processor's blocks are one thread in any case."""
+        try:
+            self._warp.launch(kernel, dim=threads, inputs=list(inputs), device=self.device, block_dim=block)
+        except RuntimeError as error:
+            raise PalpateError(
+                f"{self.device} did not take the step and its arrays are lost, so make the sensors again: {error}"
+            ) from error
 
     def fault(self) -> str:
         """Return what :meth:`.Contacts.fault` says; the arrays come to the host for it."""
@@ -208,7 +227,7 @@ class WarpSensors:
                 f"The mask of environments to reset is {mask.dtype.__name__} of shape {mask.shape} on {mask.device}: "
                 f"give ({len(self)},) bool on {self.device}."
             )
-        warp.launch(self._reset, dim=len(self), inputs=[chosen, self._worlds], device=self.device)
+        self._launch(self._reset, (len(self),), (chosen, self._worlds))
 
     def _take(self, sensor_poses: Any, target_poses: Any) -> None:
         """Copy poses of NumPy to the device."""
@@ -250,11 +269,11 @@ class WarpSensors:
     def _make_balance(self) -> None:
         """Make the kernel of steps under loads, and its arrays."""
         e, sensor = len(self), self._item
-        searches = [LoadSearch.of(sensor.texels, sensor.parameters.max_penetration, count) for count in (1, e)]
-        self._check_memory(Slots.zero(1, *self._of_slots), Beginning.zero(1), searches[0])
-        parts = Slots.zero(e, *self._of_slots), Beginning.zero(e), searches[1]
-        self._balance = tuple(self._translation.value(part, self.device) for part in parts)
-        self._kernel_of_load = self._translation.kernel(balance_kernels.balance_world, 1)
+        search = LoadSearch.of(sensor.texels, sensor.parameters.max_penetration, e)
+        self._balance = (
+            *self._room(Slots.zero(1, *self._of_slots), Beginning.zero(1)), self._translation.value(search, self.device)
+        )  # fmt: skip
+        self._kernel_of_load = self._translation.kernel(balance_kernels.balance_world, 2)
 
     def _forget_loads(self) -> None:
         """Go on without displacement."""
@@ -269,8 +288,10 @@ _NO_MESH = TriangleMesh(np.eye(3), np.array([[0, 1, 2]]))
 """Stands for the tree where all targets are simple shapes."""
 
 
-COPIES = 2
-"""How often the arrays of an environment are in memory while they are made: of NumPy, and on the device."""
+PRESS_REGISTERS = 128
+"""Most registers of a thread that presses a texel."""
+LOAD_LANES = 32
+"""Threads of a block on a GPU that searches for the displacement under a load."""
 
 
 def _check(sensor: Sensor, targets: Sequence[TriangleMesh | Shape], dt: float, environments: int) -> None:
@@ -304,14 +325,6 @@ def _check(sensor: Sensor, targets: Sequence[TriangleMesh | Shape], dt: float, e
     )
 
 
-def _device(warp: ModuleType, name: str) -> str:
-    """Return a device that is there; raise :class:`.ParameterError` for another."""
-    known = [str(one) for one in warp.get_devices()]
-    if name not in known:
-        raise ParameterError(f"Warp has no device '{name}' here: take one of {', '.join(known)}.")
-    return name
-
-
 def _translation(warp: ModuleType, single: bool, effects: EffectFunctions, sensor: Sensor) -> Translation:
     """Return the functions of Warp for a sensor with these effects; sensors with the same laws share them."""
     laws = "_".join(f"{item.name}_{item.form or 'usual'}" for item in sensor.effects).replace("-", "_") or "plain"
@@ -337,7 +350,7 @@ def _sensor_arrays(
         reach=float(parameters.max_penetration),
         share=share,
         pulls=int(effects.pulls),
-        frame=point_rows(mounted_texels(sensor), points, np.zeros(3)),
+        frame=np.ascontiguousarray(point_rows(mounted_texels(sensor), points, np.zeros(3)).T),
         first_point=np.searchsorted(points.texel, np.arange(n + 1)),
         multipliers=np.column_stack([values[points.texel] for values in painted]),
         law=np.array([contact_law(one.parameters, share) for one in sensors], float),
