@@ -79,7 +79,7 @@ def kernel_times(device: str, steps: Callable[[], None]) -> dict[str, float]:
     steps()
     found: dict[str, list[float]] = {}
     for one in warp.timing_end():
-        found.setdefault(one.name.split()[-1], []).append(1e3 * one.elapsed)
+        found.setdefault(one.name.split()[-1].rpartition("_")[0], []).append(1e3 * one.elapsed)
     return {name: statistics.median(times) for name, times in found.items()}
 
 

@@ -64,6 +64,16 @@ def write_mujoco_wrenches(
         xfrc_applied[world, body] = xfrc_applied[world, body] - _about(xipos[world, body], w, p)
 
 
+@wp.func
+def _frame(shape: int, shape_body: wp.array(dtype=int), shape_transform: wp.array(dtype=wp.transform),
+           body_q: wp.array(dtype=wp.transform)):  # fmt: skip
+    """Return where a shape of Newton is in the world."""
+    body = shape_body[shape]
+    if body >= 0:
+        return wp.transform_multiply(body_q[body], shape_transform[shape])
+    return shape_transform[shape]
+
+
 @wp.kernel(enable_backward=False)
 def write_newton_poses(
     shapes: wp.array2d(dtype=int),
@@ -74,9 +84,7 @@ def write_newton_poses(
 ):
     """Write where a sensor's shape and its targets are in Newton."""
     row, column = wp.tid()
-    body, frame = shape_body[shapes[row, column]], shape_transform[shapes[row, column]]
-    if body >= 0:
-        frame = wp.transform_multiply(body_q[body], frame)
+    frame = _frame(shapes[row, column], shape_body, shape_transform, body_q)
     _write_pose(wp.transform_get_translation(frame), wp.transform_get_rotation(frame), poses[row, column])
 
 
@@ -96,5 +104,5 @@ def add_newton_wrenches(
         body = shape_body[shapes[row, (1 + column) * (1 - side)]]
         if body >= 0:
             centre = wp.transform_point(body_q[body], body_com[body])
-            on_body = _about(centre, wrench[row, column], poses[row, 1 + column])
-            wp.atomic_add(body_f, body, on_body if side == 0 else -on_body)
+            sign = 1.0 if side == 0 else -1.0
+            wp.atomic_add(body_f, body, sign * _about(centre, wrench[row, column], poses[row, 1 + column]))

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.errors import ParameterError, PalpateError
+from ..core.errors import PalpateError, ParameterError
 from ..core.geometry.mesh import TriangleMesh
 from ..core.geometry.shapes import Shape, box, capsule, plane, sphere
 from ..core.simulators.environment_parameters import Columns

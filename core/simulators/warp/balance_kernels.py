@@ -23,7 +23,7 @@ from .press_kernels import (
     end_step,
     find_contact,
     mark_jumps,
-    move_target,
+    move_world,
     place_next,
     press_points,
     sum_world,
@@ -88,12 +88,13 @@ def balance_world(
                 _copy_slot(world, point, start, slots)
             if first:
                 place_trial(world, beginning.engine[world], worlds.poses[world, 1], search)
-                move_target(world, 0, sensor, worlds)
+        wait_for_block()
+        if whole:
+            move_world(world, lane, lanes, sensor, worlds)
         wait_for_block()
         touching = 0.0
         for texel in range(lane, out.texels.shape[1], lanes):
-            press_points(world, texel, sensor, targets, tree, worlds, slots, out)
-            if out.texels[world, texel, 0] > 0.0:
+            if press_points(world, texel, sensor, targets, tree, worlds, slots, out) > 0.0:
                 touching = 1.0
         wait_for_block()
         sum_world(world, lane, lanes, sensor, worlds, slots, out)
@@ -108,10 +109,10 @@ def balance_world(
             beginning.residual[world, i] = residual(world, i, search) if i < degrees else 0.0
     wait_for_block()
     for texel in range(lane, out.texels.shape[1], lanes):
-        write_reading(world, texel, sensor, worlds, slots, out)
+        write_reading(world, texel, out.texels[world, texel, 0], sensor, worlds, slots, out)
     mark_jumps(world, lane, lanes, worlds, jumps, out)
+    end_step(world, lane, lanes, worlds)
     if first:
-        end_step(world, worlds)
         for i in range(7):
             worlds.poses[world, 1, i] = beginning.engine[world, i]
 
@@ -127,9 +128,9 @@ def _begin_search(world: int, degrees: int, begins: bool, worlds: Worlds, search
         write_pose(at, rotation, 1, worlds.pose[world, 0])
         for body in range(2):
             for i in range(3):
-                worlds.position[world, body, i] = at[body, i]
+                worlds.position[world, 0, body, i] = at[body, i]
             for i in range(4):
-                worlds.quaternion[world, body, i] = quaternion[body, i]
+                worlds.quaternion[world, 0, body, i] = quaternion[body, i]
 
 
 def _copy_slot(world: int, point: int, slots: Slots, to: Slots) -> None:
@@ -138,8 +139,8 @@ def _copy_slot(world: int, point: int, slots: Slots, to: Slots) -> None:
     to.triangle[world, 0, point] = slots.triangle[world, 0, point]
     to.depth[world, 0, point] = slots.depth[world, 0, point]
     for i in range(3):
-        to.normal[world, 0, point, i] = slots.normal[world, 0, point, i]
-        to.bristle[world, 0, point, i] = slots.bristle[world, 0, point, i]
+        to.normal[world, 0, i, point] = slots.normal[world, 0, i, point]
+        to.bristle[world, 0, i, point] = slots.bristle[world, 0, i, point]
     for law in range(slots.memory.shape[2]):
         for i in range(slots.memory.shape[3]):
             to.memory[world, point, law, i] = slots.memory[world, point, law, i]

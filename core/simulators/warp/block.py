@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-THREADS = 128
-"""Threads of a block on a GPU."""
+THREADS, WARP = 128, 32
+"""Threads of a block on a GPU: of one whose threads work alone, and of one that adds up the texels of an environment."""
 
 
 def block_sum(value: float) -> float:

@@ -8,6 +8,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from ...geometry.bvh import Tree
 from ...geometry.mesh import TriangleMesh
 from ...geometry.shapes import Shape
 from ...geometry.texels import Texels
@@ -104,13 +105,16 @@ class Worlds(NamedTuple):
         It began with the last step.
     valid : (E,) bool
         Its poses are poses.
-    position, quaternion : (E, 1 + T, 3), (E, 1 + T, 4) float
-        Of each body at the step's beginning.
+    position, quaternion : (E, 2, 1 + T, 3), (E, 2, 1 + T, 4) float
+        Of each body at the step's beginning and at its end.
+    rotation, step_motion : (E, 2, 1 + T, 9), (E, 2, 1 + T, 12) float
+        Of each body at either end, row by row, and its motion as seen from there (see :func:`.write_step_motion`).
     pose : (E, T, 12) float
         Rotation (row by row) and position of the sensor in each target's frame, at the step's end.
-    motion, end_motion, past_motion : (E, T, 12) float
-        Of each target relative to the sensor (see :func:`.relative_motion`): over the step in the sensor's axes at its
-        beginning, the same in those at its end, and as seen from its end.
+    motion : (E, 2, T, 12) float
+        Of each target over the step, relative to the sensor (see :func:`.relative_motion`), as seen from either end.
+    end_motion : (E, T, 12) float
+        The first of these in the sensor's axes at the step's end.
     """
 
     poses: np.ndarray
@@ -119,17 +123,19 @@ class Worlds(NamedTuple):
     valid: BoolArray
     position: np.ndarray
     quaternion: np.ndarray
+    rotation: np.ndarray
+    step_motion: np.ndarray
     pose: np.ndarray
     motion: np.ndarray
     end_motion: np.ndarray
-    past_motion: np.ndarray
 
     @classmethod
     def zero(cls, e: int, targets: int) -> Worlds:
         """Return room for environments that all begin with their first step."""
         b, flags = 1 + targets, (np.ones(e, np.bool_), np.ones(e, np.bool_), np.ones(e, np.bool_))
-        pairs = [np.zeros((e, targets, 12)) for _ in range(4)]
-        return cls(np.zeros((e, b, 7)), *flags, np.zeros((e, b, 3)), np.zeros((e, b, 4)), *pairs)
+        bodies = [np.zeros((e, 2, b, *shape)) for shape in ((3,), (4,), (9,), (12,))]
+        pairs = [np.zeros((e, *shape, targets, 12)) for shape in ((), (2,), ())]
+        return cls(np.zeros((e, b, 7)), *flags, *bodies, *pairs)
 
 
 class Slots(NamedTuple):
@@ -142,9 +148,9 @@ class Slots(NamedTuple):
     triangle : (E, T, N) int
         Of a mesh, the one that was met last.
     depth : (E, T, N) float, metres
-    normal, bristle : (E, T, N, 3) float
+    normal, bristle : (E, T, 3, N) float
         Outward normal of the target and bristle deflection (m), in the sensor's frame.
-    force : (E, T, N, 3) float, N
+    force : (E, T, 3, N) float, N
         On the sensor, in its frame.
     memory : (E, N, laws, c) float
         Of effects on forces.
@@ -164,7 +170,7 @@ class Slots(NamedTuple):
     @classmethod
     def zero(cls, e: int, t: int, points: int, texels: int, laws: tuple[int, int], reading_laws: tuple[int, int]) -> Slots:
         """Allocate them; `laws` says how many laws there are, and how much each of them remembers at the most."""
-        numbers, vectors = np.zeros((e, t, points)), np.zeros((3, e, t, points, 3))
+        numbers, vectors = np.zeros((e, t, points)), np.zeros((3, e, t, 3, points))
         memory = np.zeros((e, points, *laws)), np.zeros((e, texels, *reading_laws))
         triangle = np.full(numbers.shape, -1, np.int32)
         return cls(numbers - 1.0, triangle, numbers, vectors[0], vectors[1], vectors[2], memory[0], memory[1])
@@ -185,3 +191,22 @@ class Results(NamedTuple):
         return cls(
             np.zeros((e, n, 3)), np.zeros((e, n)), np.zeros((e, n), np.bool_), np.zeros((e, t, 6)), np.zeros(e, np.int32)
         )  # fmt: skip
+
+
+def split_leaves(tree: Tree) -> Tree:
+    """Return a tree with one triangle in each leaf, in the same order, so that queries give the same.
+
+    A GPU then meets more boxes and fewer triangles. These take longest, as the threads of a warp wait for each other there.
+    """
+    many, nodes = tree.number > 1, len(tree.number)
+    extra = np.where(many, tree.number, 0)
+    place = np.arange(nodes + 1) + np.concatenate([[0], np.cumsum(extra)])  # of each node, and the end
+    old, size = place[:-1], int(place[-1])
+    bounds, skip, first, number = np.empty((size, 6)), np.arange(1, size + 1), np.zeros(size, np.int64), np.ones(size, np.int64)
+    bounds[old], skip[old] = tree.bounds, place[tree.skip]
+    first[old], number[old] = tree.first, np.where(many, 0, tree.number)
+    new = np.setdiff1d(np.arange(size), old)
+    first[new] = np.repeat(tree.first[many], tree.number[many]) + new - np.repeat(old[many] + 1, tree.number[many])
+    corners = tree.faces[first[new], :9].reshape(-1, 3, 3)
+    bounds[new] = np.hstack([corners.min(axis=1), corners.max(axis=1)])
+    return tree._replace(bounds=bounds, skip=skip, first=first, number=number, roots=place[tree.roots])

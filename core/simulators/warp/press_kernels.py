@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A step of pressed sensors in many environments, in the part of Python that :mod:`.translation` makes Warp kernels of.
 
-A step is three kernels, one after the other, without a word to the host between them: where the bodies of each environment are
-and how they move (:func:`move_world`); what each texel measures (:func:`press_texel`); and the wrenches (:func:`sum_world`).
+A step is three kernels, one after the other, without a word to the host between them: how the bodies of each environment move
+(:func:`move_world`); what each texel measures (:func:`press_texel`); and the wrenches (:func:`finish_world`). No thread goes
+through the texels: each texel has a thread of its own, and the threads of a block add them up. Arrays of contact points have
+these in their last axis, so that neighbouring threads read neighbouring numbers.
 The steps of :mod:`.pressing`, on which they are modelled, find the contacts where a step begins and again where it ends. Here
 they are kept from one step to the next, as both places are the same. All formulas are those of :mod:`.laws` and of the solver.
 These functions also run as plain Python.
@@ -17,7 +19,7 @@ import numpy as np
 
 from ...effects.engine.compiled_program import TexelMotion
 from ...geometry.bvh import Segment, Tree, segment_entry
-from ...geometry.rotations import write_backward_step_motion, write_rotation, write_step_motion, write_velocity
+from ...geometry.rotations import write_rotation, write_step_motion, write_velocity
 from ...geometry.shapes import MESH, Vector, is_in_shape, shape_entry, shape_normal
 from ...laws.contact_law import ContactLaw, read_law, scaled_law, whole_texel_law, with_friction
 from ...laws.friction import (
@@ -67,6 +69,33 @@ class Entry(NamedTuple):
     inside: bool
 
 
+class Touch(NamedTuple):
+    """Where a contact point touches a target.
+
+    Attributes
+    ----------
+    pressed : float
+        As in :attr:`.Slots.pressed`.
+    depth : float, metres
+    px, py, pz : float, metres
+        Contact point, in the sensor's frame.
+    nx, ny, nz, zx, zy, zz : float
+        Normal of the target and bristle deflection (m), in the sensor's frame.
+    """
+
+    pressed: float
+    depth: float
+    px: float
+    py: float
+    pz: float
+    nx: float
+    ny: float
+    nz: float
+    zx: float
+    zy: float
+    zz: float
+
+
 class Sliding(NamedTuple):
     """How a target moves at a contact point, relative to the sensor.
 
@@ -87,39 +116,73 @@ class Sliding(NamedTuple):
 # --- where the bodies are
 
 
-def move_target(world: int, target: int, sensor: SensorArrays, worlds: Worlds) -> None:
-    """Write how a target of an environment moves relative to the sensor over a step, whose end is at its poses."""
-    valid, begins, dt = are_poses(worlds.poses[world]), worlds.begins[world], sensor.dt
-    if target == 0:
+def move_world(world: int, lane: int, lanes: int, sensor: SensorArrays, worlds: Worlds) -> None:
+    """Write how the targets of an environment move relative to the sensor over a step, whose end is at its poses.
+
+    The threads of a block share the work: each begins with the part of its number, `lane`, and goes on by `lanes`.
+    """
+    valid, begins = are_poses(worlds.poses[world]), worlds.begins[world]
+    if lane == 0:
         worlds.valid[world] = valid
     if valid:
-        if target == 0:
+        if lane == 0:
             worlds.fresh[world] = begins
-        at, turned = np.zeros((2, 3)), np.zeros((2, 4))  # of sensor and target, where the step begins
-        to, turned_to = np.zeros((2, 3)), np.zeros((2, 4))
-        velocity, step_motion, rotation = np.zeros((2, 6)), np.zeros((2, 12)), np.zeros((2, 3, 3))
-        motion, turned_motion = np.zeros(12), np.zeros(12)
-        for side in range(2):
-            body = side * (1 + target)
-            place_next(worlds.poses[world, body], to[side], turned_to[side])
-            for i in range(3):
-                at[side, i] = to[side, i] if begins else worlds.position[world, body, i]
-            for i in range(4):
-                turned[side, i] = turned_to[side, i] if begins else worlds.quaternion[world, body, i]
-            write_velocity(at[side], turned[side], to[side], turned_to[side], dt, velocity[side])
-            write_rotation(turned[side], rotation[side])
-            write_step_motion(velocity[side], dt, step_motion[side])
-        relative_motion(0, 1, step_motion, at, rotation, motion)
-        _write_row(motion, worlds.motion[world, target])
-        _turn_motion(dt, step_motion[0], rotation[0], motion, turned_motion)
-        _write_row(turned_motion, worlds.end_motion[world, target])
-        for side in range(2):
-            write_rotation(turned_to[side], rotation[side])
-            write_backward_step_motion(velocity[side], dt, step_motion[side])
-        relative_motion(0, 1, step_motion, to, rotation, motion)
-        _write_row(motion, worlds.past_motion[world, target])
-        write_pose(to, rotation, 1, motion)
-        _write_row(motion, worlds.pose[world, target])
+        for part in range(lane, 2 * worlds.poses.shape[1], lanes):
+            _place_body(world, part % 2, part // 2, begins, sensor.dt, worlds)
+    wait_for_block()
+    if valid:
+        for part in range(lane, 2 * worlds.pose.shape[1], lanes):
+            _relate_target(world, part % 2, part // 2, sensor.dt, worlds)
+
+
+def _place_body(world: int, end: int, body: int, begins: bool, dt: float, worlds: Worlds) -> None:
+    """Write where a body is when a step begins (0) or ends (1), and how its points move, as seen from there."""
+    at, turned, to, turned_to = np.zeros(3), np.zeros(4), np.zeros(3), np.zeros(4)
+    velocity, rotation, motion = np.zeros(6), np.zeros((3, 3)), np.zeros(12)
+    place_next(worlds.poses[world, body], to, turned_to)
+    for i in range(3):
+        at[i] = to[i] if begins else worlds.position[world, 0, body, i]
+    for i in range(4):
+        turned[i] = turned_to[i] if begins else worlds.quaternion[world, 0, body, i]
+    write_velocity(at, turned, to, turned_to, dt, velocity)
+    write_step_motion(velocity, dt if end == 0 else -dt, motion)
+    for i in range(3):
+        at[i] = at[i] if end == 0 else to[i]
+    for i in range(4):
+        turned[i] = turned[i] if end == 0 else turned_to[i]
+    write_rotation(turned, rotation)
+    if begins or end == 1:  # the other thread of this body may read its place at the beginning
+        for i in range(3):
+            worlds.position[world, end, body, i] = at[i]
+        for i in range(4):
+            worlds.quaternion[world, end, body, i] = turned[i]
+    for i in range(12):
+        worlds.step_motion[world, end, body, i] = motion[i]
+    for i in range(3):
+        for j in range(3):
+            worlds.rotation[world, end, body, 3 * i + j] = rotation[i, j]
+
+
+def _relate_target(world: int, end: int, target: int, dt: float, worlds: Worlds) -> None:
+    """Write how a target moves relative to the sensor, as seen from the step's beginning (0) or from its end (1)."""
+    at, rotation, step_motion = np.zeros((2, 3)), np.zeros((2, 3, 3)), np.zeros((2, 12))
+    motion, turned = np.zeros(12), np.zeros(12)
+    for side in range(2):
+        body = side * (1 + target)
+        for i in range(3):
+            at[side, i] = worlds.position[world, end, body, i]
+            for j in range(3):
+                rotation[side, i, j] = worlds.rotation[world, end, body, 3 * i + j]
+        for i in range(12):
+            step_motion[side, i] = worlds.step_motion[world, end, body, i]
+    relative_motion(0, 1, step_motion, at, rotation, motion)
+    _write_row(motion, worlds.motion[world, end, target])
+    if end == 0:
+        _turn_motion(dt, step_motion[0], rotation[0], motion, turned)
+        _write_row(turned, worlds.end_motion[world, target])
+    else:
+        write_pose(at, rotation, 1, turned)
+        _write_row(turned, worlds.pose[world, target])
 
 
 def are_poses(poses: np.ndarray) -> bool:
@@ -189,14 +252,14 @@ def press_texel(
     world: int, texel: int, sensor: SensorArrays, targets: TargetArrays, tree: Tree, worlds: Worlds, slots: Slots, out: Results
 ) -> None:
     """Bring the contact points of a texel to the step's end, and write down what the texel measures there."""
-    press_points(world, texel, sensor, targets, tree, worlds, slots, out)
-    write_reading(world, texel, sensor, worlds, slots, out)
+    force = press_points(world, texel, sensor, targets, tree, worlds, slots, out)
+    write_reading(world, texel, force, sensor, worlds, slots, out)
 
 
 def press_points(
     world: int, texel: int, sensor: SensorArrays, targets: TargetArrays, tree: Tree, worlds: Worlds, slots: Slots, out: Results
-) -> None:
-    """Bring the contact points of a texel to the step's end, and write down its force there."""
+) -> float:
+    """Bring the contact points of a texel to the step's end, write down its force there, and return the normal part (N)."""
     force, along_x, along_y, touched = 0.0, 0.0, 0.0, False
     count = targets.kind.shape[0]
     if worlds.valid[world]:
@@ -209,14 +272,12 @@ def press_points(
                         find_contact(world, target, point, sensor, targets, tree, worlds, slots)
             _advance_point(world, point, law, sensor, worlds, slots)
             for target in range(count):
-                find_contact(world, target, point, sensor, targets, tree, worlds, slots)
-                if slots.pressed[world, target, point] >= 0.0:
-                    fn = _write_force(world, target, point, law, sensor, worlds, slots)
-                    fx, fy, fz = (
-                        slots.force[world, target, point, 0],
-                        slots.force[world, target, point, 1],
-                        slots.force[world, target, point, 2],
-                    )
+                touch = find_contact(world, target, point, sensor, targets, tree, worlds, slots)
+                if touch.pressed >= 0.0:
+                    fn, fx, fy, fz = _contact_force(world, target, point, touch, law, sensor, worlds, slots)
+                    slots.force[world, target, 0, point] = fx
+                    slots.force[world, target, 1, point] = fy
+                    slots.force[world, target, 2, point] = fz
                     force += fn
                     along_x += fx * sensor.frame[6, point] + fy * sensor.frame[7, point] + fz * sensor.frame[8, point]
                     along_y += fx * sensor.frame[9, point] + fy * sensor.frame[10, point] + fz * sensor.frame[11, point]
@@ -225,10 +286,13 @@ def press_points(
     out.texels[world, texel, 1] = along_x
     out.texels[world, texel, 2] = along_y
     out.contact[world, texel] = touched
+    return force
 
 
-def write_reading(world: int, texel: int, sensor: SensorArrays, worlds: Worlds, slots: Slots, out: Results) -> None:
-    """Write down the reading for the force of a texel."""
+def write_reading(
+    world: int, texel: int, force: float, sensor: SensorArrays, worlds: Worlds, slots: Slots, out: Results
+) -> None:
+    """Write down the reading for the normal force of a texel, N."""
     reading = 0.0
     if worlds.valid[world]:
         n = sensor.first_point.shape[0] - 1
@@ -240,8 +304,7 @@ def write_reading(world: int, texel: int, sensor: SensorArrays, worlds: Worlds, 
                 for j in range(slots.reading_memory.shape[3]):
                     slots.reading_memory[world, texel, i, j] = 0.0
         reading = reading_with_effects(
-            out.texels[world, texel, 0], zero, scale, when,
-            sensor.reading_constants[world], slots.reading_memory[world, texel],
+            force, zero, scale, when, sensor.reading_constants[world], slots.reading_memory[world, texel]
         )  # fmt: skip
     out.readings[world, texel] = reading
 
@@ -252,7 +315,7 @@ def begin_point(world: int, point: int, slots: Slots) -> None:
         slots.pressed[world, target, point] = NO_CONTACT
         slots.triangle[world, target, point] = -1
         for i in range(3):
-            slots.bristle[world, target, point, i] = 0.0
+            slots.bristle[world, target, i, point] = 0.0
     for i in range(slots.memory.shape[2]):
         for j in range(slots.memory.shape[3]):
             slots.memory[world, point, i, j] = 0.0
@@ -273,24 +336,28 @@ def _advance_point(world: int, point: int, law: ContactLaw, sensor: SensorArrays
     painted = scaled_law(law, stiff, scale)
     deepest, deepest_rate, deepest_slide = 0.0, 0.0, 0.0
     for target in range(slots.pressed.shape[1]):
-        if slots.pressed[world, target, point] >= 0.0:
-            n = slots.normal[world, target, point]
-            px, py, pz = contact_point(point, slots.pressed[world, target, point], sensor)
-            nx, ny, nz = n[0], n[1], n[2]
-            moved = _sliding_at(px, py, pz, nx, ny, nz, worlds.motion[world, target])
+        pressed, depth = slots.pressed[world, target, point], slots.depth[world, target, point]
+        n, z = slots.normal, slots.bristle
+        nx, ny, nz = n[world, target, 0, point], n[world, target, 1, point], n[world, target, 2, point]
+        zx, zy, zz = z[world, target, 0, point], z[world, target, 1, point], z[world, target, 2, point]
+        if pressed >= 0.0:  # a GPU has read all of them at a time
+            px, py, pz = contact_point(point, pressed, sensor)
+            moved = _sliding_at(px, py, pz, nx, ny, nz, worlds.motion[world, 0, target])
             square = moved.x * moved.x + moved.y * moved.y + moved.z * moved.z
-            end = slots.depth[world, target, point] + sensor.dt * moved.rate
+            end = depth + sensor.dt * moved.rate
             tangent = _tangent(
-                world, TexelMotion(slots.depth[world, target, point], moved.rate, 0.0, math.sqrt(square)), painted, scale,
-                sensor, slots.memory[world, point],
+                world, TexelMotion(depth, moved.rate, 0.0, math.sqrt(square)), painted, scale, sensor,
+                slots.memory[world, point],
             )  # fmt: skip
-            z = slots.bristle[world, target, point]
-            zx, zy, zz = z[0], z[1], z[2]
             contact = linearise_contact(
                 (nx, ny, nz), (zx, zy, zz),
                 (moved.x + moved.rate * nx, moved.y + moved.rate * ny, moved.z + moved.rate * nz), tangent, sensor.dt, law,
             )  # fmt: skip
-            _move_bristle(contact, _sliding_at(px, py, pz, nx, ny, nz, worlds.end_motion[world, target]), z)
+            v = _sliding_at(px, py, pz, nx, ny, nz, worlds.end_motion[world, target])
+            zx, zy, zz = _next_bristle(contact, v, (zx, zy, zz))
+            z[world, target, 0, point] = zx
+            z[world, target, 1, point] = zy
+            z[world, target, 2, point] = zz
             if end > deepest:
                 deepest, deepest_rate, deepest_slide = end, moved.rate, sensor.dt * math.sqrt(square)
     if HAS_EFFECTS == 1:
@@ -319,13 +386,13 @@ def _tangent(
     return Tangent(bias, slope, scale, viscosity, pulls)
 
 
-def _move_bristle(contact: LinearContact, v: Sliding, z: np.ndarray) -> None:
-    """Bring a bristle (3,) to the step's end, given the sliding in the sensor's axes at that time."""
-    zx = next_deflection(contact.keep, z[0], contact.gain, v.x)
-    zy = next_deflection(contact.keep, z[1], contact.gain, v.y)
-    zz = next_deflection(contact.keep, z[2], contact.gain, v.z)
+def _next_bristle(contact: LinearContact, v: Sliding, bristle: Vector) -> tuple[float, float, float]:
+    """Return a bristle at the step's end, given the sliding in the sensor's axes at that time."""
+    zx = next_deflection(contact.keep, bristle[0], contact.gain, v.x)
+    zy = next_deflection(contact.keep, bristle[1], contact.gain, v.y)
+    zz = next_deflection(contact.keep, bristle[2], contact.gain, v.z)
     scale = deflection_scale(zx * zx + zy * zy + zz * zz, contact.limit)
-    z[0], z[1], z[2] = scale * zx, scale * zy, scale * zz
+    return scale * zx, scale * zy, scale * zz
 
 
 def contact_point(point: int, pressed: float, sensor: SensorArrays) -> tuple[float, float, float]:
@@ -336,7 +403,7 @@ def contact_point(point: int, pressed: float, sensor: SensorArrays) -> tuple[flo
 
 def find_contact(
     world: int, target: int, point: int, sensor: SensorArrays, targets: TargetArrays, tree: Tree, worlds: Worlds, slots: Slots
-) -> None:
+) -> Touch:
     """Find where a contact point touches a target now, and write it down; a bristle is zero where nothing touches."""
     m, f, reach = worlds.pose[world, target], sensor.frame, sensor.reach
     px, py, pz, ax, ay, az = f[0, point], f[1, point], f[2, point], f[3, point], f[4, point], f[5, point]
@@ -347,22 +414,34 @@ def find_contact(
     dy = reach * (m[3] * ax + m[4] * ay + m[5] * az)
     dz = reach * (m[6] * ax + m[7] * ay + m[8] * az)
     segment, before = Segment(tx - dx, ty - dy, tz - dz, dx, dy, dz), slots.pressed[world, target, point]
-    found = _entry(segment, target, before, slots.triangle[world, target, point], reach, targets, tree)
-    slots.triangle[world, target, point] = found.triangle
+    hint, is_mesh = -1, targets.kind[target] == MESH
+    if is_mesh:
+        hint = slots.triangle[world, target, point]
+    found = _entry(segment, target, before, hint, reach, targets, tree)
+    if is_mesh:
+        slots.triangle[world, target, point] = found.triangle
+    z = slots.bristle
     if not (0.0 <= found.t <= 1.0):
-        slots.pressed[world, target, point] = TOO_DEEP if found.inside else NO_CONTACT
+        pressed = TOO_DEEP if found.inside else NO_CONTACT
+        slots.pressed[world, target, point] = pressed
         for i in range(3):
-            slots.bristle[world, target, point, i] = 0.0
-            slots.force[world, target, point, i] = 0.0
-        return
-    pressed, n = 1.0 - found.t, slots.normal[world, target, point]
+            z[world, target, i, point] = 0.0
+            slots.force[world, target, i, point] = 0.0
+        return Touch(pressed, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    pressed = 1.0 - found.t
+    depth, way = pressed * abs(dx * found.nx + dy * found.ny + dz * found.nz), pressed * reach
+    nx = m[0] * found.nx + m[3] * found.ny + m[6] * found.nz
+    ny = m[1] * found.nx + m[4] * found.ny + m[7] * found.nz
+    nz = m[2] * found.nx + m[5] * found.ny + m[8] * found.nz
+    zx, zy, zz = turned_into_plane(
+        (z[world, target, 0, point], z[world, target, 1, point], z[world, target, 2, point]), (nx, ny, nz)
+    )  # fmt: skip
     slots.pressed[world, target, point] = pressed
-    slots.depth[world, target, point] = pressed * abs(dx * found.nx + dy * found.ny + dz * found.nz)
-    z = slots.bristle[world, target, point]
-    for i in range(3):
-        n[i] = m[i] * found.nx + m[3 + i] * found.ny + m[6 + i] * found.nz
-    zx, zy, zz = turned_into_plane((z[0], z[1], z[2]), (n[0], n[1], n[2]))
-    z[0], z[1], z[2] = zx, zy, zz
+    slots.depth[world, target, point] = depth
+    n = slots.normal
+    n[world, target, 0, point], n[world, target, 1, point], n[world, target, 2, point] = nx, ny, nz
+    z[world, target, 0, point], z[world, target, 1, point], z[world, target, 2, point] = zx, zy, zz
+    return Touch(pressed, depth, px - way * ax, py - way * ay, pz - way * az, nx, ny, nz, zx, zy, zz)
 
 
 def _entry(segment: Segment, target: int, before: float, hint: int, length: float, targets: TargetArrays, tree: Tree) -> Entry:
@@ -413,37 +492,33 @@ def _mesh_entry(segment: Segment, mesh: int, before: float, hint: int, tree: Tre
     return Entry(2.0, 0.0, 0.0, 0.0, -1, inside)
 
 
-def _write_force(
-    world: int, target: int, point: int, law: ContactLaw, sensor: SensorArrays, worlds: Worlds, slots: Slots
-) -> float:
-    """Write the force of a contact on the sensor, and return its normal part (N)."""
+def _contact_force(
+    world: int, target: int, point: int, at: Touch, law: ContactLaw, sensor: SensorArrays, worlds: Worlds, slots: Slots
+) -> tuple[float, float, float, float]:
+    """Return the normal part of a contact's force on the sensor, and the force in the sensor's frame (N)."""
     stiff, scale = sensor.multipliers[point, 0], sensor.multipliers[point, 1]
-    painted, depth = scaled_law(law, stiff, scale), slots.depth[world, target, point]
-    n, z = slots.normal[world, target, point], slots.bristle[world, target, point]
-    px, py, pz = contact_point(point, slots.pressed[world, target, point], sensor)
-    v = _sliding_at(px, py, pz, n[0], n[1], n[2], worlds.past_motion[world, target])
+    painted = scaled_law(law, stiff, scale)
+    v = _sliding_at(at.px, at.py, at.pz, at.nx, at.ny, at.nz, worlds.motion[world, 1, target])
     square = v.x * v.x + v.y * v.y + v.z * v.z
-    fn = normal_force(depth, v.rate, painted)
+    fn = normal_force(at.depth, v.rate, painted)
     factor, viscosity = 1.0, 0.0
     if HAS_EFFECTS == 1:
         speed = math.sqrt(square)
         whole, _, _ = force_with_effects(
-            NOW, TexelMotion(depth, v.rate, 0.0, speed), whole_texel_law(painted, sensor.share, 1.0),
+            NOW, TexelMotion(at.depth, v.rate, 0.0, speed), whole_texel_law(painted, sensor.share, 1.0),
             sensor.force_constants[world], slots.memory[world, point], False,
         )  # fmt: skip
         factor, viscosity = friction_with_effects(speed, whole, sensor.friction_constants[world])
         fn = sensor.share * whole
     friction = with_friction(painted, factor, sensor.share * viscosity)
-    held = deflection_scale(z[0] * z[0] + z[1] * z[1] + z[2] * z[2], max_bristle_deflection(fn, friction))
+    held = deflection_scale(at.zx * at.zx + at.zy * at.zy + at.zz * at.zz, max_bristle_deflection(fn, friction))
     fx, fy, fz = 0.0, 0.0, 0.0
     if fn > 0.0:
-        zx, zy, zz, decay = held * z[0], held * z[1], held * z[2], sliding_decay(square, fn, friction)
+        zx, zy, zz, decay = held * at.zx, held * at.zy, held * at.zz, sliding_decay(square, fn, friction)
         fx = friction_force(zx, rate_under_decay(zx, v.x, decay), v.x, friction)
         fy = friction_force(zy, rate_under_decay(zy, v.y, decay), v.y, friction)
         fz = friction_force(zz, rate_under_decay(zz, v.z, decay), v.z, friction)
-    f = slots.force[world, target, point]
-    f[0], f[1], f[2] = fx + fn * n[0], fy + fn * n[1], fz + fn * n[2]
-    return fn
+    return fn, fx + fn * at.nx, fy + fn * at.ny, fz + fn * at.nz
 
 
 # --- wrenches
@@ -452,14 +527,10 @@ def _write_force(
 def finish_world(
     world: int, lane: int, lanes: int, sensor: SensorArrays, worlds: Worlds, slots: Slots, jumps: Jumps, out: Results
 ) -> None:
-    """End the step of an environment, for which its texels have been pressed; this and what it calls take a block of threads.
-
-    The threads share the contact points: each begins with that of its number, `lane`, and goes on by `lanes`.
-    """
+    """End the step of an environment whose texels have been pressed; the threads of a block share its contact points."""
     sum_world(world, lane, lanes, sensor, worlds, slots, out)
     mark_jumps(world, lane, lanes, worlds, jumps, out)
-    if lane == 0:
-        end_step(world, worlds)
+    end_step(world, lane, lanes, worlds)
 
 
 def sum_world(world: int, lane: int, lanes: int, sensor: SensorArrays, worlds: Worlds, slots: Slots, out: Results) -> None:
@@ -473,37 +544,36 @@ def sum_world(world: int, lane: int, lanes: int, sensor: SensorArrays, worlds: W
                 if pressed == TOO_DEEP:
                     too_deep += 1.0
                 if pressed >= 0.0:
-                    f = slots.force[world, target, point]
+                    f = slots.force
+                    x, y, z = f[world, target, 0, point], f[world, target, 1, point], f[world, target, 2, point]
                     px, py, pz = contact_point(point, pressed, sensor)
-                    fx, fy, fz = fx + f[0], fy + f[1], fz + f[2]
-                    mx += py * f[2] - pz * f[1]
-                    my += pz * f[0] - px * f[2]
-                    mz += px * f[1] - py * f[0]
+                    fx, fy, fz = fx + x, fy + y, fz + z
+                    mx += py * z - pz * y
+                    my += pz * x - px * z
+                    mz += px * y - py * x
         fx, fy, fz = block_sum(fx), block_sum(fy), block_sum(fz)
         mx, my, mz = block_sum(mx), block_sum(my), block_sum(mz)
         if lane == 0:
-            _write_wrench((fx, fy, fz), (mx, my, mz), worlds.valid[world], worlds.poses[world], 1 + target,
+            _write_wrench((fx, fy, fz), (mx, my, mz), 1 + target, worlds.position[world, 1], worlds.rotation[world, 1, 0],
                           out.wrench[world, target])  # fmt: skip
     too_deep = block_sum(too_deep)
     if lane == 0:
         out.too_deep[world] = int(too_deep)
 
 
-def _write_wrench(force: Vector, torque: Vector, valid: bool, poses: np.ndarray, body: int, wrench: np.ndarray) -> None:
+def _write_wrench(
+    force: Vector, torque: Vector, body: int, position: np.ndarray, rotation: np.ndarray, wrench: np.ndarray
+) -> None:
     """Write what a body exerts on the sensor, given about its origin in its frame, as the wrench (6,) on the body."""
-    for i in range(6):
-        wrench[i] = 0.0
-    if valid:
-        at, quaternion, rotation = np.zeros(3), np.zeros(4), np.zeros((3, 3))
-        place_next(poses[0], at, quaternion)
-        write_rotation(quaternion, rotation)
-        for i in range(3):
-            wrench[i] = -(rotation[i, 0] * force[0] + rotation[i, 1] * force[1] + rotation[i, 2] * force[2])
-            wrench[3 + i] = -(rotation[i, 0] * torque[0] + rotation[i, 1] * torque[1] + rotation[i, 2] * torque[2])
-        x, y, z = at[0] - poses[body, 0], at[1] - poses[body, 1], at[2] - poses[body, 2]
-        wrench[3] += y * wrench[2] - z * wrench[1]
-        wrench[4] += z * wrench[0] - x * wrench[2]
-        wrench[5] += x * wrench[1] - y * wrench[0]
+    r = rotation
+    fx = -(r[0] * force[0] + r[1] * force[1] + r[2] * force[2])
+    fy = -(r[3] * force[0] + r[4] * force[1] + r[5] * force[2])
+    fz = -(r[6] * force[0] + r[7] * force[1] + r[8] * force[2])
+    x, y, z = position[0, 0] - position[body, 0], position[0, 1] - position[body, 1], position[0, 2] - position[body, 2]
+    mx = y * fz - z * fy - (r[0] * torque[0] + r[1] * torque[1] + r[2] * torque[2])
+    my = z * fx - x * fz - (r[3] * torque[0] + r[4] * torque[1] + r[5] * torque[2])
+    mz = x * fy - y * fx - (r[6] * torque[0] + r[7] * torque[1] + r[8] * torque[2])
+    wrench[0], wrench[1], wrench[2], wrench[3], wrench[4], wrench[5] = fx, fy, fz, mx, my, mz
 
 
 def mark_jumps(world: int, lane: int, lanes: int, worlds: Worlds, jumps: Jumps, out: Results) -> None:
@@ -511,12 +581,13 @@ def mark_jumps(world: int, lane: int, lanes: int, worlds: Worlds, jumps: Jumps, 
     crossed, measures = 0.0, 0.0
     for target in range(jumps.sphere.shape[0]):
         pose, sphere, old = worlds.pose[world, target], jumps.sphere[target], jumps.centre[world, target]
-        sx, sy, sz, b = old[0], old[1], old[2], jumps.bound
+        sx, sy, sz = old[0], old[1], old[2]
         dx, dy, dz = sphere[0] - pose[9], sphere[1] - pose[10], sphere[2] - pose[11]
         x = pose[0] * dx + pose[3] * dy + pose[6] * dz
         y = pose[1] * dx + pose[4] * dy + pose[7] * dz
         z = pose[2] * dx + pose[5] * dy + pose[8] * dz
         if worlds.valid[world] and not worlds.fresh[world]:
+            b = jumps.bound
             if meets_sphere((sx, sy, sz), (x, y, z), sphere[3] + b[3], (b[0], b[1], b[2])):
                 for texel in range(lane, jumps.frame.shape[0], lanes):
                     f = jumps.frame[texel]
@@ -532,12 +603,16 @@ def mark_jumps(world: int, lane: int, lanes: int, worlds: Worlds, jumps: Jumps, 
         jumps.jumped[world] = crossed > 0.0 and not (measures > 0.0 or out.too_deep[world] > 0)
 
 
-def end_step(world: int, worlds: Worlds) -> None:
+def end_step(world: int, lane: int, lanes: int, worlds: Worlds) -> None:
     """Let the next step of an environment begin where this one ends."""
-    worlds.begins[world] = not worlds.valid[world]
+    if lane == 0:
+        worlds.begins[world] = not worlds.valid[world]
     if worlds.valid[world]:
-        for body in range(worlds.poses.shape[1]):
-            place_next(worlds.poses[world, body], worlds.position[world, body], worlds.quaternion[world, body])
+        for body in range(lane, worlds.poses.shape[1], lanes):
+            for i in range(3):
+                worlds.position[world, 0, body, i] = worlds.position[world, 1, body, i]
+            for i in range(4):
+                worlds.quaternion[world, 0, body, i] = worlds.quaternion[world, 1, body, i]
 
 
 def reset_worlds(world: int, mask: BoolArray, worlds: Worlds) -> None:

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from ...compiled.kernels import plain
-from .block import IN_CUDA
+from .block import IN_CUDA, THREADS
 
 REAL, INTEGER, BOOLEAN, OTHER = "real", "integer", "boolean", "other"
 """Kinds of values, as far as the rewriting has to tell them apart."""
@@ -86,20 +86,22 @@ class Translation:
                 self._functions[source] = self._compiled(source, name, self.warp.func, None)
         return self._functions[source]
 
-    def kernel(self, function: Callable[..., Any], threads: int, registers: int | None = None) -> Any:
-        """Return a function as a kernel of Warp; those of one Python module are compiled together.
+    def kernel(self, function: Callable[..., Any], threads: int, block: int = THREADS, registers: int | None = None) -> Any:
+        """Return a function as a kernel of Warp; those of one Python module with blocks of one size are compiled together.
 
         Parameters
         ----------
         function : callable
         threads : int
             How many of its arguments, from the first, are the index of a thread.
+        block : int
+            Threads of a block on a GPU.
         registers : int, optional
             Most registers of a thread on a GPU; fewer let more threads run at a time.
         """
         if function not in self._kernels:
-            module = self.warp.get_module(f"{self.name}_{function.__module__.rpartition('.')[2]}")
-            options = {"enable_backward": False, "fuse_fp": False, "optimization_level": 3}
+            module = self.warp.get_module(f"{self.name}_{function.__module__.rpartition('.')[2]}_{block}")
+            options = {"enable_backward": False, "fuse_fp": False, "optimization_level": 3, "block_dim": block}
             self.warp.set_module_options(options, module=module)
             decorate = self.warp.kernel(
                 enable_backward=False, module=module, grid_stride=False, cuda_max_registers=registers

@@ -30,10 +30,10 @@ from ..pressed_sensors import available_memory, check_memory, fault_of
 from ..sensor_on_mesh import SensorOnMesh
 from . import balance_kernels, press_kernels
 from .balance_kernels import Beginning
+from .block import WARP
 from .effect_functions import EffectFunctions, functions_of
-from .block import THREADS
 from .engine import require_device, require_warp
-from .press_arrays import Jumps, Results, SensorArrays, Slots, TargetArrays, Worlds
+from .press_arrays import Jumps, Results, SensorArrays, Slots, TargetArrays, Worlds, split_leaves
 from .translation import Translation
 
 _TRANSLATIONS: dict[Any, Translation] = {}
@@ -115,6 +115,7 @@ class WarpSensors:
         e, n, t, p = environments, len(sensor.texels), len(targets), len(points.texel)
         self._size, self._of_slots = (e, n, t), (t, p, n, effects.laws, effects.reading_laws)
         tree = build_tree([one for one in targets if isinstance(one, TriangleMesh)] or [_NO_MESH])
+        tree = split_leaves(tree) if self._on_gpu else tree
         translation = self._translation = _translation(warp, single, effects, sensor)
         shared = _sensor_arrays(sensors, points, effects, dt, e), _target_arrays(targets), tree
         self._sensor, self._targets, self._tree = (translation.value(part, self.device) for part in shared)
@@ -130,10 +131,10 @@ class WarpSensors:
         self._balance: tuple[Any, ...] = ()
         self.residual: Any = None
         self.displacement: Any = None
-        kernels = press_kernels
-        self._move = translation.kernel(kernels.move_target, 2)
-        self._press = translation.kernel(kernels.press_texel, 2, PRESS_REGISTERS)
-        self._finish, self._reset = translation.kernel(kernels.finish_world, 2), translation.kernel(kernels.reset_worlds, 1)
+        kernels, kernel = press_kernels, translation.kernel
+        self._move, self._reset = kernel(kernels.move_world, 2), kernel(kernels.reset_worlds, 1)
+        self._press = kernel(kernels.press_texel, 2, registers=PRESS_REGISTERS)
+        self._finish = kernel(kernels.finish_world, 2, WARP)
 
     def __len__(self) -> int:
         """Return the number of environments."""
@@ -174,23 +175,24 @@ class WarpSensors:
         """
         if sensor_poses is not None or target_poses is not None:
             self._take(sensor_poses, target_poses)
-        (e, n, t), sensor, worlds = self._size, self._sensor, self._worlds
+        (e, n, _), sensor, worlds = self._size, self._sensor, self._worlds
         touching = sensor, self._targets, self._tree, worlds, self._slots
         if wrench is not None:
             degrees = self._take_loads(wrench)
-            lanes = LOAD_LANES if self._on_gpu else 1
-            inputs = lanes, degrees, *touching, self._jumps, self._out, *self._balance
-            self._launch(self._kernel_of_load, (e, lanes), inputs, lanes)
+            self._launch(self._kernel_of_load, e, WARP, (degrees, *touching, self._jumps, self._out, *self._balance))
         else:
             self._forget_loads()
-            lanes = THREADS if self._on_gpu else 1
-            self._launch(self._move, (e, t), (sensor, worlds))
-            self._launch(self._press, (e, n), (*touching, self._out))
-            self._launch(self._finish, (e, lanes), (lanes, sensor, worlds, self._slots, self._jumps, self._out))
+            self._launch(self._move, e, MOVERS, (sensor, worlds))
+            self._launch(self._press, (e, n), 0, (*touching, self._out))
+            self._launch(self._finish, e, WARP, (sensor, worlds, self._slots, self._jumps, self._out))
         return self
 
-    def _launch(self, kernel: Any, threads: tuple[int, ...], inputs: Sequence[Any], block: int = THREADS) -> None:
-        """Run a kernel with so many threads, in blocks of `block`; a processor's blocks are one thread in any case."""
+    def _launch(self, kernel: Any, threads: int | tuple[int, ...], lanes: int, inputs: Sequence[Any]) -> None:
+        """Run a kernel by so many threads, or by so many times `lanes`, which on a processor are one, that work together."""
+        if lanes:
+            lanes = lanes if self._on_gpu else 1
+            threads, inputs = (threads, lanes), (lanes, *inputs)
+        block = kernel.module.options["block_dim"]
         try:
             self._warp.launch(kernel, dim=threads, inputs=list(inputs), device=self.device, block_dim=block)
         except RuntimeError as error:
@@ -227,7 +229,7 @@ class WarpSensors:
                 f"The mask of environments to reset is {mask.dtype.__name__} of shape {mask.shape} on {mask.device}: "
                 f"give ({len(self)},) bool on {self.device}."
             )
-        self._launch(self._reset, (len(self),), (chosen, self._worlds))
+        self._launch(self._reset, len(self), 0, (chosen, self._worlds))
 
     def _take(self, sensor_poses: Any, target_poses: Any) -> None:
         """Copy poses of NumPy to the device."""
@@ -273,7 +275,7 @@ class WarpSensors:
         self._balance = (
             *self._room(Slots.zero(1, *self._of_slots), Beginning.zero(1)), self._translation.value(search, self.device)
         )  # fmt: skip
-        self._kernel_of_load = self._translation.kernel(balance_kernels.balance_world, 2)
+        self._kernel_of_load = self._translation.kernel(balance_kernels.balance_world, 2, WARP)
 
     def _forget_loads(self) -> None:
         """Go on without displacement."""
@@ -290,8 +292,8 @@ _NO_MESH = TriangleMesh(np.eye(3), np.array([[0, 1, 2]]))
 
 PRESS_REGISTERS = 128
 """Most registers of a thread that presses a texel."""
-LOAD_LANES = 32
-"""Threads of a block on a GPU that searches for the displacement under a load."""
+MOVERS = 4
+"""Threads that move an environment: of two bodies, each has the beginning or the end."""
 
 
 def _check(sensor: Sensor, targets: Sequence[TriangleMesh | Shape], dt: float, environments: int) -> None:

@@ -129,3 +129,61 @@ def test_a_plate_on_a_pad_in_mjlab():
     assert np.abs(np.array(sums) - 9.81).max() < 2 * 9.3e-10 / 0.0005 * 64 * 10.0
     with pytest.raises(ParameterError, match="update the scene after each step"):
         scene["touch"].update(0.002)
+
+
+def wrench_about(point, wrench, origin):
+    """Force, and torque about a point, of a wrench (6,) about an origin."""
+    return np.concatenate([wrench[:3], wrench[3:] + np.cross(origin - point, wrench[:3])])
+
+
+@pytest.mark.slow("Warp compiles the kernels")
+def test_poses_go_to_the_sensor_and_wrenches_to_the_engines():
+    """Two worlds, a target's body and the sensor's; the engines' arrays in float32, the sensor's in float64."""
+    wp = pytest.importorskip("warp", reason="Warp runs the kernels: pip install warp-lang")
+    from scipy.spatial.transform import Rotation
+
+    from palpate.plugins import engine_kernels as kernels
+
+    draw = np.random.default_rng(2)
+    place, turn = draw.standard_normal((2, 3, 3)).astype(np.float32), Rotation.random(6, draw)
+    quaternion = turn.as_quat().reshape(2, 3, 4).astype(np.float32)  # (x, y, z, w)
+    matrix = turn.as_matrix().reshape(2, 3, 3, 3).astype(np.float32)
+    wrench, centre = draw.standard_normal((2, 1, 6)), draw.standard_normal((2, 3, 3)).astype(np.float32)
+    poses, force = wp.zeros((2, 2, 7), dtype=wp.float64, device="cpu"), wp.array(wrench, dtype=wp.float64, device="cpu")
+    given = [wp.array(one, dtype=kind, device="cpu") for one, kind in (
+        (place, wp.vec3), (np.roll(quaternion, 1, axis=2), wp.quat), (place, wp.vec3), (matrix, wp.mat33),
+    )]  # fmt: skip
+    geoms, xipos = wp.array([2], dtype=int, device="cpu"), wp.array(centre, dtype=wp.vec3, device="cpu")
+    wp.launch(kernels.write_mujoco_poses, dim=(2, 2), inputs=[1, geoms, *given, poses], device="cpu")
+    expected = np.concatenate([place, np.roll(quaternion, 1, axis=2)], axis=2)[:, [1, 2]]
+    sign = np.sign((poses.numpy()[..., 3:] * expected[..., 3:]).sum(axis=2, keepdims=True))  # of either sign alike
+    assert np.abs(poses.numpy()[..., :3] - expected[..., :3]).max() == 0.0
+    assert np.abs(sign * poses.numpy()[..., 3:] - expected[..., 3:]).max() < 1e-6
+    applied = wp.array(np.ones((2, 3, 6)), dtype=wp.spatial_vector, device="cpu")
+    inputs = [1, geoms, xipos, poses, force, applied]
+    wp.launch(kernels.write_mujoco_wrenches, dim=2, inputs=inputs, device="cpu")
+    for world in range(2):
+        found, origin = applied.numpy()[world], place[world, 2].astype(float)
+        assert found[0] == pytest.approx(np.ones(6))
+        assert found[2] == pytest.approx(wrench_about(centre[world, 2], wrench[world, 0], origin), abs=1e-5)
+        assert found[1] == pytest.approx(-wrench_about(centre[world, 1], wrench[world, 0], origin), abs=1e-5)
+
+    # Newton: shapes at their bodies, apart from the second world's sensor, which belongs to none.
+    frame = np.concatenate([place, quaternion], axis=2).reshape(6, 7)
+    none = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]] * 6)
+    body_q, com = wp.array(frame, dtype=wp.transform, device="cpu"), wp.array(centre.reshape(6, 3), dtype=wp.vec3, device="cpu")
+    transforms = none.copy()
+    transforms[4] = frame[4]
+    shapes = wp.array([[1, 2], [4, 5]], dtype=int, device="cpu")
+    bodies = wp.array([0, 1, 2, 3, -1, 5], dtype=int, device="cpu")
+    fixed = wp.array(transforms, dtype=wp.transform, device="cpu")
+    wp.launch(kernels.write_newton_poses, dim=(2, 2), inputs=[shapes, bodies, fixed, body_q, poses], device="cpu")
+    assert poses.numpy() == pytest.approx(expected, abs=1e-6)
+    body_f = wp.zeros(6, dtype=wp.spatial_vector, device="cpu")
+    inputs = [shapes, bodies, com, body_q, poses, force, body_f]
+    wp.launch(kernels.add_newton_wrenches, dim=(2, 1), inputs=inputs, device="cpu")
+    centres = place.reshape(6, 3) + turn.apply(centre.reshape(6, 3))
+    for body, row, sign in ((2, 0, 1.0), (1, 0, -1.0), (5, 1, 1.0)):
+        origin = place[row, 2].astype(float)
+        assert body_f.numpy()[body] == pytest.approx(sign * wrench_about(centres[body], wrench[row, 0], origin), abs=1e-4)
+    assert not body_f.numpy()[[0, 3, 4]].any()

@@ -8,14 +8,17 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import trimesh
 from exported_sensors import pad
 
+from palpate.core.errors import PalpateError, ParameterError
 from palpate.core.geometry import shapes
-from palpate.core.geometry.bvh import build_tree
+from palpate.core.geometry.bvh import Segment, build_tree, segment_entry
+from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.simulators.load_search import LoadSearch
 from palpate.core.simulators.warp import balance_kernels, block, engine, press_kernels, warp_sensors
 from palpate.core.simulators.warp.balance_kernels import Beginning
-from palpate.core.simulators.warp.press_arrays import Jumps, Results, Slots, Worlds
+from palpate.core.simulators.warp.press_arrays import Jumps, Results, Slots, Worlds, split_leaves
 from palpate.core.simulators.warp.warp_sensors import WarpSensors
 
 warp = pytest.importorskip("warp", reason="Warp runs the kernels: pip install warp-lang")
@@ -94,7 +97,7 @@ class Run:
                 rest = self.jumps, self.out, self.start, self.beginning, self.search
                 self._block.run(balance_kernels.balance_world, world, loads.shape[1], *touching, *rest)
                 continue
-            press_kernels.move_target(world, 0, self.sensor, self.worlds)
+            self._block.run(press_kernels.move_world, world, self.sensor, self.worlds)
             for texel in range(self.n):
                 press_kernels.press_texel(world, texel, *touching, self.out)
             self._block.run(
@@ -118,7 +121,7 @@ def poses_of(step):
 
 @pytest.mark.parametrize("lanes", [1, 3, 8])
 def test_the_threads_of_a_block_share_contact_points(lanes, monkeypatch):
-    """The numbers are Warp's; no thread takes more passes than its share, apart from the twelve numbers of a motion."""
+    """The numbers are Warp's; no thread takes more passes than its share, apart from loops over the numbers of a row."""
     shared, ours = Block(lanes, monkeypatch), WarpSensors(pad(5, 4), SHAPE, DT, E)
     run = Run(shared)
     for step in range(4):
@@ -147,15 +150,35 @@ def test_the_threads_of_a_block_search_together(lanes, monkeypatch):
 
 
 def test_a_gpu_gets_a_thread_for_each_texel(monkeypatch):
-    """Threads of each kernel of a step: by targets, by texels, and a block for each environment."""
-    monkeypatch.setattr(WarpSensors, "_launch", lambda self, kernel, threads, inputs, block=128: launched.append((threads, block)))
-    ours, launched = WarpSensors(pad(5, 4), SHAPE, DT, E), []
+    """Threads of each kernel of a step, and of their blocks: a few move an environment, and a warp adds its texels up."""
+    launched, ours = [], WarpSensors(pad(5, 4), SHAPE, DT, E)
+    monkeypatch.setattr(warp, "launch", lambda kernel, dim, block_dim, **_: launched.append((dim, block_dim)))
     ours._on_gpu = True
     ours.step(poses_of(0)[:, 0], poses_of(0)[:, 1])
-    assert launched == [((E, 1), 128), ((E, 20), 128), ((E, block.THREADS), block.THREADS)]
+    assert launched == [((E, warp_sensors.MOVERS), block.THREADS), ((E, 20), block.THREADS), ((E, block.WARP), block.WARP)]
     launched.clear()
     ours.step(wrench=np.zeros((E, 6)))
-    assert launched == [((E, warp_sensors.LOAD_LANES), warp_sensors.LOAD_LANES)]
+    assert launched == [((E, block.WARP), block.WARP)]
+
+
+def test_a_gpu_meets_fewer_triangles_and_finds_the_same():
+    """Lines into a ball and a cube, in trees with four triangles to a leaf and with one."""
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.01)
+    tree = build_tree(
+        [TriangleMesh(np.array(one.vertices), np.array(one.faces)) for one in (ball, trimesh.creation.box((SIZE,) * 3))]
+    )
+    fine, draw = split_leaves(tree), np.random.default_rng(1)
+    assert fine.number.max() == 1 < tree.number.max() and len(fine.number) == fine.roots[-1]
+    entered = 0
+    for mesh in (0, 1):
+        for _ in range(200):
+            base = draw.standard_normal(3)
+            base *= 0.018 / np.linalg.norm(base)
+            segment = Segment(*base, *(-draw.uniform(0.2, 1.2) * base + 0.002 * draw.standard_normal(3)))
+            found = segment_entry(segment, mesh, -1, tree)
+            assert segment_entry(segment, mesh, -1, fine) == found
+            entered += found[1] >= 0
+    assert 100 < entered < 400
 
 
 # --- devices
@@ -168,7 +191,7 @@ def test_a_device_that_does_not_do_is_one_sentence(monkeypatch):
         get_devices=lambda: ["cpu"], get_cuda_driver_version=lambda: (11, 2), is_cuda_available=lambda: False,
         get_device=lambda name: card, __version__="1.19.0",
     )  # fmt: skip
-    with pytest.raises(engine.ParameterError, match=r"^The NVIDIA driver is for CUDA 11\.2, which is too old for Warp 1\.19\.0: "):
+    with pytest.raises(ParameterError, match=r"^The NVIDIA driver is for CUDA 11\.2, which is too old for Warp 1\.19\.0: "):
         engine.require_device(fake, "cuda:0", False)
     fake.get_devices = lambda: ["cpu", "cuda:0"]
     with pytest.warns(UserWarning, match=r"^'a card' is slow in float64: single=True is faster there, and less exact\.$"):
@@ -180,8 +203,8 @@ def test_a_device_that_does_not_do_is_one_sentence(monkeypatch):
 
     ours = WarpSensors(pad(4, 4), SHAPE, DT, E)
     monkeypatch.setattr(warp, "full", lost)
-    with pytest.raises(engine.ParameterError, match=r"cpu has no 0\.0 GiB of memory in one piece for 2 environments: ask for fewer"):
+    with pytest.raises(ParameterError, match=r"cpu has no 0\.0 GiB of memory in one piece for 2 environments: ask for fewer"):
         WarpSensors(pad(4, 4), SHAPE, DT, E)
     monkeypatch.setattr(warp, "launch", lost)
-    with pytest.raises(engine.PalpateError, match=r"^cpu did not take the step and its arrays are lost, so make the sensors again: "):
+    with pytest.raises(PalpateError, match="^cpu did not take the step and its arrays are lost, so make the sensors again: "):
         ours.step(poses_of(0)[:, 0], poses_of(0)[:, 1])
