@@ -3,14 +3,12 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 from collections.abc import Callable, Sequence
-from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.errors import PalpateError, ParameterError
+from ..core.errors import ParameterError
 from ..core.geometry.mesh import TriangleMesh
 from ..core.geometry.shapes import Shape, box, capsule, plane, sphere
 from ..core.simulators.environment_parameters import Columns
@@ -118,30 +116,6 @@ class EngineSensors:
     def indices(self, rows: Sequence[Any]) -> Any:
         """Return integers on the sensors' device."""
         return self._warp.array(rows, dtype=int, device=self.sensors.device)
-
-
-def require_engine(module: str, package: str, oldest: tuple[int, int]) -> ModuleType:
-    """Return the module of an engine; raise :class:`.PalpateError` where it is missing or too old.
-
-    Parameters
-    ----------
-    module, package : str
-        Its name in Python, and the one by which pip installs it.
-    oldest : (int, int)
-        Oldest version with which the plug-in was tried.
-    """
-    try:
-        engine = importlib.import_module(module)
-        version = importlib.metadata.version(package)
-    except ImportError as error:  # PackageNotFoundError is one
-        raise PalpateError(f"The plug-in needs {module}, which is not installed: run 'pip install {package}'.") from error
-    numbers = tuple(int(part) for part in version.split(".")[:2] if part.isdigit())
-    if numbers < oldest:
-        wanted = ".".join(map(str, oldest))
-        raise PalpateError(
-            f"{module} is version {version}, and the plug-in needs {wanted} or later: run 'pip install --upgrade {package}'."
-        )
-    return engine
 
 
 def sensor_of(name: str, sensor: SensorOnMesh | None) -> SensorOnMesh:

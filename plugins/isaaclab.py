@@ -14,7 +14,8 @@ from ..core.geometry.mesh import TriangleMesh
 from ..core.geometry.shapes import Shape
 from ..core.simulators.environment_parameters import Columns
 from ..core.simulators.sensor_on_mesh import SensorOnMesh
-from .engine_sensors import EngineSensors, TouchData, require_engine, sensor_of
+from ..core.simulators.warp.engine import require_engine
+from .engine_sensors import EngineSensors, TouchData, sensor_of
 
 require_engine("isaaclab", "isaaclab", (0, 0))  # its version in a checkout is not that of the release
 

@@ -13,7 +13,8 @@ from ..core.geometry.mesh import TriangleMesh
 from ..core.geometry.shapes import Shape
 from ..core.simulators.environment_parameters import Columns
 from ..core.simulators.sensor_on_mesh import SensorOnMesh
-from .engine_sensors import EngineSensors, TouchData, require_engine, sensor_of, target_of
+from ..core.simulators.warp.engine import require_engine
+from .engine_sensors import EngineSensors, TouchData, sensor_of, target_of
 
 require_engine("mjlab", "mjlab", (1, 6))
 

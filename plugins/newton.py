@@ -16,7 +16,8 @@ from ..core.geometry.shapes import Shape
 from ..core.simulators.contact_translation import NewtonContact
 from ..core.simulators.environment_parameters import Columns
 from ..core.simulators.sensor_on_mesh import SensorOnMesh
-from .engine_sensors import EngineSensors, require_engine, target_of
+from ..core.simulators.warp.engine import require_engine
+from .engine_sensors import EngineSensors, target_of
 
 Labels = str | Sequence[str] | re.Pattern[str] | Sequence[int]
 """Shapes of a model: a glob pattern, several of them, a compiled regular expression, or indices."""

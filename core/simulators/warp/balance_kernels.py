@@ -125,12 +125,9 @@ def _begin_search(world: int, degrees: int, begins: bool, worlds: Worlds, search
         write_rotation(quaternion[body], rotation[body])
     begin_search(world, degrees, rotation[0], search)
     if begins:
-        write_pose(at, rotation, 1, worlds.pose[world, 0])
+        write_pose(at, rotation, 0, 1, worlds.pose[world, 0])
         for body in range(2):
-            for i in range(3):
-                worlds.position[world, 0, body, i] = at[body, i]
-            for i in range(4):
-                worlds.quaternion[world, 0, body, i] = quaternion[body, i]
+            place_next(worlds.poses[world, body], worlds.position[world, body], worlds.quaternion[world, body])
 
 
 def _copy_slot(world: int, point: int, slots: Slots, to: Slots) -> None:

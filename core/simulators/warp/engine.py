@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Warp, which is imported only when it is asked for."""
+"""Warp and other engines, which are imported only when they are asked for."""
 
 from __future__ import annotations
 
-import importlib
+import importlib.metadata
 import warnings
 from types import ModuleType
 
@@ -15,22 +15,36 @@ FAST_FLOAT64 = 60, 70, 80, 90, 100
 """Compute capabilities whose cards compute float64 at half the speed of float32; all others at a thirty-second or less."""
 
 
+def require_engine(module: str, package: str, oldest: tuple[int, int], who: str = "The plug-in") -> ModuleType:
+    """Return the module of an engine; raise :class:`.PalpateError` where it is missing or too old.
+
+    Parameters
+    ----------
+    module, package : str
+        Its name in Python, and the one by which pip installs it.
+    oldest : (int, int)
+        Oldest version with which it was tried.
+    who : str
+        What needs it, for messages.
+    """
+    try:
+        engine = importlib.import_module(module)
+        version = importlib.metadata.version(package)
+    except ImportError as error:  # PackageNotFoundError is one
+        raise PalpateError(f"{who} needs {module}, which is not installed: run 'pip install {package}'.") from error
+    numbers = tuple(int(part) for part in version.split(".")[:2] if part.isdigit())
+    if numbers < oldest:
+        wanted = ".".join(map(str, oldest))
+        raise PalpateError(
+            f"{module} is version {version}, and {who[0].lower()}{who[1:]} needs {wanted} or later: "
+            f"run 'pip install --upgrade {package}'."
+        )
+    return engine
+
+
 def require_warp() -> ModuleType:
     """Return Warp; raise :class:`.PalpateError` where it is missing or too old."""
-    try:
-        warp = importlib.import_module("warp")
-        version = str(warp.__version__)
-    except (ImportError, AttributeError) as error:
-        raise PalpateError(
-            "Kernels on Warp need the package warp-lang, which is not installed: run 'pip install warp-lang'."
-        ) from error
-    numbers = tuple(int(part) for part in version.split(".")[:2] if part.isdigit())
-    if numbers < OLDEST:
-        wanted = ".".join(map(str, OLDEST))
-        raise PalpateError(
-            f"Warp is version {version}, and kernels need {wanted} or later: run 'pip install --upgrade warp-lang'."
-        )
-    return warp
+    return require_engine("warp", "warp-lang", OLDEST, "A sensor on Warp")
 
 
 def require_device(warp: ModuleType, name: str, single: bool) -> str:

@@ -105,10 +105,10 @@ class Worlds(NamedTuple):
         It began with the last step.
     valid : (E,) bool
         Its poses are poses.
-    position, quaternion : (E, 2, 1 + T, 3), (E, 2, 1 + T, 4) float
-        Of each body at the step's beginning and at its end.
-    rotation, step_motion : (E, 2, 1 + T, 9), (E, 2, 1 + T, 12) float
-        Of each body at either end, row by row, and its motion as seen from there (see :func:`.write_step_motion`).
+    position, quaternion : (E, 2 + 2T, 3), (E, 2 + 2T, 4) float
+        Of all bodies at the step's beginning, and then at its end.
+    rotation, step_motion : (E, 2 + 2T, 3, 3), (E, 2 + 2T, 12) float
+        Of all bodies at either end, and their motions as seen from there (see :func:`.write_step_motion`).
     pose : (E, T, 12) float
         Rotation (row by row) and position of the sensor in each target's frame, at the step's end.
     motion : (E, 2, T, 12) float
@@ -133,7 +133,7 @@ class Worlds(NamedTuple):
     def zero(cls, e: int, targets: int) -> Worlds:
         """Return room for environments that all begin with their first step."""
         b, flags = 1 + targets, (np.ones(e, np.bool_), np.ones(e, np.bool_), np.ones(e, np.bool_))
-        bodies = [np.zeros((e, 2, b, *shape)) for shape in ((3,), (4,), (9,), (12,))]
+        bodies = [np.zeros((e, 2 * b, *shape)) for shape in ((3,), (4,), (3, 3), (12,))]
         pairs = [np.zeros((e, *shape, targets, 12)) for shape in ((), (2,), ())]
         return cls(np.zeros((e, b, 7)), *flags, *bodies, *pairs)
 

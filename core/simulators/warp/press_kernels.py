@@ -137,51 +137,31 @@ def move_world(world: int, lane: int, lanes: int, sensor: SensorArrays, worlds: 
 
 def _place_body(world: int, end: int, body: int, begins: bool, dt: float, worlds: Worlds) -> None:
     """Write where a body is when a step begins (0) or ends (1), and how its points move, as seen from there."""
-    at, turned, to, turned_to = np.zeros(3), np.zeros(4), np.zeros(3), np.zeros(4)
-    velocity, rotation, motion = np.zeros(6), np.zeros((3, 3)), np.zeros(12)
-    place_next(worlds.poses[world, body], to, turned_to)
-    for i in range(3):
-        at[i] = to[i] if begins else worlds.position[world, 0, body, i]
-    for i in range(4):
-        turned[i] = turned_to[i] if begins else worlds.quaternion[world, 0, body, i]
-    write_velocity(at, turned, to, turned_to, dt, velocity)
-    write_step_motion(velocity, dt if end == 0 else -dt, motion)
-    for i in range(3):
-        at[i] = at[i] if end == 0 else to[i]
-    for i in range(4):
-        turned[i] = turned[i] if end == 0 else turned_to[i]
-    write_rotation(turned, rotation)
-    if begins or end == 1:  # the other thread of this body may read its place at the beginning
+    to, turned, velocity, row = np.zeros(3), np.zeros(4), np.zeros(6), end * worlds.poses.shape[1] + body
+    place_next(worlds.poses[world, body], to, turned)
+    if not begins:
+        write_velocity(worlds.position[world, body], worlds.quaternion[world, body], to, turned, dt, velocity)
+    if begins or end == 1:  # another thread reads where the step begins
         for i in range(3):
-            worlds.position[world, end, body, i] = at[i]
+            worlds.position[world, row, i] = to[i]
         for i in range(4):
-            worlds.quaternion[world, end, body, i] = turned[i]
-    for i in range(12):
-        worlds.step_motion[world, end, body, i] = motion[i]
-    for i in range(3):
-        for j in range(3):
-            worlds.rotation[world, end, body, 3 * i + j] = rotation[i, j]
+            worlds.quaternion[world, row, i] = turned[i]
+    write_step_motion(velocity, dt if end == 0 else -dt, worlds.step_motion[world, row])
+    write_rotation(worlds.quaternion[world, row], worlds.rotation[world, row])
 
 
 def _relate_target(world: int, end: int, target: int, dt: float, worlds: Worlds) -> None:
     """Write how a target moves relative to the sensor, as seen from the step's beginning (0) or from its end (1)."""
-    at, rotation, step_motion = np.zeros((2, 3)), np.zeros((2, 3, 3)), np.zeros((2, 12))
-    motion, turned = np.zeros(12), np.zeros(12)
-    for side in range(2):
-        body = side * (1 + target)
-        for i in range(3):
-            at[side, i] = worlds.position[world, end, body, i]
-            for j in range(3):
-                rotation[side, i, j] = worlds.rotation[world, end, body, 3 * i + j]
-        for i in range(12):
-            step_motion[side, i] = worlds.step_motion[world, end, body, i]
-    relative_motion(0, 1, step_motion, at, rotation, motion)
+    motion, turned, row = np.zeros(12), np.zeros(12), end * worlds.poses.shape[1]
+    relative_motion(
+        row, row + 1 + target, worlds.step_motion[world], worlds.position[world], worlds.rotation[world], motion
+    )  # fmt: skip
     _write_row(motion, worlds.motion[world, end, target])
     if end == 0:
-        _turn_motion(dt, step_motion[0], rotation[0], motion, turned)
+        _turn_motion(dt, worlds.step_motion[world, 0], worlds.rotation[world, 0], motion, turned)
         _write_row(turned, worlds.end_motion[world, target])
     else:
-        write_pose(at, rotation, 1, turned)
+        write_pose(worlds.position[world], worlds.rotation[world], row, row + 1 + target, turned)
         _write_row(turned, worlds.pose[world, target])
 
 
@@ -230,18 +210,18 @@ def _turn_motion(dt: float, step_motion: np.ndarray, rotation: np.ndarray, motio
                 out[3 + 3 * k + j] += dt * turn * motion[3 + 3 * m + j]
 
 
-def write_pose(position: np.ndarray, rotation: np.ndarray, body: int, pose: np.ndarray) -> None:
-    """Write the sensor's rotation (row by row) and position in the frame of a target's body."""
+def write_pose(position: np.ndarray, rotation: np.ndarray, sensor: int, body: int, pose: np.ndarray) -> None:
+    """Write the rotation (row by row) and position of a sensor's body in the frame of a target's."""
     for i in range(3):
         total = 0.0
         for k in range(3):
-            total += rotation[body, k, i] * (position[0, k] - position[body, k])
+            total += rotation[body, k, i] * (position[sensor, k] - position[body, k])
         pose[9 + i] = total
         for j in range(3):
             pose[3 * i + j] = (
-                rotation[body, 0, i] * rotation[0, 0, j]
-                + rotation[body, 1, i] * rotation[0, 1, j]
-                + rotation[body, 2, i] * rotation[0, 2, j]
+                rotation[body, 0, i] * rotation[sensor, 0, j]
+                + rotation[body, 1, i] * rotation[sensor, 1, j]
+                + rotation[body, 2, i] * rotation[sensor, 2, j]
             )
 
 
@@ -554,7 +534,7 @@ def sum_world(world: int, lane: int, lanes: int, sensor: SensorArrays, worlds: W
         fx, fy, fz = block_sum(fx), block_sum(fy), block_sum(fz)
         mx, my, mz = block_sum(mx), block_sum(my), block_sum(mz)
         if lane == 0:
-            _write_wrench((fx, fy, fz), (mx, my, mz), 1 + target, worlds.position[world, 1], worlds.rotation[world, 1, 0],
+            _write_wrench((fx, fy, fz), (mx, my, mz), 1 + target, worlds.position[world], worlds.rotation[world],
                           out.wrench[world, target])  # fmt: skip
     too_deep = block_sum(too_deep)
     if lane == 0:
@@ -562,18 +542,21 @@ def sum_world(world: int, lane: int, lanes: int, sensor: SensorArrays, worlds: W
 
 
 def _write_wrench(
-    force: Vector, torque: Vector, body: int, position: np.ndarray, rotation: np.ndarray, wrench: np.ndarray
+    force: Vector, torque: Vector, target: int, position: np.ndarray, rotation: np.ndarray, wrench: np.ndarray
 ) -> None:
-    """Write what a body exerts on the sensor, given about its origin in its frame, as the wrench (6,) on the body."""
-    r = rotation
-    fx = -(r[0] * force[0] + r[1] * force[1] + r[2] * force[2])
-    fy = -(r[3] * force[0] + r[4] * force[1] + r[5] * force[2])
-    fz = -(r[6] * force[0] + r[7] * force[1] + r[8] * force[2])
-    x, y, z = position[0, 0] - position[body, 0], position[0, 1] - position[body, 1], position[0, 2] - position[body, 2]
-    mx = y * fz - z * fy - (r[0] * torque[0] + r[1] * torque[1] + r[2] * torque[2])
-    my = z * fx - x * fz - (r[3] * torque[0] + r[4] * torque[1] + r[5] * torque[2])
-    mz = x * fy - y * fx - (r[6] * torque[0] + r[7] * torque[1] + r[8] * torque[2])
-    wrench[0], wrench[1], wrench[2], wrench[3], wrench[4], wrench[5] = fx, fy, fz, mx, my, mz
+    """Write what a target exerts on the sensor, given about its origin in its frame, as the wrench (6,) on the target."""
+    sensor = position.shape[0] // 2  # at the step's end
+    body = sensor + target
+    for i in range(3):
+        wrench[i] = -(rotation[sensor, i, 0] * force[0] + rotation[sensor, i, 1] * force[1] + rotation[sensor, i, 2] * force[2])
+        wrench[3 + i] = -(rotation[sensor, i, 0] * torque[0] + rotation[sensor, i, 1] * torque[1]
+                          + rotation[sensor, i, 2] * torque[2])  # fmt: skip
+    x = position[sensor, 0] - position[body, 0]
+    y = position[sensor, 1] - position[body, 1]
+    z = position[sensor, 2] - position[body, 2]
+    wrench[3] += y * wrench[2] - z * wrench[1]
+    wrench[4] += z * wrench[0] - x * wrench[2]
+    wrench[5] += x * wrench[1] - y * wrench[0]
 
 
 def mark_jumps(world: int, lane: int, lanes: int, worlds: Worlds, jumps: Jumps, out: Results) -> None:
@@ -608,11 +591,12 @@ def end_step(world: int, lane: int, lanes: int, worlds: Worlds) -> None:
     if lane == 0:
         worlds.begins[world] = not worlds.valid[world]
     if worlds.valid[world]:
-        for body in range(lane, worlds.poses.shape[1], lanes):
+        bodies = worlds.poses.shape[1]
+        for body in range(lane, bodies, lanes):
             for i in range(3):
-                worlds.position[world, 0, body, i] = worlds.position[world, 1, body, i]
+                worlds.position[world, body, i] = worlds.position[world, bodies + body, i]
             for i in range(4):
-                worlds.quaternion[world, 0, body, i] = worlds.quaternion[world, 1, body, i]
+                worlds.quaternion[world, body, i] = worlds.quaternion[world, bodies + body, i]
 
 
 def reset_worlds(world: int, mask: BoolArray, worlds: Worlds) -> None:

@@ -11,7 +11,7 @@ import pytest
 from exported_sensors import pad
 
 from palpate.core.errors import PalpateError, ParameterError
-from palpate.plugins.engine_sensors import require_engine
+from palpate.core.simulators.warp.engine import require_engine
 
 
 def test_an_engine_that_is_missing_or_old_is_one_sentence(monkeypatch):

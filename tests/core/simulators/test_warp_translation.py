@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import inspect
 import math
 
@@ -191,13 +192,15 @@ def test_the_source_of_a_kernel_of_numba_is_found():
 
 
 @pytest.mark.parametrize(
-    ("module", "words"),
+    ("version", "words"),
     [
-        (None, r"warp-lang, which is not installed: run 'pip install warp-lang'\.$"),
-        (type("Old", (), {"__version__": "1.2.3"}), r"Warp is version 1\.2\.3, .* run 'pip install --upgrade warp-lang'\.$"),
+        (None, r"^A sensor on Warp needs warp, which is not installed: run 'pip install warp-lang'\.$"),
+        ("1.2.3", r"^warp is version 1\.2\.3, and a sensor on Warp needs .*: run 'pip install --upgrade warp-lang'\.$"),
     ],
 )
-def test_warp_that_is_missing_or_old_is_one_sentence(monkeypatch, module, words):
-    monkeypatch.setitem(__import__("sys").modules, "warp", module)
+def test_warp_that_is_missing_or_old_is_one_sentence(monkeypatch, version, words):
+    if version is None:
+        monkeypatch.setitem(__import__("sys").modules, "warp", None)
+    monkeypatch.setattr(importlib.metadata, "version", lambda _: version)
     with pytest.raises(PalpateError, match=words):
         engine.require_warp()
