@@ -9,6 +9,8 @@ import pkgutil
 from collections.abc import Sequence
 from functools import cache
 
+import numpy as np
+
 from ..errors import FileError, PalpateError
 from ..io.file_list import FileList
 from ..io.file_writing import require_space, writable_folder
@@ -91,6 +93,17 @@ def import_sensors(path: str | os.PathLike) -> tuple[SensorFormat, list[FoundSen
     readable = [item for item in formats().values() if item.read is not None and item.holds is not None]
     for item in readable:
         if item.holds is not None and item.read is not None and item.holds(path):
-            return item, item.read(path)
+            found = item.read(path)
+            for sensor in found:
+                _require_finite(path, sensor)
+            return item, found
     titles = ", ".join(item.title for item in readable)
     raise FileError(f"'{path}' holds no sensor that can be read: give a file of one of these, {titles}.")
+
+
+def _require_finite(path: str | os.PathLike, sensor: FoundSensor) -> None:
+    """Raise FileError for a sensor with a number that is none: a reader of another program may let it pass."""
+    for name, value in vars(sensor).items():
+        if isinstance(value, np.ndarray) and value.dtype.kind == "f" and not np.isfinite(value).all():
+            what = name.replace("_", " ")
+            raise FileError(f"The {what} of sensor '{sensor.name}' in '{path}' is NaN or infinite: correct the file.")

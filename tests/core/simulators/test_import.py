@@ -329,3 +329,10 @@ def test_a_missing_package_is_one_sentence(tmp_path, monkeypatch):
         monkeypatch.setitem(sys.modules, name, None)
         with pytest.raises(FileError, match=f"the package {name} is missing: pip install {name}"):
             read(tmp_path, text)
+
+
+def test_a_place_that_is_no_number_is_one_sentence(tmp_path):
+    """MuJoCo compiles it all the same."""
+    pytest.importorskip("mujoco", reason="MuJoCo reads the MJCF: pip install mujoco")
+    with pytest.raises(FileError, match="The frame position of sensor '.*' in '.*' is NaN or infinite"):
+        read(tmp_path, GRID.format(config=CONFIG).replace('pos="0 0 1"', 'pos="nan 0 1"'))
