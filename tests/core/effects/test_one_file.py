@@ -18,19 +18,17 @@ SOURCES = ("addon", "commands", "core", "examples", "operators", "paper", "panel
 LIBRARY = "core/effects/library/"
 
 COLUMN = "a column of recordings"
-NUMBERS_OF_TEXELS = "a parameter of single texels"
 ALLOWED = {
     # words that are names of effects and of something else
     "commands/fit.py": ({"offset"}, "the constant of a straight line, as the title of a column"),
     "core/effects/engine/declarations.py": ({"temperature"}, "what recordings must hold"),
     "core/gap/dataset/column_names.py": ({"temperature"}, COLUMN),
     "core/gap/dataset/rig.py": ({"temperature"}, COLUMN),
-    "core/gap/kinds/columns.py": ({"offset"}, NUMBERS_OF_TEXELS),
-    "core/gap/kinds/decision_numbers.py": ({"offset"}, NUMBERS_OF_TEXELS),
     "core/gap/logs/column_meaning.py": ({"temperature"}, COLUMN),
     "core/gap/logs/proposal.py": ({"temperature"}, COLUMN),
     "core/gap/selection/candidates.py": ({"temperature"}, "what recordings must hold"),
     "core/gap/selection/plausibility.py": ({"offset"}, "the parameter that the signature of an offset is about"),
+    "core/simulators/urdf_reading.py": ({"offset"}, "an attribute of arrays in a URDF"),
 }
 """Files outside the library that may name effects, which (all, if none is listed), and why. Tests may: they are examples."""
 
