@@ -54,6 +54,7 @@ class UI:
         }
         self.started = time.monotonic()
         self.x = self.y = 0
+        self.places: dict[str, tuple[int, int]] = {}  # where buttons were found last
 
     # --- what it writes down
 
@@ -296,7 +297,11 @@ class UI:
         area = area or self.area("PROPERTIES")
         region = self.region(area, kind)
         seen: dict[str, None] = {}
-        yield from self.move(*self.centre(area, kind))
+        yield from self.move(*self.places.get(name, self.centre(area, kind)))
+        here = self.button_here(area, kind) if name in self.places else ""
+        if name in (here, here.partition("(")[0]):
+            self.say(f"found {here} where it was")
+            return self.x, self.y
         unscrolled = True
         while True:
             for share in (0.6, 0.3, 0.85, 0.9):
@@ -309,6 +314,7 @@ class UI:
                     yield from self.move(self.x, self.y)  # the button under a gliding mouse wakes late: look again
                     if self.button_here(area, kind) == here:
                         self.say(f"found {here} at {self.x}, {self.y}")
+                        self.places[name] = self.x, self.y
                         return self.x, self.y
             before = region.view2d.region_to_view(0, 0)
             yield from self.scroll(*self.centre(area, kind), -60 if unscrolled else 8)
