@@ -85,10 +85,13 @@ def _equal_rows(stimulus: Stimulus) -> tuple[np.ndarray | None, np.ndarray]:
 
 
 def _untouched(stimulus: Stimulus, values: np.ndarray) -> np.ndarray:
-    """Value of each channel of `values` (T, c) where nothing presses, or where it presses least, (c,) float."""
+    """Value of each channel of `values` (T, c) where nothing presses, or where it presses least, (c,) float; NaN without one."""
     load = stimulus.load.sum(axis=1)
     free = values[load <= UNTOUCHED * float(load.max(initial=0.0))]
-    return np.nanmedian(free if len(free) else values[[int(load.argmin())]], axis=0)
+    free = free if len(free) else values[[int(load.argmin())]]
+    median, known = np.full(values.shape[1], np.nan), np.isfinite(free).any(axis=0)
+    median[known] = np.nanmedian(free[:, known], axis=0)
+    return median
 
 
 def _frozen(stimulus: Stimulus, equal: np.ndarray) -> np.ndarray:
