@@ -218,17 +218,17 @@ class Dispatch:
         """Note what became of a batch; return the halves of one that took its worker down."""
         from distributed.scheduler import KilledWorker
 
-        if future.status == "finished":
-            found = future.result()
+        if future.status == "cancelled":  # as all batches are when the scheduler ends
+            raise _scheduler_gone()
+        try:
+            found = future.result()  # waits where a result is lost with its worker, as Dask computes it again
+        except KilledWorker:
+            pass
+        else:
             self.over.done += found.done
             self.over.seconds += found.seconds
             self._note_failed(found.failed, found.failures)
             return []
-        error = future.exception() if future.status == "error" else None
-        if error is None:  # cancelled, as all batches are when the scheduler ends
-            raise _scheduler_gone()
-        if not isinstance(error, KilledWorker):
-            raise error
         if len(batch) > 1:
             return [batch[: len(batch) // 2], batch[len(batch) // 2 :]]
         if not is_last:
