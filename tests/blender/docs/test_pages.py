@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from small_study import write_study
 
 from palpate.commands import COMMANDS, _parser, main
 from palpate.core.export.registry import export
@@ -158,7 +159,16 @@ def bake_folder(tmp_path_factory):
     return folder
 
 
-LONG = pytest.mark.long("a whole diagnosis of the sample rig")
+LONG = pytest.mark.long("a whole diagnosis of the sample rig, or a whole study")
+STUDIED = "presses/runs.parquet"
+
+
+@pytest.fixture(scope="module")
+def finished_study(bake_folder):
+    """A study of three presses with recordings, in the folder `presses` beside the bake."""
+    file = write_study(bake_folder / "study", 3)
+    file.write_text(file.read_text(encoding="utf-8").replace("[vary]", "recordings = true\n[vary]"), encoding="utf-8")
+    assert main(["sweep", str(file), "--out", str(bake_folder / "presses"), "--workers", "1"]) == 0
 
 
 def python_blocks() -> list:
@@ -167,20 +177,22 @@ def python_blocks() -> list:
         for number, block in enumerate(blocks(page.read_text(encoding="utf-8"), "python")):
             # test_tutorial.py runs the block that needs Blender; tests/core/sweep reads a dataset by the libraries of its page
             if "bpy" not in block and page.stem != "dataset":
-                marks = LONG if re.search(r"\b(diagnose|find_gap|plan_experiment)\(", block) else ()
+                marks = LONG if re.search(rf"\b(diagnose|find_gap|plan_experiment)\(|{STUDIED}", block) else ()
                 found.append(pytest.param(block, id=f"{page.stem}-{number}", marks=marks))
     return found
 
 
 @pytest.mark.slow("the first of them makes the bake that all pages share")
 @pytest.mark.parametrize("block", python_blocks())
-def test_python_blocks_run(block, bake_folder, monkeypatch, capsys):
+def test_python_blocks_run(block, bake_folder, request, monkeypatch, capsys):
     import dataclasses
 
     from solver_scenes import cube_on_pad
 
     for package in re.findall(r"^import (genesis|mujoco|torch)\b", block, re.MULTILINE):
         pytest.importorskip(package, reason=f"{package} is not among what the tests install: this block of the page is not run")
+    if STUDIED in block:
+        request.getfixturevalue("finished_study")
     monkeypatch.chdir(bake_folder)
     cube = cube_on_pad()
     at_rest = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])

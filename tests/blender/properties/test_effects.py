@@ -52,7 +52,7 @@ def test_what_is_put_on_is_what_is_sampled(pad, name, form):
     (found,) = effect_stack.stack(pad)
     assert (found.name, found.form) == (name, form)
     assert found.values == pytest.approx(one.values, rel=1e-6)
-    sample_of = sensor_reader.read_sensor(pad, 0, _mesh(pad))
+    sample_of = sensor_reader.read_sensor(pad, 0, _mesh(pad), np.eye(3))
     assert sample_of.effects == (found,)
 
 

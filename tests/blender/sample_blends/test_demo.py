@@ -230,7 +230,7 @@ def test_samples_are_what_their_scripts_build(name, repository, tmp_path):
 @pytest.mark.parametrize("name", build_samples.SAMPLES)
 def test_samples_open_to_a_picture(name, repository):
     """In the camera's view with materials, at a frame past the first, with a sensor active and its tab shown."""
-    bpy.ops.wm.open_mainfile(filepath=str(repository / "sample_blends" / f"{name}.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(repository / "sample_blends" / f"{name}.blend"), load_ui=True)
     scene, active = bpy.context.scene, bpy.context.view_layer.objects.active
     assert active.palpate.role == "SENSOR" and active.select_get()
     assert scene.frame_start < scene.frame_current <= scene.frame_end
