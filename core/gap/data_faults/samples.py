@@ -85,7 +85,7 @@ def _equal_rows(stimulus: Stimulus) -> tuple[np.ndarray | None, np.ndarray]:
 
 
 def _untouched(stimulus: Stimulus, values: np.ndarray) -> np.ndarray:
-    """Value of each channel of `values` (T, c) where nothing presses, or where it presses least, (c,) float; NaN without one."""
+    """Value of each channel of `values` (T, c) where nothing presses, or where it presses least, (c,) float; else NaN."""
     load = stimulus.load.sum(axis=1)
     free = values[load <= UNTOUCHED * float(load.max(initial=0.0))]
     free = free if len(free) else values[[int(load.argmin())]]
