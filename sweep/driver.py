@@ -10,6 +10,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,8 @@ MOST_FAILURES = 100
 """Failed runs whose sentences the driver keeps."""
 LOOK = 0.1
 """Seconds between two looks at the keyboard."""
+LOOK_FOR_WORKERS = 1.0
+"""Seconds between two looks for workers of this machine that are gone."""
 
 SETTINGS = {
     "distributed.logging.distributed": "critical",
@@ -45,6 +48,8 @@ SETTINGS = {
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 64 << 20,
     "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 32 << 20,
     "distributed.nanny.pre-spawn-environ.NUMBA_NUM_THREADS": 1,
+    "distributed.scheduler.allowed-failures": 0,  # of this machine: a batch that ended its worker is halved, not repeated
+    "distributed.deploy.lost-worker-timeout": "5s",  # in which a nanny starts another worker, before it is replaced, too
 }
 
 
@@ -119,8 +124,28 @@ def dask_client(
                 f"The {workers} worker processes did not start ({error}): look whether something ends processes on this "
                 "machine, as a limit of memory does, and give the same command again."
             ) from error
-        with _closing(cluster, timeout=10), _closing(Client(cluster)) as client:
+        kept = workers if make_cluster is None else 0
+        with _closing(cluster, timeout=10), _keeping(cluster, kept), _closing(Client(cluster)) as client:
             yield client
+
+
+@contextmanager
+def _keeping(cluster: Any, workers: int) -> Iterator[None]:
+    """Replace lost workers of a local cluster, if there are to be any.
+
+    A nanny starts no other worker after one that ended before the nanny knew that it had started, as a first run can end it.
+    """
+    from tornado.ioloop import PeriodicCallback
+
+    if not workers:
+        yield
+        return
+    watch = PeriodicCallback(partial(cluster.scale, workers), LOOK_FOR_WORKERS * 1e3)
+    cluster.loop.add_callback(watch.start)
+    try:
+        yield
+    finally:
+        cluster.loop.add_callback(watch.stop)
 
 
 @contextmanager
