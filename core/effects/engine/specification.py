@@ -162,6 +162,9 @@ class Form:
         Parameter of the base model that does the same; the form is no candidate where that is free.
     needs : str
         What recordings must hold for this form, one of :data:`.declarations.NEEDS`, if it differs from the kind's.
+    error : float or None
+        φ of a form that is free to follow any law of its kind: the share of the mean square of the kind's change that it leaves
+        of other laws, measured on laws that the library does not have. None for formulas of textbooks.
     """
 
     name: str
@@ -186,6 +189,7 @@ class Form:
     over_within: dict[str, float] = field(default_factory=dict)
     same_as: str = ""
     needs: str = ""
+    error: float | None = None
 
     @cached_property
     def mechanism(self) -> str:

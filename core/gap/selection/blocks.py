@@ -40,7 +40,8 @@ class Views:
         """Return the same views of recordings about which something else is assumed."""
         by_name = {one.trial.name: one for one in predictors}
         fitted, check = (
-            [replace(view, predictor=by_name[view.predictor.trial.name]) for view in views] for views in (self.fitted, self.check)
+            [replace(view, predictor=by_name[view.predictor.trial.name]) for view in views]
+            for views in (self.fitted, self.check)
         )
         return Views(fitted, check)
 
@@ -117,9 +118,7 @@ class Blocks:
         self._masks += [
             _measured(view) & np.append(touched | ~_touched(view.predictor), [True] * 3)[None] for view in views.check
         ]
-        self._rests = [
-            [rest & mask for rest in _without_load(view)] for view, mask in zip(views.all, self._masks, strict=True)
-        ]
+        self._rests = [[rest & mask for rest in _without_load(view)] for view, mask in zip(views.all, self._masks, strict=True)]
         self.recording = np.repeat(np.arange(len(views.all)), [view.stretch_count for view in views.all])
         self.count = self._summed([mask.astype(float) for mask in self._masks])
         self.rest_count = np.stack([self._summed([rest[way].astype(float) for rest in self._rests]) for way in (0, 1)])

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Find out what the base model of a sensor misses in the recordings of a rig.
 
-The whole road: data faults are put right, noise and range are measured, the base model is refitted, the search looks for the set
-of effects with the best score, and the verdict names them.
+The whole road: data faults are put right, noise and range are measured, the base model is refitted, the search looks for the
+set of effects with the best score, and the verdict names them.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Assumptions about how recordings differ: by a factor and a zero of each, or as one session in their order.
 
-A sensor that was mounted again, or whose amplifier was set to another range, responds alike but for a factor and a zero. One that
-wears or drifts goes on from recording to recording, though the rig names no session.
+A sensor that was mounted again, or whose amplifier was set to another range, responds alike but for a factor and a zero. One
+that wears or drifts goes on from recording to recording, though the rig names no session.
 """
 
 from __future__ import annotations

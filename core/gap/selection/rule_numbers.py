@@ -15,9 +15,10 @@ MEMORIES = 5.0
 """Least length of a block in correlation times of the noise, as long as two blocks remain: then blocks are independent."""
 FORMULA_ERROR = 0.05
 """φ: share of the mean square of a kind's change that its formulas leave of a sensor that follows another formula, where the
-recordings do not measure it. The textbook forms of the library leave 0.01 to 0.2 of each other."""
-FORMULA_ERRORS = (0.005, 0.25)
-"""Bounds of that share where it is measured: two forms may happen to be alike, and one that leaves more is another kind's."""
+recordings show no larger one. The textbook forms of load spreading leave 0.04 to 0.09 of other kernels in the middle, and 0.25
+at most; a form that is free to follow any law states its own (:attr:`.specification.Form.error`)."""
+LARGEST_FORMULA_ERROR = 0.25
+"""Largest φ that recordings may show: two forms of which one leaves more describe two kinds of things."""
 LEAST_NOISE_ERROR = 0.01
 """Least standard error of the noise's mean square, as a share of it: readings with and without load have the same noise to
 about a hundredth."""

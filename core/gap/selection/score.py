@@ -21,11 +21,12 @@ from functools import cached_property
 
 import numpy as np
 
+from ...effects.engine.registry import form_of, kind_of
 from ..fitting.least_squares import BASE, Fit
 from .blocks import Sums
 from .candidates import parameters_at_bounds
 from .noise_level import NoiseLevel
-from .rule_numbers import DRAWS, FEWER_NUMBERS, FORMULA_ERROR, FORMULA_ERRORS, NEAR_ERRORS, STRETCHES
+from .rule_numbers import DRAWS, FEWER_NUMBERS, FORMULA_ERROR, LARGEST_FORMULA_ERROR, NEAR_ERRORS, STRETCHES
 
 OWN_NUMBERS, ONE_SESSION = "own numbers", "one session"
 """How recordings may be assumed to differ: by a factor and a zero each, or as one session in their order."""
@@ -70,8 +71,8 @@ class Hypothesis:
 
     @property
     def components(self) -> tuple[str, ...]:
-        """What changes the prediction: numbers of recordings, and effects."""
-        return (*([OWN_NUMBERS] if self.assumed == OWN_NUMBERS else []), *self.names)
+        """What changes the prediction: numbers of recordings, and forms of effects."""
+        return (*([OWN_NUMBERS] if self.assumed == OWN_NUMBERS else []), *self.forms)
 
     @property
     def key(self) -> tuple[str, ...]:
@@ -97,9 +98,7 @@ class Score:
     weights : (draws, b) float
         Weights of the blocks, of mean one; the first draw has equal ones.
     formula_errors : dict of str to (2,) float
-        φ of the kinds that were tried.
-    least_formula_error : (2,) float
-        That of the kind which alone leaves least; no other has less.
+        φ of the forms that were tried, by their labels.
     """
 
     noise: NoiseLevel
@@ -107,7 +106,6 @@ class Score:
     price: float
     weights: np.ndarray
     formula_errors: dict[str, np.ndarray] = field(default_factory=dict)
-    least_formula_error: np.ndarray = field(default_factory=lambda: np.zeros(2))
     _kept: dict[int, tuple[Hypothesis, np.ndarray]] = field(default_factory=dict)
 
     def parts(self, one: Hypothesis) -> tuple[np.ndarray, np.ndarray]:
@@ -120,32 +118,29 @@ class Score:
             allowed = allowed + self.formula_error(name) * change
         return excess, self.weights @ allowed / count
 
-    def formula_error(self, name: str) -> np.ndarray:
-        """Return φ of a kind for readings and forces, (2,)."""
-        return np.maximum(self.formula_errors.get(name, np.full(2, FORMULA_ERROR)), self.least_formula_error)
+    def formula_error(self, label: str) -> np.ndarray:
+        """Return φ of a form for readings and forces, (2,)."""
+        return self.formula_errors.get(label, np.full(2, _stated_error(label)))
 
     def measure_formula_errors(self, base: Hypothesis, singles: Sequence[Hypothesis]) -> None:
-        """Measure φ of each kind of which two forms or more explain something alone, by leaving the best one out.
+        """Measure φ on these recordings by leaving one form out, for kinds of which two forms or more explain something alone.
 
-        The second best leaves so much more, as a share of the change that the best one makes. Forms of a kind may be alike, so
-        no kind has a smaller φ than the one that alone leaves least.
+        The second best form leaves so much more than the best, as a share of the change that the best one makes. Forms of a
+        kind may be alike, so φ is at least that of textbooks; a form that states its φ keeps it.
         """
         least, found = self.value(base), dict[str, list[Hypothesis]]()
         for one in sorted(singles, key=self.value, reverse=True):
             own = found.setdefault(one.names[0], [])
             if self.value(one) > least and all(one.forms != other.forms for other in own):
                 own.append(one)
-        errors = {name: np.full(2, FORMULA_ERROR) for name in found}
-        for name, own in found.items():
+        errors: dict[str, np.ndarray] = {}
+        for own in found.values():
             if len(own) > 1:
                 (first, allowed), (second, _) = self.parts(own[0]), self.parts(own[1])
-                share = (second[0] - first[0]) / np.maximum(allowed[0] / self.formula_error(name), 1e-12)
-                errors[name] = np.clip(share, *FORMULA_ERRORS)
-        earning = [one for own in found.values() for one in own]
-        if earning:
-            nearest = min(earning, key=lambda one: float(np.log(self.parts(one)[0][0] + self.noise.error).sum()))
-            self.least_formula_error = errors[nearest.names[0]]
-            errors = {name: np.maximum(share, self.least_formula_error) for name, share in errors.items()}
+                share = (second[0] - first[0]) / np.maximum(allowed[0] / self.formula_error(own[0].forms[0]), 1e-12)
+                share = np.clip(share, FORMULA_ERROR, LARGEST_FORMULA_ERROR)
+                kind = kind_of(own[0].names[0])
+                errors |= {f"{kind.name}/{form.name}": share for form in kind.forms if form.error is None}
         self.formula_errors = errors
         self._kept.clear()
 
@@ -202,6 +197,14 @@ class Score:
         excess, allowed = self.parts(one)
         rest = allowed[0] + self.noise.error
         return float(0.5 * STRETCHES * np.log1p(excess[0] / rest)[self.measured].sum()) - self.price
+
+
+def _stated_error(label: str) -> float:
+    """φ of a form where these recordings do not measure it."""
+    if label == OWN_NUMBERS:
+        return FORMULA_ERROR
+    stated = form_of(*label.split("/")).error
+    return FORMULA_ERROR if stated is None else stated
 
 
 def drawn_weights(blocks: int) -> np.ndarray:

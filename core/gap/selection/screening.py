@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Screening: which effects are worth a fit on top of a model, and these fits.
 
-Every form of every kind gets the promise of a score test at the model's residual. The best form of each kind is fitted to a part
-of the data (see :mod:`.view_set`), and the best of these to all of it: linearised promises alone mislead for large effects.
+Every form of every kind gets the promise of a score test at the model's residual. The best form of each kind is fitted to a
+part of the data (see :mod:`.view_set`), and the best of these to all of it: linearised promises alone mislead for large
+effects.
 """
 
 from __future__ import annotations
@@ -161,13 +162,15 @@ class Screening:
         """Return whether the recordings hold what the library asks of an effect, the last one of a fit."""
         return is_plausible(FittedCandidate(candidate, found), replace(self.view_set, whole=self.views.fitted))
 
-    def _promises(
-        self, parent: Hypothesis, tests: _Tests, kinds: set[str] | None
-    ) -> Generator[str, None, list[Promise]]:
+    def _promises(self, parent: Hypothesis, tests: _Tests, kinds: set[str] | None) -> Generator[str, None, list[Promise]]:
         """What every form could explain on top of a model, with starting points; best first."""
         model, promises = parent.fit.model, []
         for one in self.candidates(model):
-            if one.name in parent.names or is_free_already(one, parent.fit.free) or (kinds is not None and one.name not in kinds):
+            if (
+                one.name in parent.names
+                or is_free_already(one, parent.fit.free)
+                or (kinds is not None and one.name not in kinds)
+            ):
                 continue
             yield "screening every effect"
             test = tests.of(one)

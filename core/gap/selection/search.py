@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Search for sets of effects: all alone, pairs on top of the best kinds, triples on top of the best pairs, then exchanges.
 
-Two assumptions about how recordings differ are candidates like any effect: a factor and a zero of each (which costs a name), and
-one session in their order (what the sensor remembers goes on, which costs none).
+Two assumptions about how recordings differ are candidates like any effect: a factor and a zero of each (which costs a name),
+and one session in their order (what the sensor remembers goes on, which costs none).
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 
@@ -30,6 +31,7 @@ Start = Callable[[], tuple[Screening, Hypothesis]]
 """Prepares recordings under an assumption and fits the base model to them."""
 Steps = Generator[str, None, None]
 """Work that yields what is being done."""
+Outcome = TypeVar("Outcome")
 
 
 @dataclass
@@ -196,20 +198,22 @@ class Search:
         self.score.measure_formula_errors(self.base, [one for one in self.tried if len(one.names) == one.price_count == 1])
 
 
-def _in_stage(stage: str, work: Generator[str, None, object]) -> Generator[tuple[str, float], None, object]:
+def _in_stage(stage: str, work: Generator[str, None, Outcome]) -> Generator[tuple[str, float], None, Outcome]:
     """Progress of a stage."""
     while True:
         try:
             what = next(work)
         except StopIteration as stop:
-            return stop.value
+            outcome: Outcome = stop.value
+            return outcome
         yield what, STAGES[stage]
 
 
-def _finished(work: Generator[str, None, object]) -> object:
+def _finished(work: Generator[str, None, Outcome]) -> Outcome:
     """Outcome of a work whose progress is not shown."""
     while True:
         try:
             next(work)
         except StopIteration as stop:
-            return stop.value
+            outcome: Outcome = stop.value
+            return outcome

@@ -139,7 +139,9 @@ def closed_shares(search: Search, best: Hypothesis) -> ClosedShares:
     sse = [search.base.fit.sse.sum(axis=0), best.fit.sse.sum(axis=0)]
     seen = _closed(search.score, sse[0], sse[1], best.fit.count.sum(axis=0))
     unseen, check = (
-        _closed(search.score, search.base.sums.left[own].sum(axis=0), best.sums.left[own].sum(axis=0), blocks.count[own].sum(axis=0))
+        _closed(
+            search.score, search.base.sums.left[own].sum(axis=0), best.sums.left[own].sum(axis=0), blocks.count[own].sum(axis=0)
+        )
         for own in (is_fitted, ~is_fitted)
     )
     return ClosedShares(seen, unseen, check)
@@ -150,7 +152,9 @@ def _closed(score: Score, before: np.ndarray, after: np.ndarray, count: np.ndarr
     level = score.noise.under(score.weights[0])
     gap = before - level * count
     shares = [
-        float(min((before[q] - after[q]) / gap[q], 1.0)) if gap[q] > RIVAL_ERRORS * score.noise.error[q] * count[q] > 0 else None
+        float(min((before[q] - after[q]) / gap[q], 1.0))
+        if gap[q] > RIVAL_ERRORS * score.noise.error[q] * count[q] > 0
+        else None
         for q in (0, 1)
     ]
     return shares[0], shares[1]
@@ -177,4 +181,3 @@ def _rule_out(search: Search, result: Diagnosis) -> None:
         else:
             why = "fitted to a part of the recordings it closes none of the gap, or its signature is not there"
         result.ruled_out.append((kind.name, why))
-
