@@ -549,7 +549,7 @@ def _information_shares(a: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, n
 
 
 def cross_fitted(found: Fit, views: Sequence[TrialView], seen: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Return residuals of every stretch under a fit that has not seen it: of two folds of alternating stretches, that to the other.
+    """Return residuals of every stretch under a fit that has not seen it: of two folds of alternating ones, that to the other.
 
     Parameters about which a fold has too little information keep their values. If the Newton step does not even fit the other
     fold better, it is shortened, at last to nothing.

@@ -73,7 +73,9 @@ def indistinguishable(coverage: Coverage, name: str, curvature: float = np.inf) 
     if not coverage.unloading and name in NONLINEAR and curvature < LOOP_CURVATURE:
         groups.append((name, *LOOPS))
     if not coverage.unloading and coverage.speed_ratio < SINGLE_SPEED_RATIO and coverage.longest_hold == 0.0:
-        groups.append((*NONLINEAR, *KNOWN_FROM_TIMING))  # time and depth are proportional
+        groups.append(
+            (*(NONLINEAR if name not in NONLINEAR else (name,)), *KNOWN_FROM_TIMING)
+        )  # time and depth are proportional
     if not coverage.load_moves:
         groups.append(KNOWN_FROM_PLACES)
     if coverage.unloading and coverage.cycles < LEAST_CYCLES:
