@@ -205,6 +205,6 @@ KIND = Kind(
     ),
     experiment="hold one depth for at least a minute, then release and wait as long",
     known_from=("timing",),
-    families=("late", "moving"),
+    families=("late",),
     variants=(Variant(30, relaxing, in_contact=True), Variant(60, rising, name="rising")),
 )

@@ -156,6 +156,5 @@ KIND = Kind(
         },
     ),
     known_from=("places",),
-    families=("spreading",),
     variants=(Variant(20, couplings, needs_neighbours=True),),
 )

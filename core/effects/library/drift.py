@@ -121,7 +121,5 @@ KIND = Kind(
         values={"linear": {"rate": 4e-4}, "random-walk": {"spread": 0.004}},
     ),
     known_from=("timing", "rest"),
-    families=("moving",),
     variants=(Variant(90, functions_of_time, is_signed=True, texel_columns=("rate",)),),
-    gain_falls_with="clock",
 )

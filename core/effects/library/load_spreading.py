@@ -149,6 +149,5 @@ KIND = Kind(
     experiment="press single texels with a pin narrower than a texel",
     drawing=Drawing("row"),
     known_from=("places",),
-    families=("spreading",),
     variants=(Variant(10, kernels, needs_neighbours=True),),
 )

@@ -125,7 +125,6 @@ KIND = Kind(
         values={"peak": {"depth": 0.001}},
     ),
     known_from=("unloading", "cycles"),
-    families=("losing",),
     variants=(Variant(20, losses, in_contact=True),),
     signature="end",
 )
