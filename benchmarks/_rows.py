@@ -57,7 +57,7 @@ def results_in(path: Path) -> list[dict]:
 
 def sure_names(result: Any) -> set[str]:
     """Return the effects that a diagnosis names for sure, differences between recordings included."""
-    from palpate.core.gap.selection.confidence import SURE
+    from palpate.core.gap.selection.rule_numbers import SURE
 
     between = [result.between] if result.between is not None else []
     return {one.name for one in (*result.findings, *between) if one.confidence >= SURE}

@@ -63,7 +63,6 @@ def examined(write: Write, kind: str, number: int) -> tuple[set[str], Any]:
     """Return what is surely named in a case, and the diagnosis."""
     from palpate.core.gap.dataset.rig import read_rig
     from palpate.core.gap.selection.diagnosis import diagnose
-    from palpate.core.gap.selection.rule_numbers import SURE
     from palpate.core.jobs.job_runner import run_job
 
     with tempfile.TemporaryDirectory() as folder:
