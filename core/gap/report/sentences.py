@@ -51,7 +51,7 @@ def _outcome(result: Diagnosis, errors: GapErrors) -> str:
     own, after = result.between, errors.amended["fit"] or 0.0
     said = f"Recordings differ by a gain and a level of their own; the error shrinks from {own.before:.2%} to {after:.2%} "
     said += f"of the range.{_odd_one(result)} Name their session to learn more."
-    return f"{said} Also: {_effects(result, errors)}" if result.findings else said
+    return f"{said} Also: {_effects(result, errors)}" if result.findings or result.verdict == "unexplained" else said
 
 
 def _odd_one(result: Diagnosis) -> str:

@@ -36,12 +36,15 @@ from .recording_differences import RecordingDifferences, as_one_session, may_dif
 from .score import ONE_SESSION, OWN_NUMBERS, Hypothesis
 from .screening import Screening
 from .search import Search, Start
-from .verdict import closed_shares, judge, leaves_gap, with_best_kinds
+from .verdict import closed_shares, judge, leaves_gap, with_best_forms, with_best_kinds
 from .view_set import ViewSet, view_set_of
 
 TOTAL_WORK = 1000
 BASE_MODEL_BEGINS, SELECTION_BEGINS, VERDICT_BEGINS = 40, 60, 950
 """Share of the whole work, in thousandths, at which the fit of the base model, the search and the verdict begin."""
+
+LAST_STEPS, LAST_TOLERANCE = 40, 1e-6
+"""Of the last fit, of the model that was chosen."""
 
 Outcome = TypeVar("Outcome")
 
@@ -62,7 +65,7 @@ def diagnose(rig: Rig) -> Job[Diagnosis]:
     search = Search(_starts(begun), begun.result.noise[begun.main_quantity].source == MEASURED_REPEATS)
     chosen = yield from _progress_of(search.run(), SELECTION_BEGINS, VERDICT_BEGINS)
     yield Progress("verdict", VERDICT_BEGINS, TOTAL_WORK)
-    return _concluded(begun, search, with_best_kinds(search, chosen))
+    return _concluded(begun, search, with_best_forms(search, with_best_kinds(search, chosen)))
 
 
 def fit_base(rig: Rig) -> Job[Diagnosis]:
@@ -254,15 +257,16 @@ def _structure(view_set: ViewSet, found: Fit) -> ResidualStructure:
 
 
 def _with_base_refitted(result: Diagnosis, view_set: ViewSet, found: Fit) -> Fit:
-    """The fit with all identified parameters of the base model free, because values that a rig states are rounded.
+    """The fit at its end, with all identified parameters of the base model free, because values that a rig states are rounded.
 
     Beside an effect on friction they would take over its part. There they keep their values, and are free only so that the
     intervals are as wide as the recordings say.
     """
     names = identified_base_parameters(result.rig, [view.predictor for view in view_set.whole])
     if set(names) == {item.name for item in found.free if item.effect == BASE}:
-        return found
+        return fit(view_set.whole, found.model, found.free, max_steps=LAST_STEPS, tolerance=LAST_TOLERANCE)
     has_friction_effect = any(effect.name in friction_kinds() for effect in found.model.effects)
     free = free_base_parameters(found.model.parameters, names, result.full[READINGS])
     free += [item for item in found.free if item.effect != BASE]
-    return fit(view_set.whole, found.model, free, max_steps=0 if has_friction_effect else 10, tolerance=1e-5)
+    steps = 0 if has_friction_effect else LAST_STEPS
+    return fit(view_set.whole, found.model, free, max_steps=steps, tolerance=LAST_TOLERANCE)

@@ -37,6 +37,14 @@ def with_best_kinds(search: Search, best: Hypothesis) -> Hypothesis:
     return best
 
 
+def with_best_forms(search: Search, best: Hypothesis) -> Hypothesis:
+    """Return the model with that form of each kind which describes the recordings best; the names stay."""
+    for name in best.names:
+        _, others = search.in_place_of(best, best.names.index(name))
+        best = search.score.best_form(others[name])
+    return best
+
+
 def _contains(other: Hypothesis, best: Hypothesis, index: int) -> bool:
     """True if the last effect of `other` can do whatever one of `best` does: bent to a bound, or a number for each texel."""
     per_texel = other.has_texel_numbers(len(other.names) - 1) and not best.has_texel_numbers(index)

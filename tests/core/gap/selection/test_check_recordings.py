@@ -65,10 +65,12 @@ def test_a_check_that_fails_is_said_with_what_differs():
     json.dumps(summary.summary(result, errors), allow_nan=False)
 
 
+@pytest.mark.slow("two whole diagnoses")
 def test_noise_in_the_fitted_recordings_is_no_gap_only_where_the_check_is_noise_too():
     rig = cases.rig(seed=6, trials=4, seconds=6.0)
     assert diagnosed(rig).verdict == "no gap"
-    assert diagnosed(with_check(rig, level=0.02)).verdict == "unexplained"
+    other = diagnosed(with_check(rig, level=0.02))
+    assert other.verdict != "no gap" and not other.findings
 
 
 def test_a_share_of_all_is_no_bound():
