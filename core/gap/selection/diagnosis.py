@@ -21,7 +21,7 @@ from ..fitting.heteroscedastic_noise import proportional_noise
 from ..fitting.intervals import parameter_intervals
 from ..fitting.least_squares import BASE, Fit, fit, free_base_parameters
 from ..fitting.noise_floor import ChannelNoise, coverage
-from ..fitting.repeat_noise import MEASURED_REPEATS
+from ..fitting.repeat_noise import MEASURED_REPEATS, MOST_SQUARE
 from ..fitting.residual_tests import LEAST_STRUCTURE, ResidualStructure, residual_structure
 from ..fitting.spectral_lines import strongest_line
 from ..forward.predictor import Model, Predictor, predictors_of
@@ -62,7 +62,8 @@ def diagnose(rig: Rig) -> Job[Diagnosis]:
     Diagnosis
     """
     begun = yield from _begin(rig)
-    search = Search(_starts(begun), begun.result.noise[begun.main_quantity].source == MEASURED_REPEATS)
+    is_repeated = begun.result.noise[begun.main_quantity].source == MEASURED_REPEATS
+    search = Search(_starts(begun), MOST_SQUARE - 1.0 if is_repeated else None)
     chosen = yield from _progress_of(search.run(), SELECTION_BEGINS, VERDICT_BEGINS)
     yield Progress("verdict", VERDICT_BEGINS, TOTAL_WORK)
     return _concluded(begun, search, with_best_forms(search, with_best_kinds(search, chosen)))

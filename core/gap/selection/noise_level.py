@@ -52,9 +52,9 @@ def noise_level(many: Sequence[Sums]) -> NoiseLevel:
     return NoiseLevel(rest, count, np.maximum(error, LEAST_NOISE_ERROR * np.maximum(level, 1e-6)))
 
 
-def measured_noise(count: np.ndarray) -> NoiseLevel:
+def measured_noise(count: np.ndarray, error: float = LEAST_NOISE_ERROR) -> NoiseLevel:
     """Return the noise as it was measured before any fit; `count` of values, (b, 2) float."""
-    return NoiseLevel(count, count, np.full(2, LEAST_NOISE_ERROR))
+    return NoiseLevel(count, count, np.full(2, error))
 
 
 def _level(sums: Sums, way: int, quantity: int) -> float:

@@ -42,14 +42,14 @@ class Search:
     ----------
     starts : dict of str to callable
         By what is assumed of how recordings differ, "" first.
-    is_noise_known : bool
-        True if the noise was measured by repeats, so that no model says more of it.
+    repeat_error : float or None
+        Standard error of noise that repeats measured, so that no model says more of it; None without repeats.
     tried : list of Hypothesis
     score : Score
     """
 
     starts: dict[str, Start]
-    is_noise_known: bool = False
+    repeat_error: float | None = None
     tried: list[Hypothesis] = field(default_factory=list)
     _longer: dict[object, list[Hypothesis]] = field(default_factory=dict)
     _made: dict[str, tuple[Screening, Hypothesis]] = field(default_factory=dict)
@@ -191,8 +191,10 @@ class Search:
     def _weigh(self, is_noise_measured: bool = False) -> None:
         """Set the score by the noise as the models tried so far leave it without load, or as it was measured before."""
         count = self.base.sums.count
-        is_measured = is_noise_measured or self.is_noise_known
-        noise = measured_noise(count) if is_measured else noise_level([one.sums for one in self.tried])
+        if self.repeat_error is not None:
+            noise = measured_noise(count, self.repeat_error)
+        else:
+            noise = measured_noise(count) if is_noise_measured else noise_level([one.sums for one in self.tried])
         price = float(np.log(max(len(self.library) + len(self.starts) - 1, 1)))
         self.score = Score(noise, count.sum(axis=0) > 0, price, drawn_weights(len(count)))
         self.score.measure_formula_errors(self.base, [one for one in self.tried if len(one.names) == one.price_count == 1])
