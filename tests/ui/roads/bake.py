@@ -112,6 +112,7 @@ def copy(ui):
     ui.window.view_layer.objects.active = obj("Palm")
     with ui.context(ui.area("VIEW_3D")):
         bpy.ops.object.duplicate()
+    ui.window.view_layer.update()  # as the redraw after a key does
     yield from ui.becomes(lambda: not obj("Palm.001").palpate.is_baked, "the duplicate is not baked")
     ui.check(obj("Palm").palpate.is_baked, "and the original is")
     with ui.context(ui.area("VIEW_3D")):
