@@ -19,7 +19,7 @@ FORMATS = ("hdf5", "zarr")
 
 @dataclass(frozen=True)
 class StudyRun:
-    """What has become of a study.
+    """State of a study.
 
     Attributes
     ----------

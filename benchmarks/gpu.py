@@ -158,7 +158,7 @@ def run() -> Iterator[dict]:
     try:
         from mujoco_warp import __version__ as version
     except ImportError:
-        print("MuJoCo Warp is not installed, so that nothing is measured beside it.", file=sys.stderr)
+        print("MuJoCo Warp is not installed: its steps are not measured.", file=sys.stderr)
     else:
         peers = {
             (shape, tactile): milliseconds(device, mujoco_warp_step(shape, tactile))

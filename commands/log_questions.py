@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..core.gap.logs.answers import Answers, ColumnAnswer, LoggerAnswer, has_unknown, toml_value
+from ..core.io.csv_table import is_number
 
 LEFT_OUT = "-"
 """What is typed for a column that is not to be used."""
@@ -58,7 +59,7 @@ def _asked_column(name: str, column: ColumnAnswer, logger: LoggerAnswer, ask: Ca
             return None
         if not typed and is_open:
             continue
-        if typed and column.constant is not None and _is_number(typed):
+        if typed and column.constant is not None and is_number(typed):
             column = replace(column, constant=float(typed), why="typed at the terminal")
         elif typed:
             source, _, unit = typed.rpartition(" ") if column.unit and " " in typed else (typed, "", column.unit)
@@ -67,11 +68,3 @@ def _asked_column(name: str, column: ColumnAnswer, logger: LoggerAnswer, ask: Ca
                 continue
         column = replace(column, sure=True)
     return column
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

@@ -60,7 +60,7 @@ def dependencies(values: Mapping[str, Sequence[Any] | np.ndarray], metrics: Mapp
     Parameters
     ----------
     values : mapping of str to (n,) sequence
-        What was varied: numbers or texts; None for a run without the parameter.
+        Varied values, numbers or texts; None for a run without the parameter.
     metrics : mapping of str to (n,) float
         NaN for a run in which the metric has no value.
     """

@@ -48,7 +48,7 @@ def require_pyarrow() -> None:
 
 @dataclass(frozen=True)
 class RunResult:
-    """What has become of a run.
+    """Result of a run.
 
     Attributes
     ----------

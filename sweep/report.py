@@ -38,7 +38,7 @@ class StudyColumns:
     Attributes
     ----------
     values : dict of str to (n,) float or object ndarray
-        What was varied, in all runs.
+        Names and values of the varied parameters, in all runs.
     metrics : dict of str to (n,) float
         NaN where a run lacks it, as one that failed.
     messages : list of str

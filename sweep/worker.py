@@ -40,7 +40,7 @@ _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 
 @dataclass
 class BatchResult:
-    """What has become of a batch.
+    """Result of a batch.
 
     Attributes
     ----------

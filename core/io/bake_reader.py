@@ -203,7 +203,7 @@ _PER_TEXEL = {"normal_force": (), "shear": (2,), "friction": (), "depth": (), "s
 
 @dataclass(frozen=True)
 class SensorFiles:
-    """What was read from the folder of one sensor.
+    """Content of the folder of one sensor.
 
     Attributes
     ----------

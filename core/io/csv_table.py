@@ -121,7 +121,7 @@ def _header(lines: Iterator[tuple[int, str]], path: Path) -> list[str]:
 
 
 def _check_names(names: list[str], path: Path) -> None:
-    if all(_is_number(name) for name in names):
+    if all(is_number(name) for name in names):
         raise FileError(f"'{path.name}' begins with numbers, not with column names: write `time` and the others in line 1.")
     seen: set[str] = set()
     for name in names:
@@ -130,7 +130,8 @@ def _check_names(names: list[str], path: Path) -> None:
         seen.add(name)
 
 
-def _is_number(text: str) -> bool:
+def is_number(text: str) -> bool:
+    """Return True if Python reads a text as a number."""
     try:
         float(text)
     except ValueError:
@@ -142,10 +143,10 @@ def _complain(path: Path, line: int, names: Sequence[str], cells: Sequence[str])
     """Raise for the first cell of a line that is no finite number."""
     for name, cell in zip(names, cells, strict=True):
         text = cell.strip()
-        if not text or _is_number(text) and abs(float(text)) <= LARGEST_NUMBER:
+        if not text or is_number(text) and abs(float(text)) <= LARGEST_NUMBER:
             continue
-        what = f"{text[:40]}" if _is_number(text) else f"'{text[:40]}'"
-        which = ", which nothing measured can be" if _is_number(text) and math.isfinite(float(text)) else ""
+        what = f"{text[:40]}" if is_number(text) else f"'{text[:40]}'"
+        which = ", which nothing measured can be" if is_number(text) and math.isfinite(float(text)) else ""
         raise FileError(f"Line {line} of '{path.name}' has {what} for {name}{which}: write a number, or leave the cell empty.")
 
 
