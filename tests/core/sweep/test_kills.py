@@ -49,10 +49,11 @@ def processes_of(process: subprocess.Popen) -> list:
 
 
 def lose(process: subprocess.Popen) -> None:
-    """Kill a process and all that it has started, as if its machine was gone."""
+    """Kill a process and all that it has started, as if its machine was gone, and wait until they have ended."""
     for one in processes_of(process):
         with suppress(psutil.Error):
             one.kill()
+    process.wait()
 
 
 @contextmanager
