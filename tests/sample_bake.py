@@ -3,18 +3,17 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 
+from palpate.core.geometry.layout.grid_layout import GridLayout
+from palpate.core.geometry.layout.texture_maps import UVLayout
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.texels import Texels, texels_from_region
 from palpate.core.io.bake_folder import (
     IMAGE_LIST_NAME,
-    MANIFEST_NAME,
-    OWN_DIGEST,
     RECORDING_NAME,
     Manifest,
     checksum_line,
@@ -26,7 +25,7 @@ from palpate.core.io.file_writing import file_sha256
 from palpate.core.io.recording_npz import save_recording
 from palpate.core.io.sensor_npz import SENSOR_NAME, save_sensor
 from palpate.core.io.tactile_exr import write_exrs
-from palpate.core.model.recording import Recording, SensorRecording
+from palpate.core.model.recording import Recording, SensorFrame, SensorRecording
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
 
 ROWS, COLUMNS, PITCH = 5, 3, 0.004
@@ -86,12 +85,8 @@ def write_sensor(
     recording: Recording | None = None,
     parameters: SensorParameters | None = None,
     sensors: tuple[str, ...] = (),
-    checksums: bool = False,
 ) -> Recording:
-    """Write the folder of one sensor as a bake leaves it, with a made-up recording if none is given; return its recording.
-
-    Without `checksums` the manifest is as those of older versions, and readers depend on the content alone.
-    """
+    """Write the folder of one sensor as a bake leaves it, with a made-up recording if none is given; return its recording."""
     parameters = parameters or SensorParameters()
     recording = recording or recording_of(texels, 7)
     recording = replace(recording, sensors={name: recording.sensors["pad"]}, digest=recording.digest or "d")
@@ -107,6 +102,8 @@ def write_sensor(
         [frame.sensors[name] for frame in frames],
         [{**about, "frame": str(frame.frame), "time": repr(frame.time)} for frame in frames],
     )
+    images = [frame_file(frame.frame) for frame in frames]
+    (own / IMAGE_LIST_NAME).write_bytes(b"".join(checksum_line(image, file_sha256(own / image)) for image in images))
     manifest = Manifest(
         sensor=name,
         palpate="0",
@@ -122,28 +119,22 @@ def write_sensor(
         complete=True,
         body="pad",
         sensors=sensors,
+        files={file: file_sha256(own / file) for file in (IMAGE_LIST_NAME, RECORDING_NAME, SENSOR_NAME)},
     )
-    if checksums:
-        images = [frame_file(frame.frame) for frame in frames]
-        (own / IMAGE_LIST_NAME).write_bytes(b"".join(checksum_line(image, file_sha256(own / image)) for image in images))
-        vouched = {file: file_sha256(own / file) for file in (IMAGE_LIST_NAME, RECORDING_NAME, SENSOR_NAME)}
-        manifest = replace(manifest, files=vouched)
     write_manifest(own, manifest)
-    if not checksums:
-        _remove_own_digest(own)
     return recording
 
 
-def write_bake(folder: Path, checksums: bool = False) -> None:
+def write_bake(folder: Path) -> None:
     """Write a bake of two sensors, ``pad`` with rows and columns and ``cap`` without."""
-    names = ("cap", "pad") if checksums else ()
-    write_sensor(folder, "cap", round_texels(), sensors=names, checksums=checksums)
-    write_sensor(folder, "pad", grid_texels(), Painted(k=np.ones(ROWS * COLUMNS)), sensors=names, checksums=checksums)
+    names = ("cap", "pad")
+    write_sensor(folder, "cap", round_texels(), sensors=names)
+    write_sensor(folder, "pad", grid_texels(), Painted(k=np.ones(ROWS * COLUMNS)), sensors=names)
 
 
-def _remove_own_digest(folder: Path) -> None:
-    """Make a manifest one of an older version, which did not vouch for itself."""
-    path = folder / MANIFEST_NAME
-    content = json.loads(path.read_text(encoding="utf-8"))
-    del content[OWN_DIGEST]
-    path.write_text(json.dumps(content), encoding="utf-8")
+def pictures_of(layout: GridLayout | UVLayout, frame: SensorFrame) -> dict[str, np.ndarray]:
+    """Return the pictures that an image of a frame has to hold, by channel, each (height, width) with row 0 at the bottom."""
+    values = {name: getattr(frame, name) for name in ("reading", "depth", "slip", "contact")}
+    values |= {"R": frame.normal_force, "G": frame.shear[:, 0], "B": frame.shear[:, 1]}
+    pictures = {name: layout.image(own.astype(float)).astype(np.float32) for name, own in values.items()}
+    return {**pictures, "contact": (pictures["contact"] >= 0.5).astype(np.float32)}

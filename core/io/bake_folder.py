@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 import os
 import re
 import zlib
@@ -37,7 +36,7 @@ from .sensor_npz import SENSOR_NAME
 MANIFEST_FORMAT = "palpate-bake/1"
 MANIFEST_NAME = "manifest.json"
 OWN_DIGEST = "manifest_sha256"
-"""Key of the SHA-256 of all that the manifest says otherwise; older manifests have none."""
+"""Key of the SHA-256 of all that the manifest says otherwise."""
 RECORDING_NAME = "recording.npz"
 IMAGE_LIST_NAME = "images.sha256"
 UNCHANGED_NOTE = "palpate-unchanged-since-bake:"
@@ -132,8 +131,7 @@ class Manifest:
         Names of all sensors of the bake; empty when the manifest is older.
     files : dict of str to str
         SHA-256 of each file in the folder except the manifest itself and the images, by name. Those of the images are in
-        ``images.sha256``, which is one of these files; manifests of some older versions have them here, and in still older ones
-        the dict is empty.
+        ``images.sha256``, which is one of these files.
     effects : list of dict, or None
         Of the sensor, each as :func:`.registry.to_dict` writes it; None when the manifest is older.
     channels : dict
@@ -166,31 +164,22 @@ class Manifest:
 
     @property
     def has_images(self) -> bool:
-        """Whether the bake has tactile images; older manifests without checksums always have."""
-        return not self.files or any(name == IMAGE_LIST_NAME or name.endswith(".exr") for name in self.files)
+        """Whether the bake has tactile images."""
+        return IMAGE_LIST_NAME in self.files
 
-    def image_checksums(self, folder: Path) -> Iterator[tuple[str, str]]:
-        """Yield the name and the SHA-256 of each tactile image that the manifest vouches for, in the order of the frames.
-
-        Raises
-        ------
-        FileError
-            The list of images is missing or damaged.
-        """
-        if IMAGE_LIST_NAME in self.files:
-            self.check_file(folder, IMAGE_LIST_NAME)
-            yield from read_checksums(folder / IMAGE_LIST_NAME)
-
-    def check_file(self, folder: Path, name: str) -> None:
-        """Check a file in the bake's folder against its SHA-256; without one, as in older manifests, nothing is checked.
+    def check_files(self, folder: Path, images: bool) -> None:
+        """Check the files in the bake's folder against their SHA-256; the images, each of which is read for that, if asked.
 
         Raises
         ------
         FileError
-            The file is missing or damaged.
+            A file is missing or damaged.
         """
-        if name in self.files:
-            check_sha256(folder / name, self.files[name])
+        for name, sha256 in self.files.items():
+            check_sha256(folder / name, sha256)
+        if images and self.has_images:
+            for name, sha256 in read_checksums(folder / IMAGE_LIST_NAME):
+                check_sha256(folder / name, sha256)
 
 
 def check_sha256(path: Path, sha256: str) -> None:
@@ -313,21 +302,10 @@ def read_manifest(folder: str | os.PathLike) -> Manifest:
         manifest, content = read_json(path, Manifest, MANIFEST_FORMAT, "bake again")
     except FileNotFoundError:
         raise FileError(f"'{path}' does not exist: bake first, or choose a sensor's folder inside the bake folder.") from None
-    own = _own_digest(content)
-    fault = ""
-    if content.get(OWN_DIGEST, own) != own:
-        fault = "its content is not what was baked"
-    elif "effects" in content and manifest.effects is None:
-        fault = "effects is None"
-    elif "\0" in manifest.sensor + manifest.body:
-        fault = "a name has a NUL"
-    elif not (math.isfinite(manifest.fps) and math.isfinite(manifest.dt)):
-        fault = "fps and dt must be finite"
-    for name in manifest.files:
-        if not BAKE_FILE_NAMES.fullmatch(name):
-            fault = f"files has {name!r:.60}"
-    if fault:
-        raise FileError(f"'{path}' is damaged ({fault}): bake again.")
+    if OWN_DIGEST not in content or not manifest.files.keys() >= {RECORDING_NAME, SENSOR_NAME}:
+        raise FileError(f"'{path}' is of an older version, which did not vouch for the files of a bake: bake again.")
+    if content[OWN_DIGEST] != _own_digest(content) or not manifest.files.keys() <= set(_SINGLE_FILES):
+        raise FileError(f"'{path}' is damaged (its content is not what was baked): bake again.")
     return manifest
 
 
@@ -384,8 +362,6 @@ def other_owner(manifest: Manifest, bake_folder: Path, owner: BakeOwner) -> str:
         return "another scene of the same .blend"
     if manifest.scene_path and not manifest.scene_path.startswith(("//", "\\\\")) and "\0" not in manifest.scene_path:
         blend = Path(os.path.normpath(Path(os.path.realpath(bake_folder), manifest.scene_path)))
-    elif manifest.scene_file and owner.blend is not None:  # older manifests, whose .blend lies beside the present one
-        blend = (owner.source or owner.blend).with_name(os.path.basename(manifest.scene_file))
     else:
         return ""
     if not os.path.isfile(blend):

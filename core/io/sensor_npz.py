@@ -67,7 +67,7 @@ def sensor_in(members: Any) -> tuple[Texels, Painted]:
     layout: Any = cls(**{name: _plain(members[key]) for name, key in stored.items() if key in members.files})
     texels = Texels(**{name: members[name] for name in _ARRAYS}, layout=layout)
     found = {item.name: f"painted/{item.name}" for item in fields(Painted)}
-    return texels, Painted(**{name: members[key] for name, key in found.items() if key in members.files})
+    return texels, Painted(**{name: np.asarray(members[key], float) for name, key in found.items() if key in members.files})
 
 
 def _plain(value: np.ndarray) -> Any:

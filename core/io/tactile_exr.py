@@ -41,18 +41,6 @@ UNITS = {"R": "N", "G": "N", "B": "N", "depth": "m", "slip": "m/s", "contact": "
 _PREFIX = "palpate."  # OpenEXR has header attributes of its own, some with a type ("name", "owner", "type")
 
 
-def exr_channels(layout: GridLayout | UVLayout, frame: SensorFrame) -> dict[str, np.ndarray]:
-    """Return the pictures of a frame by channel name, each (height, width) float32 with row 0 at the bottom.
-
-    Raises
-    ------
-    ValueError
-        A value is not finite or too large for 32 bits (a fault of the program, not of the user).
-    """
-    pictures = _pictures(layout, [frame], CHANNELS)[0]
-    return {name: np.ascontiguousarray(picture[::-1]) for name, picture in zip(CHANNELS, pictures)}
-
-
 def _pictures(
     layout: GridLayout | UVLayout, frames: Sequence[SensorFrame], names: Sequence[str], nearest: np.ndarray | None = None
 ) -> np.ndarray:
@@ -128,7 +116,7 @@ def write_exrs(
     FileError
         A file cannot be written.
     ValueError
-        See :func:`exr_channels`; nothing is written then.
+        A value is not finite or too large for 32 bits (a fault of the program, not of the user). Nothing is written then.
     """
     names = CHANNELS if nearest is None else (*CHANNELS, *layer_names(_channels_of(frames[0])))
     pictures = _pictures(layout, frames, names, nearest)

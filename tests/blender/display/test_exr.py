@@ -9,11 +9,12 @@ import sys
 import bpy
 import numpy as np
 import pytest
+from sample_bake import pictures_of
 
 from palpate.core.geometry.layout.grid_layout import GridLayout
 from palpate.core.geometry.layout.texture_maps import uv_layout
 from palpate.core.io.bake_folder import frame_file
-from palpate.core.io.tactile_exr import CHANNELS, exr_channels, read_exr, write_exrs
+from palpate.core.io.tactile_exr import CHANNELS, read_exr, write_exrs
 from palpate.core.model.recording import SensorFrame
 
 ROWS, COLUMNS = 5, 7
@@ -59,7 +60,7 @@ def as_blender_sees(image):
 def assert_both_read_alike(path, layout, frame):
     """Write a frame, and compare what Blender and our own reader make of it."""
     write_exrs([path], layout, [frame], [{"unit": "kPa"}])
-    expected = exr_channels(layout, frame)
+    expected = pictures_of(layout, frame)
     image = bpy.data.images.load(str(path))
     pixels = as_blender_sees(image)
     assert image.type == "IMAGE" and image.is_float
@@ -153,6 +154,6 @@ def test_sequence_of_frames_plays(tmp_path, scene):
         scene.render.filepath = str(tmp_path / "render.exr")
         bpy.ops.render.render(write_still=True)
         channels, _ = read_exr(tmp_path / "render.exr")
-        expected = exr_channels(grid(), frame)
+        expected = pictures_of(grid(), frame)
         for name in "RGB":  # negative shear too
             np.testing.assert_allclose(channels[name], expected[name], atol=1e-5)

@@ -6,7 +6,6 @@ import hashlib
 import json
 import os
 import re
-import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -46,7 +45,7 @@ def bake(tmp_path):
 @pytest.mark.parametrize("name", ["recording.npz", "sensor.npz", "tactile_0001.exr"])
 @pytest.mark.parametrize("damage", ["changed", "missing"])
 def test_a_damaged_file_is_named(tmp_path, name, damage):
-    write_bake(tmp_path, checksums=True)
+    write_bake(tmp_path)
     read_bake(tmp_path)
     path = tmp_path / "pad" / name
     path.write_bytes(path.read_bytes() + b"?")
@@ -54,12 +53,6 @@ def test_a_damaged_file_is_named(tmp_path, name, damage):
         path.unlink()
     with pytest.raises(FileError, match=f"pad/{name}' is {'damaged' if damage == 'changed' else 'missing'}"):
         read_bake(tmp_path)
-
-
-def test_a_sensor_may_be_called_old_and_a_copy_that_is_called_so_is_no_sensor(bake, tmp_path):
-    put(tmp_path / "bake", "pad.old", grid_texels())
-    shutil.copytree(tmp_path / "bake" / "pad", tmp_path / "bake" / "pad.partial")
-    assert sorted(read_bake(tmp_path / "bake").texels) == ["pad", "pad.old", "tip/1"]
 
 
 @pytest.mark.parametrize("texels", [grid_texels(), round_texels()], ids=["grid", "uv"])

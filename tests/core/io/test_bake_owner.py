@@ -117,18 +117,6 @@ def test_scenes_that_were_never_saved(project):
     assert other_owner(left, folder, BakeOwner("", None)) == ""
 
 
-def test_manifests_of_earlier_versions(project):
-    folder, blend = project
-    left = manifest(folder, BakeOwner("", blend))
-    left = Manifest(**{**vars(left), "scene_path": ""})
-    second = BakeOwner("b", blend.with_name("second.blend"))
-    assert other_owner(left, folder, BakeOwner("a", blend)) == ""
-    assert other_owner(left, folder, second) == f"'{blend}'"
-    blend.unlink()
-    assert other_owner(left, folder, second) == ""
-    assert other_owner(Manifest(**{**vars(left), "scene_file": ""}), folder, second) == ""
-
-
 @pytest.mark.parametrize("path", ["\0", "//server/share/x.blend", "\\\\server\\share\\x.blend", "x" * 10_000, "../" * 500])
 def test_a_path_from_a_hostile_manifest(project, path):
     folder, blend = project

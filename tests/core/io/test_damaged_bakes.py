@@ -5,19 +5,19 @@ import os
 import shutil
 import zipfile
 
-import numpy as np
 import pytest
 from sample_bake import write_bake
 
 from palpate.commands import main
 from palpate.core.errors import FileError
-from palpate.core.export.registry import exporters
 from palpate.core.io.bake_reader import read_bake
+from palpate.core.io.recording_npz import load_recording
+from palpate.core.io.sensor_npz import load_sensor
 
 
-@pytest.fixture(params=[False, True], ids=["older", "with checksums"])
-def bake(request, tmp_path):
-    write_bake(tmp_path / "bake", request.param)
+@pytest.fixture
+def bake(tmp_path):
+    write_bake(tmp_path / "bake")
     assert sorted(read_bake(tmp_path / "bake").texels) == ["cap", "pad"]
     return tmp_path / "bake"
 
@@ -50,10 +50,9 @@ def test_a_file_that_is_none_is_refused(bake, file, kind):
         read_bake(bake)
 
 
-@pytest.mark.parametrize("source", ["pad/tactile_0003.exr", "cap/tactile_0002.exr"])
-def test_an_image_of_another_frame_or_sensor_is_refused(bake, source):
-    shutil.copy(bake / source, bake / "pad/tactile_0002.exr")
-    with pytest.raises(FileError, match=r"tactile_0002\.exr"):
+def test_a_sensor_is_read_once(bake):
+    shutil.copytree(bake / "pad", bake / "pad copy")
+    with pytest.raises(FileError, match="both hold the sensor 'pad'"):
         read_bake(bake)
 
 
@@ -71,24 +70,21 @@ def npy(header: str) -> bytes:
     ],
     ids=["no array", "code in a header", "a petabyte", "a pickle"],
 )
-@pytest.mark.parametrize("file", ["pad/recording.npz", "pad/sensor.npz"])
-def test_a_hostile_archive_is_refused(bake, file, content):
-    with zipfile.ZipFile(bake / file) as archive:
+@pytest.mark.parametrize(("file", "load"), [("recording.npz", load_recording), ("sensor.npz", load_sensor)])
+def test_a_hostile_archive_is_refused(bake, file, load, content):
+    """Also one that its manifest vouches for."""
+    with zipfile.ZipFile(bake / "pad" / file) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
-    with zipfile.ZipFile(bake / file, "w") as archive:
+    with zipfile.ZipFile(bake / "pad" / file, "w") as archive:
         for name, data in {**members, next(reversed(members)): content}.items():
             archive.writestr(name, data)
     with pytest.raises(FileError, match="pad"):
-        read_bake(bake)
+        load(bake / "pad" / file)
 
 
-@pytest.mark.parametrize("kind", list(exporters()))
-def test_an_export_of_a_damaged_bake_writes_nothing(bake, tmp_path, kind, capsys):
-    with np.load(bake / "pad/recording.npz") as members:
-        arrays = {name: members[name] for name in members.files}
-    arrays["times"] = arrays["times"][::-1]
-    np.savez(bake / "pad/recording.npz", **arrays)
-    assert main(["export", str(bake), "--format", kind, "--out", str(tmp_path / "out")]) == 1
+def test_an_export_of_a_damaged_bake_writes_nothing(bake, tmp_path, capsys):
+    replaced_by("other bytes", bake / "pad/recording.npz")
+    assert main(["export", str(bake), "--format", "csv", "--out", str(tmp_path / "out")]) == 1
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert line.startswith("palpate export: ") and "recording.npz" in line
     assert not (tmp_path / "out").exists()

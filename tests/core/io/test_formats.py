@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 import pytest
+from sample_bake import pictures_of
 
 from palpate.core.errors import FileError, PalpateError
 from palpate.core.geometry.layout.grid_layout import GridLayout
@@ -38,7 +39,7 @@ from palpate.core.io.bake_folder import (
 )
 from palpate.core.io.file_writing import atomic_write, writable_file, writable_folder
 from palpate.core.io.recording_npz import load_recording, save_recording
-from palpate.core.io.tactile_exr import CHANNELS, describe, exr_channels, read_exr, write_exrs
+from palpate.core.io.tactile_exr import CHANNELS, describe, read_exr, write_exrs
 from palpate.core.model.effect import Effect
 from palpate.core.model.recording import Frame, Recording, SensorFrame, SensorRecording
 from palpate.core.model.sensor import Sensor
@@ -284,8 +285,9 @@ def manifest(**changes):
             parameters={"k": 58.5, "unit": "N", "list": [1, 2.5]},
             warnings=("Texel 3 of 'Pad' bottomed out at frame 7: raise k.",),
             step_reason="Steps of 1 ms.",
-            complete=False,
+            complete=True,
             scene_file="Hände.blend",
+            files={"recording.npz": "ab" * 32, "sensor.npz": "cd" * 32},
             effects=[{"name": "creep", "amount": 0.2}],
         ),
         **changes,
@@ -303,15 +305,13 @@ def test_manifest_round_trip(tmp_path):
     assert path.read_bytes() == before
 
 
-def test_a_manifest_from_before_scene_files_were_named(tmp_path):
+def test_a_manifest_of_an_older_version_is_one_sentence(tmp_path):
     path = write_manifest(tmp_path, manifest())
     content = json.loads(path.read_bytes())
-    del content["scene_file"], content["effects"], content[OWN_DIGEST]
-    path.write_text(json.dumps({**content, "done": [[1, 40]]}), encoding="utf-8")
-    older = manifest(scene_file="", effects=None)
-    assert read_manifest(tmp_path) == older
-    write_manifest(tmp_path, older)
-    assert read_manifest(tmp_path) == older and "effects" not in json.loads(path.read_bytes())
+    for missing in (OWN_DIGEST, "files"):
+        path.write_text(json.dumps({key: value for key, value in content.items() if key != missing}), encoding="utf-8")
+        with pytest.raises(FileError, match="is of an older version, which did not vouch for the files of a bake: bake again"):
+            read_manifest(tmp_path)
 
 
 @pytest.mark.parametrize("change", [{"fps": 25.0}, {"unit": "N"}, {"parameters": {"k": 58.6}}, {"warnings": []}, {"new": 1}])
@@ -336,21 +336,9 @@ def test_damaged_manifest(tmp_path):
     path = write_manifest(tmp_path, manifest())
     whole = path.read_bytes()
     good = json.loads(whole)
-    del good[OWN_DIGEST]
     broken = [b"", b"{", b"[]", b"null", b"\xff\xfe", whole[: len(whole) // 2], b"[" * 100_000]
     for key in good:
-        if key not in (
-            "scene_file",
-            "body",
-            "step_reason",
-            "bake_id",
-            "scene_id",
-            "scene_path",
-            "sensors",
-            "files",
-            "effects",
-        ):  # which older ones lack
-            broken.append(json.dumps({k: v for k, v in good.items() if k != key}).encode())
+        broken.append(json.dumps({k: v for k, v in good.items() if k != key}).encode())
         for wrong in (None, {"a": []}, [[1]], "text", True):
             if not isinstance(wrong, type(good[key])):
                 broken.append(json.dumps({**good, key: wrong}).encode())
@@ -583,7 +571,7 @@ def test_exr_round_trip(tmp_path):
         assert tuple(channels) == CHANNELS
         for name, picture in channels.items():
             assert picture.dtype == np.float32 and picture.shape == (rows, columns) and picture.flags.c_contiguous
-            np.testing.assert_array_equal(picture, exr_channels(layout, frame)[name])
+            np.testing.assert_array_equal(picture, pictures_of(layout, frame)[name])
         texel = layout.row, layout.column
         np.testing.assert_array_equal(channels["R"][texel], frame.normal_force.astype(np.float32))
         np.testing.assert_array_equal(channels["G"][texel], frame.shear[:, 0].astype(np.float32))
@@ -724,7 +712,7 @@ def exr_round_trip(path):
     write_exr(path, grid_of(14, 6), tactile_frame(84), METADATA)
     channels, metadata = read_exr(path)
     assert metadata == METADATA
-    for name, picture in exr_channels(grid_of(14, 6), tactile_frame(84)).items():
+    for name, picture in pictures_of(grid_of(14, 6), tactile_frame(84)).items():
         np.testing.assert_array_equal(channels[name], picture)
     return path.read_bytes()
 

@@ -25,8 +25,8 @@ def blend(tmp_path):
     path, folder = tmp_path / "hand.blend", tmp_path / "palpate-bake"
     path.write_bytes(b"BLENDER")
     os.utime(path, (1e9, 1e9))
-    write_sensor(folder, "cap", round_texels(), checksums=True, sensors=("cap", "pad"))
-    write_sensor(folder, "pad", grid_texels(), Painted(k=PAINT), parameters=PARAMETERS, checksums=True, sensors=("cap", "pad"))
+    write_sensor(folder, "cap", round_texels(), sensors=("cap", "pad"))
+    write_sensor(folder, "pad", grid_texels(), Painted(k=PAINT), parameters=PARAMETERS, sensors=("cap", "pad"))
     change(folder, "cap", effects=[])
     change(folder, "pad", effects=EFFECTS)
     return path
