@@ -4,7 +4,7 @@
 `specification` says what an effect is, `registry` finds and checks effects, and `sensor_effects` applies both to a sensor and a
 scenario. `contact_forces` computes forces along a known motion and `readout_chain` computes readings from forces;
 `compiled_program` does in kernels what the solver needs in each step. The library also uses `coupling_matrix`,
-`random_streams` and `signal_operators`. `declarations` has the words in which a kind states what other packages need to know.
+and `random_streams`. `declarations` has the words in which a kind states what other packages need to know.
 """
 
 __all__ = [
@@ -16,6 +16,5 @@ __all__ = [
     "readout_chain",
     "registry",
     "sensor_effects",
-    "signal_operators",
     "specification",
 ]

@@ -7,9 +7,7 @@ The gap analysis, the plans of experiments, the reports and the documentation kn
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 
@@ -66,104 +64,6 @@ DRAWINGS = {
     "ball": "forces of a ball along a column of texels",
 }
 """Experiments in which effects are drawn."""
-
-
-class Run(Protocol):
-    """What one untouched sensor did, as columns see it. Forces are without units: 1 is the base model's largest force."""
-
-    @property
-    def time(self) -> np.ndarray:
-        """Times of the samples, (T,) s."""
-
-    @property
-    def load(self) -> np.ndarray:
-        """The base model's normal force of each texel, (T, n)."""
-
-    @property
-    def elastic(self) -> np.ndarray:
-        """The same without damping, (T, n); positive exactly where there is contact."""
-
-    @property
-    def work(self) -> np.ndarray:
-        """Work done on each texel so far, pressing and sliding, (T, n); 1 is the largest of all runs."""
-
-
-class Recordings(Protocol):
-    """All fitted recordings of a rig, as columns see them."""
-
-    @property
-    def place(self) -> np.ndarray:
-        """Places of the texels in their plane, in pitches, (n, 2)."""
-
-    @property
-    def rows(self) -> np.ndarray | None:
-        """Row and column of each texel, (n, 2); None if they are not in a grid."""
-
-    @property
-    def duration(self) -> float:
-        """Of the longest run, s."""
-
-    @property
-    def full_path(self) -> float:
-        """Load that was put on the texel that was pressed most, over all of its presses; full load is 1."""
-
-
-Columns = Callable[[np.ndarray, Run, Recordings], list[np.ndarray]]
-"""From the signal (T, n) before an effect, the columns (T, n) that it can add to it."""
-
-
-def no_columns(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
-    """For variants that are parameters of single texels alone."""
-    return []
-
-
-@dataclass(frozen=True)
-class Variant:
-    """What an effect can add to a signal whatever its formula: all sums of some columns, each with a coefficient.
-
-    Formulas of the same effect from other papers lie near this cone. An effect whose formulas have two directions, as
-    hysteresis that leads or trails, has a variant for each. The columns are functions of numpy arrays; those with memory are
-    made from :mod:`.signal_operators`, which they import when they are called.
-
-    Attributes
-    ----------
-    rank : float
-        Place on the way from the contact to the reading, among the variants in contact or among the others: lower acts first.
-    columns : callable
-    is_signed : bool
-        Whether the coefficients may be negative.
-    name : str
-        Which direction; empty if there is one only.
-    in_contact : bool
-        Whether it acts on forces, so that the net force shows it as well.
-    after_clip : bool
-        Whether it acts after damping was added and the force was clipped at zero, so that a texel can pull.
-    texel_columns : tuple of str
-        Of which parameters of single texels it consists besides: "gain", "offset", "rate", "fading".
-    needs_neighbours : bool
-        Whether it passes something from texel to texel.
-    displaces : bool
-        Whether it moves the texels, so that it changes what the base model is told and adds nothing to a signal. Its
-        coefficients are the parameters of the form "rigid".
-    kind : str
-        Name of the effect, which the :class:`.specification.Kind` writes.
-    """
-
-    rank: float
-    columns: Columns = no_columns
-    is_signed: bool = False
-    name: str = ""
-    in_contact: bool = False
-    after_clip: bool = False
-    texel_columns: tuple[str, ...] = ()
-    needs_neighbours: bool = False
-    displaces: bool = False
-    kind: str = ""
-
-    @property
-    def label(self) -> str:
-        """Kind and direction."""
-        return f"{self.kind}/{self.name}" if self.name else self.kind
 
 
 def _twenty_seconds() -> np.ndarray:

@@ -23,7 +23,7 @@ Nothing outside the library names an effect. What others need to know of it is s
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -33,7 +33,7 @@ from ...errors import EffectError
 from ...model.effect import Value, Values
 from ...model.parameter import Parameter
 from .coupling_matrix import CouplingMatrix
-from .declarations import DRAWINGS, FAMILIES, FEATURES, FIT, FOUND_BY, GAIN_FALLS_WITH, NEEDS, SIGNATURES, Drawing, Variant
+from .declarations import DRAWINGS, FAMILIES, FEATURES, FIT, FOUND_BY, GAIN_FALLS_WITH, NEEDS, SIGNATURES, Drawing
 
 SITES_OF_ACTION = ("contact", "pad", "readout")
 """Where an effect acts, in the order in which a load passes: `contact` changes the contact law itself and has no memory, `pad`
@@ -224,8 +224,8 @@ class Kind:
         Features of recordings without which they do not identify it, of :data:`.declarations.FEATURES`.
     families : tuple of str
         Which effects resemble it, of :data:`.declarations.FAMILIES`.
-    variants : tuple of Variant
-        What it can add to a signal whatever its formula. Without one, the plans of experiments leave it out.
+    is_gain_of_texels : bool
+        Whether it gives each texel a gain of its own.
     found_by : str
         How it is found in recordings, one of :data:`.declarations.FOUND_BY`.
     signature : str
@@ -249,7 +249,7 @@ class Kind:
     drawing: Drawing = field(default_factory=Drawing)
     known_from: tuple[str, ...] = ()
     families: tuple[str, ...] = ()
-    variants: tuple[Variant, ...] = ()
+    is_gain_of_texels: bool = False
     found_by: str = FIT
     signature: str = ""
     needs: str = ""
@@ -270,7 +270,6 @@ class Kind:
             for word in words:
                 if word and word not in known:
                     raise EffectError(f"{attribute} of effect '{self.name}' is '{word}': choose from {', '.join(known)}.")
-        object.__setattr__(self, "variants", tuple(replace(one, kind=self.name) for one in self.variants))
 
     @cached_property
     def forms_by_name(self) -> dict[str, Form]:
@@ -284,11 +283,6 @@ class Kind:
     def needs_of(self, form: Form) -> str:
         """Return what recordings must hold for a form of this kind."""
         return form.needs or self.needs
-
-    @property
-    def is_gain_of_texels(self) -> bool:
-        """Whether it gives each texel a gain of its own."""
-        return any("gain" in variant.texel_columns for variant in self.variants)
 
 
 def scalar(values: Values, name: str) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing, Recordings, Run, Variant
+from ..engine.declarations import Drawing
 from ..engine.specification import Form, Kind, TexelInput, constants_from, scalar
 
 
@@ -94,25 +94,6 @@ def _relaxing(values: Values, dt: np.ndarray) -> np.ndarray:
 _PULL = Parameter("pull", "N", 0.02, 0.0, 100.0, "Largest pull F of one texel.")
 _ZONE = Parameter("depth", "m", 2e-4, 1e-6, 0.02, "Depth D of the largest pull, before contact ends.", log=True)
 _WAY = Parameter("depth", "m", 2e-4, 1e-6, 0.02, "Retraction D after which the pull has reached 63 %.", log=True)
-
-
-def unloading_pull(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
-    """Adhesion that pulls on the way out, at all loads or near the release."""
-    from ..engine import signal_operators as operators
-
-    touching, load = run.elastic > 0.0, np.maximum(run.elastic, 0.0)
-    held = operators.falling(run.elastic, 0.01) * touching
-    moving = (np.gradient(run.elastic, run.time, axis=0) < 0.0) & touching
-    pulls = [-operators.falling(run.elastic, length) * touching for length in (0.03, 0.1)]
-    for width in (0.08, 0.14, 0.25):
-        near = np.exp(-((load / width) ** 2)) * -np.expm1(-load / (0.1 * width))
-        pulls += [-held * near, moving * -near]
-    return pulls
-
-
-def steady_pull(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
-    """Adhesion that pulls as long as there is contact."""
-    return [np.expm1(-np.maximum(run.elastic, 0.0) / width) for width in (0.015, 0.03, 0.06)]
 
 
 KIND = Kind(
@@ -199,9 +180,5 @@ KIND = Kind(
         },
     ),
     known_from=("unloading",),
-    variants=(
-        Variant(70, unloading_pull, name="unloading", in_contact=True, after_clip=True),
-        Variant(80, steady_pull, name="steady", in_contact=True, after_clip=True),
-    ),
     signature="pull",
 )

@@ -14,7 +14,6 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import Recordings, Run, Variant
 from ..engine.specification import Form, Kind, TexelInput, scalar
 
 LOG_RATES = np.arange(-13.75, 2.76, 1.25)
@@ -111,26 +110,6 @@ _LOG = "Findley, Lai and Onaran, Creep and Relaxation of Nonlinear Viscoelastic 
 _POWER = "Nutting (1921); Schapery and Park, Int. J. Solids Struct. 36 (1999): power law by exponentials"
 
 
-def relaxing(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
-    """Stress that relaxes: a Prony series."""
-    from ..engine import signal_operators as operators
-
-    return [-operators.low_pass(x, run.time, constant, at_rest=True) for constant in _relaxation_times(recorded)]
-
-
-def rising(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
-    """Readings that go on rising under a constant load."""
-    from ..engine import signal_operators as operators
-
-    return [operators.low_pass(x, run.time, t, at_rest=True) for t in _relaxation_times(recorded) if t > 0.6]
-
-
-def _relaxation_times(recorded: Recordings) -> list[float]:
-    """Time constants of relaxation, s: from 0.15 s until twice the recording is long."""
-    longest = max(2.0 * recorded.duration, 1.0)
-    return [float(t) for t in np.geomspace(0.15, longest, max(3, round(np.log(longest / 0.15) / np.log(3.0)) + 1))]
-
-
 KIND = Kind(
     name="creep",
     title="Creep",
@@ -206,5 +185,4 @@ KIND = Kind(
     experiment="hold one depth for at least a minute, then release and wait as long",
     known_from=("timing",),
     families=("late", "moving"),
-    variants=(Variant(30, relaxing, in_contact=True), Variant(60, rising, name="rising")),
 )

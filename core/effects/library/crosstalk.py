@@ -9,7 +9,7 @@ from ...errors import EffectError
 from ...model.effect import Values
 from ...model.parameter import Parameter
 from ..engine.coupling_matrix import CouplingMatrix, coupling_matrix, nearest_distance
-from ..engine.declarations import Drawing, Recordings, Run, Variant
+from ..engine.declarations import Drawing
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 
@@ -69,27 +69,6 @@ def _coupled_wires(count: int, share: float, fall: float) -> np.ndarray:
     """One for a wire itself, and what it takes from each of the others, (count, count) float."""
     apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
     return np.where(apart == 0, 1.0, share * fall ** np.maximum(apart - 1, 0))
-
-
-def couplings(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
-    """Readings that couple into neighbours and into texels of the same row or column, on top of their own."""
-    columns = []
-    if recorded.rows is not None:
-        row, column = recorded.rows.T
-        for own, other in ((row, column), (column, row)):
-            same, apart = own[:, None] == own[None], np.abs(other[:, None] - other[None])
-            for reach in (0.5, 1.5, 4.0, np.inf):
-                couple = np.where(same & (apart > 0), np.exp(-(np.maximum(apart, 1) - 1) / reach), 0.0)
-                if reach == 0.5:
-                    couple = np.where(same & (apart == 1), 1.0, 0.0)
-                columns.append(x @ couple / max(1.0, 0.25 * float(couple.sum(axis=0).max())))
-    else:
-        apart = np.linalg.norm(recorded.place[:, None] - recorded.place[None], axis=2)
-        columns.append(x @ ((apart > 1e-9) & (apart < 1.3)))
-    order = np.arange(x.shape[1])
-    columns.append(x @ (np.abs(order[:, None] - order[None]) == 1))
-    columns.append(x @ (order[None] - order[:, None] == 1))  # the one before alone
-    return columns
 
 
 KIND = Kind(
@@ -157,5 +136,4 @@ KIND = Kind(
     ),
     known_from=("places",),
     families=("spreading",),
-    variants=(Variant(20, couplings, needs_neighbours=True),),
 )

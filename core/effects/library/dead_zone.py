@@ -7,7 +7,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing, Recordings, Run, Variant
+from ..engine.declarations import Drawing
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 
@@ -28,12 +28,6 @@ def step(signal: np.ndarray, time: np.ndarray, values: Values, transducers: Tran
 
 
 _THRESHOLD = Parameter("threshold", "N", 0.01, 0.0, 100.0, "Largest force T that is not measured.")
-
-
-def missing_below(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
-    """What is missing below thresholds."""
-    load = np.maximum(x, 0.0)
-    return [-np.minimum(load, threshold) for threshold in (0.02, 0.035, 0.06, 0.09, 0.13, 0.18, 0.24, 0.31, 0.4, 0.52)]
 
 
 KIND = Kind(
@@ -71,5 +65,4 @@ KIND = Kind(
     experiment="approach slowly, with many samples at the first touch, with a flat and with a round indenter",
     drawing=Drawing("force", values={form: {"threshold": 0.4} for form in ("hard", "soft", "step")}),
     families=("nonlinear",),
-    variants=(Variant(40, missing_below),),
 )

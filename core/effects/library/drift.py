@@ -7,7 +7,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing, Recordings, Run, Variant
+from ..engine.declarations import Drawing
 from ..engine.random_streams import random_walk
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
@@ -40,12 +40,6 @@ def listed(signal: np.ndarray, time: np.ndarray, values: Values, transducers: Tr
     """Change in each texel by an amount of its own, with a common power of the time."""
     share = (np.maximum(time, 0.0) / MINUTE) ** scalar(values, "exponent")
     return signal + share[:, None] * np.asarray(values["amount"])
-
-
-def functions_of_time(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
-    """Smooth functions of the time."""
-    share = ((run.time - run.time[0]) / recorded.duration)[:, None] + np.zeros_like(x)
-    return [np.sqrt(share), share, share**2, -np.expm1(-share / 0.1)]
 
 
 KIND = Kind(
@@ -122,6 +116,5 @@ KIND = Kind(
     ),
     known_from=("timing", "rest"),
     families=("moving",),
-    variants=(Variant(90, functions_of_time, is_signed=True, texel_columns=("rate",)),),
     gain_falls_with="clock",
 )

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing, Variant
+from ..engine.declarations import Drawing
 from ..engine.random_streams import normal
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
@@ -105,5 +105,5 @@ KIND = Kind(
     experiment="press every texel with the same flat indenter to the same depth",
     drawing=Drawing("texel"),
     known_from=("places",),
-    variants=(Variant(30, texel_columns=("gain",)),),
+    is_gain_of_texels=True,
 )

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing, Recordings, Run, Variant, cycles
+from ..engine.declarations import Drawing, cycles
 from ..engine.specification import Form, Kind, TexelInput, constants_from, scalar
 
 ELEMENTS = 4
@@ -166,22 +166,6 @@ _FORCE = Parameter("force", "N", 0.05, 1e-6, 1e3, "Force Y at which they slip.",
 _WIDTH = Parameter("width", "1", 0.15, 0.0, 0.9, "Half width h of the loop, as a share of the force.")
 
 
-def loops_below(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
-    """Loops that lie below on the way out: elements that stick and slip, and endochronic loops that grow with the load."""
-    from ..engine import signal_operators as operators
-
-    loops = [operators.stop(x, threshold) for threshold in (0.04, 0.09, 0.18, 0.36)]
-    return loops + [x * operators.branch(x, length) for length in (0.04, 0.1, 0.25)]
-
-
-def loops_above(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
-    """Loops that lie above on the way out: relays that switch off at a smaller load than they switch on at."""
-    from ..engine import signal_operators as operators
-
-    relays = [operators.relays(x, width) - np.maximum(x, 0.0) for width in (0.04, 0.1, 0.2, 0.4)]
-    return relays + [-x * operators.branch(x, length) for length in (0.04, 0.1, 0.25)]
-
-
 KIND = Kind(
     name="hysteresis",
     title="Hysteresis",
@@ -300,9 +284,4 @@ KIND = Kind(
     ),
     known_from=("unloading", "cycles"),
     families=("loop",),
-    variants=(
-        Variant(40, loops_below, name="leading", in_contact=True),
-        Variant(50, loops_above, name="trailing", in_contact=True),
-        Variant(70, loops_above, name="reading"),
-    ),
 )

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing, Recordings, Run, Variant
+from ..engine.declarations import Drawing
 from ..engine.specification import Form, Kind, TexelInput, scalar
 from .creep import step_weights
 
@@ -95,14 +95,6 @@ def _resonance(values: Values, dt: np.ndarray) -> np.ndarray:
 _TIME = Parameter("time", "s", 0.05, 0.0, 100.0, "Time constant τ.")
 
 
-def late_shares(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
-    """Low passes and delays, of which each takes a share of the reading."""
-    from ..engine import signal_operators as operators
-
-    filters = [operators.low_pass(x, run.time, constant, at_rest=False) for constant in (0.03, 0.06, 0.12, 0.25)]
-    return [late - x for late in (*filters, *(operators.delayed(x, run.time, d) for d in (0.04, 0.08, 0.15, 0.25)))]
-
-
 _SECOND = np.linspace(0, 1, 501)
 
 
@@ -163,5 +155,4 @@ KIND = Kind(
     drawing=Drawing(time=_SECOND, depth=0.002 * np.interp(_SECOND, [0.1, 0.12, 0.6, 0.62], [0, 1, 1, 0])),
     known_from=("timing",),
     families=("late",),
-    variants=(Variant(80, late_shares),),
 )

@@ -10,7 +10,7 @@ import numpy as np
 from ...model.effect import Values
 from ...model.parameter import Parameter
 from ..engine.coupling_matrix import CouplingMatrix, coupling_matrix
-from ..engine.declarations import Drawing, Recordings, Run, Variant
+from ..engine.declarations import Drawing
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 
@@ -60,22 +60,6 @@ def _spread(transducers: TransducerArray, weight: Callable[[np.ndarray], np.ndar
 _WIDTH = Parameter("width", "m", 0.003, 0.0, 0.1, "Spread s of a point load.")
 
 
-_WIDTHS, _OPEN_WIDTHS = (0.4, 0.55, 0.75, 1.0, 1.4, 2.2), (0.55, 1.0, 2.2)
-"""Widths of kernels, in pitches, and those of kernels under a cover that goes on beyond the rim."""
-
-
-def kernels(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
-    """Isotropic kernels that pass load on; most keep its sum, and some lose what goes beyond the rim."""
-    apart = np.linalg.norm(recorded.place[:, None] - recorded.place[None], axis=2)
-    columns = []
-    for width in _WIDTHS:
-        kernel = np.exp(-0.5 * (apart / width) ** 2)
-        columns.append(x @ (kernel / kernel.sum(axis=0)).T - x)
-        if width in _OPEN_WIDTHS:
-            columns.append(x @ kernel.T / _lattice_sum(width) - x)
-    return columns
-
-
 KIND = Kind(
     name="load-spreading",
     title="Load Spreading",
@@ -120,5 +104,4 @@ KIND = Kind(
     drawing=Drawing("row"),
     known_from=("places",),
     families=("spreading",),
-    variants=(Variant(10, kernels, needs_neighbours=True),),
 )

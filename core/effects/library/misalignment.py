@@ -10,7 +10,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing, Variant
+from ..engine.declarations import Drawing
 from ..engine.specification import Form, Kind, scalar
 
 
@@ -98,5 +98,4 @@ KIND = Kind(
         values={"shift": {"x": 0.0, "y": 0.005}, "turn": {"x": 0.003, "y": 0.0, "about_z": 0.4}, "tilt": {"about_x": 0.08}},
     ),
     known_from=("places",),
-    variants=(Variant(0, is_signed=True, in_contact=True, displaces=True),),
 )

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing, Variant
+from ..engine.declarations import Drawing
 from ..engine.random_streams import normal
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
@@ -69,6 +69,5 @@ KIND = Kind(
     ),
     experiment="record a minute without touching the sensor, before and after a trial",
     drawing=Drawing(time=_SECOND, depth=0.0002 * np.sin(np.pi * _SECOND) ** 2, values={"common": {"offset": 0.05}}),
-    variants=(Variant(100, texel_columns=("offset",)), Variant(110, name="fading", texel_columns=("fading",))),
     signature="unloaded",
 )

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing, Recordings, Run, Variant
+from ..engine.declarations import Drawing
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 _LEVEL = Parameter("level", "unit", 1.0, 1e-4, 1e5, "Largest reading L, counted from the reading without load.", log=True)
@@ -33,11 +33,6 @@ def rational(signal: np.ndarray, time: np.ndarray, values: Values, transducers: 
     """Flatten like a voltage divider."""
     change = signal - transducers.zero
     return transducers.zero + change / (1.0 + np.abs(change) / scalar(values, "level"))
-
-
-def missing_above(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
-    """What is missing above levels."""
-    return [-np.maximum(x - level, 0.0) for level in (0.05, 0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.93)]
 
 
 KIND = Kind(
@@ -78,5 +73,4 @@ KIND = Kind(
     experiment="press to the highest permitted load",
     drawing=Drawing("force"),
     families=("nonlinear",),
-    variants=(Variant(50, missing_above),),
 )

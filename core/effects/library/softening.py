@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing, Recordings, Run, Variant, cycles
+from ..engine.declarations import Drawing, cycles
 from ..engine.specification import Form, Kind, TexelInput, constants_from
 
 
@@ -56,16 +56,6 @@ def path(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bo
 
 
 _SHARE = Parameter("share", "1", 0.25, 0.0, 0.9, "Largest share s of the force that is lost.")
-
-
-def losses(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
-    """Force lost by the largest load so far; at all loads, or only below it (Mullins)."""
-    load = np.maximum(x, 0.0)
-    most = np.maximum(np.maximum.accumulate(load, axis=0), 1e-9)
-    below = np.clip(1.0 - load / most, 0.0, 1.0)
-    lost = [-x * -np.expm1(-most / size) for size in (0.1, 0.3, 0.9)]
-    lost += [-x * shape * -np.expm1(-((most / 0.5) ** 1.5)) for shape in (below, np.sqrt(np.tanh(3.0 * below)))]
-    return lost + [-x * shape for shape in (below, np.tanh(below / 0.2), np.tanh(below / 0.6))]
 
 
 _TWICE = np.linspace(0, 20, 2001)
@@ -126,6 +116,5 @@ KIND = Kind(
     ),
     known_from=("unloading", "cycles"),
     families=("losing",),
-    variants=(Variant(20, losses, in_contact=True),),
     signature="end",
 )

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing, Recordings, Run, Variant
+from ..engine.declarations import Drawing
 from ..engine.specification import Form, Kind, TexelInput, constants_from
 
 
@@ -56,12 +56,6 @@ _DOUBLE = Parameter("depth", "m", 0.004, 1e-4, 0.1, "Depth D at which the force 
 _POWER = Parameter("exponent", "1", 1.0, 0.5, 4.0, "Exponent p: 1 adds a quadratic force, 2 a cubic one.")
 
 
-def powers_of_load(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
-    """Convex powers of the load: each rises the steeper, the larger the load, and begins with slope zero."""
-    load = np.maximum(x, 0.0)
-    return [load**power for power in (1.5, 2.0, 3.0, 5.0)]
-
-
 KIND = Kind(
     name="stiffening",
     title="Stiffening",
@@ -103,5 +97,4 @@ KIND = Kind(
     experiment="press slowly to the largest permitted depth",
     drawing=Drawing("depth", depth=np.linspace(0, 0.004, 400)),
     families=("nonlinear",),
-    variants=(Variant(10, powers_of_load, in_contact=True),),
 )

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing, Recordings, Run, Variant
+from ..engine.declarations import Drawing
 from ..engine.specification import Form, Kind, TexelInput, constants_from, scalar
 
 
@@ -69,14 +69,6 @@ def work(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bo
         state[0] += max(texel.force, 0.0) * math.hypot(texel.slide, max(texel.depth, 0.0) - state[1])
         state[1] = max(texel.depth, 0.0)
     return texel.force * factor, texel.slope * factor
-
-
-def losses(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
-    """Force lost by work of pressing and sliding, or by pressing alone."""
-    from ..engine.signal_operators import load_put_on
-
-    paths = (run.work, load_put_on(run.load) / max(recorded.full_path, 1e-12))
-    return [x * np.expm1(-path / size) for path in paths for size in (0.2, 0.7, 3.0)]
 
 
 KIND = Kind(
@@ -145,6 +137,5 @@ KIND = Kind(
     drawing=Drawing("pressings", values={"archard": {"rate": 2e-4}, "work": {"life": 5.0}}),
     known_from=("unloading", "cycles"),
     families=("losing",),
-    variants=(Variant(60, losses, in_contact=True),),
     gain_falls_with="use",
 )

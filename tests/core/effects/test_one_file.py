@@ -41,7 +41,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing, Recordings, Run, Variant
+from ..engine.declarations import Drawing
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 
@@ -49,12 +49,6 @@ def power(signal: np.ndarray, time: np.ndarray, values: Values, transducers: Tra
     """``F (f/F)^p``."""
     force = scalar(values, "force")
     return np.sign(signal) * force * (np.abs(signal) / force) ** scalar(values, "exponent")
-
-
-def concave_powers(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
-    """Powers of the load below one, without the load itself."""
-    load = np.maximum(x, 0.0)
-    return [load**p - load for p in (0.4, 0.6, 0.8)]
 
 
 KIND = Kind(
@@ -79,7 +73,6 @@ KIND = Kind(
     experiment="press slowly, from the first touch to the highest load",
     drawing=Drawing("force", values={"power": {"exponent": 0.5}}),
     families=("nonlinear",),
-    variants=(Variant(45, concave_powers),),
 )
 '''
 COPIED = ("__init__.py", "benchmarks", "commands", "core", "pyproject.toml", "tests", "tools", "docs/effects.md")

@@ -7,7 +7,6 @@ import sys
 import pytest
 
 from palpate.core.effects import library as library_package
-from palpate.core.effects.engine.declarations import Variant
 from palpate.core.effects.engine.registry import effect, from_dict, kind_of, library, names_where, only_name_where
 from palpate.core.errors import EffectError
 
@@ -69,11 +68,6 @@ def test_a_kind_states_what_others_know(words, said):
     """A misspelt word would otherwise leave an effect out of a table without a sound."""
     with pytest.raises(EffectError, match=said):
         dataclasses.replace(kind_of("offset"), name="halving", **words)
-
-
-def test_variants_know_their_kind():
-    made = dataclasses.replace(kind_of("offset"), name="halving", variants=(Variant(1.0), Variant(2.0, name="other")))
-    assert [one.label for one in made.variants] == ["halving", "halving/other"]
 
 
 def test_what_one_effect_alone_states_is_asked_for_by_it():
