@@ -94,7 +94,7 @@ def _write(logs: list[LogFile], found: Answers, out: str) -> None:
 
     written = console.run_with_progress_bar("rig new", write_rig(logs, found, out), unit="recording")
     rig = read_rig(written.path)
-    plot_rig(rig, written.path.parent / PLOT_NAME, written.set_aside)
+    plot_rig(rig, written.path.parent / PLOT_NAME)
     for note in dict.fromkeys([*(note for log in logs for note in log.notes), *written.notes, *rig.warnings]):
         print(f"note: {note}")
     uses = [trial.use for trial in rig.trials]

@@ -40,5 +40,5 @@ def make(paths, folder: Path, accept: bool):
             )
     written = run_job(write_rig(logs, answers, folder))
     plot = folder / PLOT_NAME
-    plot_rig(read_rig(written.path), plot, written.set_aside)
+    plot_rig(read_rig(written.path), plot)
     return written, plot

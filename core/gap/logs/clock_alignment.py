@@ -62,17 +62,13 @@ class ClockShift:
         return self.correlation >= LEAST_CORRELATION and self.rival < MOST_RIVAL
 
 
-def clock_shift(
-    first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.ndarray], reach: float = np.inf
-) -> ClockShift | None:
+def clock_shift(first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.ndarray]) -> ClockShift | None:
     """Return how late the second clock is.
 
     Parameters
     ----------
     first, second : (times (T,) s, values (T,))
         What drove the sensor, and what answered, each by its own clock.
-    reach : float, s
-        Largest shift that is looked for.
 
     Returns
     -------
@@ -93,7 +89,7 @@ def clock_shift(
         for sign, height in itertools.product((1.0, -1.0), HEIGHTS):
             least, most = np.percentile(sign * driven, [1.0, 99.0])
             cause = _changes(np.maximum(sign * driven - least - height * (most - least), 0.0), width)
-            found = _shift_of(cause, answer, step, offset, reach)
+            found = _shift_of(cause, answer, step, offset)
             if found is not None and (best is None or _clearness(found) > best[0] + 1e-9):
                 best = _clearness(found), found
     return None if best is None else best[1]
@@ -103,12 +99,12 @@ def _clearness(found: ClockShift) -> float:
     return found.correlation * (1.0 - found.rival)
 
 
-def _shift_of(cause: np.ndarray, answer: np.ndarray, step: float, offset: float, reach: float) -> ClockShift | None:
+def _shift_of(cause: np.ndarray, answer: np.ndarray, step: float, offset: float) -> ClockShift | None:
     """Return the shift at which two series of changes agree best, None if one of them is constant."""
     if not cause.any() or not answer.any():
         return None
     lags, correlation = _correlation(cause, answer)
-    size = np.where(np.abs(offset + lags * step) <= reach, np.abs(correlation), 0.0)
+    size = np.abs(correlation)
     top = int(size.argmax())
     if size[top] <= 0.0:
         return None

@@ -6,12 +6,12 @@ from __future__ import annotations
 import fnmatch
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from ...errors import FileError, counted
+from ...errors import FileError
 from ...io.csv_table import LARGEST_NUMBER
 from ...io.file_list import FileList
 from ...io.file_writing import atomic_write, writable_folder
@@ -24,7 +24,6 @@ from .clock_alignment import ClockShift, clock_shift
 from .column_meaning import LOG_UNITS, PRESSURES, READING_UNITS, SINCE_1970
 from .log_table import FEWEST_ROWS, LogFile, LogTable, with_distinct_names
 from .proposal import table_of
-from .spoiled_samples import readings_of, spoiled_samples, stimulus_residual
 from .unnamed_columns import contact_of, correlation, is_unordered
 
 RIG_NAME = "rig.toml"
@@ -40,20 +39,10 @@ LEAST_CONTACT = 6.0
 """How many times the noise from sample to sample a response must rise above it. Of 1000 recordings of white noise of 20 to
 20,000 samples (evenly on a logarithmic scale) none reaches it after the mean over five samples that is taken here; the largest
 is at 4.2."""
-COMPUTERS_APART = 5.0
-"""Seconds by which times of day may differ between two computers or two programs of one."""
-TOLD_APART = 1.96
-"""Standard errors that a shift between clocks that show the time of day must be away from zero to be corrected: 95 %."""
-MOST_LEFT = 0.5
-"""Share of the squared error of the stimulus by the readings that a shift may leave to be corrected. eFlesh's three recordings,
-stamped by one computer, keep 0.81, 0.80 and 1.20 of it with the shifts of 0.27, 0.32 and 0.66 s at which changes agree best."""
 SMALLEST_INVERTED = 1e-30
 """A resistance below it counts as missing: it has no inverse."""
 DIGITS = 10
 """Significant digits of the numbers in the CSV files."""
-
-
-SetAside = tuple[str, np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -67,14 +56,11 @@ class NewRig:
     files : tuple of Path
     notes : tuple of str
         What a user should know, a sentence each; they stand in the rig as comments, too.
-    set_aside : dict of str to (quantity, (m,) float, (m,) float)
-        By the names of the files of trials: samples of the stimulus that the readings contradict, their times (s) and values.
     """
 
     path: Path
     files: tuple[Path, ...]
     notes: tuple[str, ...]
-    set_aside: dict[str, SetAside] = field(default_factory=dict)
 
 
 def write_rig(logs: Sequence[LogFile], answers: Answers, folder: str | os.PathLike) -> Job[NewRig]:
@@ -112,20 +98,17 @@ def write_rig(logs: Sequence[LogFile], answers: Answers, folder: str | os.PathLi
     with files.new_files("rig") as new:
         written: list[Path] = []
         notes: list[str] = []
-        set_aside: dict[str, SetAside] = {}
         trials = []
         for number, recording in enumerate(recordings, start=1):
             yield Progress(recording.name, number, len(recordings) + 1)
             tables = [_columns_of(by_name, file, answers, notes) for file in recording.files]
-            lines, aside = _trial(recording, tables, names[recording.name], new, written, notes)
-            trials.append(lines)
-            set_aside |= {names[recording.name]: aside} if aside else {}
+            trials.append(_trial(recording, tables, names[recording.name], new, written, notes))
         text = _rig_text(logs, answers, trials, notes)
         with atomic_write(new / RIG_NAME) as temporary:
             temporary.write_text(text, encoding="utf-8", newline="\n")
         read_rig(new / RIG_NAME)
         places = files.replace(new, {"rig": [*written, new / RIG_NAME]})
-    return NewRig(folder / RIG_NAME, tuple(places), tuple(dict.fromkeys(notes)), set_aside)
+    return NewRig(folder / RIG_NAME, tuple(places), tuple(dict.fromkeys(notes)))
 
 
 def _file_names(recordings: Sequence[RecordingAnswer], folder: Path, logs: Sequence[LogFile]) -> dict[str, str]:
@@ -326,8 +309,8 @@ def _trial(
     folder: Path,
     written: list[Path],
     notes: list[str],
-) -> tuple[list[str], SetAside | None]:
-    """Check a recording, write its files, and return the lines of its [[trial]] and the samples that were set aside."""
+) -> list[str]:
+    """Check a recording, write its files, and return the lines of its [[trial]]."""
     tables.sort(key=lambda table: any(one in table for one in ("x", "depth", "force")), reverse=True)
     tables[0] = _used_part(recording, tables[0])
     for table in tables:
@@ -335,7 +318,6 @@ def _trial(
     lines = ["[[trial]]", f'file = "{name}.csv"', f'use = "{recording.use}"']
     if len(tables) == 1:
         start = float(tables[0]["time"][0])
-        aside = _set_aside(tables[0], tables[0], 0.0, recording.name, notes)
         _check_contact(tables[0], recording.name)
         written.append(_write_csv(folder / f"{name}.csv", tables[0], start))
     else:
@@ -345,7 +327,6 @@ def _trial(
         second = start if is_one_clock else float(answered["time"][0])
         late, uncertainty, why = _lateness(recording, driven, answered, start - second)
         notes.append(f"'{recording.name}': {why}.")
-        aside = _set_aside(driven, answered, late - (start - second), recording.name, notes)
         _check_contact(answered, recording.name)
         written.append(_write_csv(folder / f"{name}.csv", driven, start))
         written.append(_write_csv(folder / f"{name}_readings.csv", answered, second))
@@ -353,27 +334,7 @@ def _trial(
         readings = {"file": f"{name}_readings.csv", "late": late, "uncertainty": uncertainty}
         lines += [f"readings = {toml_value(readings)}"]
     stamp = f"times count from {start:.3f} s of the log's clock; " if abs(start) > 1e-9 else ""
-    return [*lines, f"# {stamp}read from {', '.join(recording.files)}", ""], aside
-
-
-def _set_aside(
-    driven: dict[str, np.ndarray], answered: Mapping[str, np.ndarray], late: float, name: str, notes: list[str]
-) -> SetAside | None:
-    """Empty the samples of a depth or a known force that the readings contradict, and return them."""
-    quantity = next((one for one in ("force", "depth") if one in driven), None)
-    readings = readings_of(answered)
-    if quantity is None or readings is None:
-        return None
-    time, values = driven["time"], driven[quantity]
-    bad = spoiled_samples((time, values), (answered["time"], readings), late)
-    if not bad.any():
-        return None
-    notes.append(
-        f"'{name}': {counted(int(bad.sum()), 'sample')} of {quantity} from {time[bad][0] - time[0]:.4g} s on disagree with the "
-        "readings, while those around them agree; they are left empty, and the plot marks them."
-    )
-    driven[quantity] = np.where(bad, np.nan, values)
-    return quantity, time[bad] - time[0], values[bad]
+    return [*lines, f"# {stamp}read from {', '.join(recording.files)}", ""]
 
 
 def _used_part(recording: RecordingAnswer, table: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -399,13 +360,11 @@ def _lateness(
     if recording.late is not None:
         late = recording.late + apart
         return late, recording.uncertainty or 0.0, f"the answers say that the second clock is {recording.late:.6g} s late"
-    is_stamped = min(driven["time"][0], answered["time"][0]) > SINCE_1970
-    found = _shift(driven, answered, COMPUTERS_APART if is_stamped else np.inf)
-    if is_stamped and (found is None or not _is_told_apart(found, driven, answered)):
-        seen = f"changes agree best with {found.late:.2g} ± {found.uncertainty:.2g} s" if found else "nothing changes"
-        if found and abs(found.late) > TOLD_APART * found.uncertainty:
-            seen += ", but the readings together do not"
-        return apart, 0.0, f"the two clocks show the time of day, and the shift is not distinguishable from zero ({seen})"
+    found = _shift(driven, answered)
+    if min(driven["time"][0], answered["time"][0]) > SINCE_1970:
+        seen = f" (changes agree best with {found.late:.2g} ± {found.uncertainty:.2g} s)" if found and found.is_sure else ""
+        why = f"the two clocks show the time of day and count as one{seen}: late = … in its [[recording]] shifts one"
+        return apart, 0.0, why
     if found is None or not found.is_sure:
         seen = (
             "do not change"
@@ -430,29 +389,10 @@ def _lateness(
     )
 
 
-def _is_told_apart(found: ClockShift, driven: Mapping[str, np.ndarray], answered: Mapping[str, np.ndarray]) -> bool:
-    """True if a shift of clocks that show the time of day is distinguishable from zero.
-
-    Changes of a sensor that answers in a curve, and takes another way back, agree best with a shift even where there is none.
-    So the readings together must also explain what drove the sensor better with the shift.
-    """
-    if abs(found.late) <= TOLD_APART * found.uncertainty:
-        return False
-    readings, quantity = readings_of(answered), next((one for one in ("force", "depth") if one in driven), None)
-    if readings is None or quantity is None:
-        return True
-    stimulus, answers = (driven["time"], driven[quantity]), (answered["time"], readings)
-    without, with_shift = stimulus_residual(stimulus, answers), stimulus_residual(stimulus, answers, found.late)
-    if without is None or with_shift is None:
-        return True
-    both = np.isfinite(without) & np.isfinite(with_shift)
-    return bool(np.sum(with_shift[both] ** 2) < MOST_LEFT * np.sum(without[both] ** 2))
-
-
-def _shift(driven: dict[str, np.ndarray], answered: dict[str, np.ndarray], reach: float) -> ClockShift | None:
+def _shift(driven: dict[str, np.ndarray], answered: dict[str, np.ndarray]) -> ClockShift | None:
     """Compare what both loggers saw: a force where the first one has it, else the motion."""
     cause = next(driven[name] for name in ("force_z", "force", "depth", "z") if name in driven)
-    return clock_shift((driven["time"], cause), (answered["time"], _response(answered)), reach)
+    return clock_shift((driven["time"], cause), (answered["time"], _response(answered)))
 
 
 def _response(table: Mapping[str, np.ndarray]) -> np.ndarray:

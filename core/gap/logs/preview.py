@@ -44,15 +44,13 @@ def _ends(least: float, largest: float) -> tuple[str, str]:
     return short if short[0] != short[1] else (f"{least:.14g}", f"{largest:.14g}")
 
 
-def plot_rig(rig: Rig, path: str | Path, set_aside: Mapping[str, tuple[str, np.ndarray, np.ndarray]] | None = None) -> None:
+def plot_rig(rig: Rig, path: str | Path) -> None:
     """Write a picture of the recordings of a rig: what drove the sensor, and what answered, over time.
 
     Parameters
     ----------
     rig : Rig
     path : path of the PNG file
-    set_aside : mapping of str to (quantity, (m,) float, (m,) float)
-        By the names of trials: times and values of samples of the stimulus that were set aside; they are marked.
 
     Raises
     ------
@@ -67,10 +65,6 @@ def plot_rig(rig: Rig, path: str | Path, set_aside: Mapping[str, tuple[str, np.n
     axes = np.atleast_2d(figure.subplots(len(trials), 2, squeeze=False))
     for row, trial in zip(axes, trials, strict=True):
         _curves(row[0], trial.time, _driven(trial.stimulus, trial.level, trial.position))
-        if set_aside and trial.name in set_aside:
-            quantity, times, values = set_aside[trial.name]
-            row[0].plot(times, values, "rx", markersize=5.0, label=f"{quantity}, set aside")
-            row[0].legend(fontsize="x-small", loc="upper right")
         answered: dict[str, np.ndarray] = {}
         if trial.reading is not None:
             loudest = np.argsort(-np.nan_to_num(np.nanmax(trial.reading, axis=0) - np.nanmin(trial.reading, axis=0)))

@@ -10,17 +10,14 @@ from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.logs.log_file import read_log
 from palpate.core.gap.logs.log_table import with_distinct_names
 from palpate.core.gap.logs.missing_codes import missing_code
-from palpate.core.gap.logs.new_rig import write_rig
 from palpate.core.gap.logs.proposal import propose
-from palpate.core.gap.logs.spoiled_samples import spoiled_samples
 from palpate.core.gap.logs.unnamed_columns import is_force, is_steady, names_of_what_drove
-from palpate.core.jobs.job_runner import run_job
 
 GRAM = 9.80665e-3
 CHANNELS = 6
 
 
-def press(seed, late=0.0):
+def press(seed):
     """Two loggers of 120 s at 15 Hz: times, heights (mm) and forces (g) of one, times and six signed channels of the other."""
     random = np.random.default_rng(seed)
     time = 1.7e9 + 1000.0 * seed + np.cumsum(random.uniform(0.06, 0.075, 1700))
@@ -30,7 +27,7 @@ def press(seed, late=0.0):
         return 2500.0 * np.maximum(0.0, np.sin(2 * np.pi * since / 13.0 + 0.5)) ** 2 * (0.6 + 0.4 * np.sin(since / 31.0))
 
     clock = time + 0.002
-    load = force(clock - late)[:, None] / 2500.0
+    load = force(clock)[:, None] / 2500.0
     gain = np.array([1200.0, 350.0, -1300.0, 3000.0, -420.0, 90.0])
     readings = gain * (load + np.array([0.3, -0.2, 0.5, -0.3, 0.2, 0.0]) * load**2) + random.normal(
         0.0, 3.0, (len(time), CHANNELS)
@@ -38,12 +35,10 @@ def press(seed, late=0.0):
     return time, 288.0 - 12.0 * (force(time) / 2500.0) ** 0.7, force(time), clock, readings
 
 
-def write_files(folder, seed, spoil=None, late=0.0):
+def write_files(folder, seed):
     """The two files of a recording in a folder of its own, as the robot's program names them."""
-    time, height, force, clock, readings = press(seed, late)
+    time, height, force, clock, readings = press(seed)
     force = np.round(force, 2)
-    if spoil is not None:
-        spoil(force)
     force[1::2] = -1.0
     random = np.random.default_rng(seed + 50)
     constant = 315.0 - 3.1e-5 * (random.random(len(time)) < 0.1)
@@ -72,44 +67,6 @@ def test_raw_files_become_a_rig_without_an_answer(tmp_path, capsys):
     text = (tmp_path / "rig" / "rig.toml").read_text()
     assert "force = column_5 in g" in text and "late = 0.0" in text and "texel = column_2 … column_7 (6)" in text
     assert (tmp_path / "rig" / "recordings.png").stat().st_size > 10_000
-
-
-def test_a_shift_that_is_there_is_corrected(tmp_path):
-    logs = write_files(tmp_path / "a_1", 1, late=0.9)
-    found = propose([read_log(path) for path in logs])
-    written = run_job(write_rig([read_log(path) for path in logs], found, tmp_path / "rig"))
-    assert "late = 0.9" in written.path.read_text() or "late = 0.8" in written.path.read_text()
-
-
-def test_samples_that_the_readings_contradict_are_left_empty_and_shown(tmp_path):
-    def spoil(force):
-        top = int(np.argmax(force)) // 2 * 2
-        force[top + 4 : top + 12] = 0.0  # zeros within a press
-        force[top + 40] += 1500.0  # a spike
-        up = top - 34
-        force[up : up + 20] = force[up - 2]  # a scale that sticks
-
-    logs = write_files(tmp_path / "a_1", 1, spoil)
-    found = propose([read_log(path) for path in logs])
-    written = run_job(write_rig([read_log(path) for path in logs], found, tmp_path / "rig"))
-    ((name, (quantity, times, values)),) = written.set_aside.items()
-    assert quantity == "force" and (values == 0.0).sum() == 4 and 13 <= len(values) <= 17
-    assert any("disagree with the readings" in note for note in written.notes)
-    (trial,) = read_rig(written.path).trials
-    force = GRAM * np.interp(trial.time, press(1)[0] - press(1)[0][0], press(1)[2])
-    assert np.abs(trial.level - force)[np.isfinite(trial.reading[:, 0])].max() < 0.02 * force.max()
-    assert trial.name == name and len(times) == len(values)
-
-
-def test_what_a_slow_sensor_leaves_is_not_set_aside():
-    """A sensor behind a low pass of 0.5 s under steps with holds disagrees after each step, for no fault of the stimulus."""
-    time = np.arange(3000) * 0.05
-    level = np.repeat(np.random.default_rng(3).integers(0, 6, 75), 40).astype(float)
-    reading, state = np.empty(len(level)), 0.0
-    for i, value in enumerate(level):
-        state += (value - state) * (1.0 - np.exp(-0.1))
-        reading[i] = state
-    assert not spoiled_samples((time, level), (time, np.stack([reading, -2.0 * reading], axis=1))).any()
 
 
 def test_codes_for_missing_values():

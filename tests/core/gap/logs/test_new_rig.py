@@ -162,10 +162,15 @@ def test_a_shift_that_the_recordings_do_not_tell_is_asked(tmp_path):
     assert trial.time[0] == pytest.approx(0.0) and trial.time[-1] == pytest.approx(5.74)
 
 
-def test_two_computers_are_not_taken_to_be_minutes_apart(tmp_path):
+def test_clocks_of_the_time_of_day_count_as_one_and_a_shift_between_them_is_said(tmp_path):
     logs = two_loggers(tmp_path, late=0.4, start=1.7e9)
-    written = new_rig(tmp_path / "rig", logs, template(tmp_path, logs))
-    assert tomllib.loads(written.path.read_text())["trial"][0]["readings"]["late"] == pytest.approx(0.4, abs=0.02)
+    answers = template(tmp_path, logs)
+    written = new_rig(tmp_path / "rig", logs, answers)
+    assert tomllib.loads(written.path.read_text())["trial"][0]["readings"]["late"] == 0.0
+    assert re.search(r"count as one \(changes agree best with 0\.39 ± 0\.\d+ s\): late = …", "\n".join(written.notes))
+    answers.write_text(answers.read_text().replace('use = "fit"', 'use = "fit"\nlate = 0.4'))
+    written = new_rig(tmp_path / "rig", logs, answers)
+    assert tomllib.loads(written.path.read_text())["trial"][0]["readings"]["late"] == 0.4
     assert "times count from 1700000000.000 s" in written.path.read_text()
 
 
