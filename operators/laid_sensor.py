@@ -73,7 +73,7 @@ class PALPATE_OT_skin_add(support.ErrorReporting, bpy.types.Operator):
             ),
             ("OWN", "Sensor's Region", "The region that the object has as a sensor"),
             ("SELECTION", "Selection", "Selected faces; they are kept in a vertex group"),
-            ("GROUP", "Active Vertex Group", "Vertices whose weight is a half or more"),
+            ("GROUP", "Active Vertex Group", "Vertices whose weight reaches the threshold"),
             ("MATERIAL", "Active Material", "Faces with the active material"),
             ("FACE_SET", "Face Set", "Faces of the set that the active face is in"),
             ("MESH", "Whole Mesh", "Everywhere"),

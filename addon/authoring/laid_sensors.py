@@ -193,6 +193,7 @@ def _store_pattern(obj, carrier, region: dict, pattern: dict) -> None:
         setattr(own, key, value)
     own.region, own.region_number = region["region"], region.get("face_set", 0)
     own.region_name = region.get({"GROUP": "vertex_group", "MATERIAL": "material"}.get(own.region, ""), "")
+    own.region_threshold = region.get("threshold", 0.0)
     own.made_from = _surface_fingerprint(carrier, own)
     obj.palpate.made_vertices = len(obj.data.vertices)
     identity.ensure_uid(obj)
@@ -201,7 +202,14 @@ def _store_pattern(obj, carrier, region: dict, pattern: dict) -> None:
 def _stored_region(own) -> dict:
     """Return the region on the carrier that a laid sensor's properties hold, for :func:`.sensor_regions.vertices_of_region`."""
     name = own.region_name
-    return {"region": own.region, "vertex_group": name, "material": name, "face_set": own.region_number}
+    threshold = units.as_typed(own.region_threshold)
+    return {
+        "region": own.region,
+        "vertex_group": name,
+        "threshold": threshold,
+        "material": name,
+        "face_set": own.region_number,
+    }
 
 
 def _surface_fingerprint(carrier, own) -> str:

@@ -124,17 +124,24 @@ def describe_region(obj, source: str) -> dict:
     """
     own = obj.palpate
     if source == "OWN":
-        return {"region": own.region, "vertex_group": own.vertex_group, "material": own.material, "face_set": own.face_set}
+        return {
+            "region": own.region,
+            "vertex_group": own.vertex_group,
+            "threshold": units.as_typed(own.threshold),
+            "material": own.material,
+            "face_set": own.face_set,
+        }
     if source == "SELECTION":
         chosen = selected_vertices(obj)
         _check(obj, chosen, source)
         group = obj.vertex_groups.new(name=GROUP_NAME)  # a new group, because another laid sensor may have another selection
         group.add(np.flatnonzero(chosen).tolist(), 1.0, "REPLACE")
-        return {"region": "GROUP", "vertex_group": group.name}
+        return {"region": "GROUP", "vertex_group": group.name, "threshold": 1.0}
     if source == "GROUP":
         if obj.vertex_groups.active is None:
             raise SensorError(f"'{obj.name}' has no vertex group: paint one, or use the whole mesh.")
-        return {"region": "GROUP", "vertex_group": obj.vertex_groups.active.name}
+        name = obj.vertex_groups.active.name
+        return {"region": "GROUP", "vertex_group": name, "threshold": units.as_typed(own.threshold)}
     if source == "MATERIAL":
         return {"region": "MATERIAL", "material": _active_material(obj)[1]}
     if source == "FACE_SET":

@@ -60,4 +60,5 @@ class PALPATE_PG_skin(LengthsInUnits, bpy.types.PropertyGroup):
     region: StringProperty(options={"HIDDEN"})
     region_name: StringProperty(options={"HIDDEN"})
     region_number: IntProperty(options={"HIDDEN"})
+    region_threshold: FloatProperty(default=0.5, options={"HIDDEN"})  # that of sensors that were laid before it was stored
     made_from: StringProperty(options={"HIDDEN"})

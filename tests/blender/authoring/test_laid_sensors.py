@@ -100,6 +100,24 @@ def test_texels_laid_on_a_painted_region_take_its_place(role):
     assert bpy.context.object.palpate.role == "SENSOR" and obj.palpate.role == "NONE"
 
 
+@pytest.mark.parametrize("source", ["OWN", "GROUP"])
+def test_a_region_has_the_sensors_threshold_when_texels_are_laid_on_it(source):
+    """Half of the region is painted with 0.3: with a threshold of 0.2 it is part of it, also when texels are laid again."""
+    pad = grid(size=0.04)
+    group = pad.vertex_groups.new(name="Painted")
+    for vertex in pad.data.vertices:
+        group.add([vertex.index], 1.0 if vertex.co.x > 0.0 else 0.3, "REPLACE")
+    pad.palpate.role, pad.palpate.region, pad.palpate.vertex_group = "SENSOR", "GROUP", "Painted"
+    pad.palpate.threshold = 0.2
+    assert bpy.ops.palpate.skin_add(source=source, method="VERTICES") == {"FINISHED"}
+    skin = bpy.context.object
+    assert len(skin.data.vertices) == len(pad.data.vertices) and pad.palpate.role == "NONE"
+    assert not laid_sensors.is_outdated(skin)
+    pad.palpate.threshold = 0.9  # not the object's own any more: the sensor that lies there keeps its region
+    bpy.ops.palpate.skin_update()
+    assert len(skin.data.vertices) == len(pad.data.vertices)
+
+
 def test_texels_laid_beside_a_painted_region_leave_it_as_it_is():
     obj = finger()
     bpy.ops.palpate.weight_paint()
