@@ -5,6 +5,7 @@ import bpy
 
 from ..addon.authoring import laid_sensors
 from ..addon.properties.scene_units import name_in_units
+from ..addon.scene import attached_objects
 from ..addon.session import first_use, frame_status, session_state
 from ..core.model.sensor_parameters import CONTACT, FRICTION, HUNT_CROSSLEY, LINEAR, READOUT, SENSOR_PARAMETERS
 from ..operators import presets
@@ -219,7 +220,7 @@ class Readout(Subpanel):
             box.label(text=f"{name}: {value}")
         if readings is not None and readings.channels is not None:
             box.label(text=_summary(readings.channels))
-        draw_sentences(box, NET, "NONE", context)
+        draw_sentences(box, _sentence_of_net(context.scene, context.object), "NONE", context)
 
 
 def _draw_channels(layout, own, context) -> None:
@@ -241,7 +242,14 @@ def _summary(channels) -> str:
     return f"Channels: {channels.values.size}, largest {abs(channels.values).max():.4g} {channels.unit}{ending}"
 
 
-NET = "Net is the vector sum of normals and shear: what points in different directions cancels in part."
+def _sentence_of_net(scene, obj) -> str:
+    """Return what Net is, and in which axes."""
+    body = attached_objects.body_object(obj, attached_objects.objects_with_role(scene))
+    mirrored = ", x reversed because its scale mirrors it" if body.matrix_world.is_negative else ""
+    return (
+        f"Net is the vector sum of normals and shear, along the local axes of '{body.name}'{mirrored}: "
+        "what points in different directions cancels in part."
+    )
 
 
 def _measured(readings, unit: str) -> list[tuple[str, str]]:

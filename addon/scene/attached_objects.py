@@ -22,14 +22,19 @@ def body_objects(objects) -> dict:
 
     An attached object whose parent is not simulated is a body of its own, which its parents move like any other object.
     """
-    return {obj: _body_object(obj, set(objects)) for obj in objects}
+    return {obj: body_object(obj, set(objects)) for obj in objects}
 
 
-def _body_object(obj, participants):
-    """Return the object whose body an object belongs to."""
-    while obj.palpate.body == "PARENT" and obj.parent in participants:
+def body_object(obj, objects):
+    """Return the object whose body an object belongs to; `objects` are those of the simulation."""
+    while obj.palpate.body == "PARENT" and obj.parent in objects:
         obj = obj.parent
     return obj
+
+
+def objects_with_role(scene) -> set:
+    """Return the objects of a scene that have a role, also those that are hidden."""
+    return {obj for obj in scene.objects if obj.palpate.role != "NONE"}
 
 
 def check_parents(objects, body_objects: dict) -> None:
@@ -72,9 +77,7 @@ def to_body_frame(matrix: np.ndarray, attachment: np.ndarray) -> tuple[np.ndarra
 def check_attachments(scene, depsgraph, attachments: dict[str, np.ndarray]) -> None:
     """Raise SceneError when an object has moved on its body; `attachments` are the matrices at the first frame, by key."""
     for key, obj in identity.find_objects(scene, attachments).items():
-        now = matrix_on_body(
-            obj, _body_object(obj, {other for other in scene.objects if other.palpate.role != "NONE"}), depsgraph
-        )
+        now = matrix_on_body(obj, body_object(obj, objects_with_role(scene)), depsgraph)
         if np.abs(now - attachments[key]).max() > SAME_MATRIX * np.abs(attachments[key]).max():
             raise SceneError(
                 f"'{obj.name}' moves on its parent (frame {scene.frame_current}), but is part of that body: "

@@ -33,7 +33,8 @@ def decompose(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     location : (3,) float, Blender units
     quaternion : (4,) float, (w, x, y, z)
     stretch : (3, 3) float
-        Diagonal unless the matrix is sheared; of negative determinant where the matrix mirrors.
+        Diagonal unless the matrix is sheared; of negative determinant where the matrix mirrors. The rotation then has the y and
+        z axes of the object, and x against its x axis, so that equal forces on a left and a right finger read the same along z.
     """
     (a, b, c, x), (d, e, f, y), (g, h, i, z), _ = matrix.tolist()  # plain numbers take a tenth of the time of small arrays
     columns = (a, d, g), (b, e, h), (c, f, i)
@@ -44,8 +45,9 @@ def decompose(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     else:  # polar decomposition: the rotation nearest to the matrix
         left, size, right = np.linalg.svd(matrix[:3, :3])
         rotation, stretch = (left @ right).tolist(), right.T @ np.diag(size) @ right
-    if _determinant(((a, b, c), (d, e, f), (g, h, i))) < 0:  # as Blender does: mirror all three axes
-        rotation, stretch = [[-value for value in row] for row in rotation], -stretch
+    if _determinant(((a, b, c), (d, e, f), (g, h, i))) < 0:
+        rotation = [[-x, y, z] for x, y, z in rotation]
+        stretch = np.diag([-1.0, 1.0, 1.0]) @ stretch
     return np.array([x, y, z]), np.array(_quaternion(rotation)), stretch
 
 

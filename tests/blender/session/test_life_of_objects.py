@@ -85,6 +85,19 @@ def test_mirrored_by_a_negative_scale(axis):
     assert forces()["Pad"] == pytest.approx(before["Pad"], rel=0.02)  # other diagonals of the quads
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_net_force_on_a_mirrored_sensor_has_the_sign_of_one_that_is_not(axis):
+    """Along the y and z axes of the object; x completes a right-handed frame."""
+    scene, pad, target = press(4)
+    pad.rotation_euler.z = 0.3
+    before = run(run_job(scene_reader.read_scene(scene)).scenario).sensors["Pad"].net_force[-1]
+    pad.scale[axis] = -1.0
+    after = run(run_job(scene_reader.read_scene(scene)).scenario).sensors["Pad"].net_force[-1]
+    signs = [1.0, 1.0, 1.0] if axis == 0 else [-1.0, -1.0, 1.0]
+    assert before[2] < -0.01
+    assert after == pytest.approx(signs * before, abs=0.02 * abs(before[2]))
+
+
 def test_mirrored_upside_down_it_faces_down():
     """As Blender shows it: a negative scale along the normal turns the normal around."""
     scene, pad, _ = press(4)
