@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, field, replace
 from typing import Any, TypedDict, Unpack
 
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.geometry import shapes
-from ..core.geometry.mesh import TriangleMesh, mass_properties
+from ..core.geometry.mesh import TriangleMesh, mass_properties, outward_faces
 from ..core.model import body as model
 from . import arguments
 from .arguments import ArgumentError
@@ -200,7 +201,9 @@ class Body:
         """Return a body; `argument` is what the size of its mesh follows from."""
         arguments.known(placement, sorted(Placement.__annotations__), "argument")
         name = arguments.name_from(mesh, placement.get("name"), "body")
-        surface = arguments.mesh_of(mesh, "mesh", name)
+        surface, turned = outward_faces(arguments.mesh_of(mesh, "mesh", name), name)
+        for warning in turned:
+            warnings.warn(warning, stacklevel=4)
         arguments.size_checked(surface.vertices, arguments.LARGEST_BODY, argument, f"body '{name}'")
         path, turn = placement.get("path_of_motion"), placement.get("quaternion", LEVEL)
         if mass is not None and path is not None:
@@ -233,9 +236,9 @@ class Body:
         motion = self.path.motion(fps)
         if self.mass is None:
             return model.Body(self.name, motion), []
-        center, inertia, warnings = mass_properties(self.mesh, self.mass, self.name)
+        center, inertia, said = mass_properties(self.mesh, self.mass, self.name)
         made = model.Body(self.name, motion, True, self.mass, center, inertia, self.velocity, self.angular_velocity)
-        return made, warnings
+        return made, said
 
     def __repr__(self) -> str:
         size = " × ".join(f"{1e3 * edge:.3g}" for edge in np.ptp(self.mesh.vertices, axis=0))

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...core.geometry.mesh import TriangleMesh, checked_mesh
+from ...core.geometry.mesh import TriangleMesh, checked_mesh, outward_faces
 from ...core.geometry.texels import FRAME_NORMAL, Texels, texels_from_region
 from ...core.model.sensor import Sensor
 from ...core.model.sensor_parameters import Painted
@@ -47,6 +47,9 @@ def mesh_in_body_frame(obj, depsgraph, linear: np.ndarray, offset: np.ndarray | 
         triangles, quads = triangles[:, ::-1], quads[:, ::-1]
         warnings.append(f"The scale of '{obj.name}' mirrors it: its faces were turned so that they still point outwards.")
     mesh, more = checked_mesh(arrays.vertices @ linear.T + offset, triangles, obj.name, quads)
+    if obj.palpate.role == "TARGET":
+        mesh, turned = outward_faces(mesh, obj.name)
+        more += turned
     return mesh, warnings + more
 
 

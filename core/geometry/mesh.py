@@ -9,6 +9,9 @@ import numpy as np
 
 from ..errors import MeshError, ParameterError
 
+LEAST_VOLUME = 1e-9
+"""Volume in cubes of a mesh's longest side, above which a closed mesh counts as a solid."""
+
 
 @dataclass(frozen=True)
 class TriangleMesh:
@@ -111,6 +114,22 @@ def is_closed(triangles: np.ndarray) -> bool:
     return edge_defects(triangles) == (0, 0, 0)
 
 
+def outward_faces(mesh: TriangleMesh, name: str) -> tuple[TriangleMesh, list[str]]:
+    """Return an indenter with its faces turned outwards where it encloses a negative volume, and a warning that says so.
+
+    Faces make contact in front only, so a solid whose faces all point inwards would press nothing.
+    """
+    if not is_closed(mesh.triangles):
+        return mesh, []
+    middle, size = _extent(mesh)
+    a, b, c = _corners(TriangleMesh((mesh.vertices - middle) / size.max(), mesh.triangles))
+    if np.einsum("ij,ij->", a, np.cross(b, c)) > -6.0 * LEAST_VOLUME:
+        return mesh, []
+    quads = None if mesh.quads is None else mesh.quads[:, ::-1]
+    warning = f"The faces of '{name}' point inwards: they are taken as turned outwards, flip its normals to have them so."
+    return TriangleMesh(mesh.vertices, np.ascontiguousarray(mesh.triangles[:, ::-1]), quads), [warning]
+
+
 def _corners(mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     a, b, c = mesh.triangles.T
     return mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]
@@ -210,7 +229,7 @@ def mass_properties(mesh: TriangleMesh, mass: float, name: str) -> tuple[np.ndar
         unit = (mesh.vertices - middle) / size.max()
         properties = trimesh.triangles.mass_properties(unit[mesh.triangles])
         volume = float(properties["volume"])
-        if volume > 1e-9:
+        if volume > LEAST_VOLUME:
             inertia = np.asarray(properties["inertia"]) * (mass / volume) * size.max() ** 2
             center = np.asarray(properties["center_mass"]) * size.max() + middle
             return center, 0.5 * (inertia + inertia.T), []

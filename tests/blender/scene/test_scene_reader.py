@@ -14,6 +14,7 @@ from palpate.addon.session import transforms, units
 from palpate.core.errors import SceneError
 from palpate.core.geometry.mesh import face_normals
 from palpate.core.jobs.job_runner import run_job
+from palpate.core.solver.simulation import run
 
 
 def sampled(scene):
@@ -107,6 +108,16 @@ def test_a_mirrored_object_is_mentioned():
     scene, _, target = press()
     target.scale.x = -1.0
     assert "mirrors" in " ".join(sampled(scene).warnings)
+
+
+def test_a_target_with_faces_that_point_inwards_presses_as_one_without():
+    """Before, it read 0 N, and the advice was to reduce the depth."""
+    scene, _, target = press(4)
+    before = run(sampled(scene).scenario).sensors["Pad"].normal_force[-1].sum()
+    target.data.flip_normals()
+    reading = sampled(scene)
+    assert "The faces of 'Ball' point inwards" in " ".join(reading.warnings)
+    assert before > 0.01 and run(reading.scenario).sensors["Pad"].normal_force[-1].sum() == pytest.approx(before, rel=1e-9)
 
 
 def test_shear_is_in_the_vertices_too():

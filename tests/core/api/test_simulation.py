@@ -175,3 +175,10 @@ def test_a_wrong_argument_is_named_in_one_sentence(call, message):
         call()
     text = str(refused.value)
     assert "\n" not in text and text.endswith((".", "?"))
+
+
+def test_a_body_with_faces_that_point_inwards_is_turned():
+    box = pp.Body.box(0.05)
+    with pytest.warns(UserWarning, match="faces of 'lump' point inwards"):
+        inverted = pp.Body.from_mesh((box.mesh.vertices, box.mesh.triangles[:, ::-1]), name="lump")
+    assert (inverted.mesh.triangles == box.mesh.triangles).all()

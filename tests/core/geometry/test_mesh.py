@@ -13,6 +13,7 @@ from palpate.core.geometry.mesh import (
     face_normals,
     is_closed,
     mass_properties,
+    outward_faces,
     triangle_areas,
     vertex_areas,
     vertex_normals,
@@ -93,6 +94,19 @@ def test_mass_properties_of_a_box(offset):
     np.testing.assert_allclose(center, offset, atol=1e-12)
     closed = 2.0 / 12 * np.diag([b * b + c * c, a * a + c * c, a * a + b * b])
     np.testing.assert_allclose(inertia, closed, atol=1e-12 * closed.max() if offset == 0 else 1e-9 * closed.max())
+
+
+@pytest.mark.parametrize("offset", [0.0, 100.0])
+def test_a_solid_with_faces_that_point_inwards_is_turned(offset):
+    mesh = box(0.02, 0.03, 0.05)
+    moved, _ = checked_mesh(mesh.vertices + offset, mesh.triangles, "box")
+    assert outward_faces(moved, "box") == (moved, [])
+    inverted, _ = checked_mesh(moved.vertices, moved.triangles[:, ::-1], "box")
+    turned, warnings = outward_faces(inverted, "box")
+    np.testing.assert_allclose(face_normals(turned), face_normals(moved))
+    assert "'box' point inwards" in warnings[0]
+    sheet = grid_mesh()
+    assert outward_faces(sheet, "sheet") == (sheet, [])
 
 
 def test_mass_of_an_open_sheet_is_that_of_a_box_with_a_warning():
