@@ -15,9 +15,8 @@ from . import file_handlers
 
 
 @persistent
-def palpate_frame_change_pre(scene, _depsgraph=None):
+def palpate_frame_change_pre(_scene, _depsgraph=None):
     file_handlers.examine_file()
-    playback.before_frame(scene)
 
 
 @persistent

@@ -8,6 +8,8 @@ Blender reports a change), or the motion of keyframed bodies (poses are compared
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -135,15 +137,23 @@ def _extend(run: LiveRun, sample: scene_reading.FrameSample, **share) -> None:
 
 
 def _sample_between_frames(scene, run: LiveRun, frame: int) -> None:
-    """Read the scene between the last frame and this one, as a bake does, and return to this one."""
-    before, parts = (scene.frame_current, scene.frame_subframe), scene.palpate.subframes
+    """Read the scene between the last frame and this one, as a bake does."""
+    parts = scene.palpate.subframes
+    with at_other_frames(scene):
+        for part in range(1, parts):
+            scene.frame_set(frame - 1, subframe=part / parts)
+            sample = run.reading.sample(scene, participants.depsgraph_of(scene))
+            _extend(run, sample, share=part / parts)
+
+
+@contextmanager
+def at_other_frames(scene) -> Iterator[None]:
+    """Let the scene stand at other frames without showing them, and return to the present one."""
+    before = scene.frame_current, scene.frame_subframe
     with session_state.suspended():
         try:
             with animation_time.without_time_stretching(scene):
-                for part in range(1, parts):
-                    scene.frame_set(frame - 1, subframe=part / parts)
-                    sample = run.reading.sample(scene, participants.depsgraph_of(scene))
-                    _extend(run, sample, share=part / parts)
+                yield
         finally:
             scene.frame_set(before[0], subframe=before[1])
 

@@ -46,18 +46,6 @@ def has_participants(scene) -> bool:
     return session.has_roles.get(key, True)
 
 
-def before_frame(scene) -> None:
-    """Start a run at the frame that is being left: pressing Play on the first frame evaluates the second frame next."""
-    if not _is_on(scene) or scene.frame_current != scene.frame_start + 1 or _waits_for_solver(scene):
-        return
-    depsgraph = participants.view_layer_of(scene).depsgraph
-    if depsgraph is None or depsgraph.scene_eval.frame_current != scene.frame_start or depsgraph.scene_eval.frame_subframe:
-        return
-    run = live_cache.get(scene)
-    if run is None or live_cache.is_stale(scene, depsgraph, run):
-        _start(scene, depsgraph)
-
-
 def on_frame(scene, depsgraph) -> None:
     """Compute or show the frame at which the scene has arrived."""
     if not has_participants(scene) or session_state.session.suspension_depth or _renders_beside_window(scene):
@@ -90,6 +78,10 @@ def _updated_run(scene, depsgraph, run, frame: int):
         run = None
     if run is None and frame == scene.frame_start:
         return _start(scene, depsgraph)
+    if run is None and frame == scene.frame_start + 1:  # Play on the first frame evaluates the second one next
+        with live_cache.at_other_frames(scene):  # as animation has it, without what was moved there and not keyframed
+            scene.frame_set(scene.frame_start)
+            run = _start(scene, participants.depsgraph_of(scene))
     if run is not None and frame == run.simulation.frame + 1:
         return _attempt(scene, lambda: live_cache.advance(scene, depsgraph, run))
     return run

@@ -285,8 +285,23 @@ def test_edited_keyframes_make_it_stale():
     target.location.z = 0.02
     target.keyframe_insert("location", frame=3)
     bpy.context.view_layer.update()
-    play(scene, 2)
+    play(scene, 4)
     assert live_cache.get(scene) is None
+
+
+@pytest.mark.parametrize("is_known", [True, False], ids=["after a run", "first of all"])
+def test_a_pose_that_is_not_keyframed_reaches_no_later_frame(is_known):
+    """The animation puts the ball back as soon as another frame is shown; before, frame 1 kept it in the pad."""
+    scene, _, target = press(frames=8)
+    play(scene, *range(1, 9), 1)
+    expected = {number: frame.sensors["Pad"].normal_force.tobytes() for number, frame in live_cache.get(scene).frames.items()}
+    if not is_known:
+        live_cache.drop_all()
+    target.location.z = 0.005
+    bpy.context.view_layer.update()
+    play(scene, *range(2, 9))
+    found = {number: frame.sensors["Pad"].normal_force.tobytes() for number, frame in live_cache.get(scene).frames.items()}
+    assert found == expected
 
 
 def test_a_free_body_moved_at_the_first_frame_starts_there():
