@@ -4,6 +4,7 @@
 import bpy
 
 from ..addon.scene import participants
+from ..addon.session import session_state
 from ..addon.study import property_path
 
 
@@ -96,6 +97,13 @@ def _draw_physics(self, context):
         self.layout.operator("palpate.sensor_remove", text="Tactile Sensor", icon="X")
 
 
+def _draw_render(self, context):
+    """Say in the window of a render what it lacks: a render runs in a thread, which cannot report anything."""
+    image = context.space_data.image
+    if session_state.session.render_note and image is not None and image.type == "RENDER_RESULT":
+        self.layout.label(text=session_state.session.render_note, icon="ERROR")
+
+
 VARIABLE_TYPES = {"BOOLEAN", "INT", "FLOAT", "ENUM"}
 """Types of properties that a study may vary."""
 
@@ -124,6 +132,7 @@ ENTRIES = (
     ("VIEW3D_MT_sculpt", _draw),
     ("UI_MT_button_context_menu", _draw_button),
     ("PHYSICS_PT_add", _draw_physics),
+    ("IMAGE_HT_header", _draw_render),
 )
 
 

@@ -28,6 +28,10 @@ class Session:
     suspension_depth: int = 0
     """Above zero while a bake reads the scene: the timeline must not simulate then."""
     rendering: bool = False
+    rendered_from: tuple[int, float] = (0, 0.0)
+    """The frame at which the scene stood when the render began."""
+    render_note: str = ""
+    """What the present or last render lacks, in one sentence; empty where nothing is missing."""
     catching_up: bool = False
     """True while the frames that a jump on the timeline left out are computed."""
     bake_progress: object = None

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Generator
 from contextlib import suppress
 
@@ -48,7 +49,11 @@ def has_participants(scene) -> bool:
 
 def on_frame(scene, depsgraph) -> None:
     """Compute or show the frame at which the scene has arrived."""
-    if not has_participants(scene) or session_state.session.suspension_depth or _renders_beside_window(scene):
+    if not has_participants(scene) or session_state.session.suspension_depth:
+        return
+    if session_state.session.rendering:
+        _note_missing(scene)
+    if _renders_beside_window(scene):
         return
     if baked_scene.baked_objects(scene):
         live_cache.drop(scene)
@@ -69,6 +74,16 @@ def on_frame(scene, depsgraph) -> None:
         is_busy = session_state.session.rendering or session_state.session.catching_up
         if not bpy.app.background and not is_busy and missing_frames(scene):
             bpy.app.timers.register(_offer_to_compute, first_interval=0.0)
+
+
+def _note_missing(scene) -> None:
+    """Note once in a render that it shows neither forces nor the motion of free bodies, as nothing is computed meanwhile."""
+    session, run, here = session_state.session, live_cache.get(scene), animation_time.current_frame(scene)
+    is_shown = run is not None and here[0] in run.frames and not _renders_beside_window(scene)
+    if session.render_note or here == session.rendered_from or is_shown or baked_scene.baked_objects(scene):
+        return
+    session.render_note = f"'{scene.name}' is rendered without forces, and free bodies stay in their place: bake it first."
+    print(session.render_note, file=sys.stderr)
 
 
 def _updated_run(scene, depsgraph, run, frame: int):

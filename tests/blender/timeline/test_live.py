@@ -464,7 +464,7 @@ def test_the_numbers_of_a_bake_follow_a_file_saved_elsewhere(tmp_path):
     assert frame_status.status_of(scene).frame.sensors["Pad"].normal_force.tolist() == felt.normal_force[2].tolist()
 
 
-def test_rendering_never_simulates(tmp_path):
+def test_rendering_never_simulates(tmp_path, capfd):
     scene, _, _, _, free = press_and_drop(frames=4)
     play(scene, 1, 2)
     bpy.ops.object.camera_add(location=(0.2, -1.0, 0.1), rotation=(1.5, 0.0, 0.0))
@@ -483,6 +483,18 @@ def test_rendering_never_simulates(tmp_path):
     index = run.reading.object_names.index("Cube")
     assert seen[1][1] == pytest.approx(run.frames[2].poses[index, 2])  # remembered frames are shown
     assert not session_state.session.rendering
+    note = "'Scene' is rendered without forces, and free bodies stay in their place: bake it first."
+    assert session_state.session.render_note == note and capfd.readouterr().err.count(note) == 1
+    bpy.ops.render.render()  # a still picture shows the frame that was shown before
+    assert not session_state.session.render_note
+    render.use_lock_interface, scene.frame_end = True, 2
+    bpy.ops.render.render(animation=True)  # computed frames
+    assert not session_state.session.render_note
+    save(tmp_path)
+    run_job(bake(scene))
+    scene.frame_end = 4
+    bpy.ops.render.render(animation=True)
+    assert not session_state.session.render_note
 
 
 def test_a_baked_scene_is_not_simulated_again(tmp_path):
