@@ -51,6 +51,7 @@ class LoadBalance:
         self._out, self._environments, self._press = out, environments, press
         self._search = LoadSearch.of(model.sensor.texels, model.sensor.parameters.max_penetration, count)
         self._engine, self._rotation, self._residual = np.zeros((count, 7)), np.zeros((count, 3, 3)), np.zeros((count, 6))
+        self._normals, self._degrees = model.sensor.texels.normal, 0
         self._states = stacked_states(environments)
         self._saved = [np.empty_like(field) for field in self._states]
         self.displacement = self._search.at
@@ -59,6 +60,16 @@ class LoadBalance:
         """Put the targets of some environments (E,) back to the engine's poses."""
         for number in np.flatnonzero(chosen):
             forget_load(int(number), self._search)
+
+    @property
+    def pulls(self) -> np.ndarray:
+        """(E,) bool: True where no texel can push along the force of the last load, so that contact exerts nothing of it."""
+        search = self._search
+        given = np.where(np.isfinite(search.given), search.given, 0.0)
+        force = given[:, :1] * search.direction if self._degrees == 1 else given[:, :3]
+        along = np.einsum("eji,ej->ei", self._rotation, force) @ self._normals.T
+        shear = 1e-9 * np.linalg.norm(force, axis=1, keepdims=True)  # rounding: what has no part along a normal is no pull
+        return np.asarray((along < -shear).all(axis=1))
 
     def step(self, wrench: np.ndarray) -> np.ndarray:
         """Run one step under a load, and return the part of it that the contact does not exert.
@@ -75,6 +86,7 @@ class LoadBalance:
         residual : (E, m) float, N and N·m
         """
         out, degrees = self._out, wrench.shape[1]
+        self._degrees = degrees
         whole = np.isfinite(wrench).all(axis=1) & np.isfinite(out.poses).all(axis=(1, 2))
         whole &= (out.poses[:, :, 3:] != 0.0).any(axis=2).all(axis=1)
         out.poses[~whole] = np.nan
@@ -97,6 +109,13 @@ class LoadBalance:
             going = _advance_searches(out.wrench, out.texels, self._engine, out.poses, self._search)
         _write_residuals(self._residual, self._search)
         return self._residual[:, :degrees].copy()
+
+
+PULL = (
+    "pulls the target off the sensor, and contact can only push: give the force that the contact exerts on the target, as "
+    "(0, 0, 9.81) N for 1 kg at rest on a sensor that faces up."
+)
+"""Ending of the sentence on a load that contact cannot exert."""
 
 
 def check_targets(count: int) -> None:

@@ -18,7 +18,7 @@ from ..model.recording import SENSOR_FIELDS, SensorFrame
 from ..solver.jumps import JumpFinder
 from ..solver.pressed_model import PressedModel
 from ..solver.pressing import PressedTexels, StepMemory, begin_at
-from .load_balance import LoadBalance
+from .load_balance import PULL, LoadBalance
 from .pressed_sensors import REMEDY
 from .sensor_on_mesh import SensorOnMesh
 
@@ -74,6 +74,8 @@ class PressedSensor:
         How many contact points are pressed past their maximum penetration at the last step, and measure nothing.
     residual : (1,), (3,) or (6,) float, N and N·m
         Part of the load given to the last step that no contact balances.
+    residual_reason : str
+        One sentence where this load pulls, with the convention of loads; else empty.
     displacement : (6,) float, metres and rad
         Of the target from its pose at the last step, for the load: in the world, and rotation vector about its origin.
 
@@ -127,6 +129,12 @@ class PressedSensor:
         return np.zeros(6) if self._balance is None else self._balance.displacement[0].copy()
 
     @property
+    def residual_reason(self) -> str:
+        """Why no contact balances the load given to the last step, where it pulls; else empty."""
+        is_pull = len(self.residual) and self._balance is not None and self._balance.pulls[0]
+        return f"The load {PULL}" if is_pull else ""
+
+    @property
     def too_deep(self) -> int:
         """How many contact points are pressed past their maximum penetration at the last step."""
         return int(self._out.too_deep[0])
@@ -171,8 +179,9 @@ class PressedSensor:
         out : Contact, optional
             Returned by an earlier step, to write into instead of new arrays.
         wrench : (6,), (3,) or (1,) float, N and N·m, optional
-            Load that the contact exerts on the target: force and torque about its origin, force alone, or force along the mean
-            normal of the texels. The target is displaced until the contact exerts it (see :mod:`.load_balance`), along and
+            What the contact exerts on the target, in the world: force and torque about its origin, force alone, or force along
+            the mean normal of the texels. For 1 kg at rest on a sensor that faces up it is ``(0, 0, 9.81)``, against the weight
+            of ``(0, 0, -9.81)``, and ``(9.81,)`` along the normal. The target is displaced until the contact exerts it (see :mod:`.load_balance`), along and
             about all axes, along all axes, or along the normal.
 
         Raises

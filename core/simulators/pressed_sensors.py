@@ -19,7 +19,7 @@ from ..solver.jumps import JumpFinder
 from ..solver.pressed_model import PressedModel
 from ..solver.pressing import PressedTexels, Presser, StepMemory
 from .environment_parameters import Columns, sensors_of
-from .load_balance import LoadBalance
+from .load_balance import PULL, LoadBalance
 from .sensor_on_mesh import SensorOnMesh
 
 REMEDY = "take shorter steps, or reset where a target is put elsewhere."
@@ -117,6 +117,8 @@ class PressedSensors:
     ----------
     residual : (E, 1), (E, 3) or (E, 6) float, N and N·m
         Part of the loads given to the last step that no contact balances.
+    residual_reason : str
+        One sentence where some of these loads pull, with the convention of loads; else empty.
     displacement : (E, 6) float, metres and rad
         Of the targets from their poses at the last step, for the loads: in the world, and rotation vector about their origin.
 
@@ -163,6 +165,14 @@ class PressedSensors:
     def __repr__(self) -> str:
         size = f"{len(self._environments)} environments, {self._model.texels} texels"
         return f"<PressedSensors: {size}, step {1e3 / self._model.rate:.4g} ms>"
+
+    @property
+    def residual_reason(self) -> str:
+        """Which environments have a load at the last step that pulls, and why no contact balances it; else empty."""
+        if not self.residual.shape[1] or self._balance is None or not self._balance.pulls.any():
+            return ""
+        pulls = self._balance.pulls
+        return f"In {np.sum(pulls)} of {len(self)} environments ({_numbers(pulls)}) the load {PULL}"
 
     @property
     def displacement(self) -> np.ndarray:

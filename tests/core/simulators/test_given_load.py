@@ -166,6 +166,24 @@ def test_what_nothing_balances_is_a_residual(load, left):
     contact = pressed.step(pose(LEVEL), pose(at(z=2e-4)), wrench=load)
     assert pressed.residual == pytest.approx(left, abs=1e-12)
     assert not contact.texels.contact.any() and np.abs(pressed.displacement).max() == 0.0
+    is_pull = load[-1] < 0.0 or load[2:3] == [-5.0]
+    assert ("give the force that the contact exerts on the target" in pressed.residual_reason) == is_pull
+
+
+@pytest.mark.parametrize("degrees", [6, 3, 1])
+def test_a_weight_in_place_of_the_force_that_carries_it_is_named(degrees):
+    """The sensor faces down and is turned: the load that its texels exert points down."""
+    many = PressedSensors(pad(6, 6, **LAW), box(SIZE, SIZE, SIZE), 0.005, 4, 1)
+    upside_down = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
+    below = at() * [1, 1, -1, 1, 1, 1, 1]
+    loads = np.zeros((4, degrees))
+    loads[:, 0 if degrees == 1 else 2] = np.array([WEIGHT, -WEIGHT, 0.0, np.nan]) * (-1.0 if degrees == 1 else 1.0)
+    many.step(upside_down, np.tile(below, (4, 1)), wrench=loads)
+    assert many.residual_reason.startswith("In 1 of 4 environments (0) the load pulls the target off the sensor")
+    many.step(upside_down, np.tile(below, (4, 1)), wrench=-loads[[0, 0, 0, 0]])
+    assert many.residual_reason == "" and np.abs(many.residual).max() < EXACT
+    many.step(upside_down, np.tile(below, (4, 1)))
+    assert many.residual_reason == ""
 
 
 @pytest.mark.parametrize(
