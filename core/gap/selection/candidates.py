@@ -64,8 +64,8 @@ class Scales:
         Distance between neighbouring texels, and extent of the sensor.
     step, seconds : float, s
         Median time between samples, and length of the longest trial or session.
-    speed : float, m/s
-        Largest speed of sliding.
+    speed, rate : float, m/s
+        Largest speeds of sliding, and of a texel's depth.
     texels : int
     travel : float, m
         Path that texels are pressed in along the longest session; infinite without a session.
@@ -81,6 +81,7 @@ class Scales:
     step: float
     seconds: float
     speed: float
+    rate: float
     texels: int
     travel: float = np.inf
     warmth: float = 0.0
@@ -103,10 +104,17 @@ def scales_of(predictors: Sequence[Predictor], model: Model) -> Scales:
         step=float(np.median([q.trial.step for q in predictors])),
         seconds=max(float(np.ptp(q.trial.time if q.session is None else q.session.stimulus.time)) for q in predictors),
         speed=max(max(float(q.stimulus.slide.max(initial=0.0)) for q in predictors), 1e-6),
+        rate=max(max(_largest_rate(q) for q in predictors), 1e-6),
         texels=len(p),
         travel=_travel(predictors),
         warmth=_warmth(predictors),
     )
+
+
+def _largest_rate(predictor: Predictor) -> float:
+    """Largest speed of a texel's depth in a trial, m/s."""
+    steps = np.abs(np.diff(predictor.stimulus.depth, axis=0)).max(axis=1, initial=0.0)
+    return float((steps / np.diff(predictor.trial.time)).max(initial=0.0))
 
 
 def _warmth(predictors: Sequence[Predictor]) -> float:
@@ -126,15 +134,16 @@ def _travel(predictors: Sequence[Predictor]) -> float:
     return max(found, default=np.inf)
 
 
-def search_range(parameter: Parameter, scales: Scales) -> tuple[float, float]:
-    """Return the range of values in which a parameter would show in recordings of these scales, inside its bounds."""
+def search_range(parameter: Parameter, scales: Scales, form: Form) -> tuple[float, float]:
+    """Return the range of values in which a parameter of a form would show in recordings of these scales, inside its bounds."""
     warmth = max(scales.warmth, LEAST_WARMTH)
+    speed = scales.rate if form.friction_law is None else scales.speed
     known = {
         "N": (SMALL * scales.force, LARGE * scales.force),
         "unit": (SMALL * scales.reading, LARGE * scales.reading),
         "m": (min(0.05 * scales.depth, 0.3 * scales.pitch), max(5.0 * scales.depth, 2.0 * scales.pitch)),
         "s": (0.5 * scales.step, 2.0 * scales.seconds),
-        "m/s": (0.02 * scales.speed, 2.0 * scales.speed),
+        "m/s": (0.02 * speed, 2.0 * speed),
         "N·s": (0.1 * scales.force * scales.seconds, 50.0 * scales.force * scales.seconds),
         "J": (0.1 * scales.force * scales.depth, 50.0 * scales.force * scales.speed * scales.seconds),
         **{unit: (0.02 / scales.force**power, 2.0 / scales.force**power) for power, unit in INVERSE_FORCES.items()},
@@ -183,7 +192,7 @@ class Candidate:
         made = []
         for raw in self.form.parameters:
             p = raw.scaled(gain)
-            _, top = search_range(p, scales)
+            _, top = search_range(p, scales, self.form)
             size = max(abs(p.default), 0.1 * top) if p.unit == "1" else 0.3 * top
             low, high = p.low, min(p.high, self.form.fitted_up_to.get(p.name, p.high))
             if p.name in self.form.over_within:
@@ -211,7 +220,7 @@ class Candidate:
             values = {}
             for share, raw in zip(point, self.form.parameters, strict=True):
                 p = raw.scaled(gain)
-                low, high = search_range(p, scales)
+                low, high = search_range(p, scales, self.form)
                 if low > 0 and (p.log or high > LOG_RATIO * low):
                     values[p.name] = float(np.exp(np.log(low) + share * (np.log(high) - np.log(low))))
                 else:
