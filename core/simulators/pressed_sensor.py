@@ -181,8 +181,8 @@ class PressedSensor:
         wrench : (6,), (3,) or (1,) float, N and N·m, optional
             What the contact exerts on the target, in the world: force and torque about its origin, force alone, or force along
             the mean normal of the texels. For 1 kg at rest on a sensor that faces up it is ``(0, 0, 9.81)``, against the weight
-            of ``(0, 0, -9.81)``, and ``(9.81,)`` along the normal. The target is displaced until the contact exerts it (see :mod:`.load_balance`), along and
-            about all axes, along all axes, or along the normal.
+            of ``(0, 0, -9.81)``, and ``(9.81,)`` along the normal. The target is displaced until the contact exerts it (see
+            :mod:`.load_balance`), along and about all axes, along all axes, or along the normal.
 
         Raises
         ------
