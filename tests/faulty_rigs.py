@@ -210,11 +210,6 @@ def _shifted(rng, one: Measured, plan: dict) -> None:
     _resample(rng, one, lambda time: time - late)
 
 
-def _apart(rng, one: Measured, plan: dict) -> None:
-    rate = plan.setdefault("rate", float(rng.choice([-1, 1]) * rng.uniform(0.015, 0.05)))
-    _resample(rng, one, lambda time: time[0] + (time - time[0]) * (1.0 + rate))
-
-
 def _resample(rng, one: Measured, clock: Callable[[np.ndarray], np.ndarray]) -> None:
     """Take each response at another time; noise is that of the nearest sample, so that nothing is smoothed."""
     time = one.columns["time"]
@@ -257,14 +252,6 @@ def _repeated(rng, one: Measured, plan: dict) -> None:
         one.columns[name] = one.columns[name][index]
 
 
-def _dropped(rng, one: Measured, plan: dict) -> None:
-    lost, count = int(rng.uniform(0.25, 0.8) / one.step), len(one.columns["time"])
-    start = int(rng.integers(count // 4, count // 2))
-    index = np.arange(count)
-    index[start:] += lost
-    _take(rng, one, index)
-
-
 def _unit(rng, one: Measured, plan: dict) -> None:
     factor = plan.setdefault("factor", float(rng.choice([10.0, 0.1, 9.81, 1 / 9.81])))
     for name in one.responses:
@@ -290,12 +277,10 @@ def _negated(rng, one: Measured, plan: dict) -> None:
 
 KINDS: dict[str, tuple[Callable, tuple[str, ...]]] = {
     "clock-shift": (_shifted, (ALL, ONE)),
-    "clock-rate": (_apart, (ALL, ONE)),
     "swapped-channels": (_swapped, (ALL,)),
     "reversed-channels": (_reversed, (ALL,)),
     "stuck-logger": (_stuck, (ONE,)),
     "repeated-samples": (_repeated, (ALL, ONE)),
-    "dropped-samples": (_dropped, (ONE,)),
     "unit": (_unit, (ALL, ONE)),
     "saturated-converter": (_railed, (ALL,)),
     "sign": (_negated, (ALL, ONE)),

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ..dataset.rig import Rig
-from ..forward.stimulus import Stimulus
+from ..forward.stimulus import Stimulus, stimulus_of
 from .channels import find_channel_faults
 from .clocks import find_clock_faults
 from .data_fault import DataFault
@@ -32,10 +32,7 @@ def find_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
         return faults  # nothing else can be judged before the channels are those of the texels
     samples = find_sample_faults(rig, judged)
     stuck = {name for fault in samples if fault.kind == "stuck-logger" for name in fault.trials}
-    clocks = find_clock_faults(rig, [s for s in judged if s.trial.name not in stuck])
-    if any(fault.kind == "repeated-samples" for fault in samples):
-        clocks = [fault for fault in clocks if fault.kind != "dropped-samples"]
-    return [*faults, *clocks, *samples]
+    return [*faults, *find_clock_faults([s for s in judged if s.trial.name not in stuck]), *samples]
 
 
 def put_right(rig: Rig, stimuli: Sequence[Stimulus]) -> tuple[Rig, list[DataFault]]:
@@ -63,5 +60,5 @@ def put_right(rig: Rig, stimuli: Sequence[Stimulus]) -> tuple[Rig, list[DataFaul
         corrections = wanted[0].corrections
         trials = tuple(corrections[one.name](one) if one.name in corrections else one for one in rig.trials)
         rig = replace(rig, trials=trials)
-        stimuli = [replace(s, trial=trial) for s, trial in zip(stimuli, trials, strict=True)]
+        stimuli = [s if s.trial is trial else stimulus_of(trial, rig) for s, trial in zip(stimuli, trials, strict=True)]
         done.append(replace(wanted[0], put_right=True))

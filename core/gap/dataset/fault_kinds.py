@@ -9,8 +9,6 @@ FAULT_KINDS = {
     "reversed-channels": "channels in another order",
     "swapped-channels": "swapped channels",
     "clock-shift": "clocks of stimulus and response that are shifted",
-    "clock-rate": "clocks of stimulus and response that run apart",
-    "dropped-samples": "samples of the response that were dropped",
     "repeated-samples": "repeated samples",
     "stuck-logger": "a stuck logger",
     "saturated-converter": "a converter at its rail",

@@ -13,7 +13,7 @@ import pytest
 from palpate.benchmarks._handmade import low_pass
 from palpate.benchmarks._recordings import Recording
 from palpate.core.errors import PalpateError
-from palpate.core.gap.data_faults.clock_corrections import refined_shifts, with_shift
+from palpate.core.gap.data_faults.clocks import shift_of, with_shift
 from palpate.core.gap.data_faults.search import find_faults, put_right
 from palpate.core.gap.dataset.fault_kinds import FAULT_KINDS
 from palpate.core.gap.dataset.rig import read_rig
@@ -58,20 +58,6 @@ def test_a_healthy_rig_is_not_accused(tmp_path, family):
         assert not find_faults(rig, stimuli_of(rig))
 
 
-def test_a_strip_that_relaxes_and_goes_slack_has_lost_no_samples(tmp_path):
-    """Pulled and released at one speed each: only the turn can show a shift, and what changes elsewhere is the strip."""
-    rng, trials = np.random.default_rng(5), []
-    for name, use, seconds in (("slow", "fit", 60.0), ("fast", "fit", 40.0), ("other", "check", 50.0)):
-        time = np.arange(0.0, seconds, 0.08)
-        depth = 0.05 * np.minimum(time, seconds - time) / seconds
-        late = [low_pass(time, depth, tau) for tau in (0.3, 2.0, 25.0)]
-        force = 100.0 * np.maximum(depth - 0.5 * late[0] - 0.2 * late[1] - 0.28 * late[2], 0.0)
-        trials.append((name, use, {"time": time, "depth": depth, "texel_0": force + rng.normal(0.0, 1e-3, len(time))}))
-    strip = Recording("strip", "grid = { rows = 1, columns = 1, pitch = 0.01 }\nk = 100.0\nmax_penetration = 0.5", trials)
-    rig = read_rig(strip.write(tmp_path))
-    assert not find_faults(rig, stimuli_of(rig))
-
-
 @pytest.mark.parametrize(("late", "kinds"), [(False, []), (True, ["clock-shift"])])
 def test_a_sensor_that_lags_has_no_shifted_clock(tmp_path, late, kinds):
     """Three low passes in turn delay and smear the response of all recordings; a clock that is as late does not smear it."""
@@ -90,19 +76,6 @@ def test_a_sensor_that_lags_has_no_shifted_clock(tmp_path, late, kinds):
     press = Recording("press", 'grid = { rows = 1, columns = 1, pitch = 0.01 }\nunit = "kPa"\nmax_penetration = 0.01', trials)
     rig = read_rig(press.write(tmp_path))
     assert [fault.kind for fault in find_faults(rig, stimuli_of(rig))] == kinds
-
-
-def test_a_press_that_is_felt_late_and_let_go_early_has_lost_no_samples(tmp_path):
-    """Below a threshold nothing is read: the response to one press begins later and ends earlier than the press."""
-    rng, trials = np.random.default_rng(6), []
-    for name, use, hold in (("short", "fit", 0.0), ("long", "fit", 6.0), ("other", "check", 3.0)):
-        time = np.arange(0.0, 14.0 + hold, 0.1)
-        depth = 0.003 * np.clip(np.minimum(time - 2.0, 12.0 + hold - time) / 5.0, 0.0, 1.0)
-        felt = 1e6 * np.maximum(depth - 0.001, 0.0) ** 2.0
-        trials.append((name, use, {"time": time, "depth": depth, "texel_0": felt + rng.normal(0.0, 0.01, len(time))}))
-    press = Recording("press", 'grid = { rows = 1, columns = 1, pitch = 0.01 }\nunit = "kPa"\nmax_penetration = 0.01', trials)
-    rig = read_rig(press.write(tmp_path))
-    assert not find_faults(rig, stimuli_of(rig))
 
 
 @pytest.mark.parametrize(("threshold", "rest", "kinds"), [(8.0, 0.0, []), (8.0, 40.0, []), (0.0, None, ["stuck-logger"])])
@@ -156,30 +129,24 @@ def test_unknown_corrections_are_refused(tmp_path, words):
         read_rig(with_correction(made.draw("foam", "", 0, tmp_path).path, words))
 
 
-@pytest.mark.parametrize("fraction", [0.0, 0.5])
-def test_shifts_are_refined_to_a_fraction_of_a_sample(fraction):
-    """A viscous response comes earlier than its load, here by 0.4 samples, which may be left in all shifts."""
-    whole, step = 20, 1.0 / cases.RATE
-    rig = cases.rig(trials=3, seconds=8.0)
-    late = []
-    for trial in rig.trials:
-        ahead = [np.interp(trial.time + fraction * step, trial.time, column) for column in trial.position.T]
-        reading = np.roll(trial.reading, whole, axis=0)
-        reading[:whole] = np.nan
-        late.append(replace(trial, position=np.stack(ahead, axis=1), reading=reading))
-    rough = (whole + fraction + np.array([-0.8, 0.3, 0.9])) * step
-    samples = np.array(refined_shifts(rig, late, rough)) / step - whole - fraction
-    assert np.ptp(samples) < 0.12 and (samples > -0.45).all() and (samples < 0.1).all()
-    mended = with_shift(late[0], (whole + 0.9 * fraction) * step)  # a half would round to either side
-    np.testing.assert_allclose(mended.position[2:-2], rig.trials[0].position[2:-2], atol=2e-4)
-    np.testing.assert_allclose(mended.reading[:-whole], rig.trials[0].reading[:-whole])
+def test_a_shift_is_found_and_taken_back_to_less_than_a_sample():
+    """This pad is viscous: its response comes 0.4 samples before its load."""
+    late, step = 20.4, 1.0 / cases.RATE
+    rig = cases.rig(trials=1, seconds=8.0)
+    trial = rig.trials[0]
+    reading = np.stack([np.interp(trial.time - late * step, trial.time, column) for column in trial.reading.T], axis=1)
+    found = shift_of(stimulus_of(replace(trial, reading=reading), rig))
+    assert abs(found.late / step - late) < 1.0
+    mended = with_shift(replace(trial, reading=reading), late * step)
+    np.testing.assert_allclose(mended.position[40:-20], trial.position[20:-40] - 0.4 * np.diff(trial.position, axis=0)[19:-40])
+    assert np.isnan(mended.reading[:20]).all() and np.array_equal(mended.reading[21:], reading[21:])
 
 
 def test_the_time_of_a_shift_is_found_again_in_an_uneven_clock():
     trial = cases.rig(trials=1, seconds=4.0, noise=0.0).trials[0]
     time = trial.time + 0.01 * np.sin(7.0 * trial.time)
-    uneven = replace(trial, time=time, reading=np.repeat(time[:, None], 24, axis=1))
+    uneven = replace(trial, time=time, position=np.repeat(time[:, None], 3, axis=1))
     moved = with_shift(uneven, 0.3)
     kept = np.isfinite(moved.reading[:, 0])
-    np.testing.assert_allclose(moved.reading[kept, 0], time[kept] + 0.3)
-    assert moved.position is trial.position and 0.9 < kept.mean() < 0.95
+    np.testing.assert_allclose(moved.position[kept, 0], time[kept] - 0.3)
+    assert 0.9 < kept.mean() < 0.95
