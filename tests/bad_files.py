@@ -23,7 +23,7 @@ import numpy as np
 import random_rigs
 import tomli_w
 from hypothesis import strategies as st
-from sample_bake import grid_texels, recording_of, round_texels, write_sensor
+from sample_bake import grid_texels, recording_of, round_texels
 from small_study import STUDY, scenario
 
 from palpate.core.errors import PalpateError
@@ -38,12 +38,10 @@ from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.sampling.texel_arrays import pad_array
 from palpate.core.geometry.texels import texels_from_region
 from palpate.core.io import tactile_exr
-from palpate.core.io.bake_folder import read_manifest
-from palpate.core.io.bake_reader import Bake, read_bake
 from palpate.core.io.csv_table import read_table
-from palpate.core.io.recording_npz import load_recording
+from palpate.core.io.recording_npz import load_recording, save_recording
 from palpate.core.io.scenario_npz import load_scenario, save_scenario
-from palpate.core.io.sensor_npz import load_sensor
+from palpate.core.io.sensor_npz import load_sensor, save_sensor
 from palpate.core.io.sensor_toml import FORMAT, read_sensor
 from palpate.core.jobs.job_runner import run_job
 from palpate.core.model.sensor import Sensor
@@ -377,11 +375,14 @@ def files_of(write: Callable[[Path], Any]) -> Files:
         }
 
 
-@cache
-def bake_files(kind: str) -> Files:
-    """The bake of a sensor with a grid, or with a texture map ("uv")."""
-    texels = grid_texels() if kind == "grid" else round_texels()
-    return files_of(lambda folder: write_sensor(folder / "bake", "pad", texels, Painted(k=np.ones(len(texels)))))
+def recording_files() -> Files:
+    """A recording; a whole bake is believed by the SHA-256 of its files."""
+    return files_of(lambda folder: save_recording(folder / "recording.npz", recording_of(grid_texels(), 4)))
+
+
+def texel_files() -> Files:
+    """The texels of a sensor with a texture map."""
+    return files_of(lambda folder: save_sensor(folder / "sensor.npz", round_texels(), Painted(k=np.ones(13))))
 
 
 def image_files() -> Files:
@@ -502,19 +503,6 @@ def _read_study(folder: Path) -> None:
     assert all(np.isfinite(value) for run in runs for value in run.values.values() if isinstance(value, float))
 
 
-def read_whole_bake(folder: Path) -> Bake:
-    """Read the files of a sensor one by one, then the bake; what is accepted can be drawn."""
-    own = folder / "bake" / "pad"
-    for read, path in ((read_manifest, own), (load_recording, own / "recording.npz"), (load_sensor, own / "sensor.npz")):
-        assert not (fault := fault_of(partial(read, path))), fault
-    bake = read_bake(folder / "bake")
-    for name, texels in bake.texels.items():
-        readings = bake.recording.sensors[name].normal_force
-        assert np.isfinite(texels.layout.image(readings[-1])).all(), "an image that is not finite"
-        assert texels.layout.uv().shape == (len(texels), 2), "no place for each texel"
-    return bake
-
-
 def import_all(name: str, folder: Path) -> list[FoundSensor]:
     _, found = import_sensors(folder / name)
     assert found, "no sensor and no sentence"
@@ -575,7 +563,8 @@ def readers() -> dict[str, Reader]:
         "study": Reader(_toml("study.toml", tomllib.loads(study)), _read_study),
         "scenario": Reader(scene, lambda folder: load_scenario(folder / "pad.npz")),
         "image": Reader(later(image_files), lambda folder: tactile_exr.read_exr(folder / "tactile.exr")),
-        "bake": Reader(st.sampled_from(["grid", "uv"]).flatmap(lambda kind: damaged(bake_files(kind))), read_whole_bake),
+        "recording": Reader(later(recording_files), lambda folder: load_recording(folder / "recording.npz")),
+        "texels": Reader(later(texel_files), lambda folder: load_sensor(folder / "sensor.npz")),
         "answers": Reader(answers, _read_answers),
     }
     for kind in LOG_WRITERS:

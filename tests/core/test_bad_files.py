@@ -6,12 +6,10 @@ import os
 import pytest
 from bad_files import (
     LOG_WRITERS,
-    bake_files,
     exported_sensor,
     fault_in,
     import_all,
     log_files,
-    read_whole_bake,
     readers,
     rig_from_log,
     write_files,
@@ -41,12 +39,6 @@ def test_a_damaged_file_is_one_sentence(kind):
         assert not (fault := fault_in(reader, files)), fault
 
     try_out()
-
-
-@pytest.mark.parametrize("kind", ["grid", "uv"])
-def test_an_undamaged_bake_is_read(kind, tmp_path):
-    write_files(tmp_path, bake_files(kind))
-    assert list(read_whole_bake(tmp_path).texels) == ["pad"]
 
 
 @pytest.mark.parametrize("kind", LOG_WRITERS)

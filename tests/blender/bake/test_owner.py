@@ -99,8 +99,12 @@ def test_a_blend_that_was_renamed_or_moved_owns_its_bake(saved, tmp_path):
 def test_a_copy_of_a_blend_does_not_replace_the_bake_of_its_original(saved, tmp_path):
     scene, path = saved
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "copy.blend"))
-    with pytest.raises(FileError, match=r"holds the bake of '.*first\.blend'"):
+    files = contents(tmp_path / "palpate-bake")
+    with pytest.raises(FileError) as caught:
         baked(scene)
+    folder = tmp_path / "palpate-bake" / "Pad"
+    assert str(caught.value) == f"'{folder}' holds the bake of '{path}': choose another bake folder, or rename this one."
+    assert contents(tmp_path / "palpate-bake") == files
     path.unlink()
     baked(scene)
     assert read_manifest(tmp_path / "palpate-bake" / "Pad").scene_file == "copy.blend"

@@ -33,7 +33,6 @@ from palpate.core.io.bake_folder import (
     Manifest,
     file_stems,
     folder_names,
-    frame_file,
     read_manifest,
     write_manifest,
 )
@@ -258,14 +257,6 @@ def test_folder_names():
     assert folder_names(["a/b"])["a/b"] == chosen["a/b"]  # whoever else is there
 
 
-def test_frame_file():
-    assert [frame_file(frame) for frame in (1, 250, 12345)] == [
-        "tactile_0001.exr",
-        "tactile_0250.exr",
-        "tactile_12345.exr",
-    ]
-
-
 # --- the manifest
 
 
@@ -484,21 +475,9 @@ def test_damaged_recording(tmp_path):
     cannot_load(load_recording, tmp_path)
     save_recording(path, recording())
     whole = path.read_bytes()
-    rng = np.random.default_rng(0)
-    for length in (0, 1, 10, 100, *rng.integers(0, len(whole), 20)):
+    for length in (0, 1, 100, len(whole) // 2, len(whole) - 1):
         path.write_bytes(whole[:length])
         cannot_load(load_recording, path)
-    refused = 0
-    for place in rng.integers(0, len(whole), 300):  # a flipped bit is noticed, or was in a date or an attribute
-        path.write_bytes(whole[:place] + bytes([whole[place] ^ (1 << rng.integers(8))]) + whole[place + 1 :])
-        try:
-            found = load_recording(path)
-        except FileError as error:
-            assert str(path) in str(error)
-            refused += 1
-        else:
-            same(found, recording())
-    assert refused > 200
 
 
 def test_other_files_are_no_recordings(tmp_path):
@@ -626,15 +605,6 @@ def test_value_that_no_pixel_can_hold_is_our_fault(tmp_path, value, channel):
     assert os.listdir(tmp_path) == []
 
 
-def test_largest_and_smallest_values(tmp_path):
-    frame = tactile_frame(4)
-    frame.reading[:] = np.finfo(np.float32).max, -np.finfo(np.float32).max, 1e-300, -0.0
-    layout = grid_of(2, 2)
-    write_exr(tmp_path / "a.exr", layout, frame, METADATA)
-    channels, _ = read_exr(tmp_path / "a.exr")
-    np.testing.assert_array_equal(channels["reading"][layout.row, layout.column], frame.reading.astype(np.float32))
-
-
 def test_exr_in_wrong_places(tmp_path):
     (tmp_path / "file").write_text("")
     for path in (tmp_path / "missing" / "a.exr", tmp_path / "file" / "a.exr", tmp_path):
@@ -686,17 +656,6 @@ def test_a_name_that_is_no_text_is_written_as_far_as_it_is(tmp_path):
     assert read_exr(tmp_path / "a.exr")[1] == {"sensor": "pad ?"}
 
 
-@pytest.mark.parametrize("compression", [OpenEXR.NO_COMPRESSION, OpenEXR.ZIPS_COMPRESSION, OpenEXR.PIZ_COMPRESSION])
-def test_images_of_other_programs_are_read(tmp_path, compression):
-    pictures = {"R": np.random.default_rng(1).random((17, 5), np.float32)}
-    pictures |= {"half": pictures["R"].astype(np.float16), "count": np.arange(85, dtype=np.uint32).reshape(17, 5)}
-    with OpenEXR.File({"compression": compression, "type": OpenEXR.scanlineimage}, dict(pictures)) as file:
-        file.write(str(tmp_path / "theirs.exr"))
-    found, _ = exr_file.read_image(tmp_path / "theirs.exr")
-    for name, picture in pictures.items():
-        np.testing.assert_array_equal(found[name], picture.astype(np.float32))
-
-
 def test_only_openimageio_can_write_where_the_process_is_linked_against_another_openexr(tmp_path, monkeypatch):
     monkeypatch.setattr(exr_file, "library", lambda: "OpenImageIO")
     if importlib.util.find_spec("OpenImageIO") is None:
@@ -741,19 +700,3 @@ def test_the_library_reads_what_an_image_says_of_itself(tmp_path):
     )
     hashes = {describe(other, frame, "")["parameters"] for other in (sensor, replace(sensor, body=1), *others)}
     assert len(hashes) == 4 and about["parameters"] in hashes
-
-
-def test_any_damage_to_an_exr_is_noticed_or_harmless(tmp_path):
-    """No byte can be changed so that reading ends in anything but a picture or a sentence."""
-    path = tmp_path / "a.exr"
-    write_exr(path, grid_of(5, 4), tactile_frame(20), METADATA)
-    whole = path.read_bytes()
-    rng = np.random.default_rng(2)
-    for at in range(0, len(whole), 7):
-        damaged = bytearray(whole)
-        damaged[at] = rng.integers(256)
-        path.write_bytes(damaged)
-        try:
-            read_exr(path)
-        except FileError as error:
-            assert "\n" not in str(error)
