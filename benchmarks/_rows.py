@@ -27,7 +27,6 @@ ROWS = {
 """What is hidden in each kind of cases, in words, and the aim."""
 RIGHT = {"none": "no gap", "outside": "unexplained"}
 """The outcome that is right where it is not that all is named."""
-CASE_NAME = "case.json"
 """Name of the file in which a run of the study has its case."""
 
 
@@ -49,9 +48,8 @@ def fingerprint() -> str:
 
 
 def results_in(path: Path) -> list[dict]:
-    """Return the results in a file or in the folder of a study, the last of each case."""
-    files = sorted(path.glob(f"runs/*/{CASE_NAME}")) if path.is_dir() else [path]
-    lines = [json.loads(line) for file in files for line in file.read_text(encoding="utf-8").splitlines()]
+    """Return the results in a file, the last of each case."""
+    lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
     return list({(r["kind"], r["number"]): r for r in lines}.values())
 
 

@@ -14,8 +14,7 @@ Environment:
 ``PALPATE_GAP_PROCESSES``  how many at a time (2)
 ``PALPATE_GAP_FIRST``      number of the first case of each kind; below 1000 are those to develop on, from 5000 on those that
                            nobody looks at before the figures are drawn (5000)
-``PALPATE_GAP_RESULTS``    a file of results, or the folder of the study docs/sample-study/hidden-effects.toml: nothing is run,
-                           its figures are printed
+``PALPATE_GAP_RESULTS``    a file of results: nothing is run, its figures are printed
 """
 
 from __future__ import annotations

@@ -1,18 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Studies whose runs a Python file computes, and the hidden-effect benchmark as one of them."""
 
-import importlib.util
 import json
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from small_study import begun, rows_of
+from small_study import begun
 
-from palpate.benchmarks import _rows, gap
 from palpate.core.errors import PalpateError
-from palpate.core.study.study_file import Run, study_of
+from palpate.core.study.study_file import study_of
 from palpate.sweep.parts import Parts
 from palpate.sweep.scene_evaluation import ALLOW, REFUSE
 from palpate.sweep.study_folder import OpenStudy, resume_study
@@ -165,48 +163,3 @@ def test_words_of_scenes_mean_nothing_to_a_job():
             study_of({**table, word: value}, "s")
     with pytest.raises(PalpateError, match="one of them"):
         study_of({**table, "scene": "a.blend"}, "s")
-
-
-def module_of(path: Path):
-    spec = importlib.util.spec_from_file_location("hidden_effects", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-@pytest.mark.long("two cases of the hidden-effects study, each diagnosed twice")
-def test_hidden_effects_as_a_study_say_what_the_benchmark_says(repository, tmp_path):
-    """Two small cases: the table of the study's folder is that of the benchmark, but for the seconds."""
-    folder = repository / "docs" / "sample-study"
-    module = module_of(folder / "hidden_effects.py")
-    assert (folder / "hidden-effects.toml").read_text(encoding="utf-8") == module.study()
-    plan = [("other", 14), ("poor", 3)]
-    names = "\n".join(f'    "{kind} {number}",' for kind, number in plan)
-    (tmp_path / "hidden_effects.py").write_bytes((folder / "hidden_effects.py").read_bytes())
-    (tmp_path / "study.toml").write_text(module.STUDY.format(cases=names), encoding="utf-8")
-    opened = begun(tmp_path / "study.toml")
-    assert computed(opened).done == 2
-    kept = {(one["kind"], one["number"]): one for one in _rows.results_in(opened.folder)}
-    expected = [gap.examine(kind, number) for kind, number in plan]
-    for one in expected:
-        assert kept[one["kind"], one["number"]].pop("seconds") > 0.0
-        cpu = kept[one["kind"], one["number"]].pop("cpu_seconds")
-        assert (
-            json.loads(json.dumps({key: value for key, value in one.items() if key not in ("seconds", "cpu_seconds")}))
-            == (kept[one["kind"], one["number"]])
-        )
-        one["cpu_seconds"] = kept[one["kind"], one["number"]]["cpu_seconds"] = cpu
-    assert gap.table([kept[entry] for entry in plan]) == gap.table(expected)
-    run: Run = opened.runs[0]
-    row = rows_of(opened.folder)[0]
-    assert (row["digest"], row["varied.case"]) == (run.digest, "other 14")
-    assert row["metric.right"] == row["metric.right.other"] == 1.0
-
-
-@pytest.mark.parametrize(("kind", "outcome"), [("none", "no gap"), ("outside", "unexplained"), ("two", "right")])
-def test_a_row_of_hidden_effects_has_a_metric_of_what_is_right_there(repository, tmp_path, monkeypatch, kind, outcome):
-    """Where nothing, or nothing that has a name, is hidden, to say so is right."""
-    module = module_of(repository / "docs" / "sample-study" / "hidden_effects.py")
-    monkeypatch.setattr(gap, "examine", lambda *_: {"outcome": outcome, "sure": [], "closed": None})
-    metrics = module.run({"case": f"{kind} 1"}, tmp_path)
-    assert metrics[f"right.{kind}"] == 1.0 and metrics[f"wrong.{kind}"] == 0.0
