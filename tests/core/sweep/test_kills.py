@@ -25,8 +25,9 @@ pytest.importorskip("pyarrow")
 psutil = pytest.importorskip("psutil")
 
 KILLS, SEED, LATEST = 20, 41, 3.0
-"""Kills, and the seconds before each at most; half of them come after a part, the others mostly while something starts."""
+"""Kills, and the seconds before each at most; half of them wait for the next part, the others mostly hit a start."""
 RUNS = 3000
+"""A batch is an eighth of what is to be computed, and a kill follows each part at once: 20 kills come before the end."""
 LONGEST = 300.0
 """Seconds until a wait counts as hanging; a busy machine may have to compile the solver first."""
 FATAL = """
@@ -76,6 +77,13 @@ def until(condition: Callable[[], bool], what: str) -> None:
         time.sleep(0.02)
 
 
+def wait(seconds: float, condition: Callable[[], bool]) -> None:
+    """Wait for some time, at most until the condition holds."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end and not condition():
+        time.sleep(0.02)
+
+
 def has_moved(out: Path, before: tuple[int, int], driver: subprocess.Popen) -> bool:
     return counted_runs(out) != before or driver.poll() is not None
 
@@ -86,19 +94,18 @@ def free_port() -> str:
         return str(probe.getsockname()[1])
 
 
-@pytest.fixture
-def expected(tmp_path):
-    """The rows of the study, computed in this process, and hashes of its dataset."""
+def undisturbed(folder: Path, runs: int) -> tuple[list[dict], dict[str, str]]:
+    """Return the rows of a study that is computed in this process, and hashes of its dataset."""
     from palpate.sweep.dataset import publish
 
-    opened = begun(write_study(tmp_path / "expected", RUNS, fails=True, hold=0.5))
-    compute_batch(range(RUNS), str(opened.folder))
+    opened = begun(write_study(folder, runs, fails=True, hold=0.5))
+    compute_batch(range(runs), str(opened.folder))
     publish(opened.folder, opened.study)
     return rows_of(opened.folder), tree(opened.folder / "dataset")
 
 
 @pytest.mark.long("kills a study twenty times and computes it again")
-def test_a_study_killed_twenty_times_has_the_table_of_an_undisturbed_one(tmp_path, expected):
+def test_a_study_killed_twenty_times_has_the_table_of_an_undisturbed_one(tmp_path):
     """Of a scheduler and two workers that were started by hand, and the command, one is killed at a random moment."""
     study, out, dice, killed = (
         write_study(tmp_path / "own", RUNS, fails=True, hold=0.5),
@@ -124,9 +131,11 @@ def test_a_study_killed_twenty_times_has_the_table_of_an_undisturbed_one(tmp_pat
                 more = ("--nworkers", "1", "--nthreads", "1", "--no-dashboard", "--local-directory", str(tmp_path / name))
                 start(name, "dask", "worker", address, *more)
             start("driver", "palpate.commands", "sweep", str(study), "--out", str(out), "--scheduler", address)
+            moved = partial(has_moved, out, counted_runs(out), alive["driver"])
             if dice.random() < 0.5:
-                until(partial(has_moved, out, counted_runs(out), alive["driver"]), "the next part")
-            time.sleep(dice.uniform(0.0, LATEST))
+                until(moved, "the next part")
+            else:
+                wait(dice.uniform(0.0, LATEST), moved)
             name = dice.choice([name for name in sorted(alive) if alive[name].poll() is None])
             lose(alive[name])
             killed.append((name, sum(counted_runs(out))))
@@ -137,13 +146,13 @@ def test_a_study_killed_twenty_times_has_the_table_of_an_undisturbed_one(tmp_pat
     assert (finished.returncode, finished.stderr) == (0, "")
     print(f"kills, and how many runs were over: {killed}; runs in {len(Parts(out).files)} parts")
     assert len(killed) == KILLS, f"the study was over after {len(killed)} kills: give it more runs"
-    assert rows_of(out) == expected[0] and tree(out / "dataset") == expected[1]
+    assert (rows_of(out), tree(out / "dataset")) == undisturbed(tmp_path / "expected", RUNS)
 
 
 @pytest.mark.long("stops a study and computes it again")
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
-def test_a_stopped_study_goes_on_where_it_was(tmp_path, expected, number):
+def test_a_stopped_study_goes_on_where_it_was(tmp_path, number):
     """A terminal's Ctrl-C reaches the whole group; what is done is not computed again."""
     study, out = write_study(tmp_path / "own", RUNS, fails=True, hold=0.5), tmp_path / "out"
     command = [sys.executable, "-m", "palpate.commands", "sweep", str(study), "--out", str(out), "--workers", "2"]
@@ -160,7 +169,7 @@ def test_a_stopped_study_goes_on_where_it_was(tmp_path, expected, number):
     assert (finished.returncode, finished.stderr) == (0, "")
     assert before and all(path.read_bytes() == content for path, content in before.items())
     assert sum(counted_runs(out)) == RUNS, "a run was computed twice"
-    assert rows_of(out) == expected[0]
+    assert rows_of(out) == undisturbed(tmp_path / "expected", RUNS)[0]
 
 
 @pytest.mark.long("starts the command twice, each with workers")
