@@ -75,7 +75,7 @@ def bake_stopped(path, number):
     return steps[0]
 
 
-@pytest.mark.slow("bakes once for each step")
+@pytest.mark.long("bakes once for each step")
 def test_stopped_at_every_step_of_the_last_one(saved, tmp_path):
     """Bake and .blend are the earlier ones, or the new ones, or whoever finds them says that they do not belong together."""
     path, earlier = saved

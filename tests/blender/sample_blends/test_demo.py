@@ -215,8 +215,13 @@ def described(scene):
     return found
 
 
+LARGE = [pytest.mark.long("the two scenes that take longest to build")]
+
+
 @pytest.mark.slow("builds each sample scene again")
-@pytest.mark.parametrize("name", build_samples.SAMPLES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=LARGE if name in ("hand", "geometries") else ()) for name in build_samples.SAMPLES]
+)
 def test_samples_are_what_their_scripts_build(name, repository, tmp_path):
     path = repository / "sample_blends" / f"{name}.blend"
     assert path.stat().st_size < 1_000_000

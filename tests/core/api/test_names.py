@@ -92,7 +92,7 @@ def test_names_resolve_without_blender():
     assert not {"bpy", "matplotlib"} & eval(subprocess_output(code))
 
 
-@pytest.mark.slow("runs mypy on the whole package")
+@pytest.mark.long("runs mypy on the whole package, as make lint does")
 def test_mypy_passes_on_a_script_of_a_user(repository, tmp_path):
     """The types are shipped: a right script passes, and a wrong argument is found."""
     (tmp_path / "palpate").symlink_to(repository, target_is_directory=True)

@@ -29,7 +29,7 @@ def test_contact_is_learnt_from_presses(tmp_path, repository):
     assert (study / "train_contact.png").read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.slow("opens the data set in a library that is loaded for it")
+@pytest.mark.long("runs an example, which opens the data set in libraries that are loaded for it")
 def test_a_batch_is_drawn(tmp_path, repository):
     """Of a pad whose texels form a picture; the forces in the titles are those of the frames."""
     study = published(new_study(tmp_path / "study"), [solved_press(index)[0] for index in range(4)])
