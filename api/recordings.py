@@ -93,8 +93,7 @@ class Recording:
     @property
     def unit(self) -> str:
         """Of the reading."""
-        found = self.bake.parameters.get(self.name)
-        return found.unit if found else "N"
+        return self.bake.recording.sensors[self.name].unit
 
     @property
     def position(self) -> np.ndarray:
@@ -230,7 +229,8 @@ class Recording:
         ----------
         t : float or sequence of float, seconds, optional
             The frames nearest to these times. Default: some times over which the forces change.
-        quantity : "force" or "pressure"
+        quantity : str
+            "force", "pressure", "reading", "shear", "depth", "slip" or "channels"; arrows are shear.
         """
         from ..core.figures.figure_style import FigureStyle
         from .drawings import shown_in_notebooks

@@ -8,8 +8,9 @@ from typing import Any
 
 from ..core.figures import color_maps, gel_image
 from ..core.figures.figure_style import WIDTHS, FigureStyle
+from ..core.figures.quantities import QUANTITIES
 
-STYLE_OPTIONS = ("colour_map", "quantity", "limit", "width", "dpi")
+STYLE_OPTIONS = ("colour_map", "quantity", "limit", "lowest", "width", "dpi")
 GEL_OPTIONS = ("light_angle", "markers", "marker_pitch")
 
 
@@ -18,11 +19,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--colour-map", metavar="NAME", choices=names, help=f"{', '.join(names)} (default: the scene's)")
     parser.add_argument(
         "--quantity",
-        choices=("force", "pressure"),
-        help="what the colours show: force per texel (N) or pressure (kPa) (default: the scene's)",
+        choices=QUANTITIES,
+        help=f"quantity that the colours show: {', '.join(QUANTITIES)} (default: the scene's)",
     )
     parser.add_argument(
-        "--limit", metavar="VALUE", type=float, help="end of the colour scale, N or kPa (default: a round number)"
+        "--limit", metavar="VALUE", type=float, help="end of the colour scale, in its unit (default: a round number)"
+    )
+    parser.add_argument(
+        "--lowest", metavar="VALUE", type=float, help="with --limit: value at which the colours begin (default: 0)"
     )
     parser.add_argument("--width", choices=WIDTHS, help="width of figures, as columns of a journal (default: double)")
     parser.add_argument("--dpi", metavar="N", type=int, help="resolution of PNG figures (default: 300)")
@@ -60,8 +64,13 @@ def pixels(text: str) -> int:
 
 
 def figure_style_from(arguments: argparse.Namespace, **others: Any) -> FigureStyle:
-    """Return the figure style of the options; `others` replaces the defaults where no option is given."""
+    """Return the figure style of the options; `others` replaces the defaults where no option is given.
+
+    Ends of a scale are of one quantity: those of another one are not used.
+    """
     given = {key: value for key in STYLE_OPTIONS if (value := getattr(arguments, key)) is not None}
     if "colour_map" in given:
         given["colour_map"] = given["colour_map"].upper()
+    if given.get("quantity", others.get("quantity")) != others.get("quantity"):
+        others |= {"limit": None, "lowest": None}
     return FigureStyle(**{**others, **given})

@@ -32,6 +32,7 @@ from palpate.commands.console import blender_output_hidden
 from palpate.core.figures import color_maps
 from palpate.core.figures.figure_canvas import new_figure, save_figure, tidy_axes
 from palpate.core.figures.figure_style import INK, NORMAL_COLOUR, SHEAR_COLOUR, FigureStyle
+from palpate.core.figures.quantities import Extent, Scale
 from palpate.core.figures.tactile_image import SensorView, draw_colour_bar
 from palpate.core.gap.report.plots import overview
 from palpate.core.geometry.texels import Texels
@@ -151,14 +152,19 @@ def draw_view(figure, path: Path, view: Place) -> None:
 # --- tactile images and curves next to the 3D view
 
 
+def force_scale(top: float) -> Scale:
+    """Return the colours of normal forces up to one of them, N."""
+    return Scale.of(STYLE.shown, Extent(units=("N",)), STYLE.colour_map, top)
+
+
 class Touch(NamedTuple):
     """Tactile images at one moment: texels, normal force (n,) N and shear (n, 2) N of each sensor by its name, and the scales.
 
-    `top` and `strongest` are the ends of the scales of normal force and shear, N.
+    `scale` is that of the colours; `strongest` is the shear (N) of the longest arrow.
     """
 
     sensors: Mapping[str, tuple[Texels, np.ndarray, np.ndarray]]
-    top: float
+    scale: Scale
     strongest: float
 
 
@@ -167,7 +173,7 @@ def touch_of(recording, texels: Mapping[str, Texels], frame: int) -> Touch:
     i = int(np.searchsorted(recording.frames, frame))
     seen = recording.sensors
     found = {name: (own, seen[name].normal_force[i], seen[name].shear[i]) for name, own in texels.items()}
-    return Touch(found, STYLE.scale_limit(recording, texels), metrics.peak_shear(recording))
+    return Touch(found, STYLE.scale(recording, texels), metrics.peak_shear(recording))
 
 
 def draw_touch(figure, touch: Touch, place: Place) -> None:
@@ -181,11 +187,11 @@ def draw_touch(figure, touch: Touch, place: Place) -> None:
         across, up = inches * view.width / WIDE, inches * view.height / HIGH
         x = left + (number + 0.5) * (room[0] if upright else width / len(touch.sensors)) - 0.5 * across
         axes = figure.add_axes((x, bottom + height - 0.07 - up, across, up))
-        image = view.at_size(inches).draw(axes, force, shear, touch.strongest, touch.top, STYLE)
+        image = view.at_size(inches).draw(axes, force, shear, touch.strongest, touch.scale)
         figure.text(x + 0.5 * across, bottom + height - 0.03, name, fontsize=SMALL, color=INK, ha="center", va="center")
     sideways = (left + 0.03, bottom + 0.115, width - 0.06, 0.022)
     bar = (x + across + 0.012, bottom + height - 0.07 - up, 0.014, up) if upright else sideways
-    draw_colour_bar(figure, image, figure.add_axes(bar), STYLE)
+    draw_colour_bar(figure, image, figure.add_axes(bar), touch.scale)
 
 
 def draw_curves(figure, place: Place, time, curves: Mapping[str, tuple[np.ndarray, str, str]], i: int, unit: str) -> None:
@@ -248,7 +254,7 @@ def paint(film: Film, scene) -> Any:
     finger.data.materials.pop()
     texels = pp.sensor_of(finger).texels
     none = np.zeros(len(texels))
-    touch = Touch({hand.INDEX: (texels, none, np.zeros((len(texels), 2)))}, 0.15, 1.0)
+    touch = Touch({hand.INDEX: (texels, none, np.zeros((len(texels), 2)))}, force_scale(0.15), 1.0)
 
     def draw(figure) -> None:
         draw_view(figure, path, BROAD)
@@ -447,7 +453,7 @@ def simulator(film: Film) -> None:
     obj, cube, title = scene.objects[weighing.PAD], scene.objects[weighing.CUBE], "5  In a simulator's loop"
     pad = pp.sensor_of(obj)
     moments = mujoco_moments(pad, 0.8, 96)
-    top = metrics.scale_limit(2.0 * WEIGHT / len(pad.texels))  # the impact is far above the scale
+    scale = force_scale(metrics.scale_limit(2.0 * WEIGHT / len(pad.texels)))  # the impact is far above the scale
     strongest = max(float(np.linalg.norm(one.shear, axis=1).max()) for one in moments)
     time, lift = np.array([one.time for one in moments]), np.array([one.lift for one in moments])
     curves = {"on the cube": (lift, NORMAL_COLOUR, "-"), "weight": (np.full(len(time), WEIGHT), INK, "--")}
@@ -469,14 +475,14 @@ def simulator(film: Film) -> None:
 
         def draw(figure) -> None:
             draw_view(figure, path, NARROW)
-            draw_touch(figure, Touch({weighing.PAD: (pad.texels, one.force, one.shear)}, top, strongest), MIDDLE)
+            draw_touch(figure, Touch({weighing.PAD: (pad.texels, one.force, one.shear)}, scale, strongest), MIDDLE)
             draw_curves(figure, RIGHT, time, curves, number, "force (N)")
 
         return draw
 
     def colour(force: np.ndarray) -> None:
         colors = np.ones((len(obj.data.vertices), 4), np.float32)
-        colors[vertex, :3] = color_maps.linear(color_maps.colors(STYLE.colour_map, force / top))
+        colors[vertex, :3] = color_maps.linear(scale.colors(force))
         obj.data.color_attributes[HEAT].data.foreach_set("color", colors.ravel())
         obj.data.update()
 

@@ -15,7 +15,8 @@ import numpy as np
 import trimesh
 
 from palpate.core.figures.figure_canvas import new_figure, save_figure
-from palpate.core.figures.figure_style import GREY, INK, FigureStyle
+from palpate.core.figures import color_maps
+from palpate.core.figures.figure_style import GREY, INK
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.simulators.pressed_sensor import PressedSensor
 from palpate.core.simulators.probe_list import read_probe_list
@@ -117,7 +118,7 @@ def draw(finger: SensorOnMesh, outcomes: list[tuple[Outcome, Outcome]], path: st
     """Draw the texels from above, Palpate's on top and MuJoCo's below; each column has one scale."""
     position = finger.sensor.texels.position * 1e3
     figure = new_figure(9.6, 4.6)
-    columns, colours = len(LOADS), FigureStyle().matplotlib_colormap()
+    columns, colours = len(LOADS), color_maps.matplotlib_colormap("VIRIDIS")
     for i, (load, pair) in enumerate(zip(LOADS, outcomes, strict=True)):
         limit = max(outcome.force.max() for outcome in pair)
         for row, (name, outcome) in enumerate(zip(("Palpate's texels", "MuJoCo's tactile"), pair, strict=True)):

@@ -179,9 +179,9 @@ class PALPATE_OT_gap_show(support.ErrorReporting, bpy.types.Operator):
 
     def run(self, context):
         support.leave_edit_mode(context)
-        top = gap_results.show_on_sensor(context, context.object, self.amended)
+        largest = gap_results.show_on_sensor(context, context.object, self.amended)
         gap_results.mark_phases(context.scene, context.object)
-        self.report({"INFO"}, f"Largest texel error: {top:.2%} of the range")
+        self.report({"INFO"}, f"Largest texel error: {largest}")
 
 
 class PALPATE_OT_gap_report(modal_job.ModalJob, bpy.types.Operator):

@@ -43,7 +43,7 @@ class Measured(Subpanel):
             is_shown = shown is not None and shown.amended == amended
             row.operator("palpate.gap_show", text=text, icon="COLOR", depress=is_shown).amended = amended
         if shown is not None:
-            draw_sentences(layout, f"Black: no error. Bright yellow: {shown.top:.2%} of the range.", "COLOR", context)
+            draw_sentences(layout, f"Black: no error. Bright yellow: {shown.scale.words(shown.scale.high)}.", "COLOR", context)
         layout.operator("palpate.gap_report", icon="EXPORT")
 
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from ..core.figures.figure_canvas import new_figure, save_figure, tidy_axes
 from ..core.figures.figure_style import FONT, GREY, INK, NORMAL_COLOUR, SHEAR_COLOUR, SMALL, FigureStyle
+from ..core.figures.quantities import Extent
 from ..core.figures.tactile_image import SensorView, draw_colour_bar
 from ..core.geometry.texels import Texels
-from ..core.response.metrics import scale_limit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -115,8 +115,8 @@ def draw_image_sheet(path: Path, images: Sequence[RunImage]) -> None:
     images : sequence of RunImage
         One at least.
     """
-    style = FigureStyle()
-    peak = max(float(image.normal_force.max(initial=0.0)) for image in images)
+    high = max(float(image.normal_force.max(initial=0.0)) for image in images)
+    scale = FigureStyle().scale_of(Extent(0.0, high, ("N",)))
     shear = max(float(np.linalg.norm(image.shear, axis=1).max(initial=0.0)) for image in images)
     views = [SensorView.of(image.texels, image.normal_force) for image in images]
     across = min(len(images), IMAGES_ACROSS)
@@ -128,10 +128,8 @@ def draw_image_sheet(path: Path, images: Sequence[RunImage]) -> None:
     for axes in grid.flat[len(images) :]:
         axes.set_axis_off()
     for axes, image, view in zip(grid.flat, images, views, strict=False):
-        drawn = view.at_size(tall / max(view.height, view.width)).draw(
-            axes, image.normal_force, image.shear, shear, scale_limit(peak) if peak > 0 else 1.0, style
-        )
+        drawn = view.at_size(tall / max(view.height, view.width)).draw(axes, image.normal_force, image.shear, shear, scale)
         axes.set_title(image.label, fontsize=SMALL, color=INK, pad=2)
-    draw_colour_bar(figure, drawn, figure.add_axes((0.9, 0.25, 0.015, 0.5)), style)
+    draw_colour_bar(figure, drawn, figure.add_axes((0.9, 0.25, 0.015, 0.5)), scale)
     figure.subplots_adjust(0.01, 0.01, 0.88, 1.0 - 0.2 / figure.get_figheight(), 0.1, 0.15)
     save_figure(figure, path, DPI)

@@ -16,6 +16,7 @@ import numpy as np
 
 from ...core.errors import SceneError
 from ...core.figures import color_maps
+from ...core.figures.quantities import ERROR, Scale, error_scale
 from ...core.jobs.job_runner import part_of_job
 from ...core.jobs.progress import Progress
 from ..authoring import exchange
@@ -48,10 +49,10 @@ class Result:
 
 @dataclass(frozen=True)
 class Shown:
-    """What the colours of a sensor show: the error of which model, and the error where they end, as a share of the range."""
+    """What the colours of a sensor show: the error of which model, on which scale."""
 
     amended: bool
-    top: float
+    scale: Scale
 
 
 _results: dict[str, Result] = {}
@@ -152,17 +153,17 @@ def sensor_called(scene, name: str | None, how: str = "name one with --sensor"):
     return sensors[name]
 
 
-def show_on_sensor(context, obj, amended: bool) -> float:
-    """Colour the sensor's vertices by the error of their texels; return the largest, as a share of the range."""
+def show_on_sensor(context, obj, amended: bool) -> str:
+    """Colour the sensor's vertices by the error of their texels; return the largest one in words."""
     from ...core.gap.report.comparison import rms_by_texel
 
     result = of(obj)
     if result is None:
         raise SceneError(f"Nothing was found for '{obj.name}' yet: use Find Gap first.")
     d = result.diagnosis
-    top = float(rms_by_texel(d, d.base.model).max())
-    values = rms_by_texel(d, d.best.model if amended else d.base.model)
     texels = _texels(context, obj)
+    base, values = (ERROR.values(rms_by_texel(d, model), texels) for model in (d.base.model, (d.base, d.best)[amended].model))
+    scale = error_scale(float(base.max()))
     if len(texels) != len(values):
         raise SceneError(
             f"The rig's sensor has {len(values)} texels and '{obj.name}' has {len(texels)}: give both the same grid to see it."
@@ -173,15 +174,15 @@ def show_on_sensor(context, obj, amended: bool) -> float:
         mesh.color_attributes.remove(old)
     layer = mesh.color_attributes.new(ATTRIBUTE, "FLOAT_COLOR", "POINT")
     colours = np.full((len(mesh.vertices), 4), (0.2, 0.2, 0.2, 1.0))
-    colours[texels.vertex, :3] = color_maps.linear(color_maps.colors("INFERNO", values / max(top, 1e-300)))
+    colours[texels.vertex, :3] = color_maps.linear(scale.colors(values))
     layer.data.foreach_set("color", colours.ravel())
     mesh.color_attributes.active_color = layer
-    _shown[identity.key(obj)] = Shown(amended, top)
+    _shown[identity.key(obj)] = Shown(amended, scale)
     for area in context.screen.areas if context.screen else ():
         if area.type == "VIEW_3D":  # the colours of the scale, not those of a lit surface
             area.spaces.active.shading.color_type = "VERTEX"
             area.spaces.active.shading.light = "FLAT"
-    return top
+    return scale.words(float(values.max()))
 
 
 def _texels(context, obj):

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 
@@ -34,7 +36,10 @@ STOPS = {
 }
 """(m, 3) float, sRGB, by the name that scenes use."""
 
-_SIGNED = _stops("053061 2166ac 4393c3 92c5de d1e5f0 f7f7f7 fddbc7 f4a582 d6604d b2182b 67001f")  # ColorBrewer, RdBu
+SIGNED = "SIGNED"
+"""Map of values with a sign: blue below zero, white at it, red above."""
+ALL = {**STOPS, SIGNED: _stops("053061 2166ac 4393c3 92c5de d1e5f0 f7f7f7 fddbc7 f4a582 d6604d b2182b 67001f")}
+"""The maps to choose from, and that of signed values (ColorBrewer, RdBu)."""
 
 NAMES = {
     "VIRIDIS": ("Viridis", "Dark blue to yellow, perceptually uniform"),
@@ -59,15 +64,13 @@ def srgb(linear_values: np.ndarray) -> np.ndarray:
 
 def colors(name: str, share: np.ndarray) -> np.ndarray:
     """(n, 3) sRGB colours of (n,) values from 0 to 1; what lies outside has the colour of the nearer end."""
-    return _mixed(STOPS[name], share)
-
-
-def signed_colors(share: np.ndarray) -> np.ndarray:
-    """(n, 3) sRGB colours of (n,) values from −1 to 1: blue below zero, white at it, red above."""
-    return _mixed(_SIGNED, 0.5 + 0.5 * share)
-
-
-def _mixed(stops: np.ndarray, share: np.ndarray) -> np.ndarray:
+    stops, share = ALL[name], np.clip(share, 0.0, 1.0)
     at = np.linspace(0.0, 1.0, len(stops))
-    share = np.clip(share, 0.0, 1.0)
     return np.column_stack([np.interp(share, at, channel) for channel in stops.T])
+
+
+def matplotlib_colormap(name: str) -> Any:
+    """Return a map as an object of matplotlib."""
+    from matplotlib.colors import LinearSegmentedColormap
+
+    return LinearSegmentedColormap.from_list(name, [tuple(color) for color in ALL[name]], N=1024)

@@ -71,7 +71,7 @@ def label_picture(
     background.set_axis_off()
 
     sensors = recording.at(frame).sensors
-    top, strongest = style.scale_limit(recording, texels), metrics.peak_shear(recording)
+    scale, strongest = style.scale(recording, texels), metrics.peak_shear(recording)
     views = [SensorView.of(texels[name], recording.sensors[name].normal_force.sum(axis=0)) for name in texels]
     image = None
     # A column at the right edge: one tactile image per sensor over each other, the colour bar beside them.
@@ -88,12 +88,12 @@ def label_picture(
         )
         y -= each
         axes = figure.add_axes((x / width, y / height, column / width, each / height))
-        values = style.values(sensors[name], texels[name])
+        values = scale.values(sensors[name], texels[name])
         view = view.at_size(min(column / view.width, each / view.height))
-        image = view.draw(axes, values, sensors[name].shear, strongest, top, style, edge="#ffffff80")
+        image = view.draw(axes, values, sensors[name].shear, strongest, scale, edge="#ffffff80")
     if image is not None:
         bar = figure.add_axes(((width - bar_room) / width, y / height, 0.12 / width, (y_top - y) / height))
-        draw_colour_bar(figure, image, bar, style, ink="white")
+        draw_colour_bar(figure, image, bar, scale, ink="white")
     for label in labels:
         _draw_label(figure, label, width, height)
     save_figure(figure, path, dpi)

@@ -81,7 +81,7 @@ def side_by_side(
     axes.imshow(picture, aspect="auto", interpolation="antialiased")
     axes.set_axis_off()
 
-    top, strongest = style.scale_limit(recording, texels), metrics.peak_shear(recording)
+    scale, strongest = style.scale(recording, texels), metrics.peak_shear(recording)
     left, room = wide + _MARGIN, _SIDE - 2 * _MARGIN
     parts = [_Part.of(own, recording.sensors[name], strongest) for name, own in shown.items()]
     places = _placed(parts, room, _TALL - _CURVE - _BAR - _MARGIN)
@@ -93,11 +93,11 @@ def side_by_side(
         words = name if len(name) * _LETTER < part.room else name[: int(part.room / _LETTER) - 1] + "…"
         figure.text(x / width, y / _TALL, words, fontsize=FONT, color=colour, weight="bold", va="top")
         place = axes_at(x, y - _NAME - up, across, up)
-        image = view.draw(place, style.values(sensor, own)[i], sensor.shear[i], strongest, top, style)
+        image = view.draw(place, scale.values(sensor, own)[i], sensor.shear[i], strongest, scale)
         draw_scale_key(figure, (x, y - _NAME - up - 0.1), view, part.strongest, inches, room=part.room)
         low = min(low, y - _NAME - up - part.below(inches))
     if image is not None:
-        draw_colour_bar(figure, image, axes_at(left + 0.1, low - 0.24, room - 0.2, 0.1), style)
+        draw_colour_bar(figure, image, axes_at(left + 0.1, low - 0.24, room - 0.2, 0.1), scale)
     curve = min(low - _BAR, _MOST_CURVE)
     _force_so_far(axes_at(left + 0.3, 0.3, room - 0.38, curve - 0.5), recording, i, shown)
     save_figure(figure, path, dpi)

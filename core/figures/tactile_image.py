@@ -10,7 +10,9 @@ import numpy as np
 
 from ..geometry.layout.grid_layout import GridLayout
 from ..geometry.texels import Texels
-from .figure_style import FONT, INK, SMALL, FigureStyle, force_label
+from . import color_maps
+from .figure_style import FONT, INK, SMALL
+from .quantities import Scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -156,13 +158,15 @@ class SensorView:
         values: np.ndarray,
         shear: np.ndarray,
         strongest: float,
-        top: float,
-        style: FigureStyle,
+        scale: Scale,
         edge: str = OUTLINE,
     ) -> Any:
         """Draw one tactile image; the arrow of the `strongest` shear is as long as texels, or arrows, are apart."""
         layout = self.texels.layout
-        colours: dict[str, Any] = {"cmap": style.matplotlib_colormap(), "clim": (0.0, top)}
+        colours: dict[str, Any] = {
+            "cmap": color_maps.matplotlib_colormap(scale.colour_map),
+            "clim": (scale.low, scale.high),
+        }
         image: Any
         if self.corners is not None and self.triangles is not None:
             image = _draw_surface(axes, self.triangles, self.corners, values, colours)
@@ -300,7 +304,7 @@ _LETTER = 0.066
 def _arrow_scale(view: SensorView, strongest: float, inches: float) -> tuple[str, float]:
     """Words for the arrow below the images, and its length in inches."""
     value = float(f"{strongest:.1g}")
-    return f"{force_label(value)} shear", value / strongest * view.arrow * inches
+    return f"{value:g} N shear", value / strongest * view.arrow * inches
 
 
 def widest_scale_key(view: SensorView, strongest: float, inches: float) -> float:
@@ -363,7 +367,7 @@ def draw_scale_key(
         figure.text((stop + 0.07) / width, y / height, label, **words)
 
 
-def draw_colour_bar(figure: Figure, image: Any, axes: Axes, style: FigureStyle, ink: str = INK) -> None:
+def draw_colour_bar(figure: Figure, image: Any, axes: Axes, scale: Scale, ink: str = INK) -> None:
     """Fill `axes` with the colour bar of an image; it is horizontal where the axes are wider than high."""
     from matplotlib.ticker import MaxNLocator
 
@@ -374,7 +378,7 @@ def draw_colour_bar(figure: Figure, image: Any, axes: Axes, style: FigureStyle, 
     bar.update_ticks()
     bar.ax.tick_params(labelsize=FONT, colors=ink, length=2.5, width=0.6)
     long = (place.width * width if lies else place.height * height) > 1.9  # inches; else the words need two lines
-    label = (" " if long or lies else "\n").join(style.quantity_label)
+    label = (" " if long or lies else "\n").join(scale.label)
     bar.set_label(label, fontsize=FONT, color=ink, labelpad=2.0 if lies else 4.0)
     bar.outline.set_edgecolor(ink)
     bar.outline.set_linewidth(0.5)

@@ -15,6 +15,7 @@ from ..model.recording import Recording
 from ..response import metrics
 from .figure_canvas import new_figure, save_figure
 from .figure_style import FONT, GREY, INK, SMALL, FigureStyle
+from .quantities import Scale
 from .tactile_image import SMALLEST_ARROW, SensorView, draw_colour_bar, draw_scale_key, scale_key_width
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ def strip_figure(
     frames: Sequence[int] | np.ndarray | None = None,
     style: FigureStyle | None = None,
 ) -> Figure:
-    """Return a figure of the tactile images of all sensors over time: normal force or pressure in colour, shear as arrows.
+    """Return a figure of the tactile images of all sensors over time: a quantity in colour, shear as arrows.
 
     Parameters
     ----------
@@ -67,8 +68,7 @@ def strip_figure(
         recording=recording,
         index=np.searchsorted(recording.frames, chosen),
         strongest_shear=metrics.peak_shear(recording),
-        limit=style.scale_limit(recording, texels),
-        style=style,
+        scale=style.scale(recording, texels),
     )
     image, y = None, page.height - _ABOVE
     for row, (name, view) in enumerate(zip(texels, views, strict=True)):
@@ -78,7 +78,7 @@ def strip_figure(
     assert image is not None
     x, y, across, up = page.colour_bar()
     bar = strip.figure.add_axes((x / page.width, y / page.height, across / page.width, up / page.height))
-    draw_colour_bar(strip.figure, image, bar, style)
+    draw_colour_bar(strip.figure, image, bar, strip.scale)
     return strip.figure
 
 
@@ -141,8 +141,7 @@ class _Strip:
         Numbers of the chosen frames in the recording.
     strongest_shear : float, N
         Of the recording, which the longest arrow stands for.
-    limit : float, N or kPa
-        End of the colour scale.
+    scale : Scale
     """
 
     figure: Figure
@@ -150,21 +149,20 @@ class _Strip:
     recording: Recording
     index: np.ndarray
     strongest_shear: float
-    limit: float
-    style: FigureStyle
+    scale: Scale
 
     def draw_row(self, row: int, y: float, name: str, view: SensorView) -> Any:
         """Draw the images of one sensor, `y` inches above the lower edge, with its name and scale; return the last image."""
         page, figure, sensor = self.page, self.figure, self.recording.sensors[name]
         across, up = page.cell - 0.06, page.rows[row]
-        values = self.style.values(sensor, view.texels)
+        values = self.scale.values(sensor, view.texels)
         inches = min(across / view.width, up / view.height)
         view = view.at_size(inches)
         image = None
         for column, i in enumerate(self.index):
             x = _LEFT + column * page.cell + 0.03
             axes = figure.add_axes((x / page.width, y / page.height, across / page.width, up / page.height))
-            image = view.draw(axes, values[i], sensor.shear[i], self.strongest_shear, self.limit, self.style)
+            image = view.draw(axes, values[i], sensor.shear[i], self.strongest_shear, self.scale)
             axes.set_anchor("C")
             if row == 0:
                 axes.set_title(f"{self.recording.times[i]:.2f} s", fontsize=FONT, color=INK, pad=4)

@@ -37,9 +37,9 @@ def texel_numbers(
     frame: int,
     style: FigureStyle | None = None,
 ) -> None:
-    """Write the force or pressure of every texel of one sensor at one frame as numbers on its tactile image.
+    """Write the values of one sensor's texels at one frame as numbers on its tactile image.
 
-    Small forces are in millinewtons, small pressures in pascals, so that three digits suffice. The colours
+    Numbers below one are in a finer unit where there is one, so that three digits suffice. The colours
     are those of the sensor's other figures. Where a journal's column is too narrow for the numbers, the figure is wider.
 
     Parameters
@@ -62,9 +62,13 @@ def texel_numbers(
             f"Sensor '{name}' has {len(own)} texels, whose numbers could not be read (at most {MOST}): "
             "export them as CSV instead."
         )
-    values = style.values(recording.at(frame).sensors[name], own)
+    scale = style.scale(recording, texels)
+    values = scale.values(recording.at(frame).sensors[name], own)
+    peak = float(np.abs(values).max(initial=0.0))
+    scale, factor = scale.in_finer_unit(peak)
+    values = values * factor
     view = SensorView.of(own, recording.sensors[name].normal_force.sum(axis=0))
-    unit, words = _numbers(values, style.quantity)
+    words = [_digits(value, peak * factor) for value in values]
 
     # The closest pair of texels must leave room for a number of 8 pt between their middles.
     letters = max(len(word) for word in words) * _LETTER * SMALL / 72 + 0.05
@@ -75,26 +79,19 @@ def texel_numbers(
     axes = figure.add_axes(
         (_SIDE / width, _SIDE / height, inches * view.width / width, inches * view.height / height), anchor="NW"
     )
-    image = view.draw(axes, values, np.zeros((len(own), 2)), 0.0, style.scale_limit(recording, texels), style)
+    image = view.draw(axes, values, np.zeros((len(own), 2)), 0.0, scale)
     if not isinstance(own.layout, GridLayout):  # texels lie on the very rim there: room for their numbers
         room = 0.5 * letters / inches
         axes.set_xlim(view.window[0] - room, view.window[1] + room)
         axes.set_ylim(view.window[2] - room, view.window[3] + room)
     _write_numbers(axes, view, words, image.cmap(image.norm(values)))
     time = recording.times[int(np.searchsorted(recording.frames, frame))]
-    title = f"{name}, {time:.2f} s, numbers in {unit}"
+    title = f"{name}, {time:.2f} s, numbers in {scale.unit}"
     figure.text(_SIDE / width, 1 - 0.05 / height, title, fontsize=FONT, color=INK, weight="bold", va="top")
     tall = max(inches * view.height, 1.2)
     bar = figure.add_axes(((width - _RIGHT + 0.08) / width, _SIDE / height, 0.11 / width, tall / height))
-    draw_colour_bar(figure, image, bar, style)
+    draw_colour_bar(figure, image, bar, scale)
     save_figure(figure, path, style.dpi)
-
-
-def _numbers(values: np.ndarray, quantity: str) -> tuple[str, list[str]]:
-    """Return the unit that suits the largest value, and the values in it as words."""
-    peak = float(values.max(initial=0.0))
-    unit, factor = _unit(peak, quantity)
-    return unit, [_digits(value * factor, peak * factor) for value in values]
 
 
 def _write_numbers(axes: Axes, view: SensorView, words: list[str], colours: np.ndarray) -> None:
@@ -111,12 +108,6 @@ def _write_numbers(axes: Axes, view: SensorView, words: list[str], colours: np.n
         # Without a grid, numbers at the edge lie half on the white page.
         rim = [] if on_grid else [withStroke(linewidth=1.2, foreground=around, alpha=0.55)]
         axes.text(x, y, word, fontsize=SMALL, color=ink, ha="center", va="center_baseline", path_effects=rim)
-
-
-def _unit(peak: float, quantity: str) -> tuple[str, float]:
-    if quantity == "pressure":
-        return ("Pa", 1e3) if peak < 1.0 else ("kPa", 1.0)
-    return ("mN", 1e3) if peak < 1.0 else ("N", 1.0)
 
 
 def _digits(value: float, peak: float) -> str:

@@ -127,13 +127,13 @@ def read_sensors(folders: Sequence[Path], images: bool = True) -> Bake:
         manifest.check_files(folder, images)
     recordings = {name: load_recording(folder / RECORDING_NAME) for name, folder in places.items()}
     sensors = {name: load_sensor(folder / SENSOR_NAME) for name, folder in places.items()}
+    parameters = {name: _parameters(folder, manifests[folder]) for name, folder in places.items()}
+    recorded = {name: replace(own.sensors[name], unit=parameters[name].unit) for name, own in recordings.items()}
     return Bake(
-        recording=replace(
-            next(iter(recordings.values())), sensors={name: own.sensors[name] for name, own in recordings.items()}
-        ),
+        recording=replace(next(iter(recordings.values())), sensors=recorded),
         texels={name: texels for name, (texels, _) in sensors.items()},
         painted={name: painted for name, (_, painted) in sensors.items()},
-        parameters={name: _parameters(folder, manifests[folder]) for name, folder in places.items()},
+        parameters=parameters,
         folders=places,
         manifests={name: manifests[folder] for name, folder in places.items()},
     )

@@ -185,6 +185,7 @@ def load_with_sensors(path: str | os.PathLike) -> tuple[Recording, Sensors]:
                 if len(texels) != recording.sensors[name].normal_force.shape[1]:
                     raise ParameterError("its texels and its forces differ in number")
                 sensors[name] = texels, painted, parameters
+                recording.sensors[name].unit = parameters.unit
     except ParameterError as error:
         raise FileError(f"'{path}' is damaged ({error}): write it again.") from error
     return recording, sensors

@@ -154,6 +154,7 @@ class FrameTable:
         folder: Path | None = None,
     ):
         self._bodies, self._sensors, self._channels = tuple(bodies), tuple(texels), channels
+        self._units: dict[str, str] = {}
         kind = row_type(len(bodies), texels, channels)
         self._row = np.zeros(1, kind)
         self._parts = {name: self._row[name] for name in kind.names or ()}
@@ -205,7 +206,8 @@ class FrameTable:
             channels = self._channels.get(name)
             if channels is not None:
                 channels = replace(channels, values=part(f"sensor_{i}/{VALUES}"), clipped=part(f"sensor_{i}/{CLIPPED}"))
-            sensors[name] = SensorRecording(**{key: part(f"sensor_{i}/{key}") for key in SENSOR_FIELDS}, channels=channels)
+            own = {key: part(f"sensor_{i}/{key}") for key in SENSOR_FIELDS}
+            sensors[name] = SensorRecording(**own, channels=channels, unit=self._units.get(name, SensorRecording.unit))
         return Recording(
             **{name: part(name) for name in ("frames", "times", "poses", "velocities")},
             sensors=sensors,
@@ -225,6 +227,7 @@ class FrameTable:
         }
         for i, sensor in enumerate(self._sensors):
             own = frame.sensors[sensor]
+            self._units[sensor] = own.unit
             values |= {f"sensor_{i}/{name}": getattr(own, name) for name in SENSOR_FIELDS}
             if own.channels is not None:
                 values |= {f"sensor_{i}/{VALUES}": own.channels.values, f"sensor_{i}/{CLIPPED}": own.channels.clipped}

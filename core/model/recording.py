@@ -42,7 +42,7 @@ class SensorArrays:
     slip : (n,) float, m/s
         Relative tangential speed (Eq. 6).
     contact : (n,) bool
-    reading : (n,) float, the sensor's unit
+    reading : (n,) float, in `unit`
     net_force : (3,) float, N
     net_torque : (3,) float, N·m
         About the origin of the sensor's body.
@@ -50,6 +50,8 @@ class SensorArrays:
         Force-weighted mean of the contact points; zero without contact.
     channels : VectorReadings or None
         Readings of several channels, of a sensor that has such a read-out.
+    unit : str
+        The sensor's, of its reading.
     """
 
     normal_force: np.ndarray
@@ -63,9 +65,10 @@ class SensorArrays:
     net_torque: np.ndarray
     centre_of_pressure: np.ndarray
     channels: VectorReadings | None = None
+    unit: str = "N"
 
 
-SENSOR_FIELDS = tuple(item.name for item in fields(SensorArrays) if item.name != "channels")
+SENSOR_FIELDS = tuple(item.name for item in fields(SensorArrays) if item.name not in ("channels", "unit"))
 """Names of the arrays that every sensor has, in the order in which files hold them."""
 
 
@@ -116,12 +119,14 @@ class SensorRecording(SensorArrays):
 
     def at(self, i: int) -> SensorFrame:
         """Return the recorded frame with index `i`."""
-        return SensorFrame(**{name: getattr(self, name)[i] for name in SENSOR_FIELDS}, channels=self._channels(i))
+        return SensorFrame(
+            **{name: getattr(self, name)[i] for name in SENSOR_FIELDS}, channels=self._channels(i), unit=self.unit
+        )
 
     def part(self, frames: slice) -> SensorRecording:
         """Return some of the frames, by their indices; the arrays are views."""
         arrays = {name: getattr(self, name)[frames] for name in SENSOR_FIELDS}
-        return SensorRecording(**arrays, channels=self._channels(frames))
+        return SensorRecording(**arrays, channels=self._channels(frames), unit=self.unit)
 
     def arrays(self) -> list[np.ndarray]:
         """Return all arrays with an axis of length F."""
@@ -137,7 +142,7 @@ def _all_frames(parts: Sequence[SensorArrays], put: Callable[[list[np.ndarray]],
     arrays = {name: put([getattr(part, name) for part in parts]) for name in SENSOR_FIELDS}
     own = [part.channels for part in parts if part.channels is not None]
     channels = replace(own[0], values=put([o.values for o in own]), clipped=put([o.clipped for o in own])) if own else None
-    return SensorRecording(**arrays, channels=channels)
+    return SensorRecording(**arrays, channels=channels, unit=parts[0].unit)
 
 
 @dataclass

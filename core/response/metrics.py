@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-
 import numpy as np
 
 from ..geometry.texels import Texels
@@ -107,23 +105,10 @@ def free_moment(sensor: SensorRecording | SensorFrame) -> np.ndarray:
     return sensor.net_torque - np.cross(sensor.centre_of_pressure, sensor.net_force)
 
 
-def pressure(normal_force: np.ndarray, texels: Texels) -> np.ndarray:
-    """Return normal forces (..., n) in N over the texels' areas, Pa."""
-    return normal_force / texels.area
-
-
 def peak_force(recording: Recording) -> float:
     """Return the largest normal force of any texel at any frame, N; one newton without any contact."""
-    return _peak(sensor.normal_force for part in recording.blocks() for sensor in part.sensors.values())
-
-
-def peak_pressure(recording: Recording, texels: Mapping[str, Texels]) -> float:
-    """Return the largest pressure on any texel at any frame, Pa; one pascal without any contact."""
-    return _peak(pressure(part.sensors[name].normal_force, texels[name]) for part in recording.blocks() for name in texels)
-
-
-def _peak(values: Iterable[np.ndarray]) -> float:
-    peak = max((float(value.max(initial=0.0)) for value in values), default=0.0)
+    sensors = (sensor for part in recording.blocks() for sensor in part.sensors.values())
+    peak = max((float(sensor.normal_force.max(initial=0.0)) for sensor in sensors), default=0.0)
     return peak if peak > 0 else 1.0
 
 

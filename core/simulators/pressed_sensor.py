@@ -97,6 +97,7 @@ class PressedSensor:
     ):
         self._one_target = isinstance(target, TriangleMesh | Shape)
         targets = [target] if isinstance(target, TriangleMesh | Shape) else list(target)
+        self._unit = item.sensor.parameters.unit
         model = self._model = PressedModel(item.sensor, targets, dt, threads)
         out = self._out = PressedTexels.zero(1, model.texels, len(targets))
         memory = self._memory = StepMemory.zero(model.texels, len(targets))
@@ -211,7 +212,7 @@ class PressedSensor:
             raise ParameterError(f"A target went through the sensor within one step: {REMEDY}")
         if out is None:
             arrays = zip(SENSOR_FIELDS, self._texels, strict=True)
-            texels = SensorFrame(**{name: values.copy() for name, values in arrays}, channels=None)
+            texels = SensorFrame(**{name: values.copy() for name, values in arrays}, channels=None, unit=self._unit)
             return Contact(texels, self._force.copy(), self._torque.copy())
         for name, values in zip(SENSOR_FIELDS, self._texels, strict=True):
             np.copyto(getattr(out.texels, name), values)

@@ -318,6 +318,7 @@ class Simulation:
             net_force=net[:, :3].copy(),
             net_torque=net[:, 3:] + _cross(center, net[:, :3]),
             centre_of_pressure=centre_of_pressure,
+            unit=self.scenario.sensors[i].parameters.unit,
         )
         readout = self.scenario.sensors[i].channels
         if readout is not None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from ...errors import PalpateError
 from ...figures.figure_style import FigureStyle
+from ...figures.quantities import Quantity
 from ...geometry.layout.grid_layout import GridLayout
 from ...io.bake_reader import Bake
 from ...io.file_writing import write_file
@@ -32,8 +33,8 @@ _POINT = np.dtype([*((name, "<f4") for name in POINT_FIELDS), ("contact", "u1")]
 _CHUNK_BYTES = 1 << 20
 
 
-def write_mcap(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Path]]:
-    """Write ``palpate.mcap``."""
+def write_mcap(bake: Bake, folder: Path, style: FigureStyle) -> Job[list[Path]]:
+    """Write ``palpate.mcap``, whose tactile images show the quantity of the style."""
     try:
         import rosbags  # noqa: F401 of the messages
         from mcap.writer import CompressionType, Writer
@@ -47,7 +48,7 @@ def write_mcap(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Path]]
     with write_file(path) as temporary, open(temporary, "wb") as file:
         writer = Writer(file, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD)
         writer.start(profile=Profile.ROS2, library="palpate")
-        output = _Output(writer, bake)
+        output = _Output(writer, bake, style.shown)
         names, frames = list(bake.texels), len(bake.recording.frames)
         done = 0
         for part in bake.recording.blocks():
@@ -62,8 +63,8 @@ def write_mcap(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Path]]
 class _Output:
     """Channels of a file, and what goes into them."""
 
-    def __init__(self, writer: Any, bake: Bake):
-        self._writer, self._bake = writer, bake
+    def __init__(self, writer: Any, bake: Bake, shown: Quantity):
+        self._writer, self._bake, self._shown = writer, bake, shown
         self._schemas: dict[str, int] = {}
         recording = bake.recording
         self._bodies = _frame_names(recording.body_names)
@@ -111,7 +112,8 @@ class _Output:
                 for field in ("normal_force", "reading", "depth", "slip", "contact"):
                     points[field] = getattr(own, field)
                 points["shear_x"], points["shear_y"] = own.shear.T
-                picture = self._bake.texels[name].layout.image(own.normal_force)[::-1]
+                texels = self._bake.texels[name]
+                picture = texels.layout.image(self._shown.values(own, texels))[::-1]
                 content = {
                     "texels": ros2_messages.point_cloud(time, frame, points),
                     "tactile_image": ros2_messages.image(time, frame, picture),
@@ -136,6 +138,7 @@ class _Output:
                 "sensor": name,
                 "frame": self._frames[name],
                 "unit": self._bake.parameters[name].unit,
+                "tactile_image": [self._shown.name, self._shown.unit_of(recording.sensors[name])],
                 "parameters": asdict(self._bake.parameters[name]),
                 **{key: getattr(texels, key).tolist() for key in ("position", "normal", "tangent", "area")},
                 **({} if grid is None else {"row": grid.row.tolist(), "column": grid.column.tolist()}),

@@ -27,7 +27,7 @@ def write_png(bake: Bake, folder: Path, style: FigureStyle) -> Job[list[Path]]:
     """Write one picture per frame and ``scale.json`` into a folder per sensor; all sensors share one colour scale."""
     recording = bake.recording
     written: list[Path] = []
-    top = style.scale_limit(recording, bake.texels)
+    shown = style.scale(recording, bake.texels)
     for name, stem in folder_names(bake.texels).items():
         yield sensor_progress(bake, name)
         own_folder = writable_folder(folder / stem, create=True)
@@ -36,18 +36,18 @@ def write_png(bake: Bake, folder: Path, style: FigureStyle) -> Job[list[Path]]:
         mask = layout.mask()
         magnified = max(1, -(-_LEAST_PIXELS // max(layout.shape)))
         for i, frame in enumerate(recording.frames):
-            own = style.values(recorded.at(i), texels)
-            color = color_maps.colors(style.colour_map, layout.image(own).ravel() / top).reshape(*layout.shape, 3)
+            own = shown.values(recorded.at(i), texels)
+            color = shown.colors(layout.image(own).ravel()).reshape(*layout.shape, 3)
             pixels = np.dstack([color, mask])[::-1]
             pixels = np.repeat(np.repeat(pixels, magnified, axis=0), magnified, axis=1)
             path = own_folder / f"tactile_{frame:04d}.png"
             save_pixels((pixels * 255 + 0.5).astype(np.uint8), path)
             written.append(path)
         scale = {
-            "quantity": " ".join(style.quantity_label),
-            "first_colour": 0.0,
-            "last_colour": top,
-            "colour_map": style.colour_map,
+            "quantity": " ".join(shown.label),
+            "first_colour": shown.low,
+            "last_colour": shown.high,
+            "colour_map": shown.colour_map,
         }
         written += _write_channels(bake, name, own_folder)
         with atomic_write(own_folder / "scale.json") as temporary:
@@ -69,7 +69,7 @@ def _write_channels(bake: Bake, name: str, folder: Path) -> list[Path]:
     written = []
     for values, frame in zip(channels.values, recording.frames, strict=True):
         images = np.moveaxis(layout.image((values - rest) / top), 2, 0)
-        color = color_maps.signed_colors(images.ravel()).reshape(*images.shape, 3)
+        color = color_maps.colors(color_maps.SIGNED, 0.5 + 0.5 * images.ravel()).reshape(*images.shape, 3)
         tiles = np.concatenate([color, np.broadcast_to(mask[None, ..., None], (*images.shape, 1))], axis=3)
         pixels = np.concatenate(list(tiles), axis=1)[::-1]
         pixels = np.repeat(np.repeat(pixels, magnified, axis=0), magnified, axis=1)

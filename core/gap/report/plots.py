@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...effects.engine.registry import kind_of
+from ...figures import color_maps
 from ...figures.figure_canvas import new_figure, save_figure, tidy_axes
 from ...figures.figure_style import GREY, INK, NORMAL_COLOUR, SHEAR_COLOUR, WIDTHS
+from ...figures.quantities import ERROR, error_scale
 from ...geometry.layout.grid_layout import GridLayout
 from ...jobs.progress import Job, Progress
 from ..forward.contact_phases import PHASES
@@ -139,8 +141,8 @@ def error_map(result: Diagnosis) -> Figure:
 
 
 def _maps(result: Diagnosis) -> list[tuple[str, np.ndarray]]:
-    """Error of each texel, percent of the range, by the name of the model."""
-    return [(label, 100.0 * rms_by_texel(result, model)) for label, model, _ in _models(result)]
+    """Error of each texel, in the unit of :data:`.ERROR`, by the name of the model."""
+    return [(label, ERROR.values(rms_by_texel(result, model), result.rig.texels)) for label, model, _ in _models(result)]
 
 
 def _is_row(result: Diagnosis) -> bool:
@@ -153,7 +155,8 @@ def _draw_error_maps(figure: Figure, place: tuple[float, float, float, float], r
     """Draw the maps and their colour bar into a part of a figure: left, bottom, width and height, as shares of it."""
     maps, texels = _maps(result), result.rig.texels
     layout, position = texels.layout, texels.position
-    top = max(float(values.max()) for _, values in maps)
+    scale = error_scale(max(float(values.max()) for _, values in maps))
+    colours: dict[str, Any] = {"cmap": color_maps.matplotlib_colormap(scale.colour_map), "vmin": scale.low, "vmax": scale.high}
     left, bottom, width, height = place
     image: Any = None
     for i, (label, values) in enumerate(maps):
@@ -161,9 +164,9 @@ def _draw_error_maps(figure: Figure, place: tuple[float, float, float, float], r
         axes = figure.add_axes((start, bottom, 0.375 * width, height))
         if isinstance(layout, GridLayout):
             picture: Any = np.ma.masked_array(layout.image(values), ~layout.mask())
-            image = axes.imshow(picture, origin="lower", cmap="inferno", vmin=0.0, vmax=top, interpolation="nearest")
+            image = axes.imshow(picture, origin="lower", interpolation="nearest", **colours)
         else:
-            image = axes.scatter(position[:, 0], position[:, 1], c=values, s=14, cmap="inferno", vmin=0.0, vmax=top)
+            image = axes.scatter(position[:, 0], position[:, 1], c=values, s=14, **colours)
             axes.set_aspect("equal")
         axes.set_title(label, fontsize=8.5, color=INK)
         axes.set_xticks([])
@@ -172,7 +175,7 @@ def _draw_error_maps(figure: Figure, place: tuple[float, float, float, float], r
         image, cax=figure.add_axes((left + 0.835 * width, bottom + 0.095 * height, 0.0365 * width, 0.81 * height))
     )
     bar.ax.tick_params(labelsize=8, colors=INK)
-    bar.set_label("error (% of range)", fontsize=8.5, color=INK)
+    bar.set_label(f"{scale.quantity.label[0]} ({scale.unit})", fontsize=8.5, color=INK)
 
 
 def _draw_error_line(axes: Axes, result: Diagnosis) -> None:

@@ -45,7 +45,7 @@ def test_from_a_rig_to_an_amended_sensor(scene, rig_file, tmp_path):
 
     assert gap_results.shown_on(obj) is None
     assert bpy.ops.palpate.gap_show(amended=False) == {"FINISHED"}
-    assert not gap_results.shown_on(obj).amended and 0.0 < gap_results.shown_on(obj).top < 1.0
+    assert not gap_results.shown_on(obj).amended and 0.0 < gap_results.shown_on(obj).scale.high < 100.0
     layer = obj.data.color_attributes[gap_results.ATTRIBUTE]
     colours = np.zeros(4 * len(obj.data.vertices))
     layer.data.foreach_get("color", colours)

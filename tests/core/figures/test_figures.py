@@ -120,7 +120,7 @@ def test_no_text_is_smaller_than_eight_points_or_leaves_the_figure(tmp_path, mon
     both = {"pad": texels, long_name: texels}
     parameters = dict.fromkeys(both, SensorParameters())
     for width in figure_style.WIDTHS:
-        for quantity in ("force", "pressure"):
+        for quantity in ("force", "pressure", "reading", "slip"):
             look = FigureStyle(width=width, quantity=quantity)
             tactile_strip(tmp_path / "a.png", recording, both, style=look)
             time_curves(tmp_path / "c.png", recording, both, parameters, style=look)
