@@ -96,8 +96,10 @@ def run(arguments: argparse.Namespace) -> int:
         given: dict[str, Any] = figure_options.gel_options_from(arguments)
         given |= {"kinds": tuple(arguments.only)} if arguments.only else {}
         given |= {"formats": tuple(arguments.format)} if arguments.format else {}
+        style = figure_options.figure_style_from(arguments, **vars(bake_display.figure_style(scene)))
+        bake_display.take_style(scene, style)
         request = FigureRequest(
-            style=figure_options.figure_style_from(arguments, **vars(bake_display.figure_style(scene))),
+            style=style,
             frames=tuple(arguments.frame or ()),
             sensors=tuple(arguments.sensor or ()),
             engine=arguments.engine,

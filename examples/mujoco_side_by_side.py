@@ -14,8 +14,8 @@ import mujoco
 import numpy as np
 import trimesh
 
-from palpate.core.figures.figure_canvas import new_figure, save_figure
 from palpate.core.figures import color_maps
+from palpate.core.figures.figure_canvas import new_figure, save_figure
 from palpate.core.figures.figure_style import GREY, INK
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.simulators.pressed_sensor import PressedSensor

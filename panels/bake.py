@@ -2,6 +2,7 @@
 """Panels of a scene: bake, display of results, figures."""
 
 from ..addon.display import baked_scene
+from ..addon.properties import scene_properties
 from ..addon.properties.scene_units import name_in_units
 from ..addon.session import frame_status, session_state
 from .subpanels import Subpanel, draw_named, draw_sentences
@@ -63,7 +64,8 @@ class Display(Subpanel):
         column = layout.column(align=True)
         column.prop(own, "use_auto_range")
         if not own.use_auto_range:
-            column.prop(own, "range_max_pressure" if own.quantity == "PRESSURE" else "range_max")
+            for name in scene_properties.range_names(own):
+                column.prop(own, name)
         row = layout.row(align=True)
         row.prop(own, "show_indentation")
         if own.show_indentation:

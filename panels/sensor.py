@@ -3,10 +3,12 @@
 
 import bpy
 
-from ..addon.authoring import laid_sensors
+from ..addon.authoring import laid_sensors, sensor_report
+from ..addon.display import bake_display
 from ..addon.properties.scene_units import name_in_units
 from ..addon.scene import attached_objects
 from ..addon.session import first_use, frame_status, session_state
+from ..core.figures.quantities import QUANTITIES, Extent
 from ..core.model.sensor_parameters import CONTACT, FRICTION, HUNT_CROSSLEY, LINEAR, READOUT, SENSOR_PARAMETERS
 from ..operators import presets
 from .subpanels import ROOT, Subpanel, draw_named, draw_sentences
@@ -216,7 +218,7 @@ class Readout(Subpanel):
         readings = status.frame.sensors.get(context.object.name) if status.frame is not None else None
         box = layout.box().column()
         box.label(text=f"Frame {context.scene.frame_current}:" + ("" if readings else " not computed"))
-        for name, value in _measured(readings, settings.unit):  # as many lines without numbers: what is below does not jump
+        for name, value in _measured(context, readings):  # as many lines without numbers: what is below does not jump
             box.label(text=f"{name}: {value}")
         if readings is not None and readings.channels is not None:
             box.label(text=_summary(readings.channels))
@@ -252,9 +254,11 @@ def _sentence_of_net(scene, obj) -> str:
     )
 
 
-def _measured(readings, unit: str) -> list[tuple[str, str]]:
+def _measured(context, readings) -> list[tuple[str, str]]:
     """Return names and values of what a sensor measures at a frame; dashes where there is nothing."""
-    names = "Texels in contact", "Sum of normals", "Largest normal", "Largest shear", "Net", "Reading"
+    quantities = QUANTITIES["reading"], bake_display.figure_style(context.scene).shown
+    shown = {quantity.title: quantity for quantity in quantities}
+    names = "Texels in contact", "Sum of normals", "Largest normal", "Largest shear", "Net", *shown
     if readings is None:
         return [(name, "–") for name in names]
     net = ", ".join(f"{round(value, 3) + 0.0:.3f}" for value in readings.net_force)  # adding zero turns -0.0 into 0.0
@@ -264,9 +268,19 @@ def _measured(readings, unit: str) -> list[tuple[str, str]]:
         f"{readings.normal_force.max():.4f} N",
         f"{(readings.shear**2).sum(axis=1).max() ** 0.5:.4f} N",
         f"{net} N",
-        f"{readings.reading.min():.4g} to {readings.reading.max():.4g} {unit}",
+        *(_range(context, quantity, readings) for quantity in shown.values()),
     )
     return list(zip(names, values, strict=True))
+
+
+def _range(context, quantity, readings) -> str:
+    """Return the least and the largest value of a quantity at a frame; a dash where the sensor has none or has changed."""
+    report = sensor_report.known_report(context.object, context.scene)
+    texels = None if report is None else report.texels
+    if texels is None or len(texels) != len(readings.reading) or not quantity.is_in(readings):
+        return "–"
+    extent = Extent.of(quantity, [(readings, texels)])
+    return f"{extent.low:.4g} to {extent.high:.4g} {extent.units[0]}"
 
 
 class Magnet(Subpanel):

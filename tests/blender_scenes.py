@@ -68,6 +68,16 @@ def press_and_drop(frames=8):
     return scene, pad, target, second, free
 
 
+def scene_with_readings(frames=8):
+    """A slide over a pad that has every quantity: its reading falls under load from 5 V, and a load cell has channels."""
+    scene, pad, target = press(frames)
+    pad.palpate.gain, pad.palpate.zero, pad.palpate.unit, pad.palpate.readout.kind = -2.0, 5.0, "V", "NET_FORCE"
+    target.location = (0.005, 0.0005, 0.006)
+    target.keyframe_insert("location", frame=frames)
+    scene.frame_set(1)
+    return scene
+
+
 def save(folder, name="scene.blend"):
     path = folder / name
     bpy.ops.wm.save_as_mainfile(filepath=str(path))

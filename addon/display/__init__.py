@@ -16,5 +16,6 @@ __all__ = [
     "markers",
     "materials",
     "overlays",
+    "played_table",
     "texel_arrows",
 ]

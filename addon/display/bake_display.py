@@ -15,16 +15,16 @@ import numpy as np
 
 from ...core.errors import SceneError
 from ...core.figures.figure_style import FigureStyle
+from ...core.figures.quantities import Extent
 from ...core.io.bake_folder import frame_file
 from ...core.io.bake_reader import Bake, read_sensors
 from ...core.response import metrics
+from ..properties import scene_properties
 from ..scene import baked_names
 from ..session import units
-from . import bake_identity, heat_map, indentation, markers, materials, texel_arrows
+from . import bake_identity, baked_scene, heat_map, indentation, markers, materials, texel_arrows
 from .baked_sensor import BakedSensor
 
-MIN_COLOR_RANGE = 1e-6
-"""End of the colours, N or Pa, if nothing touched any sensor."""
 LONGEST_TEXEL_ARROW = 0.2
 """Automatic length of the longest arrow of a texel, as a share of the largest sensor's size."""
 FACING_COSINE = 0.7
@@ -39,8 +39,6 @@ class Scales:
 
     Attributes
     ----------
-    maximum : float, N or Pa
-        End of the colours.
     force, moment : float
         Blender units per newton and per newton metre, for the markers.
     texel : dict of str to float
@@ -50,7 +48,6 @@ class Scales:
         Length of the longest of these arrows by kind, Blender units.
     """
 
-    maximum: float
     force: float
     moment: float
     texel: dict[str, float]
@@ -75,7 +72,7 @@ class Scales:
             texel = {kind: LONGEST_TEXEL_ARROW * size / peak if peak > 0 else 0.0 for kind, peak in peaks.items()}
         longest = {kind: texel[kind] * peak for kind, peak in peaks.items()}
         moment = 0.6 * size / largest_moment if largest_moment > 0 else 0.0
-        return cls(color_range(settings, baked_sensors), force, moment, texel, longest)
+        return cls(force, moment, texel, longest)
 
 
 def _max_scale_of_facing_arrows(baked_sensors: list[BakedSensor]) -> float:
@@ -102,49 +99,37 @@ def _largest(tables) -> float:
     return max((float(table.max(initial=0.0)) for table in tables), default=0.0)
 
 
-def color_range(settings, baked_sensors: list[BakedSensor]) -> float:
-    """Return the end of the colour scale, N or Pa: as set, or as in figures (:meth:`.FigureStyle.scale_limit`)."""
-    if not settings.use_auto_range:
-        return user_range(settings)
-    largest = _largest(displayed_values(settings, item.readings.normal_force, item.texels) for item in baked_sensors)
-    return rounded_range(settings, largest) if largest > 0 else MIN_COLOR_RANGE
-
-
-def rounded_range(settings, largest: float) -> float:
-    """Return the end of the automatic colour scale for a largest value, both N or Pa."""
-    unit = 1e3 if settings.quantity == "PRESSURE" else 1.0
-    return unit * metrics.scale_limit(largest / unit)
-
-
-def user_range(settings) -> float:
-    """Return the end of the colours from the settings, N or Pa."""
-    return 1e3 * settings.range_max_pressure if settings.quantity == "PRESSURE" else settings.range_max
-
-
-def displayed_values(settings, normal_force: np.ndarray, texels) -> np.ndarray:
-    """Return the values that the colours show, (n,) or (F, n) float, N or Pa."""
-    return metrics.pressure(normal_force, texels) if settings.quantity == "PRESSURE" else normal_force
-
-
 def figure_style(scene, **others) -> FigureStyle:
     """Return a figure style that agrees with the colours in the scene; `others` are further fields of it."""
     own = scene.palpate
-    limit = None
-    if not own.use_auto_range:
-        limit = own.range_max_pressure if own.quantity == "PRESSURE" else own.range_max
-    return FigureStyle(**{"colour_map": own.color_map, "quantity": own.quantity.lower(), "limit": limit, **others})
+    lowest, limit = (None, None) if own.use_auto_range else scene_properties.color_range(own)
+    given = {"colour_map": own.color_map, "quantity": own.quantity.lower(), "lowest": lowest, "limit": limit}
+    return FigureStyle(**{**given, **others})
+
+
+def take_style(scene, style: FigureStyle) -> None:
+    """Let the settings of a scene, and its bake, show what a figure style does."""
+    if figure_style(scene, width=style.width, dpi=style.dpi) == style:
+        return
+    own = scene.palpate
+    own.color_map, own.quantity, own.use_auto_range = style.colour_map, style.quantity.upper(), style.limit is None
+    if style.limit is not None:
+        scene_properties.set_color_range(own, style.lowest, style.limit)
+    refresh(scene, baked_scene.bake_folders(scene))
 
 
 def show_bake(scene, baked_sensors: list[BakedSensor]) -> None:
     """Put heat maps, markers and arrows on the sensors of a finished bake; they replace earlier ones."""
     settings = scene.palpate
     scales = Scales.of(settings, baked_sensors)
-    colors = materials.ColorScale(scales.maximum, settings.color_map, settings.quantity == "PRESSURE")
+    style = figure_style(scene)
+    sources = ((item.readings, item.texels) for item in baked_sensors if style.shown.is_in(item.readings))
+    scale = style.scale_of(Extent.of(style.shown, sources))
     relative = settings.folder.startswith("//")
     for item in baked_sensors:
         obj, frames = item.obj, (int(item.frames[0]), int(item.frames[-1]))
         image = materials.load_sequence(obj.palpate.uid, item.folder / frame_file(frames[0]), relative)
-        heat_map.apply(obj, item.texels, image, frames, colors)
+        heat_map.apply(item, image, scale)
         markers.keyframe_markers(scene, item, settings.overlays, {"FORCE": scales.force, "TORQUE": scales.moment})
         texel_arrows.build_arrows(scene, item, image, settings.overlays, scales.texel, scales.longest)
         obj.palpate.bake_folder = bpy.path.relpath(str(item.folder)) if relative else str(item.folder)

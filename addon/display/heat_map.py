@@ -6,48 +6,72 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from ...core.figures.quantities import Scale
 from ...core.geometry.layout.texture_maps import UVLayout
 from ...core.geometry.texels import Texels
 from ..scene import mesh_arrays
 from ..scene.display_names import HEAT_MAP_MODIFIER, OLD_MATERIAL, UV_MAP
-from . import materials
+from . import materials, played_table
+from .baked_sensor import BakedSensor
 
 EMPTY_SLOT = "palpate_empty_slot"
 """Custom property of a mesh that had no material slot before."""
 
 
-def apply(obj, texels: Texels, image, frames: tuple[int, int], scale: materials.ColorScale) -> None:
-    """Show a baked image sequence on a sensor; it replaces the heat map of an earlier bake.
+def apply(sensor: BakedSensor, image, scale: Scale) -> None:
+    """Show a quantity of a bake on its sensor; it replaces the heat map of an earlier bake.
 
     Parameters
     ----------
-    obj : Object
-    texels : Texels
+    sensor : BakedSensor
     image : Image
         From :func:`.materials.load_sequence`.
-    frames : (int, int)
-        First and last frame of the bake.
-    scale : ColorScale
+    scale : Scale
     """
+    obj, texels = sensor.obj, sensor.texels
     clear(obj, keep_image=True)
+    if not scale.quantity.is_in(sensor.readings):
+        return
     uid, mesh, layout = obj.palpate.uid, obj.data, texels.layout
-    user_map = isinstance(layout, UVLayout) and layout.map_name
-    uv = None if user_map else _one_uv_per_texel(texels)
+    frames = int(sensor.frames[0]), int(sensor.frames[-1])
+    is_in_image = scale.quantity.channel == materials.IMAGE_CHANNEL
+    user_map = is_in_image and isinstance(layout, UVLayout) and layout.map_name
+    uv = _one_uv_per_texel(texels) if is_in_image and not user_map else None
     on_vertices = uv is None and not user_map
     if on_vertices:
-        _store_texel_uv(mesh, texels)
-        _store_area(mesh, texels)
+        group = materials.empty_node_group(uid, obj.name)
+        add = materials.NodeAdder(group)
+        start = add("NodeGroupInput").outputs[0]
+        if is_in_image:
+            _store_texel_uv(mesh, texels)
+            value = materials.image_values(add, image, frames)
+        else:
+            value = _table(sensor, scale).lookup(add)
+        shown = played_table.stored(add, start, materials.attribute_of(scale.quantity), value, "FLOAT")
+        group.links.new(shown, add("NodeGroupOutput").inputs[0])
         modifier = obj.modifiers.new(HEAT_MAP_MODIFIER, "NODES")
-        modifier.node_group = materials.force_node_group(uid, obj.name, image, frames)
+        modifier.node_group = group
         obj.modifiers.move(len(obj.modifiers) - 1, 0)  # before modifiers that would change the vertices
     elif uv is not None:
         _write_uv(mesh, texels, uv)
-    area = None
-    if scale.pressure:
-        area = materials.AREA if on_vertices else materials.area_image(uid, obj.name, layout.image(texels.area))
     mapping = materials.ImageMapping(user_map, not layout.nearest) if user_map else materials.ImageMapping()
-    material = materials.heat_map_material(uid, obj.name, None if on_vertices else image, frames, scale, area, mapping)
+    material = materials.heat_map_material(uid, obj.name, None if on_vertices else image, frames, scale, mapping)
     _assign(obj, texels, material)
+
+
+def _table(sensor: BakedSensor, scale: Scale) -> played_table.PlayedTable:
+    """Return a table of what a scale shows of a sensor."""
+    obj, texels, mark = sensor.obj, sensor.texels, f"{sensor.obj.palpate.uid}:{materials.TABLE}"
+    step = played_table.frame_step(len(sensor.frames), len(texels))
+    rows = scale.values(sensor.readings.part(slice(None, None, step)), texels)
+    name = f"Palpate {obj.name} {scale.quantity.name}"
+    attributes = _table_attributes(obj.palpate.uid)
+    return played_table.PlayedTable.packed(mark, name, obj.data, texels.vertex, rows, sensor.frames, attributes)
+
+
+def _table_attributes(uid: str) -> tuple[str, str]:
+    """Return the names of a table's attributes. They hold the sensor's identity, because several sensors may share a mesh."""
+    return f"palpate_value_column:{uid}", f"palpate_value_channel:{uid}"
 
 
 def clear(obj, keep_image: bool = False) -> None:
@@ -59,14 +83,16 @@ def clear(obj, keep_image: bool = False) -> None:
     modifier = obj.modifiers.get(HEAT_MAP_MODIFIER)
     if modifier is not None:
         obj.modifiers.remove(modifier)
+    names = _table_attributes(uid)
     if _slot_of(mesh) is None:
+        names += materials.TEXEL_UV, materials.FORCE, "palpate_area"  # the last one of Palpate 0.1.0
         layer = mesh.uv_layers.get(UV_MAP)
         if layer is not None:
             mesh.uv_layers.remove(layer)
-        for name in (materials.TEXEL_UV, materials.FORCE, materials.AREA):
-            attribute = mesh.attributes.get(name)
-            if attribute is not None:
-                mesh.attributes.remove(attribute)
+    for name in names:
+        attribute = mesh.attributes.get(name)
+        if attribute is not None:
+            mesh.attributes.remove(attribute)
     materials.remove_blocks(uid, keep_image)
 
 
@@ -95,13 +121,6 @@ def _store_texel_uv(mesh, texels: Texels) -> None:
     table = np.zeros((len(mesh.vertices), 3), dtype=np.float32)
     table[texels.vertex, :2] = texels.layout.uv()
     attribute.data.foreach_set("vector", table.ravel())
-
-
-def _store_area(mesh, texels: Texels) -> None:
-    attribute = mesh.attributes.get(materials.AREA) or mesh.attributes.new(materials.AREA, "FLOAT", "POINT")
-    table = np.zeros(len(mesh.vertices), dtype=np.float32)
-    table[texels.vertex] = texels.area
-    attribute.data.foreach_set("value", table)
 
 
 def region_faces(mesh, texels: Texels) -> np.ndarray:

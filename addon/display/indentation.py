@@ -22,8 +22,9 @@ from ...core.geometry.smooth_depth import NEIGHBOUR_WEIGHT, SHARPENINGS
 from ..scene import mesh_arrays
 from ..scene.display_names import INDENTATION_MODIFIER, MODIFIERS, REST_POSITION
 from ..session import transforms
-from . import materials
+from . import materials, played_table
 from .baked_sensor import BakedSensor
+from .played_table import PlayedTable, attribute, out, stored
 
 MARK = "indentation"
 """What follows the sensor's identity in the marks of the image and the node group."""
@@ -36,8 +37,6 @@ MOST_LEVELS = 3
 MOST_CORNERS = 8
 """Corners of a face that is subdivided as it is; larger ones are cut into triangles first. The sample "gel" has a face with 160
 corners below: Blender 4.5 subdivides it in 4 s per frame, and its triangles in 0.05 s."""
-MOST_PIXELS = 4_000_000
-"""Pixels of the image at most, 64 MB of memory; of longer bakes every second, third, … frame is kept."""
 
 
 @dataclass(frozen=True)
@@ -53,12 +52,12 @@ class _Names:
 
     @property
     def column(self) -> str:
-        """Vector on vertices whose x is the image's texture coordinate u."""
+        """See :class:`.PlayedTable`."""
         return f"palpate_column:{self.uid}"
 
     @property
     def channel(self) -> str:
-        """Vector on vertices: one for the channel of the image that holds the vertex, zero for the other two."""
+        """See :class:`.PlayedTable`."""
         return f"palpate_channel:{self.uid}"
 
 
@@ -89,11 +88,16 @@ def show(sensors: Sequence[BakedSensor], factor: float | None) -> None:
 
 def _apply(sensor: BakedSensor, touched: np.ndarray, factor: float) -> None:
     obj, uid = sensor.obj, sensor.obj.palpate.uid
-    step = _frame_step(len(sensor.frames), int(touched.sum()))
-    image = _depth_image(uid, obj.name, sensor.readings.depth[::step], touched)
-    _store_attributes(obj.data, _Names(uid), sensor, touched, image.size[0])
+    vertices, mark = sensor.texels.vertex[touched], f"{uid}:{MARK}"
+    names = _Names(uid)
+    inward = -sensor.texels.normal[touched] @ np.linalg.inv(_body_from_object(sensor)).T
+    played_table.store_vectors(obj.data, names.inward, vertices, inward)
+    step = played_table.frame_step(len(sensor.frames), len(vertices))
+    depth = np.maximum(sensor.readings.depth[::step][:, touched], 0.0)
+    attributes = names.column, names.channel
+    play = PlayedTable.packed(mark, f"Palpate {obj.name} depth", obj.data, vertices, depth, sensor.frames, attributes)
+    obj.data.update()
     modifier = obj.modifiers.new(INDENTATION_MODIFIER, "NODES")
-    play = _Play(image, int(sensor.frames[0]), int(sensor.frames[-1]), step)
     modifier.node_group = _nodes(uid, obj.name, play, levels_of(len(obj.data.vertices)), factor)
 
 
@@ -124,16 +128,6 @@ def factor_of(obj) -> float:
     return 0.0 if node is None else node.inputs["Scale"].default_value
 
 
-@dataclass(frozen=True)
-class _Play:
-    """An image of depths, its first and last frame, and the frames from one of its rows to the next."""
-
-    image: object
-    first: int
-    last: int
-    step: int
-
-
 def _touched(sensor: BakedSensor) -> np.ndarray:
     """(n,) bool: texels with any penetration; a long recording is read in parts."""
     depth = sensor.readings.depth
@@ -153,45 +147,9 @@ def may_indent(obj, depsgraph) -> bool:
         return len(mesh.vertices) == len(obj.data.vertices)
 
 
-def _frame_step(frames: int, texels: int) -> int:
-    """Return the least distance of kept frames at which the image has no more than :data:`MOST_PIXELS`."""
-    return max(1, -(-frames * -(-texels // 3) // MOST_PIXELS))
-
-
 def levels_of(vertices: int) -> int:
     """Return how often the faces are subdivided; each time their number becomes fourfold."""
     return next((level for level in range(MOST_LEVELS, 0, -1) if vertices * 4**level <= MOST_VERTICES), 0)
-
-
-def _depth_image(uid: str, name: str, depth: np.ndarray, touched: np.ndarray):
-    """Return an image with a row for each frame and three touched texels in each of its pixels, packed into the .blend."""
-    width = -(-int(touched.sum()) // 3)
-    image = bpy.data.images.new(f"Palpate {name} depth", width, len(depth), alpha=False, float_buffer=True, is_data=True)
-    image[materials.SENSOR_KEY] = f"{uid}:{MARK}"
-    pixels = np.zeros((len(depth), width, 4), dtype=np.float32)
-    pixels[..., 3] = 1.0
-    (texels,) = np.nonzero(touched)
-    for channel in range(3):
-        chosen = texels[channel::3]
-        pixels[:, : len(chosen), channel] = np.maximum(depth[:, chosen], 0.0)
-    image.pixels.foreach_set(pixels.ravel())
-    image.pack()
-    return image
-
-
-def _store_attributes(mesh, names: _Names, sensor: BakedSensor, touched: np.ndarray, width: int) -> None:
-    place = np.cumsum(touched) - 1
-    rows = sensor.texels.vertex[touched]
-    columns = {
-        names.inward: -sensor.texels.normal[touched] @ np.linalg.inv(_body_from_object(sensor)).T,
-        names.column: np.outer((place[touched] // 3 + 0.5) / width, (1.0, 0.0, 0.0)),
-        names.channel: np.eye(3)[place[touched] % 3],
-    }
-    for name, values in columns.items():
-        table = np.zeros((len(mesh.vertices), 3), dtype=np.float32)
-        table[rows] = values
-        mesh.attributes.new(name, "FLOAT_VECTOR", "POINT").data.foreach_set("vector", table.ravel())
-    mesh.update()
 
 
 def _body_from_object(sensor: BakedSensor) -> np.ndarray:
@@ -201,17 +159,17 @@ def _body_from_object(sensor: BakedSensor) -> np.ndarray:
     return sensor.scale * turn.T @ own[:3, :3]
 
 
-def _nodes(uid: str, name: str, play: _Play, levels: int, factor: float):
+def _nodes(uid: str, name: str, play: PlayedTable, levels: int, factor: float):
     """Return geometry nodes that look up each texel's depth, spread it smoothly over finer faces, and move them inwards."""
     group = materials.empty_node_group(f"{uid}:{MARK}", f"{name} indentation")
     add, names, depth_name = materials.NodeAdder(group), _Names(uid), f"palpate_depth:{uid}"
-    rest = _stored(add, add("NodeGroupInput").outputs[0], REST_POSITION, _out(add, "GeometryNodeInputPosition"), "FLOAT_VECTOR")
-    coarse = _stored(add, rest, depth_name, _depth(add, names, play), "FLOAT")
-    fine, depth = _subdivided(add, coarse, _attribute(add, depth_name, "FLOAT"), levels)
+    rest = stored(add, add("NodeGroupInput").outputs[0], REST_POSITION, out(add, "GeometryNodeInputPosition"), "FLOAT_VECTOR")
+    coarse = stored(add, rest, depth_name, play.lookup(add), "FLOAT")
+    fine, depth = _subdivided(add, coarse, attribute(add, depth_name, "FLOAT"), levels)
     depth = _math(add, "MAXIMUM", depth, 0.0)
-    inward = _out(add, "ShaderNodeVectorMath", {0: _attribute(add, names.inward), "Scale": depth}, operation="SCALE")
-    moved = _out(add, "ShaderNodeVectorMath", {0: inward, "Scale": factor}, operation="SCALE", label=FACTOR_LABEL)
-    move = _out(add, "GeometryNodeSetPosition", {"Geometry": fine, "Offset": moved})
+    inward = out(add, "ShaderNodeVectorMath", {0: attribute(add, names.inward), "Scale": depth}, operation="SCALE")
+    moved = out(add, "ShaderNodeVectorMath", {0: inward, "Scale": factor}, operation="SCALE", label=FACTOR_LABEL)
+    move = out(add, "GeometryNodeSetPosition", {"Geometry": fine, "Offset": moved})
     group.links.new(move, add("NodeGroupOutput").inputs[0])
     return group
 
@@ -224,59 +182,22 @@ def _subdivided(add, geometry, values, levels: int):
     """
     if not levels:
         return geometry, values
-    is_large = _math(add, "GREATER_THAN", _out(add, "GeometryNodeInputMeshFaceNeighbors"), float(MOST_CORNERS))
-    geometry = _out(add, "GeometryNodeTriangulate", {"Mesh": geometry, "Selection": is_large})
+    is_large = _math(add, "GREATER_THAN", out(add, "GeometryNodeInputMeshFaceNeighbors"), float(MOST_CORNERS))
+    geometry = out(add, "GeometryNodeTriangulate", {"Mesh": geometry, "Selection": is_large})
     sharp = values
     for _ in range(SHARPENINGS):
         blurred = {"Value": sharp, "Iterations": 1, "Weight": NEIGHBOUR_WEIGHT}
-        lost = _math(add, "SUBTRACT", values, _out(add, "GeometryNodeBlurAttribute", blurred, data_type="FLOAT"))
+        lost = _math(add, "SUBTRACT", values, out(add, "GeometryNodeBlurAttribute", blurred, data_type="FLOAT"))
         sharp = _math(add, "ADD", sharp, lost)
-    place = _out(add, "ShaderNodeCombineXYZ", {"X": sharp})
-    graph = _out(add, "GeometryNodeSetPosition", {"Geometry": geometry, "Position": place})
-    smooth = _out(add, "GeometryNodeSubdivisionSurface", {"Mesh": graph, "Level": levels})
-    even = _out(add, "GeometryNodeSubdivideMesh", {"Mesh": geometry, "Level": levels})
-    position, index = _out(add, "GeometryNodeInputPosition"), _out(add, "GeometryNodeInputIndex")
+    place = out(add, "ShaderNodeCombineXYZ", {"X": sharp})
+    graph = out(add, "GeometryNodeSetPosition", {"Geometry": geometry, "Position": place})
+    smooth = out(add, "GeometryNodeSubdivisionSurface", {"Mesh": graph, "Level": levels})
+    even = out(add, "GeometryNodeSubdivideMesh", {"Mesh": geometry, "Level": levels})
+    position, index = out(add, "GeometryNodeInputPosition"), out(add, "GeometryNodeInputIndex")
     given = {"Geometry": smooth, "Value": position, "Index": index}
-    found = _out(add, "GeometryNodeSampleIndex", given, data_type="FLOAT_VECTOR", domain="POINT")
-    return even, _out(add, "ShaderNodeSeparateXYZ", {0: found})
-
-
-def _depth(add, names: _Names, play: _Play):
-    """Return the socket of the depth at each texel, metres, between two frames in between."""
-    frame = _out(add, "GeometryNodeInputSceneTime", output="Frame")
-    frame = _out(add, "ShaderNodeClamp", {"Value": frame, "Min": play.first, "Max": play.last})
-    rows = play.image.size[1]
-    last_row = play.first + play.step * (rows - 1)
-    ends = {"From Min": play.first, "From Max": max(last_row, play.first + 1), "To Min": 0.5 / rows, "To Max": 1.0 - 0.5 / rows}
-    row = _out(add, "ShaderNodeMapRange", {"Value": frame, **ends}, clamp=True)
-    column = _out(add, "ShaderNodeSeparateXYZ", {0: _attribute(add, names.column)})
-    given = {"Image": play.image, "Vector": _out(add, "ShaderNodeCombineXYZ", {"X": column, "Y": row})}
-    color = _out(add, "GeometryNodeImageTexture", given, interpolation="Linear", extension="EXTEND")
-    chosen = {0: color, 1: _attribute(add, names.channel)}
-    return _out(add, "ShaderNodeVectorMath", chosen, output="Value", operation="DOT_PRODUCT")
-
-
-def _out(add, kind: str, given: dict | None = None, output: int | str = 0, **settings):
-    """Return an output of a new node; `given` are the sockets that lead to its inputs, or their values."""
-    node = add(kind, **settings)
-    for place, value in (given or {}).items():
-        if isinstance(value, bpy.types.NodeSocket):
-            add.tree.links.new(value, node.inputs[place])
-        else:
-            node.inputs[place].default_value = value
-    return node.outputs[output]
+    found = out(add, "GeometryNodeSampleIndex", given, data_type="FLOAT_VECTOR", domain="POINT")
+    return even, out(add, "ShaderNodeSeparateXYZ", {0: found})
 
 
 def _math(add, operation: str, first, second):
-    return _out(add, "ShaderNodeMath", {0: first, 1: second}, operation=operation)
-
-
-def _stored(add, geometry, name: str, value, data_type: str):
-    """Return the socket of a geometry with an attribute on its points."""
-    given = {"Geometry": geometry, "Name": name, "Value": value}
-    return _out(add, "GeometryNodeStoreNamedAttribute", given, data_type=data_type, domain="POINT")
-
-
-def _attribute(add, name: str, data_type: str = "FLOAT_VECTOR"):
-    """Return the socket of a named attribute."""
-    return _out(add, "GeometryNodeInputNamedAttribute", {"Name": name}, data_type=data_type)
+    return out(add, "ShaderNodeMath", {0: first, 1: second}, operation=operation)

@@ -9,20 +9,18 @@ import bpy
 import numpy as np
 
 from ...core.figures import color_maps
+from ...core.figures.quantities import Scale
 from ...core.geometry.layout.grid_layout import GridLayout
 from ...core.geometry.layout.texture_maps import UVLayout
 from ...core.geometry.projection import Projection, projection_of
 from ...core.geometry.texels import Texels
 from ..session import redraw
-from . import bake_display
 
 MAX_SENSORS = 4
 """Number of sensors that are shown at most."""
 IMAGE, SPACING, CURVE, BAR = 120.0, 12.0, 56.0, 10.0
 """Longest side of an image, space between parts, height of the curves and width of the colour bar; pixels at a resolution scale
 of one."""
-NO_LOAD = 1e-9
-"""End of the colours (N or Pa) as long as nothing has been touched, so that no load has the colour of zero."""
 MAX_IMAGE_SIDE = 256
 """Pixels along a side of an image: larger images are subsampled, images of few texels are enlarged."""
 VIEW_SIDE = 120
@@ -30,7 +28,7 @@ VIEW_SIDE = 120
 COLORS = ((0.34, 0.7, 0.91), (1.0, 0.62, 0.25), (0.4, 0.85, 0.6), (0.9, 0.6, 0.8))
 BACKGROUND_COLOR, AXIS_COLOR = (0.05, 0.05, 0.06, 0.72), (1.0, 1.0, 1.0, 0.35)
 VIEW_COLOR = (1.0, 1.0, 1.0, 0.7)
-NOTE_COLOR = (1.0, 0.62, 0.1, 1.0)
+TEXT_COLOR, NOTE_COLOR = (1.0, 1.0, 1.0, 1.0), (1.0, 0.62, 0.1, 1.0)
 
 
 @dataclass
@@ -66,9 +64,8 @@ class InsetContent:
     Attributes
     ----------
     insets : list of SensorInset
-    color_map : str
-    end : str
-        Label at the upper end of the colour bar.
+    scale : Scale
+        What the colours mean.
     span : (2,) float
         First and last frame of the scene.
     frame : float
@@ -78,8 +75,7 @@ class InsetContent:
     """
 
     insets: list[SensorInset]
-    color_map: str
-    end: str
+    scale: Scale
     span: tuple[float, float]
     frame: float
     note: str = ""
@@ -104,12 +100,12 @@ def picture_layout(texels: Texels) -> GridLayout | UVLayout | Projection:
     return known[1]
 
 
-def tactile_pixels(layout, values: np.ndarray, maximum: float, color_map: str) -> np.ndarray:
+def tactile_pixels(layout, values: np.ndarray, scale: Scale) -> np.ndarray:
     """(h, w, 4) float32: a tactile image in colours, transparent where there is no texel."""
     image, mask = layout.image(values), layout.mask()
     step = -(-max(image.shape) // MAX_IMAGE_SIDE)
     image, mask = image[::step, ::step], mask[::step, ::step]
-    rgb = color_maps.colors(color_map, image.ravel() / maximum).reshape(*image.shape, 3)
+    rgb = scale.colors(image.ravel()).reshape(*image.shape, 3)
     pixels = np.dstack([rgb, mask]).astype(np.float32)
     if isinstance(layout, GridLayout):  # the screen blends neighbouring pixels, but texels shall stay distinct
         repeats = -(-MAX_IMAGE_SIDE // max(image.shape))
@@ -117,7 +113,7 @@ def tactile_pixels(layout, values: np.ndarray, maximum: float, color_map: str) -
     return pixels
 
 
-def inset_content(scene, frame, texels: dict, frames: np.ndarray, loads: dict, maximum: float, note: str = "") -> InsetContent:
+def inset_content(scene, frame, texels: dict, frames: np.ndarray, loads: dict, scale: Scale, note: str = "") -> InsetContent:
     """Return the content of the inset for one frame.
 
     Parameters
@@ -129,27 +125,19 @@ def inset_content(scene, frame, texels: dict, frames: np.ndarray, loads: dict, m
         Frames of the force curves.
     loads : dict of str to (f,) float, N
         Sum of the normal forces of each sensor at these frames.
-    maximum : float, N or Pa
-        End of the colours.
+    scale : Scale
     note : str, optional
         See :class:`InsetContent`.
     """
-    settings, insets = scene.palpate, []
-    for name, own in list(texels.items())[:MAX_SENSORS]:
-        forces = frame.sensors[name].normal_force
-        layout = picture_layout(own)
-        pixels = tactile_pixels(layout, bake_display.displayed_values(settings, forces, own), maximum, settings.color_map)
+    insets = []
+    shown = {name: own for name, own in texels.items() if scale.quantity.is_in(frame.sensors[name])}
+    for name, own in list(shown.items())[:MAX_SENSORS]:
+        readings, layout = frame.sensors[name], picture_layout(own)
+        pixels = tactile_pixels(layout, scale.values(readings, own), scale)
         views = layout.names if isinstance(layout, Projection) else ("",)
-        insets.append(SensorInset(name, pixels, frames, loads[name], float(forces.sum()), views))
+        insets.append(SensorInset(name, pixels, frames, loads[name], float(readings.normal_force.sum()), views))
     span = float(scene.frame_start), float(scene.frame_end)
-    return InsetContent(insets, settings.color_map, range_label(settings, maximum), span, float(frame.frame), note)
-
-
-def range_label(settings, maximum: float) -> str:
-    """Return the value at the end of the colours with its unit; nothing as long as nothing has been touched."""
-    if maximum <= NO_LOAD:
-        return ""
-    return f"{maximum / 1e3:.3g} kPa" if settings.quantity == "PRESSURE" else f"{maximum:.3g} N"
+    return InsetContent(insets, scale, span, float(frame.frame), note)
 
 
 def show(scene, content: InsetContent) -> None:
@@ -170,7 +158,7 @@ def clear(scene=None) -> None:
 def _draw() -> None:
     """Called by each 3D view, in pixels of its region."""
     content = _contents.get(bpy.context.scene.session_uid)
-    if content is None or not bpy.context.space_data.overlay.show_overlays:
+    if content is None or not content.insets or not bpy.context.space_data.overlay.show_overlays:
         return
     import gpu
 
@@ -196,7 +184,10 @@ def _draw_content(content: InsetContent, canvas, x: float, top: float) -> None:
     scale, gap = canvas.scale, SPACING * canvas.scale
     tall = max(_sizes(inset, scale)[1] for inset in content.insets)
     widths = [max(_sizes(inset, scale)[0], 70.0 * scale) for inset in content.insets]
-    whole = sum(widths) + gap * (len(widths) + 1) + (BAR + 58.0) * scale
+    ends = content.scale.words(content.scale.low), content.scale.words(content.scale.high)
+    room = max(canvas.width(words) for words in (*ends, content.scale.quantity.title)) + (BAR + 4.0) * scale
+    line = sum(canvas.width(text) + 8.0 * scale for text, _ in _line(content)) + 4.0 * scale
+    whole = max(sum(widths) + gap * len(widths) + room, line) + 2 * gap
     height = _height(content, scale)
     canvas.rectangle(x, top - height, whole, height, BACKGROUND_COLOR)
     at, upper = x + gap, top - gap - 12.0 * scale
@@ -210,13 +201,22 @@ def _draw_content(content: InsetContent, canvas, x: float, top: float) -> None:
             canvas.text(at + size[0] * number / len(inset.views), upper - 1.0 * scale - size[1], view, VIEW_COLOR)
         at += width + gap
     if content.bar is None:
-        colors = color_maps.colors(content.color_map, np.linspace(0.0, 1.0, 64))
+        colors = color_maps.colors(content.scale.colour_map, np.linspace(0.0, 1.0, 64))
         content.bar = _texture(np.column_stack([colors, np.ones(64)])[:, None].astype(np.float32))
     low = upper - 3.0 * scale - tall
     canvas.image(content.bar, at, low, BAR * scale, tall)
-    canvas.text(at + (BAR + 4.0) * scale, low + tall - 9.0 * scale, content.end, (1.0, 1.0, 1.0, 1.0))
-    canvas.text(at + (BAR + 4.0) * scale, low, "0", (1.0, 1.0, 1.0, 1.0))
+    canvas.text(at, upper + 3.0 * scale, content.scale.quantity.title, TEXT_COLOR)
+    canvas.text(at + (BAR + 4.0) * scale, low + tall - 9.0 * scale, ends[1], TEXT_COLOR)
+    canvas.text(at + (BAR + 4.0) * scale, low, ends[0], TEXT_COLOR)
     _draw_curves(content, canvas, x + gap, top - height + gap, whole - 2 * gap)
+
+
+def _line(content: InsetContent) -> list[tuple[str, tuple]]:
+    """Return the words above the curves with their colours."""
+    if content.note:
+        return [(content.note, NOTE_COLOR)]
+    sums = [(f"{inset.now:.3g} N", (*color, 1.0)) for inset, color in zip(content.insets, COLORS)]
+    return [("sum of normals", TEXT_COLOR), *sums]
 
 
 def _draw_curves(content: InsetContent, canvas, x: float, y: float, width: float) -> None:
@@ -234,11 +234,8 @@ def _draw_curves(content: InsetContent, canvas, x: float, y: float, width: float
             )  # the first curves are wider, so that equal curves do not hide each other
     now = x + (content.frame - first) / span * width
     canvas.line([(now, y), (now, y + height)], AXIS_COLOR, 1.0)
-    parts = [(content.note, NOTE_COLOR)] if content.note else [("sum of normals", (1.0, 1.0, 1.0, 1.0))]
-    if not content.note:
-        parts += [(f"{inset.now:.3g} N", (*color, 1.0)) for inset, color in zip(content.insets, COLORS)]
     at = x + 4.0 * scale
-    for text, color in parts:
+    for text, color in _line(content):
         at += canvas.text(at, y + height + 3.0 * scale, text, color, x + width - at) + 8.0 * scale
 
 
@@ -279,6 +276,13 @@ class _PixelPainter:
         blf.color(0, *color)
         blf.position(0, x, y, 0.0)
         blf.draw(0, words)
+        return blf.dimensions(0, words)[0]
+
+    def width(self, words: str) -> float:
+        """Return the width of words."""
+        import blf
+
+        blf.size(0, 11.0 * self.scale)
         return blf.dimensions(0, words)[0]
 
     @staticmethod

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The heat-map material shows the normal force of the baked images in colours. It consists of Blender's own nodes only.
+"""The heat-map material shows a quantity of a bake in colours. It consists of Blender's own nodes only.
 
-Where the tactile image of the region is in one piece, an image texture shows the EXR sequence pixel by pixel. A region that is
-cut open for its image, such as a whole sphere, has no UV map in which faces share corners. There, geometry nodes look up the
-image once per texel and pass the force to the material as a vertex attribute.
+Blender's nodes read the first three channels of the baked images. A quantity in the first one is shown pixel by pixel by an
+image texture, where the tactile image of the region is in one piece. A region that is cut open for its image, such as a whole
+sphere, has no UV map in which faces share corners: there geometry nodes look up the image once per texel and pass the value to
+the material as a vertex attribute. They do the same with a table of any other quantity (:mod:`.played_table`).
 """
 
 from __future__ import annotations
@@ -15,17 +16,27 @@ import bpy
 import numpy as np
 
 from ...core.figures import color_maps
+from ...core.figures.quantities import QUANTITIES, Quantity, Scale
 from ...core.io.input_files import require_regular
 from ..scene.display_names import UV_MAP
 
 TEXEL_UV = "palpate_uv"
-FORCE = "palpate_force"
-"""Vertex attribute with the normal force (N): written by geometry nodes after a bake, by the timeline while it plays."""
-AREA = "palpate_area"
-"""Vertex attribute with the area of the texel, m²."""
+TABLE = "values"
+"""What follows the sensor's identity in the mark of the table of its values."""
+IMAGE_CHANNEL = "R"
+"""Channel of the baked images that the material reads."""
 SENSOR_KEY = "palpate_sensor"
 """Custom property of a material, image, node group or marker: the identity of its sensor."""
 RAMP_STOPS = 32
+
+
+def attribute_of(quantity: Quantity) -> str:
+    """Return the name of the vertex attribute with a quantity, which geometry nodes write."""
+    return f"palpate_{quantity.name}"
+
+
+FORCE = attribute_of(QUANTITIES["force"])
+"""The timeline also writes this one, while it plays."""
 MISSING_COLOR = (1.0, 0.0, 1.0)
 """Colour that Blender shows for an image that it does not find. Forces of exactly these values (N) do not occur in practice."""
 GLOW = 0.8
@@ -75,29 +86,6 @@ def set_image_frames(user, frame_start: int, frame_end: int) -> None:
     user.use_auto_refresh = True
 
 
-def area_image(uid: str, name: str, area: np.ndarray):
-    """Return an image of the texels' areas that is stored in the .blend.
-
-    Parameters
-    ----------
-    uid, name : str
-        Identity and name of the sensor.
-    area : (height, width) float, m²
-    """
-    mark = f"{uid}:area"
-    image = find_block(bpy.data.images, mark)
-    if image is not None:
-        bpy.data.images.remove(image)
-    height, width = area.shape
-    image = bpy.data.images.new(f"Palpate {name} area", width, height, alpha=False, float_buffer=True, is_data=True)
-    image[SENSOR_KEY] = mark
-    pixels = np.ones((height, width, 4), dtype=np.float32)
-    pixels[..., :3] = area[..., None]
-    image.pixels.foreach_set(pixels.ravel())
-    image.pack()
-    return image
-
-
 @dataclass(frozen=True)
 class ImageMapping:
     """Mapping of an image onto a sensor: its UV map, and if its pixels are blended."""
@@ -106,27 +94,8 @@ class ImageMapping:
     smooth: bool = False
 
 
-@dataclass(frozen=True)
-class ColorScale:
-    """What the colours of a heat map mean.
-
-    Attributes
-    ----------
-    maximum : float, N or Pa
-        Value at the upper end of the colour map.
-    color_map : str
-        Key of :data:`.color_maps.STOPS`.
-    pressure : bool
-        True if the colours show force over area (Pa), False if they show the force (N).
-    """
-
-    maximum: float
-    color_map: str
-    pressure: bool = False
-
-
 def heat_map_material(
-    uid: str, name: str, image, frames: tuple[int, int], scale: ColorScale, area=None, mapping: ImageMapping = ImageMapping()
+    uid: str, name: str, image, frames: tuple[int, int], scale: Scale, mapping: ImageMapping = ImageMapping()
 ):
     """Create a sensor's heat-map material, or rebuild the nodes of the existing one.
 
@@ -135,15 +104,11 @@ def heat_map_material(
     uid, name : str
         Identity and name of the sensor.
     image : Image or None
-        From :func:`load_sequence`; None to read the force from the vertex attribute :data:`FORCE`.
+        From :func:`load_sequence`; None to read the values from the vertex attribute :func:`attribute_of`.
     frames : (int, int)
         First and last frame of the bake.
-    scale : ColorScale
-    area : Image, str or None
-        What the force is divided by if the colours show pressure: an image from :func:`area_image`, or the name of a vertex
-        attribute.
+    scale : Scale
     mapping : ImageMapping
-        Of both images.
 
     Returns
     -------
@@ -155,42 +120,31 @@ def heat_map_material(
         material.use_nodes = True
     material.node_tree.nodes.clear()
     add = NodeAdder(material.node_tree)
-    value, missing = _add_force(add, image, frames, mapping)
-    if area is not None:
-        value = _add_pressure(add, value, area, mapping)
-    color = _add_colors(add, value, scale, "Normal force / maximum (N)" if area is None else "Pressure / maximum (Pa)")
+    value, missing = _add_value(add, image, frames, scale, mapping)
+    color = _add_colors(add, value, scale)
     if missing is not None:
         color = _add_missing_color(add, color, missing)
     _add_surface(add, color)
     return material
 
 
-def _add_force(add, image, frames: tuple[int, int], mapping: ImageMapping):
-    """Return the sockets of the force and, where it comes from an image, of a test that the image is missing."""
+def _add_value(add, image, frames: tuple[int, int], scale: Scale, mapping: ImageMapping):
+    """Return the sockets of the value and, where it comes from an image, of a test that the image is missing."""
     if image is None:
-        return add("ShaderNodeAttribute", attribute_name=FORCE).outputs["Fac"], None
+        return add("ShaderNodeAttribute", attribute_name=attribute_of(scale.quantity)).outputs["Fac"], None
     texture = _texture(add, image, mapping)
     set_image_frames(texture.image_user, *frames)
     return _red(add, texture), add_missing_test(add, texture.outputs["Color"])
 
 
-def _add_pressure(add, force, area, mapping: ImageMapping):
-    """Return the socket of force over area."""
-    attribute = add("ShaderNodeAttribute", attribute_name=area).outputs["Fac"] if isinstance(area, str) else None
-    quotient = add("ShaderNodeMath", operation="DIVIDE", label="Pressure (Pa)")
-    add.tree.links.new(force, quotient.inputs[0])
-    add.tree.links.new(attribute or _red(add, _texture(add, area, mapping)), quotient.inputs[1])
-    return quotient.outputs[0]
-
-
-def _add_colors(add, value, scale: ColorScale, label: str):
-    """Return the socket of the colour of a force or pressure."""
-    share = add("ShaderNodeMath", operation="DIVIDE", use_clamp=True, label=label)
-    add.tree.links.new(value, share.inputs[0])
-    share.inputs[1].default_value = scale.maximum
+def _add_colors(add, value, scale: Scale):
+    """Return the socket of the colour of a value."""
+    share = add("ShaderNodeMapRange", clamp=True, label=f"{scale.quantity.title} ({scale.unit})")
+    add.tree.links.new(value, share.inputs["Value"])
+    share.inputs["From Min"].default_value, share.inputs["From Max"].default_value = scale.low, scale.high
     ramp = add("ShaderNodeValToRGB")
-    _fill_ramp(ramp.color_ramp, scale.color_map)
-    add.tree.links.new(share.outputs[0], ramp.inputs["Fac"])
+    _fill_ramp(ramp.color_ramp, scale.colour_map)
+    add.tree.links.new(share.outputs["Result"], ramp.inputs["Fac"])
     return ramp.outputs["Color"]
 
 
@@ -229,7 +183,7 @@ def _texture(add, image, coordinates: ImageMapping):
 
 
 def _red(add, texture):
-    """Return the socket of an image's red channel, the normal force."""
+    """Return the socket of an image's red channel, :data:`IMAGE_CHANNEL`."""
     channels = add("ShaderNodeSeparateColor")
     add.tree.links.new(texture.outputs["Color"], channels.inputs["Color"])
     return channels.outputs["Red"]
@@ -300,19 +254,11 @@ def add_image_lookup(add, image, frames: tuple[int, int]):
     return texture.outputs["Color"]
 
 
-def force_node_group(uid: str, name: str, image, frames: tuple[int, int]):
-    """Return geometry nodes that look up the image at each texel and store the force on the vertices."""
-    group = empty_node_group(uid, name)
-    add, link = NodeAdder(group), group.links.new
-    start = add("NodeGroupInput")
+def image_values(add, image, frames: tuple[int, int]):
+    """Return the socket of the image's channel :data:`IMAGE_CHANNEL` at each texel."""
     channels = add("FunctionNodeSeparateColor")
-    link(add_image_lookup(add, image, frames), channels.inputs["Color"])
-    store = add("GeometryNodeStoreNamedAttribute", data_type="FLOAT", domain="POINT")
-    store.inputs["Name"].default_value = FORCE
-    link(start.outputs[0], store.inputs["Geometry"])
-    link(channels.outputs["Red"], store.inputs["Value"])
-    link(store.outputs["Geometry"], add("NodeGroupOutput").inputs[0])
-    return group
+    add.tree.links.new(add_image_lookup(add, image, frames), channels.inputs["Color"])
+    return channels.outputs["Red"]
 
 
 def remove_blocks(uid: str, keep_image: bool = False) -> None:
@@ -320,7 +266,8 @@ def remove_blocks(uid: str, keep_image: bool = False) -> None:
     for blocks, mark in (
         (bpy.data.materials, uid),
         (bpy.data.node_groups, uid),
-        (bpy.data.images, f"{uid}:area"),
+        (bpy.data.images, f"{uid}:{TABLE}"),
+        (bpy.data.images, f"{uid}:area"),  # of Palpate 0.1.0
         (bpy.data.images, uid),
     ):
         block = find_block(blocks, mark)

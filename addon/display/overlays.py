@@ -12,7 +12,7 @@ from functools import lru_cache
 import bpy
 import numpy as np
 
-from ...core.figures import color_maps
+from ...core.figures.quantities import Scale
 from ...core.geometry.mesh import TriangleMesh, vertex_normals
 from ...core.io.bake_reader import frame_index
 from ..scene import baked_names, participants
@@ -46,20 +46,21 @@ class SensorOverlay:
         Ends of the net-force arrow.
     plain_only : bool
         Drawn only in views whose materials do not show the same.
+    sensor : int
+        Blender's number of the sensor in this session. Its overlay is not drawn while it is painted or edited.
     """
 
     corners: np.ndarray
     colors: np.ndarray
     line: np.ndarray | None
     plain_only: bool = False
+    sensor: int = 0
     at_rest: np.ndarray | None = None
     normals: np.ndarray | None = None
     batches: list | None = None
 
 
 _overlays: dict[int, list[SensorOverlay]] = {}
-_largest: dict[int, tuple[float, float]] = {}
-"""Largest displayed value and net force of any sensor so far, by scene and quantity."""
 _handle = None
 
 
@@ -80,23 +81,25 @@ def show(scene, run, frame) -> None:
 
 def sensor_overlays(scene, run, frame) -> list[SensorOverlay]:
     """Return the heat maps and arrows of one frame of a live simulation; all sensors share one scale."""
-    maximum, strongest = _scale(scene, run, frame)
-    scale, overlays = run.reading.metres_per_unit, []
-    length = ARROW_SHARE * max((_size(sensor.texels) for sensor in _read_out(run)), default=0.0) / strongest
+    scale, metres, overlays = live_scale(scene, run), run.reading.metres_per_unit, []
+    length = ARROW_SHARE * max((_size(sensor.texels) for sensor in _read_out(run)), default=0.0) / run.largest_net_force()
     settings = scene.palpate
     factor = settings.indentation_factor if settings.show_indentation else 0.0
     for sensor, obj in zip(run.scenario.sensors, run.reading.sensor_objects(scene), strict=True):
         if not sensor.readout:
             continue
         readings, pose = frame.sensors[sensor.name], frame.poses[sensor.body]
+        if not scale.quantity.is_in(readings):
+            continue
         displacement = (factor if _gives_way(scene, obj) else 0.0) * readings.depth
-        overlay = _heat_map(scene, sensor.texels, readings.normal_force, displacement, pose, maximum, scale)
-        overlay.line = _net_force(readings, pose, length, scale)
+        overlay = _heat_map(sensor.texels, readings, displacement, pose, scale, metres)
+        overlay.line = _net_force(readings, pose, length, metres)
+        overlay.sensor = obj.session_uid if obj is not None else 0
         overlays.append(overlay)
     return overlays
 
 
-def show_bake(scene, bake, number: int, maximum: float) -> None:
+def show_bake(scene, bake, number: int, scale: Scale) -> None:
     """Show the heat maps of one frame of a bake in views without materials; its arrows are objects of the scene.
 
     Parameters
@@ -104,15 +107,14 @@ def show_bake(scene, bake, number: int, maximum: float) -> None:
     bake : Bake
     number : int
         The frame, which the bake must have.
-    maximum : float, N or Pa
-        End of the colours.
+    scale : Scale
     """
     if scene.palpate.show_overlay:
-        _overlays[scene.session_uid] = baked_overlays(scene, bake, number, maximum)
+        _overlays[scene.session_uid] = baked_overlays(scene, bake, number, scale)
         redraw.views()
 
 
-def baked_overlays(scene, bake, number: int, maximum: float) -> list[SensorOverlay]:
+def baked_overlays(scene, bake, number: int, scale: Scale) -> list[SensorOverlay]:
     """Return the heat maps of one frame of a bake; see :func:`show_bake`."""
     recording, overlays = bake.recording, []
     sensors, poses = recording.at(number).sensors, recording.poses[frame_index(recording, number)]
@@ -122,20 +124,22 @@ def baked_overlays(scene, bake, number: int, maximum: float) -> list[SensorOverl
         if body in recording.body_names:
             pose = poses[recording.body_names.index(body)]
             readings, obj = sensors[name], objects.get(name)
+            if not scale.quantity.is_in(readings):
+                continue
             displacement = indentation.factor_of(obj) * readings.depth
-            overlay = _heat_map(scene, texels, readings.normal_force, displacement, pose, maximum, units.metres_per_unit(scene))
+            overlay = _heat_map(texels, readings, displacement, pose, scale, units.metres_per_unit(scene))
             overlay.plain_only = True
+            overlay.sensor = obj.session_uid if obj is not None else 0
             overlays.append(overlay)
     return overlays
 
 
 def inset_content(scene, run, frame) -> inset.InsetContent:
     """Return the tactile images and curves of one frame of a live simulation."""
-    maximum, _ = _scale(scene, run, frame)
     known = sorted(run.frames)
     texels = {sensor.name: sensor.texels for sensor in _read_out(run)}
     loads = {name: np.array([run.total_forces(number)[name] for number in known]) for name in texels}
-    return inset.inset_content(scene, frame, texels, np.array(known, float), loads, maximum)
+    return inset.inset_content(scene, frame, texels, np.array(known, float), loads, live_scale(scene, run))
 
 
 def _read_out(run) -> list:
@@ -143,20 +147,10 @@ def _read_out(run) -> list:
     return [sensor for sensor in run.scenario.sensors if sensor.readout]
 
 
-def _scale(scene, run, frame) -> tuple[float, float]:
-    """Return the end of the colours (N or Pa) and the net force (N) that the longest arrow shows, as a bake so far would."""
-    settings = scene.palpate
-    key = hash((scene.session_uid, settings.quantity))
-    value, net = _largest.get(key, (inset.NO_LOAD, inset.NO_LOAD))
-    for sensor in _read_out(run):
-        readings = frame.sensors[sensor.name]
-        value = max(
-            value, float(bake_display.displayed_values(settings, readings.normal_force, sensor.texels).max(initial=0.0))
-        )
-        net = max(net, float(np.linalg.norm(readings.net_force)))
-    _largest[key] = value, net
-    limit = bake_display.rounded_range(settings, value) if value > inset.NO_LOAD else value
-    return (limit if settings.use_auto_range else bake_display.user_range(settings)), net
+def live_scale(scene, run) -> Scale:
+    """Return the colours of a live simulation, as a bake of the frames so far would have them."""
+    style = bake_display.figure_style(scene)
+    return style.scale_of(run.extent(style.shown))
 
 
 def _gives_way(scene, obj) -> bool:
@@ -168,23 +162,21 @@ def _gives_way(scene, obj) -> bool:
     return depsgraph is not None and indentation.may_indent(obj, depsgraph)
 
 
-def _heat_map(
-    scene, texels, force: np.ndarray, displacement: np.ndarray, pose: np.ndarray, maximum: float, scale: float
-) -> SensorOverlay:
-    """Return the heat map of a sensor at a pose, (7,) in metres; `scale` is the metres of a Blender unit.
+def _heat_map(texels, readings, displacement: np.ndarray, pose: np.ndarray, scale: Scale, metres: float) -> SensorOverlay:
+    """Return the heat map of a sensor at a pose, (7,) in metres; `metres` are those of a Blender unit.
 
     It lies on both sides of the surface, because the body of a sensor that is a sheet is seen from both. Its texels are moved
     inwards by `displacement`, (n,) metres.
     """
     lift = LIFT * _size(texels)
     rotation = transforms.rotation(pose[3:])
-    rgb = color_maps.colors(scene.palpate.color_map, bake_display.displayed_values(scene.palpate, force, texels) / maximum)
+    rgb = scale.colors(scale.values(readings, texels))
     triangles = texels.layout.triangles
     corner = triangles.ravel()
 
     def on_both_sides(position: np.ndarray) -> np.ndarray:
         lifted = lift * texels.normal
-        sides = [(pose[:3] + (position + side * lifted)[corner] @ rotation.T) / scale for side in (1.0, -1.0)]
+        sides = [(pose[:3] + (position + side * lifted)[corner] @ rotation.T) / metres for side in (1.0, -1.0)]
         return np.concatenate(sides).astype(np.float32)
 
     if not (displacement > 0.0).any():
@@ -207,13 +199,13 @@ def _opaque(rgb: np.ndarray) -> np.ndarray:
     return np.column_stack([rgb, np.ones(len(rgb))]).astype(np.float32)
 
 
-def _net_force(readings, pose: np.ndarray, length: float, scale: float) -> np.ndarray | None:
+def _net_force(readings, pose: np.ndarray, length: float, metres: float) -> np.ndarray | None:
     """Return the ends of the net-force arrow, of `length` metres per newton; None without contact."""
     if not readings.contact.any():
         return None
     foot = readings.centre_of_pressure
     tip = foot - readings.net_force * length
-    return (pose[:3] + np.array([foot, tip]) @ transforms.rotation(pose[3:]).T) / scale
+    return (pose[:3] + np.array([foot, tip]) @ transforms.rotation(pose[3:]).T) / metres
 
 
 def _size(texels) -> float:
@@ -225,7 +217,6 @@ def clear(scene=None) -> None:
     """Stop showing the overlays of a scene, or of all scenes."""
     if scene is None:
         _overlays.clear()
-        _largest.clear()
         inset.clear()
     else:
         _overlays.pop(scene.session_uid, None)
@@ -242,13 +233,13 @@ def _draw() -> None:
     import gpu
 
     scene = bpy.context.scene
-    through = draws_through(scene, space)
+    through, edited = draws_through(scene, space), edited_objects(bpy.context)
     materials_suffice = space.shading.type in SHOWING_MATERIALS and shows_colors_as_they_are(scene) and not through
     gpu.state.depth_test_set("ALWAYS" if through else "LESS_EQUAL")
     gpu.state.face_culling_set("BACK" if through else "NONE")  # of a closed sensor, its far side does not show
     gpu.state.depth_mask_set(True)
     for overlay in overlays:
-        if overlay.plain_only and materials_suffice:
+        if overlay.plain_only and materials_suffice or overlay.sensor in edited:
             continue
         if overlay.batches is None:
             overlay.batches = _batches(overlay)
@@ -266,6 +257,14 @@ def _draw() -> None:
 def draws_through(scene, space) -> bool:
     """Return True where a 3D view draws heat maps over what covers them: as set, or in X-ray."""
     return scene.palpate.show_through or view_shading.is_xray(space.shading)
+
+
+def edited_objects(context) -> set[int]:
+    """Return Blender's numbers of the objects that are painted, sculpted or edited, which a heat map would hide."""
+    active = context.object
+    if active is None or active.mode in ("OBJECT", "POSE"):
+        return set()
+    return {obj.session_uid for obj in context.objects_in_mode} | {active.session_uid}
 
 
 def shows_colors_as_they_are(scene) -> bool:

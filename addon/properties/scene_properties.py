@@ -5,7 +5,8 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
 from ...core.figures import color_maps
-from ..session import session_state
+from ...core.figures.quantities import QUANTITIES, between
+from ..session import session_state, units
 from . import figure_properties, path_options, study_properties
 
 SETTING: dict = {"options": set(), "update": session_state.settings_changed}
@@ -28,8 +29,56 @@ OVERLAYS = (
 )
 
 
+def range_names(settings) -> tuple[str, ...]:
+    """Return the names of the properties that are the ends of the colours of the quantity in view; zero is not among them."""
+    name = settings.quantity.lower()
+    upper = RANGE_NAMES.get(name, f"range_max_{name}")
+    return (f"range_min_{name}", upper) if QUANTITIES[name].span is between else (upper,)
+
+
+RANGE_NAMES = {"force": "range_max"}
+"""Names of upper ends that are not ``range_max_`` and the quantity."""
+
+
+def color_range(settings) -> tuple[float | None, float | None]:
+    """Return the ends of the colours as set; the lower one is None where it follows from the other, both if they are none."""
+    *lower, upper = (units.as_typed(getattr(settings, name)) for name in range_names(settings))
+    if lower and lower[0] >= upper:
+        return None, None
+    return (lower[0] if lower else None), upper
+
+
+def set_color_range(settings, lowest: float | None, limit: float) -> None:
+    """Set the ends of the colours of the quantity in view."""
+    *lower, upper = range_names(settings)
+    setattr(settings, upper, limit)
+    for name in lower:
+        setattr(settings, name, lowest or 0.0)
+
+
+def _ranges() -> dict:
+    """Return the properties of the ends of all quantities' colours."""
+    found = {}
+    for name, quantity in QUANTITIES.items():
+        unit = f" ({quantity.unit})" if isinstance(quantity.unit, str) else ""
+        is_between = quantity.span is between
+        text = f"{quantity.title} at the %s of the heat map{unit or ', in the unit of the sensor'}"
+        found[RANGE_NAMES.get(name, f"range_max_{name}")] = FloatProperty(
+            name=f"Maximum{unit}",
+            description=text % "end",
+            default=quantity.limit,
+            **({} if is_between else {"min": 1e-9}),
+            **SETTING,
+        )
+        if is_between:
+            found[f"range_min_{name}"] = FloatProperty(name=f"Minimum{unit}", description=text % "beginning", **SETTING)
+    return found
+
+
 class PALPATE_PG_scene(bpy.types.PropertyGroup):
     """`Scene.palpate`"""
+
+    __annotations__ = _ranges()
 
     schema_version: IntProperty(options={"HIDDEN"})
     folder: StringProperty(
@@ -127,14 +176,8 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
     quantity: EnumProperty(
         name="Shows",
         description="What the colours of heat maps and tactile images mean",
-        items=(
-            ("FORCE", "Force", "Normal force of the texel, N"),
-            ("PRESSURE", "Pressure", "Normal force over the area of the texel, kPa"),
-        ),
+        items=[(name.upper(), quantity.title, quantity.text) for name, quantity in QUANTITIES.items()],
         **SETTING,
-    )
-    range_max_pressure: FloatProperty(
-        name="Maximum (kPa)", description="Pressure at the end of the heat map, kPa", default=10.0, min=1e-9, **SETTING
     )
     show_indentation: BoolProperty(
         name="Indentation",
@@ -167,9 +210,6 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
         min=0.0,
         precision=5,
         **SETTING,
-    )
-    range_max: FloatProperty(
-        name="Maximum (N)", description="Normal force at the end of the heat map, N", default=0.1, min=1e-9, **SETTING
     )
     use_auto_arrow: BoolProperty(
         name="Auto Length",

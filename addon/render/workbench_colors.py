@@ -48,7 +48,7 @@ def workbench_colors(folders: dict, bake: Bake, style: FigureStyle) -> Iterator[
     sensors = {obj: names[folder] for obj, folder in folders.items() if folder in names}
     meshes_shown = [obj for obj in bpy.context.scene.objects if obj.type == "MESH" and len(obj.data.polygons)]
     before = {obj: (obj.data, tuple(obj.color)) for obj in meshes_shown}
-    top = style.scale_limit(bake.recording, bake.texels)
+    scale = style.scale(bake.recording, bake.texels)
     try:
         plain = {obj: _in_material_colours(obj) for obj in meshes_shown}
         regions = {obj: _corners_of_region(obj.data, bake.texels[name]) for obj, name in sensors.items()}
@@ -57,10 +57,10 @@ def workbench_colors(folders: dict, bake: Bake, style: FigureStyle) -> Iterator[
             index = frame_index(bake.recording, number)
             for obj, name in sensors.items():
                 texels = bake.texels[name]
-                values = style.values(bake.recording.sensors[name].at(index), texels)
+                values = scale.values(bake.recording.sensors[name].at(index), texels)
                 corners, texel = regions[obj]
                 table = plain[obj].copy()
-                table[corners, :3] = color_maps.linear(color_maps.colors(style.colour_map, values / top))[texel]
+                table[corners, :3] = color_maps.linear(scale.colors(values))[texel]
                 obj.data.attributes[COLOR_ATTRIBUTE].data.foreach_set("color", table.ravel())
                 obj.data.update_tag()
 

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import PalpateError
+from ...core.figures.quantities import Extent, Scale
 from ...core.io.bake_reader import Bake, read_sensors
 from ...core.model.recording import Frame, Recording
 from ..display import bake_display, bake_identity, baked_scene, inset, overlays
@@ -22,6 +23,8 @@ _names: dict[Path, str] = {}
 _read: dict[tuple[Path, ...], tuple[list[tuple[int, ...]], Bake | PalpateError]] = {}
 """By the folders of a scene's sensors: the stamps of their manifests and their bake, read and checked when it is first needed
 and when another one has taken its place, or why it cannot be read."""
+_extents: dict[tuple[int, str], tuple[Bake, Extent]] = {}
+"""By identity of a bake, which is kept with it, and quantity: the extent of the colours that were shown last."""
 
 
 def forget() -> None:
@@ -29,6 +32,7 @@ def forget() -> None:
     _new.clear()
     _read.clear()
     _names.clear()
+    _extents.clear()
 
 
 def remember(recording: Recording, folders: dict[str, Path]) -> None:
@@ -72,13 +76,24 @@ def _show_in_views(scene, frame: Frame, note: str) -> None:
     if bake is None or frame.frame not in bake.recording.frames:
         return
     recording, present = bake.recording, _present_names(scene)
-    style = bake_display.figure_style(scene)
-    top = style.scale_limit(recording, bake.texels) * (1e3 if style.quantity == "pressure" else 1.0)
-    overlays.show_bake(scene, bake, frame.frame, top)
+    scale = _scale(scene, bake)
+    overlays.show_bake(scene, bake, frame.frame, scale)
     if scene.palpate.show_inset:
         texels = {present.get(name, name): own for name, own in bake.texels.items()}
         loads = {present.get(name, name): readings.normal_force.sum(axis=1) for name, readings in recording.sensors.items()}
-        inset.show(scene, inset.inset_content(scene, frame, texels, recording.frames.astype(float), loads, top, note))
+        inset.show(scene, inset.inset_content(scene, frame, texels, recording.frames.astype(float), loads, scale, note))
+
+
+def _scale(scene, bake: Bake) -> Scale:
+    """Return the colours of a bake, whose extent is looked up once for each quantity."""
+    style = bake_display.figure_style(scene)
+    key = id(bake), style.quantity
+    if _extents.get(key, (None,))[0] is not bake:
+        sensors = bake.recording.sensors
+        sources = ((sensors[name], own) for name, own in bake.texels.items() if style.shown.is_in(sensors[name]))
+        _extents.clear()
+        _extents[key] = bake, Extent.of(style.shown, sources)
+    return style.scale_of(_extents[key][1])
 
 
 def _present_names(scene) -> dict[str, str]:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...core.errors import PalpateError
+from ...core.figures.quantities import Extent, Quantity
 from ...core.model.recording import Frame
 from ...core.model.scenario import Scenario
 from ..properties import start_transforms
@@ -55,6 +56,8 @@ class LiveRun:
     samples: dict[int, scene_reading.FrameSample] = field(default_factory=dict)
     placed_channels: dict[int, np.ndarray] = field(default_factory=dict)
     _total_forces: dict[int, dict[str, float]] = field(default_factory=dict)
+    _extents: dict[str, tuple[int, Extent]] = field(default_factory=dict)
+    _largest_net: tuple[int, float] = (0, 1e-9)
 
     @property
     def scenario(self) -> Scenario:
@@ -67,6 +70,24 @@ class LiveRun:
             sensors = self.frames[number].sensors
             self._total_forces[number] = {name: float(readings.normal_force.sum()) for name, readings in sensors.items()}
         return self._total_forces[number]
+
+    def largest_net_force(self) -> float:
+        """Return the largest net force on a sensor in the frames that were computed, N; a billionth without any contact."""
+        done, known = self._largest_net
+        frames = list(self.frames.values())
+        new = (float(np.linalg.norm(own.net_force)) for frame in frames[done:] for own in frame.sensors.values())
+        self._largest_net = len(frames), max((known, *new))
+        return self._largest_net[1]
+
+    def extent(self, quantity: Quantity) -> Extent:
+        """Return the extent of a quantity in the frames that were computed."""
+        count, known = self._extents.get(quantity.name, (0, None))
+        texels = {sensor.name: sensor.texels for sensor in self.scenario.sensors if sensor.readout}
+        frames = list(self.frames.values())
+        new = ((frame.sensors[name], own) for frame in frames[count:] for name, own in texels.items())
+        found = Extent.of(quantity, ((felt, own) for felt, own in new if quantity.is_in(felt)), known)
+        self._extents[quantity.name] = len(frames), found
+        return found
 
 
 _runs: dict[int, LiveRun] = {}

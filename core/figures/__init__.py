@@ -13,6 +13,7 @@ __all__ = [
     "gel_image",
     "html_templates",
     "picture_labels",
+    "quantities",
     "side_by_side",
     "tactile_image",
     "tactile_strip",

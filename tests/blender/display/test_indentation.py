@@ -7,11 +7,12 @@ import pytest
 from blender_scenes import ball, changes, dump, grid, press, press_and_drop, reopen, save
 
 from palpate.addon.bake.bake import bake
-from palpate.addon.display import indentation, materials, overlays
+from palpate.addon.display import indentation, materials, overlays, played_table
 from palpate.addon.scene import mesh_arrays, mesh_fingerprint
 from palpate.addon.scene.display_names import INDENTATION_MODIFIER
 from palpate.addon.session import frame_status
 from palpate.addon.timeline import live_cache
+from palpate.core.figures.figure_style import FigureStyle
 from palpate.core.jobs.job_runner import run_job
 
 
@@ -159,7 +160,7 @@ def test_modifiers_that_add_vertices_leave_the_surface_as_it_is(tmp_path):
 
 def test_long_bakes_keep_every_second_frame(tmp_path, monkeypatch):
     scene, pad, _ = press()
-    monkeypatch.setattr(indentation, "MOST_PIXELS", 4)
+    monkeypatch.setattr(played_table, "MOST_PIXELS", 4)
     save(tmp_path)
     result = run_job(bake(scene))
     image = next(image for image in bpy.data.images if image.name.endswith("depth"))
@@ -178,7 +179,7 @@ def test_the_overlay_of_solid_view_is_indented_as_the_texels_are(tmp_path):
     made = type("Bake", (), {})()
     made.recording, made.texels = result.recording, {"Pad": result.scenario.sensors[0].texels}
     made.manifests = {"Pad": type("Manifest", (), {"body": ""})()}
-    (overlay,) = overlays.baked_overlays(scene, made, 6, 1.0)
+    (overlay,) = overlays.baked_overlays(scene, made, 6, FigureStyle(limit=1.0).scale(made.recording, made.texels))
     assert_indented(overlay, made.texels["Pad"], result.recording.at(6).sensors["Pad"].depth)
 
 

@@ -9,11 +9,12 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import cube, press_and_drop, save
+from blender_scenes import cube, press_and_drop, save, scene_with_readings
 
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import materials
 from palpate.core.figures import color_maps
+from palpate.core.figures.quantities import QUANTITIES
 from palpate.core.jobs.job_runner import run_job
 from palpate.core.response import metrics
 
@@ -94,6 +95,26 @@ def test_it_plays_without_the_addon(scene_file, tmp_path):
     for frame in FRAMES:
         matrix = np.array(without["frames"][str(frame)]["bodies"]["Cube"])
         assert matrix[:3, 3] == pytest.approx(recording.poses[frame - 1, cube_at, :3], abs=1e-6)
+
+
+@pytest.mark.slow("starts Blender")
+@pytest.mark.parametrize("name", [name for name in QUANTITIES if name != "force"])
+def test_every_quantity_plays_without_the_addon(tmp_path, name):
+    scene = scene_with_readings()
+    scene.palpate.quantity = name.upper()
+    cube("Tip", (0.0, 0.1, 0.0), size=0.02)
+    figure_style_from_above(scene)
+    path = save(tmp_path)
+    result = run_job(bake(scene))
+    save(tmp_path)
+    (tmp_path / "palpate-bake").rename(tmp_path / "lost")  # the values are in the .blend
+    pad = next(sensor for sensor in result.scenario.sensors if sensor.name == "Pad")
+    seen = watch(path, tmp_path, name, False)["frames"]
+    for frame in FRAMES:
+        expected = QUANTITIES[name].values(result.recording.at(frame).sensors["Pad"], pad.texels)
+        shown = np.array(seen[str(frame)]["shown"][f"palpate_{name}"])[pad.texels.vertex]
+        assert shown == pytest.approx(expected, rel=1e-5, abs=1e-5 * max(abs(expected).max(), 1e-9))
+    assert np.abs(expected).max() > 0.0
 
 
 @pytest.mark.long("starts Blender three times and renders")

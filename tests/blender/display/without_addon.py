@@ -37,10 +37,17 @@ for frame in map(int, frames):
     picture = bpy.data.images.load(str(path))
     pixels = np.empty(len(picture.pixels), dtype=np.float32)
     picture.pixels.foreach_get(pixels)
+    corners = len(scene.objects["Tip"].data.vertices)
     tip = scene.objects["Tip"].evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    pad_mesh = scene.objects["Pad"].evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     report["frames"][frame] = {
         # the vertices of the mesh itself come first; those of the indented surface follow
-        "tip": [item.value for item in tip.attributes["palpate_force"].data][: len(scene.objects["Tip"].data.vertices)],
+        "tip": [item.value for item in getattr(tip.attributes.get("palpate_force"), "data", ())][:corners],
+        "shown": {
+            item.name: [value.value for value in item.data][: len(scene.objects["Pad"].data.vertices)]
+            for item in pad_mesh.attributes
+            if item.name.startswith("palpate_") and item.data_type == "FLOAT" and ":" not in item.name
+        },
         "depth": deepest(scene.objects["Pad"]),
         "size": list(picture.size),
         "pixels": np.round(pixels, 4).tolist(),

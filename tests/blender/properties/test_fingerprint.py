@@ -7,6 +7,7 @@ import re
 import bpy
 import pytest
 
+from palpate.addon.properties import scene_properties
 from palpate.addon.properties.scene_units import ENDING
 from palpate.addon.scene import drives, scene_fingerprint
 
@@ -22,9 +23,9 @@ COMPARED_WHEN_DRIVEN = set(drives.TARGET_PROPERTIES.values())
 SCENE_WITHOUT_FORCES = {
     *("schema_version", "folder", "use_live", "figures", "baked_digest", "baked_fingerprint", "baked_shapes", "baked_names"),
     *("baked_start", "baked_end", "show_texels", "show_normals", "show_numbers", "show_reach", "show_overlay", "show_inset"),
-    *("color_map", "use_auto_range", "quantity", "range_max_pressure", "range_max", "overlays", "texel_arrow_scale"),
+    *("color_map", "use_auto_range", "quantity", "overlays", "texel_arrow_scale"),
     *("use_auto_arrow", "arrow_scale", "scene_id", "baked_id", "unchanged_note", "study"),
-    *("show_indentation", "indentation_factor", "show_through"),
+    *("show_indentation", "indentation_factor", "show_through", *scene_properties._ranges()),
 }
 """Properties of a scene that change no force: how results are shown, where they are written, and what a bake has left."""
 

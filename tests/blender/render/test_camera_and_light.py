@@ -222,7 +222,8 @@ def test_colours_are_those_of_the_colour_bar(tmp_path, engine):
     found = figure_export.read_scene_bake(scene)
     texels, readings = found.texels["Pad"], found.recording.at(3).sensors["Pad"]
     style = request.style
-    values = style.values(readings, texels) / style.scale_limit(found.recording, found.texels)
+    scale = style.scale(found.recording, found.texels)
+    values = scale.values(readings, texels) / scale.high
     scene.frame_set(3)
     matrix = np.array(scene.objects["Pad"].matrix_world)
     free = readings.normal_force == 0.0

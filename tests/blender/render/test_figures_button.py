@@ -48,7 +48,7 @@ def test_the_window_offers_what_the_command_offers():
         "out": "folder", "only": "kinds", "sensor": "sensors", "frame": "frames", "format": "formats", "own_camera": "camera",
         "peak": "frames", "opaque_targets": "see_through",
     }  # fmt: skip
-    display = {"colour_map": "color_map", "quantity": "quantity", "limit": "range_max"}
+    display = {"colour_map": "color_map", "quantity": "quantity", "limit": "range_max", "lowest": "range_min_reading"}
     scene = bpy.context.scene.palpate
     for action in parser._actions:
         if action.dest in ("help", "scene", "bake", "scripts", "time_limit", "memory_limit"):  # of a run without a window

@@ -139,8 +139,8 @@ def test_the_scene_shows_the_colours_of_the_colour_bar(baked):
     made = figure_export.read_scene_bake(scene)
     pad = scene.objects["Pad"]
     nodes = pad.material_slots[-1].material.node_tree.nodes
-    end = next(node.inputs[1].default_value for node in nodes if "maximum" in node.label)
-    assert end == pytest.approx(bake_display.figure_style(scene).scale_limit(made.recording, made.texels))
+    end = next(node.inputs["From Max"].default_value for node in nodes if node.bl_idname == "ShaderNodeMapRange")
+    assert end == pytest.approx(bake_display.figure_style(scene).scale(made.recording, made.texels).high)
 
 
 def test_a_scene_that_is_not_baked_and_a_frame_that_is_not_are_one_sentence(baked, tmp_path):

@@ -11,6 +11,7 @@ from palpate.addon.display import overlays
 from palpate.addon.session import frame_status
 from palpate.addon.timeline import baked_frames, live_cache, second_look
 from palpate.core.figures import color_maps
+from palpate.core.figures.figure_style import FigureStyle
 from palpate.core.io.bake_reader import read_sensors
 from palpate.core.jobs.job_runner import run_job
 
@@ -169,7 +170,8 @@ def test_views_without_materials_show_the_colours_of_a_bake_on_both_sides(tmp_pa
     run_job(bake(scene))
     scene.frame_set(4)
     bake_read = read_sensors(list(baked_frames._folders(scene)), images=False)
-    (overlay,) = overlays.baked_overlays(scene, bake_read, 4, 0.5)
+    scale = FigureStyle(limit=0.5).scale(bake_read.recording, bake_read.texels)
+    (overlay,) = overlays.baked_overlays(scene, bake_read, 4, scale)
     texels, readings = bake_read.texels["Pad"], bake_read.recording.at(4).sensors["Pad"]
     corner = texels.layout.triangles.ravel()
     assert overlay.plain_only and overlay.line is None

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Values of a sensor's vertices at every frame, packed into the .blend as an image, and nodes that look them up.
+
+They play in any Blender and without the files of a bake. Three vertices share a pixel, and each frame has a row.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from . import materials
+
+MOST_PIXELS = 4_000_000
+"""Pixels of an image at most, 64 MB of memory; of longer bakes every second, third, … frame is kept."""
+
+
+@dataclass(frozen=True)
+class PlayedTable:
+    """An image of values, its first and last frame, the frames from one of its rows to the next, and the names of attributes.
+
+    The vector attribute `column` holds the image's texture coordinate u as x. `channel` is one for the channel that holds the
+    vertex, and zero for the other two.
+    """
+
+    image: object
+    first: int
+    last: int
+    step: int
+    column: str
+    channel: str
+
+    @classmethod
+    def packed(
+        cls, mark: str, name: str, mesh, vertices: np.ndarray, rows: np.ndarray, frames: np.ndarray, attributes: tuple
+    ) -> PlayedTable:
+        """Return a new table.
+
+        Parameters
+        ----------
+        mark, name : str
+            The :data:`.materials.SENSOR_KEY` and the name of the image.
+        vertices : (v,) int
+        rows : (r, v) float
+            Values of every :func:`frame_step` of the frames.
+        frames : (F,) int
+            One after another.
+        attributes : (str, str)
+            Names of the attributes that `mesh` gets.
+        """
+        width = max(1, -(-len(vertices) // 3))
+        image = bpy.data.images.new(name, width, len(rows), alpha=False, float_buffer=True, is_data=True)
+        image[materials.SENSOR_KEY] = mark
+        pixels = np.zeros((len(rows), width, 4), dtype=np.float32)
+        pixels[..., 3] = 1.0
+        for channel in range(3):
+            own = rows[:, channel::3]
+            pixels[:, : own.shape[1], channel] = own
+        image.pixels.foreach_set(pixels.ravel())
+        image.pack()
+        place = np.arange(len(vertices))
+        store_vectors(mesh, attributes[0], vertices, np.outer((place // 3 + 0.5) / width, (1.0, 0.0, 0.0)))
+        store_vectors(mesh, attributes[1], vertices, np.eye(3)[place % 3])
+        return cls(image, int(frames[0]), int(frames[-1]), frame_step(len(frames), len(vertices)), *attributes)
+
+    def lookup(self, add):
+        """Return the socket of the value at each vertex, between two frames in between."""
+        frame = out(add, "GeometryNodeInputSceneTime", output="Frame")
+        frame = out(add, "ShaderNodeClamp", {"Value": frame, "Min": self.first, "Max": self.last})
+        rows = self.image.size[1]
+        last_row = self.first + self.step * (rows - 1)
+        ends = {"From Min": self.first, "From Max": max(last_row, self.first + 1)}
+        ends |= {"To Min": 0.5 / rows, "To Max": 1.0 - 0.5 / rows}
+        row = out(add, "ShaderNodeMapRange", {"Value": frame, **ends}, clamp=True)
+        column = out(add, "ShaderNodeSeparateXYZ", {0: attribute(add, self.column)})
+        given = {"Image": self.image, "Vector": out(add, "ShaderNodeCombineXYZ", {"X": column, "Y": row})}
+        color = out(add, "GeometryNodeImageTexture", given, interpolation="Linear", extension="EXTEND")
+        chosen = {0: color, 1: attribute(add, self.channel)}
+        return out(add, "ShaderNodeVectorMath", chosen, output="Value", operation="DOT_PRODUCT")
+
+
+def frame_step(frames: int, vertices: int) -> int:
+    """Return the least distance of kept frames at which the image has no more than :data:`MOST_PIXELS`."""
+    return max(1, -(-frames * -(-vertices // 3) // MOST_PIXELS))
+
+
+def store_vectors(mesh, name: str, vertices: np.ndarray, values: np.ndarray) -> None:
+    """Give a mesh a vector attribute with values at some vertices and zero at the others."""
+    table = np.zeros((len(mesh.vertices), 3), dtype=np.float32)
+    table[vertices] = values
+    mesh.attributes.new(name, "FLOAT_VECTOR", "POINT").data.foreach_set("vector", table.ravel())
+
+
+def out(add, kind: str, given: dict | None = None, output: int | str = 0, **settings):
+    """Return an output of a new node; `given` are the sockets that lead to its inputs, or their values."""
+    node = add(kind, **settings)
+    for place, value in (given or {}).items():
+        if isinstance(value, bpy.types.NodeSocket):
+            add.tree.links.new(value, node.inputs[place])
+        else:
+            node.inputs[place].default_value = value
+    return node.outputs[output]
+
+
+def stored(add, geometry, name: str, value, data_type: str):
+    """Return the socket of a geometry with an attribute on its points."""
+    given = {"Geometry": geometry, "Name": name, "Value": value}
+    return out(add, "GeometryNodeStoreNamedAttribute", given, data_type=data_type, domain="POINT")
+
+
+def attribute(add, name: str, data_type: str = "FLOAT_VECTOR"):
+    """Return the socket of a named attribute."""
+    return out(add, "GeometryNodeInputNamedAttribute", {"Name": name}, data_type=data_type)

@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every quantity of the table is seen in every place: live and baked heat map, inset, panel and Workbench, on one scale."""
+
+import bpy
+import numpy as np
+import pytest
+from blender_scenes import press, save, scene_with_readings
+
+from palpate.addon.bake.bake import bake
+from palpate.addon.display import bake_display, baked_scene, heat_map, materials, overlays
+from palpate.addon.properties import scene_properties
+from palpate.addon.render import figure_export, workbench_colors
+from palpate.addon.scene import mesh_arrays
+from palpate.addon.timeline import live_cache
+from palpate.core.errors import PalpateError
+from palpate.core.figures import color_maps
+from palpate.core.figures.quantities import QUANTITIES, Scale, between
+from palpate.core.jobs.job_runner import run_job
+from palpate.panels import sensor as sensor_panel
+
+EVERY = pytest.mark.parametrize("name", QUANTITIES)
+
+
+def play(scene, last=8):
+    for frame in range(1, last + 1):
+        scene.frame_set(frame)
+    return live_cache.get(scene)
+
+
+def expected_colors(quantity, felt, texels, scale):
+    share = (quantity.values(felt, texels) - scale.low) / (scale.high - scale.low)
+    return color_maps.colors(scale.colour_map, share)
+
+
+@EVERY
+def test_it_is_seen_while_playing(name):
+    scene = scene_with_readings()
+    scene.palpate.quantity, scene.palpate.show_indentation = name.upper(), False
+    run = play(scene)
+    frame, texels, quantity = run.frames[8], run.scenario.sensors[0].texels, QUANTITIES[name]
+    values = np.array([quantity.values(run.frames[number].sensors["Pad"], texels) for number in range(1, 9)])
+    scale = overlays.live_scale(scene, run)
+    assert np.ptp(values) > 0.0
+    assert scale.low <= values.min() and values.max() <= scale.high and scale.unit == quantity.unit_of(frame.sensors["Pad"])
+    colors = expected_colors(quantity, frame.sensors["Pad"], texels, scale)
+    (overlay,) = overlays.sensor_overlays(scene, run, frame)
+    half = len(overlay.colors) // 2
+    assert overlay.colors[:half, :3] == pytest.approx(colors[texels.layout.triangles.ravel()], abs=1e-6)
+    content = overlays.inset_content(scene, run, frame)
+    assert content.scale == scale and scale.unit in content.scale.words(scale.high)
+    pixels = content.insets[0].pixels
+    rows, columns = texels.layout.shape
+    size = pixels.shape[0] // rows
+    shown = pixels[size // 2 :: size, size // 2 :: size, :3][texels.layout.row, texels.layout.column]
+    assert shown == pytest.approx(colors, abs=1e-6)
+
+
+@EVERY
+def test_it_is_seen_on_a_bake(tmp_path, name):
+    scene, quantity = scene_with_readings(), QUANTITIES[name]
+    pad, scene.palpate.quantity = scene.objects["Pad"], name.upper()
+    save(tmp_path)
+    run_job(bake(scene))
+    found = figure_export.read_scene_bake(scene)
+    scale = bake_display.figure_style(scene).scale(found.recording, found.texels)
+    node = next(node for node in pad.material_slots[-1].material.node_tree.nodes if node.bl_idname == "ShaderNodeMapRange")
+    ends = [node.inputs[key].default_value for key in ("From Min", "From Max")]
+    assert ends == pytest.approx([scale.low, scale.high]) and scale.unit in node.label and quantity.title in node.label
+    felt, texels = found.recording.at(7).sensors["Pad"], found.texels["Pad"]
+    if quantity.channel != materials.IMAGE_CHANNEL:
+        scene.frame_set(7)
+        mesh = pad.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+        shown = np.empty(len(mesh.vertices), dtype=np.float32)
+        mesh.attributes[materials.attribute_of(quantity)].data.foreach_get("value", shown)
+        values = quantity.values(felt, texels)
+        assert shown[texels.vertex] == pytest.approx(values, rel=1e-5, abs=1e-5 * np.abs(values).max())
+    colors = expected_colors(quantity, felt, texels, scale)
+    assert np.ptp([quantity.values(found.recording.sensors["Pad"].at(i), texels) for i in (0, 6)]) > 0.0
+    (overlay,) = overlays.baked_overlays(scene, found, 7, scale)  # what Solid view shows
+    corner = texels.layout.triangles.ravel()
+    free = np.tile(felt.depth[corner] == 0.0, 2)
+    assert overlay.colors[free, :3] == pytest.approx(np.tile(colors[corner], (2, 1))[free], abs=1e-6)
+    with workbench_colors.workbench_colors(baked_scene.bake_folders(scene), found, bake_display.figure_style(scene)) as show:
+        show(7)
+        attribute = pad.data.attributes[workbench_colors.COLOR_ATTRIBUTE]
+        table = np.empty((len(attribute.data), 4), dtype=np.float32)
+        attribute.data.foreach_get("color", table.ravel())
+        vertices = mesh_arrays.corner_vertices(pad.data)
+        place = {vertex: texel for texel, vertex in enumerate(texels.vertex.tolist())}
+        at = [place[vertex] for vertex in vertices.tolist()]
+        assert table[:, :3] == pytest.approx(color_maps.linear(colors)[at], abs=1e-6)
+    heat_map.clear(pad)
+    assert not [item.name for item in pad.data.attributes if "value_" in item.name]
+    assert materials.find_block(bpy.data.images, f"{pad.palpate.uid}:{materials.TABLE}") is None
+
+
+@EVERY
+def test_the_panel_says_it(name, monkeypatch):
+    scene = scene_with_readings()
+    scene.palpate.quantity = name.upper()
+    run = play(scene)
+    felt, texels = run.frames[8].sensors["Pad"], run.scenario.sensors[0].texels
+    report = type("Report", (), {"texels": texels})
+    monkeypatch.setattr(sensor_panel.sensor_report, "known_report", lambda *_: report)
+    words = dict(sensor_panel._measured(bpy.context, felt))
+    values = QUANTITIES[name].values(felt, texels)
+    unit = QUANTITIES[name].unit_of(felt)
+    assert words[QUANTITIES[name].title] == f"{values.min():.4g} to {values.max():.4g} {unit}"
+    assert words["Reading"].endswith(" V")
+
+
+@EVERY
+def test_its_ends_are_set_in_its_own_unit(name):
+    scene = bpy.context.scene
+    own, quantity = scene.palpate, QUANTITIES[name]
+    own.quantity, own.use_auto_range = name.upper(), False
+    names = scene_properties.range_names(own)
+    assert len(names) == 1 + (quantity.span is between)
+    own.range_max, own.range_max_pressure = 0.15, 20.0  # names that older files have
+    setattr(own, names[-1], 3.0)
+    style = bake_display.figure_style(scene)
+    assert style.limit == 3.0 and (style.lowest is None or style.lowest == 0.0)
+    own.quantity = "PRESSURE" if name == "force" else "FORCE"
+    assert bake_display.figure_style(scene).limit in (0.15, 20.0)
+
+
+def test_a_reading_is_seen_where_the_force_is_not_changed():
+    """With load spreading the force of a texel stays, and its reading does not."""
+    scene, pad, _ = press(8)
+    effect = pad.palpate.effects.add()
+    effect.kind = "load-spreading"
+    shown = {}
+    for name in ("FORCE", "READING"):
+        scene.palpate.quantity = name
+        run = play(scene)
+        shown[name] = overlays.sensor_overlays(scene, run, run.frames[8])[0].colors
+    felt = run.frames[8].sensors["Pad"]
+    assert np.abs(felt.reading - felt.normal_force).max() > 0.01 * felt.normal_force.max()
+    assert np.abs(shown["FORCE"] - shown["READING"]).max() > 0.05
+
+
+def test_the_automatic_range_is_that_of_the_present_run():
+    """After a harder press the range is wide; softened again, it is narrow again, with Reset and without."""
+    scene, pad, _ = press(8)
+    ends = []
+    for k in (100.0, 1000.0, 100.0):
+        pad.palpate.k = k
+        ends.append(overlays.live_scale(scene, play(scene)).high)
+    bpy.ops.palpate.reset()
+    ends.append(overlays.live_scale(scene, play(scene)).high)
+    assert ends[0] == ends[2] == ends[3] and ends[1] > 5.0 * ends[0]
+
+
+def test_a_sensor_without_channels_shows_none(tmp_path):
+    scene, pad, _ = press(4)
+    scene.palpate.quantity = "CHANNELS"
+    run = play(scene, 4)
+    assert overlays.sensor_overlays(scene, run, run.frames[4]) == []
+    assert overlays.inset_content(scene, run, run.frames[4]).insets == []
+    save(tmp_path)
+    run_job(bake(scene))
+    assert not any(slot.material and materials.SENSOR_KEY in slot.material for slot in pad.material_slots)
+    found = figure_export.read_scene_bake(scene)
+    with pytest.raises(PalpateError, match="without channels"):
+        bake_display.figure_style(scene).scale(found.recording, found.texels)
+
+
+def test_a_heat_map_leaves_the_sensor_that_is_painted_alone():
+    scene, pad, _ = press(4)
+    run = play(scene, 4)
+    (overlay,) = overlays.sensor_overlays(scene, run, run.frames[4])
+    bpy.context.view_layer.objects.active = pad
+    assert overlay.sensor == pad.session_uid and overlay.sensor not in overlays.edited_objects(bpy.context)
+    for mode in ("WEIGHT_PAINT", "VERTEX_PAINT", "SCULPT"):
+        bpy.ops.object.mode_set(mode=mode)
+        assert overlay.sensor in overlays.edited_objects(bpy.context)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert not overlays.edited_objects(bpy.context)
+
+
+def test_a_picture_of_another_quantity_has_its_own_range(tmp_path):
+    """The scene's end of 0.15 N is no end of 0.15 kPa."""
+    scene, pad, _ = press(8)
+    scene.palpate.use_auto_range, scene.palpate.range_max = False, 0.15
+    save(tmp_path)
+    run_job(bake(scene))
+    found = figure_export.read_scene_bake(scene)
+    import argparse
+
+    from palpate.commands import figure_options, render
+
+    parser = argparse.ArgumentParser()
+    render.add_arguments(parser)
+    arguments = parser.parse_args(["scene.blend", "--quantity", "pressure"])
+    style = figure_options.figure_style_from(arguments, **vars(bake_display.figure_style(scene)))
+    scale = style.scale(found.recording, found.texels)
+    peak = (found.recording.sensors["Pad"].normal_force / found.texels["Pad"].area).max() / 1e3
+    assert style.limit is None and peak <= scale.high < 2.0 * peak and isinstance(scale, Scale)
+    bake_display.take_style(scene, style)
+    node = next(n for n in pad.material_slots[-1].material.node_tree.nodes if n.bl_idname == "ShaderNodeMapRange")
+    assert node.inputs["From Max"].default_value == pytest.approx(scale.high) and "kPa" in node.label
