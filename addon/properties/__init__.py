@@ -16,6 +16,7 @@ __all__ = [
     "painted_maps",
     "parameter_properties",
     "registration",
+    "scene_properties",
     "scene_units",
     "settings_migration",
     "start_transforms",
