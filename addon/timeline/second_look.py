@@ -45,9 +45,20 @@ def _look() -> float | None:
             return DELAY
         active = window.view_layer.objects.active
         is_edited = active is not None and active.mode not in ("OBJECT", "POSE")  # leaving the mode is a change of its own
-        if not is_edited and not window.screen.is_animation_playing:  # playing looks at each frame
+        if is_edited:
+            note_edit(window.scene, active)
+        elif not window.screen.is_animation_playing:  # playing looks at each frame
             look_again(window.scene)
     return None
+
+
+def note_edit(scene, obj) -> None:
+    """Take away what is shown of a frame once painting or editing has changed an object of the simulation."""
+    if obj.palpate.role == "NONE" or obj.name not in session_state.session.changed_geometry:
+        return
+    if frame_status.status_of(scene).frame is not None:
+        overlays.clear(scene)
+        frame_status.set_status(scene, f"'{obj.name}' has changed since this frame was computed: go on in Object Mode.")
 
 
 def look_again(scene) -> None:

@@ -182,3 +182,21 @@ def test_views_without_materials_show_the_colours_of_a_bake_on_both_sides(tmp_pa
     assert (away > 0).all()  # the pad stands at the origin, unturned
     assert readings.depth.max() > 1e-4
     np.testing.assert_allclose(0.5 * (above + below), texels.position[corner], atol=1e-7)
+
+
+def test_the_first_stroke_puts_what_is_shown_out_of_date():
+    scene, pad, _ = press(frames=4)
+    bpy.context.view_layer.objects.active = pad
+    for frame in range(1, 5):
+        scene.frame_set(frame)
+    second_look.note_edit(scene, pad)
+    assert frame_status.status_of(scene).frame is not None  # entering a mode changes nothing
+    group = pad.vertex_groups.new(name="Texels")
+    bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
+    group.add(list(range(20)), 1.0, "REPLACE")
+    pad.data.update_tag()
+    bpy.context.view_layer.update()
+    second_look.note_edit(scene, pad)
+    status = frame_status.status_of(scene)
+    assert status.frame is None and status.text == "'Pad' has changed since this frame was computed: go on in Object Mode."
+    bpy.ops.object.mode_set(mode="OBJECT")

@@ -42,6 +42,9 @@ class FakePainter:
     def text(self, *args, **settings):
         return 0.0
 
+    def width(self, words):
+        return 0.0
+
     def nothing(self, *args, **settings):
         pass
 
@@ -65,7 +68,8 @@ def shares_now():
     """Return each pad's force over the force that is written at the end of the colour bar."""
     scene = bpy.context.scene
     readings = status().frame.sensors
-    end = float(palpate("addon.display.inset")._contents[scene.session_uid].end.removesuffix(" N"))
+    scale = palpate("addon.display.inset")._contents[scene.session_uid].scale
+    end = float(scale.words(scale.high).removesuffix(" N"))
     return {name: float(readings[name].normal_force.max()) / end for name in PADS}
 
 
