@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ...core.geometry.layout.grid_layout import GridLayout
+from ..scene.display_names import GAP_COLORS
 from ..session import frame_status, transforms, view_shading
 from . import sensor_report
 
@@ -111,8 +112,7 @@ def _draw() -> None:
     with gpu.matrix.push_pop():
         gpu.matrix.multiply_matrix(_frame(obj))
         gpu.state.depth_test_set("NONE" if view_shading.is_xray(bpy.context.space_data.shading) else "LESS_EQUAL")
-        readings = frame_status.status_of(bpy.context.scene).frame
-        shown = obj.mode == "OBJECT" and readings is not None and obj.name in readings.sensors  # the heat map is where they are
+        shown = hides_dots(bpy.context.scene, obj, bpy.context.space_data.shading)
         if own.show_texels and not shown:
             _triangles(drawing, "fine", VALID_COLOR)
         if own.show_normals and not shown:
@@ -123,6 +123,16 @@ def _draw() -> None:
         if own.show_reach:
             _lines(drawing, "reach", REACH_COLOR)
     gpu.state.blend_set("NONE")
+
+
+def hides_dots(scene, obj, shading) -> bool:
+    """Return True where colours stand where the dots would: of a heat map, or of errors in measurements."""
+    if obj.mode != "OBJECT":
+        return False
+    readings = frame_status.status_of(scene).frame
+    active = obj.data.color_attributes.active_color
+    errors = shading.type == "SOLID" and shading.color_type == "VERTEX" and active is not None and active.name == GAP_COLORS
+    return errors or (readings is not None and obj.name in readings.sensors)
 
 
 def _triangles(drawing: Drawing, name: str, color) -> None:

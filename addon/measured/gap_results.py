@@ -22,14 +22,13 @@ from ...core.jobs.progress import Progress
 from ..authoring import exchange
 from ..properties import effect_stack
 from ..scene import participants, sensor_reader
+from ..scene.display_names import GAP_COLORS
 from ..session import first_use, identity
 
 if TYPE_CHECKING:
     from ...core.gap.report.comparison import GapErrors
     from ...core.gap.selection.findings import Diagnosis
 
-ATTRIBUTE = "Palpate Gap"
-"""Colours of the residual on the sensor's vertices."""
 MARK = "gap: "
 """How the timeline markers of phases begin."""
 
@@ -67,7 +66,7 @@ def of(obj) -> Result | None:
 def shown_on(obj) -> Shown | None:
     """Return which errors the colours of a sensor show; None if they show none, as after an undo."""
     layer = obj.data.color_attributes.active_color
-    return _shown.get(identity.key(obj)) if layer is not None and layer.name == ATTRIBUTE else None
+    return _shown.get(identity.key(obj)) if layer is not None and layer.name == GAP_COLORS else None
 
 
 def rig_path(obj) -> Path:
@@ -169,10 +168,10 @@ def show_on_sensor(context, obj, amended: bool) -> str:
             f"The rig's sensor has {len(values)} texels and '{obj.name}' has {len(texels)}: give both the same grid to see it."
         )
     mesh = obj.data
-    old = mesh.color_attributes.get(ATTRIBUTE)
+    old = mesh.color_attributes.get(GAP_COLORS)
     if old is not None:
         mesh.color_attributes.remove(old)
-    layer = mesh.color_attributes.new(ATTRIBUTE, "FLOAT_COLOR", "POINT")
+    layer = mesh.color_attributes.new(GAP_COLORS, "FLOAT_COLOR", "POINT")
     colours = np.full((len(mesh.vertices), 4), (0.2, 0.2, 0.2, 1.0))
     colours[texels.vertex, :3] = color_maps.linear(scale.colors(values))
     layer.data.foreach_set("color", colours.ravel())

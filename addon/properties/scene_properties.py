@@ -182,7 +182,7 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
     show_indentation: BoolProperty(
         name="Indentation",
         description="The surface of a sensor is displaced by its penetration, while playing and after a bake, "
-        "so that objects do not intersect it",
+        "so that objects hardly intersect it",
         default=True,
         **SETTING,
     )

@@ -24,6 +24,12 @@ from . import color_maps
 FINER = {"N": "mN", "kPa": "Pa", "mm": "µm", "mm/s": "µm/s", "T": "mT", "V": "mV"}
 """For each unit one that is a thousand times finer."""
 
+
+def three_digits(value: float) -> str:
+    """Return a number with three digits: 2000 and not 2e+03."""
+    return f"{float(f'{value:.3g}'):g}"
+
+
 Span = Callable[[float, float], tuple[float, float]]
 
 
@@ -211,7 +217,7 @@ class Scale:
 
     def words(self, value: float) -> str:
         """Return a value with its unit."""
-        return f"{value:.3g} {self.unit}"
+        return f"{three_digits(value)} {self.unit}"
 
     def in_finer_unit(self, peak: float) -> tuple[Scale, float]:
         """Return the scale in a finer unit, if there is one and a `peak` is below one, and the factor of values."""

@@ -12,7 +12,7 @@ from ..geometry.layout.grid_layout import GridLayout
 from ..geometry.texels import Texels
 from . import color_maps
 from .figure_style import FONT, INK, SMALL
-from .quantities import Scale
+from .quantities import Scale, three_digits
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -124,7 +124,7 @@ class SensorView:
         """What kind of sensor this is."""
         layout = self.texels.layout
         if isinstance(layout, GridLayout):
-            return f"{layout.rows} × {layout.columns} texels\n{self.width / layout.columns:.3g} mm pitch"
+            return f"{layout.rows} × {layout.columns} texels\n{three_digits(self.width / layout.columns)} mm pitch"
         how = "flattened" if self.axes is None else f"{self.seen.sum()} in view"
         return f"{len(self.texels)} texels,\n{how}"
 

@@ -4,13 +4,15 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import press, save, scene_with_readings
+from blender_scenes import press, reopen, save, scene_with_readings
 
+from palpate.addon.authoring import texel_overlay
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import bake_display, baked_scene, heat_map, materials, overlays
 from palpate.addon.properties import scene_properties
 from palpate.addon.render import figure_export, workbench_colors
 from palpate.addon.scene import mesh_arrays
+from palpate.addon.scene.display_names import GAP_COLORS
 from palpate.addon.timeline import live_cache
 from palpate.core.errors import PalpateError
 from palpate.core.figures import color_maps
@@ -163,6 +165,47 @@ def test_a_sensor_without_channels_shows_none(tmp_path):
     found = figure_export.read_scene_bake(scene)
     with pytest.raises(PalpateError, match="without channels"):
         bake_display.figure_style(scene).scale(found.recording, found.texels)
+
+
+def test_dots_of_texels_stand_on_no_colours():
+    """Neither on a heat map nor on the errors of measurements, which Solid view shows as vertex colours."""
+    scene, pad, _ = press(4)
+    bpy.ops.palpate.reset()
+    shading = type("Shading", (), {"type": "SOLID", "color_type": "MATERIAL"})
+    assert not texel_overlay.hides_dots(scene, pad, shading)
+    pad.data.color_attributes.active_color = pad.data.color_attributes.new(GAP_COLORS, "FLOAT_COLOR", "POINT")
+    assert not texel_overlay.hides_dots(scene, pad, shading)
+    shading.color_type = "VERTEX"
+    assert texel_overlay.hides_dots(scene, pad, shading)
+    pad.data.color_attributes.remove(pad.data.color_attributes[GAP_COLORS])
+    assert not texel_overlay.hides_dots(scene, pad, shading)
+    play(scene, 4)
+    assert texel_overlay.hides_dots(scene, pad, shading)
+
+
+def test_files_keep_their_choice_and_its_ends(tmp_path):
+    """A .blend stores the number of a choice and the names of the ends, which Palpate 0.1 has chosen."""
+    items = bpy.context.scene.palpate.bl_rna.properties["quantity"].enum_items
+    assert [(item.identifier, item.value) for item in items][:2] == [("FORCE", 0), ("PRESSURE", 1)]
+    scene = bpy.context.scene
+    scene.palpate.quantity, scene.palpate.use_auto_range = "PRESSURE", False
+    scene.palpate.range_max, scene.palpate.range_max_pressure = 0.25, 12.0
+    path = save(tmp_path)
+    own = reopen(path).palpate
+    assert (own.quantity, own.range_max, own.range_max_pressure) == ("PRESSURE", 0.25, 12.0)
+    assert bake_display.figure_style(bpy.context.scene).limit == 12.0
+
+
+def test_a_heat_map_of_palpate_0_1_is_removed_with_its_areas(tmp_path):
+    scene, pad, _ = press(4)
+    save(tmp_path)
+    run_job(bake(scene))
+    uid = pad.palpate.uid
+    pad.data.attributes.new("palpate_area", "FLOAT", "POINT")
+    bpy.data.images.new("area", 4, 4)[materials.SENSOR_KEY] = f"{uid}:area"
+    assert bpy.ops.palpate.bake_clear() == {"FINISHED"}
+    assert pad.data.attributes.get("palpate_area") is None
+    assert not [image.name for image in bpy.data.images if materials.SENSOR_KEY in image]
 
 
 def test_a_heat_map_leaves_the_sensor_that_is_painted_alone():

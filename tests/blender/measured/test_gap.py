@@ -46,7 +46,7 @@ def test_from_a_rig_to_an_amended_sensor(scene, rig_file, tmp_path):
     assert gap_results.shown_on(obj) is None
     assert bpy.ops.palpate.gap_show(amended=False) == {"FINISHED"}
     assert not gap_results.shown_on(obj).amended and 0.0 < gap_results.shown_on(obj).scale.high < 100.0
-    layer = obj.data.color_attributes[gap_results.ATTRIBUTE]
+    layer = obj.data.color_attributes[gap_results.GAP_COLORS]
     colours = np.zeros(4 * len(obj.data.vertices))
     layer.data.foreach_get("color", colours)
     before = colours.reshape(-1, 4)[:, 0].max()
@@ -54,7 +54,7 @@ def test_from_a_rig_to_an_amended_sensor(scene, rig_file, tmp_path):
     assert {"gap: approach", "gap: loading", "gap: unloading"} <= names
     bpy.ops.palpate.gap_show(amended=True)
     assert gap_results.shown_on(obj).amended
-    obj.data.color_attributes[gap_results.ATTRIBUTE].data.foreach_get("color", colours)
+    obj.data.color_attributes[gap_results.GAP_COLORS].data.foreach_get("color", colours)
     assert colours.reshape(-1, 4)[:, 0].max() < before  # on one scale the amended sensor is darker
     other = obj.data.color_attributes.new("Own", "FLOAT_COLOR", "POINT")
     obj.data.color_attributes.active_color = other

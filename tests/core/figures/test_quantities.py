@@ -143,3 +143,8 @@ def test_a_sensor_without_channels_is_named_by_one_sentence(recorded):
     recording.sensors["pad"].channels = None
     with pytest.raises(ParameterError, match="choose another quantity"):
         strip_figure(recording, {"pad": texels}, [5], FigureStyle(quantity="channels"))
+
+
+def test_numbers_in_words_have_no_exponent_where_digits_do():
+    words = [quantities.three_digits(value) for value in (0.0061234, 20.84, 2000.0, 12345.0, -0.5)]
+    assert words == ["0.00612", "20.8", "2000", "12300", "-0.5"]
