@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What stops a command: limits of time and memory, and what is found before work begins. An earlier bake stays."""
 
-import os
 import shutil
 import subprocess
 import sys
@@ -85,14 +84,3 @@ def test_a_sensor_definition_is_not_overwritten_by_a_scene(tmp_path, repository,
     assert main(["openrave", "export", demo, "--out", xml]) == 0
     assert main(["openrave", "import", xml, demo, "--from", "Finger A", "--save-as", xml]) == 1
     assert "would be overwritten" in capfd.readouterr().err
-
-
-def test_a_fifo_in_place_of_a_manifest_is_refused_before_a_bake(tmp_path, repository, capfd):
-    folder = tmp_path / "out" / "Finger A"
-    folder.mkdir(parents=True)
-    os.mkfifo(folder / "manifest.json")
-    assert (
-        main(["bake", str(repository / "sample_blends" / "demo.blend"), "--frames", "1", "2", "--out", str(tmp_path / "out")])
-        == 1
-    )
-    assert "is a FIFO, not a file" in capfd.readouterr().err
