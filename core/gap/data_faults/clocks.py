@@ -10,12 +10,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
+from ..dataset.rig import Rig
 from ..dataset.shift_peak import peak_offset
 from ..dataset.trial import Trial
-from ..forward.stimulus import Stimulus
+from ..forward.stimulus import Stimulus, stimulus_of
 from .data_fault import Correction, DataFault
 
 LONGEST_SHIFT, LARGEST_SHIFT_SHARE = 3.0, 0.25
@@ -40,6 +42,12 @@ MOST_LEFT = 0.6
 about as well."""
 LEAST_CORRELATION = 0.4
 """Least correlation of the changes, with the shift, from which a clock can be judged."""
+REACH, SHIFTS = 1.5, 25
+"""Samples on either side of a shift within which it is refined, and the number of shifts that are tried there."""
+LEADS = np.concatenate([[0.0], np.geomspace(1e-3, 0.1, 13)])
+"""Seconds by which a viscous response may lead its load: damping divided by stiffness."""
+MOST_LOADS = 1_000_000
+"""Loads of the part of a recording from which a shift is refined."""
 MOST_KNOWN = 0.9
 """Share of the samples of the best known channel that a channel has to have."""
 
@@ -53,7 +61,7 @@ class Shift:
     unshifted: float
 
 
-def find_clock_faults(stimuli: Sequence[Stimulus]) -> list[DataFault]:
+def find_clock_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
     """Return the shifted clocks of some recordings."""
     known = {s.trial.name: shift for s in stimuli if (shift := shift_of(s)) is not None}
     typical = float(np.median([one.late for one in known.values()])) if known else 0.0
@@ -70,6 +78,9 @@ def find_clock_faults(stimuli: Sequence[Stimulus]) -> list[DataFault]:
             shifts[s.trial.name] = shift
     if not shifts:
         return []
+    if "clock-shift" in rig.correct:
+        exact = refined_shifts(rig, [s.trial for s in stimuli if s.trial.name in shifts], [s.late for s in shifts.values()])
+        shifts = {name: replace(shifts[name], late=late) for name, late in zip(shifts, exact, strict=True)}
     name = max(shifts, key=lambda one: shifts[one].correlation - shifts[one].unshifted)
     corrections: dict[str, Correction] = {one: partial(with_shift, late=shift.late) for one, shift in shifts.items()}
     return [DataFault("clock-shift", tuple(shifts), _sentence(shifts[name], name), corrections)]
@@ -92,6 +103,77 @@ def shift_of(stimulus: Stimulus) -> Shift | None:
     best = int(np.argmax(total))
     late = (best - most + peak_offset(total, best)) * step
     return Shift(late, float(total[best]), float(total[most])) if total[best] >= LEAST_CORRELATION else None
+
+
+def refined_shifts(rig: Rig, trials: Sequence[Trial], shifts: Sequence[float]) -> list[float]:
+    """Return constant shifts (s) of some trials to a fraction of a sample.
+
+    A viscous response comes earlier than its load. Beginnings and ends of contact distinguish that from a shift, so contacts
+    are computed again for each shift, and changes of the response are compared with those of load and rate together. All
+    trials have the same ratio of both, because the sensor is the same. A part of this lead may be left in the shifts, the
+    same in all trials: then the viscosity is fitted too small, and nothing else changes.
+    """
+    tables = [_explained(rig, trial, shift) for trial, shift in zip(trials, shifts, strict=True)]
+    peaks = [[_peak(column) for column in table.T] for table in tables]
+    best = int(np.argmax([sum(value for _, value in of_lead) for of_lead in zip(*peaks, strict=True)]))
+    return [
+        shift + (of_trial[best][0] / (SHIFTS - 1) - 0.5) * 2.0 * REACH * trial.step
+        for shift, trial, of_trial in zip(shifts, trials, peaks, strict=True)
+    ]
+
+
+def _explained(rig: Rig, trial: Trial, late: float) -> np.ndarray:
+    """Share of the response's changes that load and rate explain, for each further shift and each lead."""
+    moved = with_shift(trial, late)
+    part = _busiest_part(rig, moved)
+    stimulus = stimulus_of(_part_of(moved, part), rig)
+    channels = None if trial.reading is None else _strongest_channels(stimulus, MOST_CHANNELS)
+    response = _net_force_along_normal(stimulus) if channels is None else stimulus.trial.reading[:, channels]
+    width = max(1, round(SMOOTHING / trial.step))
+    good = np.isfinite(response).all(axis=1)
+    both = good[width:] & good[:-width]
+    table = np.zeros((SHIFTS, len(LEADS)))
+    if both.sum() < LEAST_SAMPLES or not response.shape[1]:
+        return table
+
+    def changes(values: np.ndarray) -> np.ndarray:
+        found: np.ndarray = (values[width:] - values[:-width])[both]
+        return found
+
+    y = changes(response)
+    for row, shift in zip(table, late + np.linspace(-REACH, REACH, SHIFTS) * trial.step, strict=True):
+        other = stimulus_of(_part_of(with_shift(trial, float(shift)), part), rig)
+        load, rate = (one if channels is None else one[:, channels] for one in (other.load, other.rate))
+        for i, lead in enumerate(LEADS):
+            force = np.maximum(load + lead * rate, 0.0)  # a contact does not pull
+            x = changes(force.sum(axis=1, keepdims=True) if channels is None else force)
+            row[i] = float(((x * y).sum(axis=0) ** 2 / np.maximum((x * x).sum(axis=0), 1e-300)).sum())
+    return table / max(float((y * y).sum()), 1e-300)
+
+
+def _peak(values: np.ndarray) -> tuple[float, float]:
+    """Place and value of the maximum, between its neighbours by a parabola."""
+    best = int(np.argmax(values))
+    away = peak_offset(values, best)
+    return best + away, float(values[best]) + (0.25 * float(values[best + 1] - values[best - 1]) * away if away else 0.0)
+
+
+def _busiest_part(rig: Rig, trial: Trial) -> slice:
+    """The stretch of a trial in which loads change most, short enough."""
+    most = int(np.clip(MOST_LOADS // len(rig.surface), 4 * LEAST_SAMPLES, MOST_SAMPLES))
+    if len(trial.time) <= most:
+        return slice(None)
+    change = np.abs(np.diff(stimulus_of(trial, rig).load, axis=0, prepend=0.0)).sum(axis=1)
+    total = np.concatenate([[0.0], np.cumsum(change)])
+    first = int(np.argmax(total[most:] - total[:-most]))
+    return slice(first, first + most)
+
+
+def _part_of(trial: Trial, part: slice) -> Trial:
+    """A stretch of a trial."""
+    parts = {name: getattr(trial, name) for name in ("time", "position", "quaternion", "level", "slide", "reading", "force")}
+    kept: dict[str, Any] = {name: None if one is None else one[part] for name, one in parts.items()}
+    return replace(trial, **kept)
 
 
 def _is_clearly_better(new: float, old: float) -> bool:

@@ -32,7 +32,7 @@ def find_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
         return faults  # nothing else can be judged before the channels are those of the texels
     samples = find_sample_faults(rig, judged)
     stuck = {name for fault in samples if fault.kind == "stuck-logger" for name in fault.trials}
-    return [*faults, *find_clock_faults([s for s in judged if s.trial.name not in stuck]), *samples]
+    return [*faults, *find_clock_faults(rig, [s for s in judged if s.trial.name not in stuck]), *samples]
 
 
 def put_right(rig: Rig, stimuli: Sequence[Stimulus]) -> tuple[Rig, list[DataFault]]:

@@ -13,7 +13,7 @@ import pytest
 from palpate.benchmarks._handmade import low_pass
 from palpate.benchmarks._recordings import Recording
 from palpate.core.errors import PalpateError
-from palpate.core.gap.data_faults.clocks import shift_of, with_shift
+from palpate.core.gap.data_faults.clocks import refined_shifts, shift_of, with_shift
 from palpate.core.gap.data_faults.search import find_faults, put_right
 from palpate.core.gap.dataset.fault_kinds import FAULT_KINDS
 from palpate.core.gap.dataset.rig import read_rig
@@ -129,17 +129,22 @@ def test_unknown_corrections_are_refused(tmp_path, words):
         read_rig(with_correction(made.draw("foam", "", 0, tmp_path).path, words))
 
 
-def test_a_shift_is_found_and_taken_back_to_less_than_a_sample():
-    """This pad is viscous: its response comes 0.4 samples before its load."""
+def test_shifts_are_refined_and_taken_back_to_a_fraction_of_a_sample():
+    """A viscous response comes earlier than its load, here by 0.4 samples, which may be left in all shifts."""
     late, step = 20.4, 1.0 / cases.RATE
-    rig = cases.rig(trials=1, seconds=8.0)
-    trial = rig.trials[0]
-    reading = np.stack([np.interp(trial.time - late * step, trial.time, column) for column in trial.reading.T], axis=1)
-    found = shift_of(stimulus_of(replace(trial, reading=reading), rig))
-    assert abs(found.late / step - late) < 1.0
-    mended = with_shift(replace(trial, reading=reading), late * step)
-    np.testing.assert_allclose(mended.position[40:-20], trial.position[20:-40] - 0.4 * np.diff(trial.position, axis=0)[19:-40])
-    assert np.isnan(mended.reading[:20]).all() and np.array_equal(mended.reading[21:], reading[21:])
+    rig = cases.rig(trials=3, seconds=8.0)
+    trials = []
+    for trial in rig.trials:
+        reading = np.stack([np.interp(trial.time - late * step, trial.time, column) for column in trial.reading.T], axis=1)
+        trials.append(replace(trial, reading=reading))
+    rough = [shift_of(stimulus_of(trial, rig)).late for trial in trials]
+    assert max(abs(one / step - late) for one in rough) < 1.0
+    samples = np.array(refined_shifts(rig, trials, rough)) / step - late
+    assert np.ptp(samples) < 0.15 and (samples > -0.45).all() and (samples < 0.1).all()
+    mended = with_shift(trials[0], late * step)
+    path = rig.trials[0].position
+    np.testing.assert_allclose(mended.position[40:-20], path[20:-40] - 0.4 * np.diff(path, axis=0)[19:-40])
+    assert np.isnan(mended.reading[:20]).all() and np.array_equal(mended.reading[21:], trials[0].reading[21:])
 
 
 def test_the_time_of_a_shift_is_found_again_in_an_uneven_clock():
