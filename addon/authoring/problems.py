@@ -15,7 +15,7 @@ from mathutils.bvhtree import BVHTree
 from ...core.errors import ImageError, PaintedError, PalpateError, RegionError, SensorError
 from ...core.geometry.mesh import TriangleMesh, edge_defects, is_closed
 from ...core.geometry.texels import Texels
-from ..scene import sensor_regions
+from ..scene import participants, sensor_regions
 from . import laid_sensors, surface_binding
 
 OVERLAP_DISTANCE = 0.1
@@ -284,7 +284,12 @@ def _on_its_own(obj, _problem, _report) -> None:
     obj.palpate.body = "KEYFRAMED"
 
 
+def _show(_obj, _problem, _report) -> None:
+    participants.show_hidden(bpy.context.scene)
+
+
 FIXES: dict[str, tuple[str, Callable]] = {
+    "HIDDEN": ("Show Hidden Objects", _show),
     "NORMALS": ("Turn Faces Alike", _turn_alike),
     "FLIPPED": ("Flip Normals", _flip),
     "INSIDE": ("Leave Them Out", _leave_out),

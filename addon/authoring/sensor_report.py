@@ -132,13 +132,16 @@ def _work() -> float | None:
 def _compute(obj, scene) -> Report:
     depsgraph = participants.depsgraph_of(scene)
     advice, missing = _advice(scene, depsgraph)
+    hidden = [problems.Problem("HIDDEN", missing)] if missing and participants.find_participants(scene)[1] else []
+    missing = "" if hidden else missing  # a problem with a button
     metres = units.metres_per_unit(scene)
     reach = units.as_typed(obj.palpate.max_penetration)
     try:
         sensor, mesh = sensor_reader.sensor_in_own_frame(scene, obj, depsgraph)
         notes = mesh_arrays.sensor_arrays(obj, depsgraph)[1]
         around = _around(obj, depsgraph, metres) if laid_sensors.is_laid(obj) and obj.parent else None
-        found = problems.object_problems(obj, notes) + problems.texel_problems(obj, mesh, sensor.texels, reach, around)
+        found = hidden + problems.object_problems(obj, notes)
+        found += problems.texel_problems(obj, mesh, sensor.texels, reach, around)
     except PalpateError as error:
         return Report(None, reach, metres, None, [problems.problem_of_error(obj, error)], advice, missing)
     return Report(sensor.texels, reach, metres, mesh if around is None else around, found, advice, missing)

@@ -29,12 +29,38 @@ def depsgraph_of(scene):
 def find_participants(scene) -> tuple[list, list[str]]:
     """Return the participants, in the scene's order, and a warning for each object that is hidden."""
     layer = view_layer_of(scene)
-    found, warnings = [], []
+    found, hidden = [], []
     for obj in scene.objects:
-        if obj.palpate.role == "NONE" or obj.type not in OBJECT_TYPES:
+        if obj.palpate.role != "NONE" and obj.type in OBJECT_TYPES:
+            (found if obj.visible_get(view_layer=layer) else hidden).append(obj)
+    return found, [f"'{obj.name}' is hidden and is not part of the simulation." for obj in hidden]
+
+
+def why_left_out(scene) -> str:
+    """Return sentences on the objects with a role that are not part of the simulation: hidden ones and those in instances."""
+    sentences = find_participants(scene)[1]
+    for obj in scene.objects:
+        collection = obj.instance_collection if obj.instance_type == "COLLECTION" else None
+        found = [other.name for other in collection.all_objects if other.palpate.role != "NONE"] if collection else []
+        if found:
+            sentences.append(
+                f"'{obj.name}' shows an instance of '{found[0]}', which is not part of the simulation: "
+                "use Object › Apply › Make Instances Real."
+            )
+    return " ".join(sentences)
+
+
+def show_hidden(scene) -> None:
+    """Show all hidden objects with a role in the view layer that decides, and the collections that hold them."""
+    layer = view_layer_of(scene)
+    for obj in scene.objects:
+        if obj.palpate.role == "NONE" or obj.type not in OBJECT_TYPES or obj.visible_get(view_layer=layer):
             continue
-        if obj.visible_get(view_layer=layer):
-            found.append(obj)
-        else:
-            warnings.append(f"'{obj.name}' is hidden and is not part of the simulation.")
-    return found, warnings
+        waiting = [layer.layer_collection]
+        while waiting:
+            holder = waiting.pop()
+            if obj.name in holder.collection.all_objects:
+                holder.exclude = holder.hide_viewport = holder.collection.hide_viewport = False
+                waiting += holder.children
+        obj.hide_viewport = False
+        obj.hide_set(False, view_layer=layer)

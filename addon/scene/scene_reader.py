@@ -208,7 +208,10 @@ class _StartReader:
         )
         sensors, targets = deforming_objects.with_first_shapes(scenario, self.surfaces)
         scenario = replace(scenario, sensors=sensors, targets=targets)
-        check_scenario(scenario)
+        try:
+            check_scenario(scenario)
+        except SceneError as error:  # perhaps what is missing is there, and hidden
+            raise SceneError(f"{participants.why_left_out(scene)} {error}".strip()) from error
         return scenario
 
 

@@ -54,6 +54,40 @@ def test_a_scene_that_makes_no_run_says_what_is_missing():
     assert "give at least one other object the role Target" in look(sensor(grid())).missing
 
 
+def hide_collection(target):
+    collection = bpy.data.collections.new("Objects")
+    bpy.context.scene.collection.children.link(collection)
+    collection.objects.link(target)
+    bpy.context.scene.collection.objects.unlink(target)
+    bpy.context.view_layer.layer_collection.children[0].exclude = True
+
+
+@pytest.mark.parametrize(
+    "hide",
+    [lambda target: target.hide_set(True), lambda target: setattr(target, "hide_viewport", True), hide_collection],
+    ids=["H", "monitor", "collection"],
+)
+def test_a_hidden_target_is_named_and_shown(hide):
+    pad, target = sensor(grid()), ball()
+    target.palpate.role = "TARGET"
+    bpy.context.view_layer.update()
+    hide(target)
+    problem = look(pad).problems[0]
+    assert problem.kind == "HIDDEN" and problem.text.startswith("'Ball' is hidden and is not part of the simulation. Nothing")
+    fix(pad, "HIDDEN")
+    assert target.visible_get() and look(pad).advice is not None and kinds(pad) == []
+
+
+def test_a_target_in_an_instance_of_a_collection_is_named():
+    pad, target = sensor(grid()), ball()
+    target.palpate.role = "TARGET"
+    collection = bpy.data.collections.new("Asset")
+    collection.objects.link(target)
+    bpy.context.scene.collection.objects.unlink(target)
+    bpy.ops.object.collection_instance_add(collection="Asset")
+    assert look(pad).missing.startswith("'Asset' shows an instance of 'Ball', which is not part of the simulation: use Object")
+
+
 def flip(obj, faces):
     for index in faces:
         obj.data.polygons[index].flip()
