@@ -78,6 +78,23 @@ def remove(curves, paths) -> None:
         curves.remove(curve)
 
 
+def has_other_values(block, time: float) -> bool:
+    """Return True when a property of a data-block was set to another value than its F-curve has, and not keyframed.
+
+    Blender puts it back as soon as another frame is shown.
+    """
+    for curve in of_animation_data(getattr(block, "animation_data", None)) or ():
+        try:
+            value = block.path_resolve(curve.data_path)
+        except ValueError:
+            continue  # a curve of something that is gone
+        value = value[curve.array_index] if hasattr(value, "__len__") else value
+        expected = curve.evaluate(time)
+        if not curve.mute and isinstance(value, float) and abs(value - expected) > 1e-6 * max(1.0, abs(expected)):
+            return True
+    return False
+
+
 def animated_paths(obj) -> set[str]:
     """Return the data paths of the properties that keyframes or drivers of an object animate."""
     paths = {curve.data_path for curve in of_object(obj) or ()}

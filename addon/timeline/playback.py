@@ -73,7 +73,7 @@ def on_frame(scene, depsgraph) -> None:
         frame_status.set_status(scene, _not_computed(scene, run))
         is_busy = session_state.session.rendering or session_state.session.catching_up
         if not bpy.app.background and not is_busy and missing_frames(scene):
-            bpy.app.timers.register(_offer_to_compute, first_interval=0.0)
+            bpy.app.timers.register(offer_to_compute, first_interval=0.0)
 
 
 def _note_missing(scene) -> None:
@@ -145,6 +145,11 @@ def missing_frames(scene) -> range:
     return range(first, min(frame + bool(part), scene.frame_end) + 1)
 
 
+def forget_error(scene) -> None:
+    """Forget why the last attempt failed, because something has changed since."""
+    _errors.pop(scene.session_uid, None)
+
+
 def compute_to_present_frame(scene) -> Generator[Progress, None, None]:
     """Compute the missing frames up to the present one, and return to it. Closing the generator keeps what was computed."""
     if scene.session_uid in _waiting:
@@ -180,11 +185,11 @@ def _compute_opened_file() -> None:
     """Timer after a file was opened."""
     scene = bpy.context.scene
     if scene is not None and scene.frame_current > scene.frame_start:
-        _offer_to_compute()
+        offer_to_compute()
 
 
-def _offer_to_compute() -> None:
-    """Timer after a jump on the timeline: compute the missing frames with progress. The handler itself must return at once."""
+def offer_to_compute() -> None:
+    """Timer after a jump or a change: compute the missing frames with progress. The handler itself must return at once."""
     scene = bpy.context.scene
     if scene is not None and not session_state.is_baking() and not session_state.session.catching_up and missing_frames(scene):
         bpy.ops.palpate.catch_up("INVOKE_DEFAULT", by_itself=True)
@@ -302,4 +307,4 @@ def reset(scene) -> None:
     live_cache.drop(scene)
     overlays.clear(scene)
     frame_status.forget(scene)
-    _errors.pop(scene.session_uid, None)
+    forget_error(scene)

@@ -12,34 +12,54 @@ from contextlib import suppress
 import bpy
 
 from ..display import baked_scene, markers, overlays
-from ..scene import participants
-from ..session import animation_time, frame_status, redraw, session_state
+from ..scene import animation_fingerprint, participants
+from ..session import animation_time, fcurves, frame_status, redraw, session_state
 from . import baked_frames, live_cache, playback
 
 DELAY = 0.1
 """Seconds between a change and the look: short for the eye, long beside the milliseconds that a look takes."""
 QUICK = 0.05
 """Seconds of computing after which a slider that is dragged would seem to stick."""
+PAUSE = 0.5
+"""Seconds without a change after which what takes longer is computed, with progress: the slider has stopped."""
 
 _seconds_per_frame: dict[int, float] = {}
 """By scene: what a frame took when frames were last computed here."""
+_dropped: set[int] = set()
+"""Scenes whose frames were taken away here and have to be computed again."""
 
 
 def soon() -> None:
     """Look at the scenes of all windows in a moment."""
-    if not bpy.app.background and not bpy.app.timers.is_registered(_look):
+    if bpy.app.background:
+        return
+    if not bpy.app.timers.is_registered(_look):
         bpy.app.timers.register(_look, first_interval=DELAY)
+    if bpy.app.timers.is_registered(playback.offer_to_compute):
+        compute_later()
+
+
+def compute_later() -> None:
+    """Compute the missing frames, with progress, once nothing has changed for a while."""
+    if bpy.app.timers.is_registered(playback.offer_to_compute):
+        bpy.app.timers.unregister(playback.offer_to_compute)
+    if not bpy.app.background:
+        bpy.app.timers.register(playback.offer_to_compute, first_interval=PAUSE)
 
 
 def stop() -> None:
     """Forget what was to be looked at."""
-    if bpy.app.timers.is_registered(_look):
-        bpy.app.timers.unregister(_look)
+    for timer in (_look, playback.offer_to_compute):
+        if bpy.app.timers.is_registered(timer):
+            bpy.app.timers.unregister(timer)
     _seconds_per_frame.clear()
+    _dropped.clear()
 
 
 def _look() -> float | None:
     """Timer: look at the scenes of all windows, or come back later where the user is in the middle of something."""
+    if session_state.session.catching_up:
+        return DELAY
     for window in bpy.context.window_manager.windows:
         if getattr(window, "modal_operators", ()):  # moving an object, say: computing would put it back; not told by 4.2
             return DELAY
@@ -64,8 +84,8 @@ def note_edit(scene, obj) -> None:
 def look_again(scene) -> None:
     """Compare what is shown of a scene with the scene as it is now.
 
-    A bake that is out of date is named so. Frames that were computed while playing are computed again where that is quick, and
-    else taken away.
+    A bake that is out of date is named so. Frames that were computed while playing are computed again: at once where that is
+    quick, else with progress once nothing changes any more.
     """
     session = session_state.session
     if session.suspension_depth or session.rendering or session.catching_up or session_state.is_baking():
@@ -81,16 +101,23 @@ def look_again(scene) -> None:
         return
     run = live_cache.get(scene)
     frame, part = animation_time.current_frame(scene)
-    if run is None or part or frame not in run.frames:
+    if part or run is None and scene.session_uid not in _dropped:
         return
-    has_moved = live_cache.has_moved(scene, depsgraph, run)
-    if has_moved or live_cache.is_stale(scene, depsgraph, run):
-        live_cache.drop(scene)
-        overlays.clear(scene)
-        frame_status.set_status(scene, "Out of date, something has changed: use Compute to Here, or play from the first frame.")
-        if not has_moved:  # what is moved without a keyframe would be put back
-            _compute_again(scene)
-        redraw.views()
+    has_moved = run is not None and frame in run.frames and live_cache.has_moved(scene, depsgraph, run)
+    if run is not None and not has_moved and not live_cache.is_stale(scene, depsgraph, run):
+        _dropped.discard(scene.session_uid)
+        return
+    live_cache.drop(scene)
+    overlays.clear(scene)
+    frame_status.set_status(scene, "Out of date, something has changed: use Compute to Here, or play from the first frame.")
+    _dropped.add(scene.session_uid)
+    playback.forget_error(scene)
+    blocks = animation_fingerprint.related_data_blocks(participants.find_participants(scene)[0])
+    if not any(fcurves.has_other_values(block, frame) for block in blocks):  # what is not keyframed would be put back
+        _compute_again(scene)
+        if playback.missing_frames(scene):
+            compute_later()
+    redraw.views()
 
 
 def _compute_again(scene) -> None:

@@ -9,7 +9,7 @@ from blender_scenes import press, press_and_drop, save
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import overlays
 from palpate.addon.session import frame_status
-from palpate.addon.timeline import baked_frames, live_cache, second_look
+from palpate.addon.timeline import baked_frames, live_cache, playback, second_look
 from palpate.core.figures import color_maps
 from palpate.core.figures.figure_style import FigureStyle
 from palpate.core.io.bake_reader import read_sensors
@@ -134,15 +134,47 @@ def test_a_slider_gives_the_numbers_of_playing_anew(monkeypatch):
     np.testing.assert_array_equal(live_cache.get(scene).frames[5].sensors["Pad"].normal_force, hard)
 
 
-def test_what_would_take_long_is_taken_away(monkeypatch):
+def test_what_would_take_long_is_computed_later_and_after_each_change(monkeypatch):
+    """The window computes it once nothing changes for a while, as after a jump; see tests/ui."""
     monkeypatch.setattr(second_look, "QUICK", 0.0)
+    later = []
+    monkeypatch.setattr(second_look, "compute_later", lambda: later.append(True))
     scene, pad, *_ = press_and_drop(frames=6)
     play_to(scene, 5)
     pad.palpate.k *= 2
     second_look.look_again(scene)
     status = frame_status.status_of(scene)
     assert status.frame is None and status.text.startswith(("Out of date", "Frame 5 is not computed"))
-    assert live_cache.get(scene) is None and scene.frame_current == 5
+    assert live_cache.get(scene) is None and scene.frame_current == 5 and later == [True]
+    second_look.look_again(scene)  # a change while it was computed has dropped it again
+    assert later == [True, True]
+    job = playback.compute_to_present_frame(scene)
+    next(job), next(job)
+    job.close()  # stopped by the user: it does not begin again by itself
+    second_look.look_again(scene)
+    assert later == [True, True] and frame_status.status_of(scene).frame is None
+    pad.palpate.k *= 2
+    second_look.look_again(scene)
+    assert later == [True, True, True]
+    bpy.ops.palpate.catch_up()
+    second_look.look_again(scene)
+    assert later == [True, True, True] and frame_status.status_of(scene).frame.frame == 5
+
+
+@pytest.mark.parametrize("is_keyframed", [True, False])
+def test_what_is_moved_with_a_keyframe_or_has_none_is_computed_again(monkeypatch, is_keyframed):
+    monkeypatch.setattr(second_look, "QUICK", 60.0)
+    scene, pad, target = press(frames=6)
+    play_to(scene, 5)
+    before = frame_status.status_of(scene).frame.sensors["Pad"].normal_force.sum()
+    if is_keyframed:
+        target.location.z -= 1e-3
+        target.keyframe_insert("location", frame=5)
+    else:
+        pad.location.z += 1e-3
+    bpy.context.view_layer.update()
+    second_look.look_again(scene)
+    assert frame_status.status_of(scene).frame.sensors["Pad"].normal_force.sum() > 1.2 * before
 
 
 def test_what_is_moved_without_a_keyframe_stays_where_it_was_put(monkeypatch):
@@ -153,6 +185,19 @@ def test_what_is_moved_without_a_keyframe_stays_where_it_was_put(monkeypatch):
     second_look.look_again(scene)
     assert target.location.x == pytest.approx(0.003)
     assert frame_status.status_of(scene).text.startswith("Out of date")
+
+
+def test_a_hidden_target_is_named_and_computed_again_when_it_is_shown(monkeypatch):
+    monkeypatch.setattr(second_look, "QUICK", 60.0)
+    scene, _, target = press(frames=6)
+    play_to(scene, 5)
+    before = frame_status.status_of(scene).frame.sensors["Pad"].normal_force
+    target.hide_set(True)
+    second_look.look_again(scene)
+    assert frame_status.status_of(scene).text.startswith("'Ball' is hidden")
+    target.hide_set(False)
+    second_look.look_again(scene)
+    np.testing.assert_array_equal(frame_status.status_of(scene).frame.sensors["Pad"].normal_force, before)
 
 
 def test_nothing_changed_is_left_as_it_is():
