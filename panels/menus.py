@@ -3,6 +3,7 @@
 
 import bpy
 
+from ..addon.properties.parameter_properties import CONSTANT
 from ..addon.scene import participants
 from ..addon.session import session_state
 from ..addon.study import property_path
@@ -117,6 +118,8 @@ def _draw_button(self, context):
     path = property_path.path_of(pointer, item.identifier, chosen[2] if chosen is not None else -1)
     if path:
         self.layout.separator()
+        if not item.is_animatable and ".palpate." in path:
+            self.layout.label(text=f"{CONSTANT}: vary it in a study", icon="INFO")
         self.layout.operator("palpate.study_vary", icon="MOD_ARRAY").path = path
 
 

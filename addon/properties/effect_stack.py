@@ -19,7 +19,7 @@ from ...core.errors import EffectError
 from ...core.model.effect import Effect
 from ...core.model.parameter import Parameter
 from ..session import units
-from .parameter_properties import FIXED, float_property, unit_in_words, with_unit
+from .parameter_properties import CONSTANT, FIXED, float_property, unit_in_words, with_unit
 
 SITE_ICONS = {"contact": "MOD_PHYSICS", "pad": "MOD_CLOTH", "readout": "DRIVER"}
 
@@ -51,9 +51,8 @@ def title(name: str) -> str:
 def _tooltip(form: Form, parameter: Parameter) -> str:
     """Say what a parameter does, its unit and bounds, and where the formula comes from."""
     bounds = "" if parameter.unit.startswith("unit") else f"; {parameter.low:g} to {parameter.high:g}"
-    return (
-        f"{parameter.text.removesuffix('.')} ({unit_in_words(parameter)}{bounds}). Source: {form.reference.removesuffix('.')}"
-    )
+    text, reference = parameter.text.removesuffix("."), form.reference.removesuffix(".")
+    return f"{text} ({unit_in_words(parameter)}{bounds}). Source: {reference}. {CONSTANT}"
 
 
 def _property(form: Form, parameter: Parameter):

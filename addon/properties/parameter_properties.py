@@ -13,6 +13,8 @@ from .scene_units import ENDING, KINDS, in_units
 
 FIXED: dict = {"options": set(), "override": {"LIBRARY_OVERRIDABLE"}, "update": session_state.settings_changed}
 """A parameter is constant during a run, so it has no keyframes; what is shown follows it."""
+CONSTANT = "Constant during a run, so it has no keyframes"
+"""Ends the tooltip of a number that one could want to keyframe, and stands in its context menu."""
 LOWEST, HIGHEST = -1e9, 3.402823466e38
 """Bounds of a panel's number where the parameter has none; the second is the largest number of Blender."""
 
@@ -53,7 +55,7 @@ def described(parameter: Parameter) -> str:
     text = f"{parameter.text}, {unit_in_words(parameter)}"
     if parameter.source:
         text += f" ({parameter.source})"
-    return f"{text}. {parameter.note}" if parameter.note else text
+    return f"{text}. {parameter.note.rstrip('.')}. {CONSTANT}" if parameter.note else f"{text}. {CONSTANT}"
 
 
 def property_of(specification: Specification):

@@ -5,7 +5,7 @@ import bpy
 import pytest
 
 from palpate.addon.authoring.sensor_presets import COPIED
-from palpate.addon.properties.parameter_properties import put_sensor_parameters, sensor_parameters
+from palpate.addon.properties.parameter_properties import CONSTANT, put_sensor_parameters, sensor_parameters
 from palpate.addon.scene import scene_fingerprint
 from palpate.core.model.drive import DRIVE_PARAMETERS
 from palpate.core.model.parameter import Parameter
@@ -36,6 +36,16 @@ def test_every_parameter_is_written_and_read(settings):
 def test_every_parameter_is_copied_shown_and_noticed_by_the_timeline():
     assert set(SENSOR_PARAMETERS) <= set(COPIED) and set(SENSOR_PARAMETERS) <= set(scene_fingerprint.OBJECT_PROPERTIES)
     assert {specification.group for specification in SENSOR_PARAMETERS.values()} == {CONTACT, FRICTION, READOUT}
+
+
+def test_a_parameter_without_keyframes_says_so(settings):
+    """The words stand in the tooltip; the context menu, where one looks for Insert Keyframe, has them as well."""
+    effects = settings.effects.add().bl_rna.properties
+    found = [settings.bl_rna.properties[name] for name, item in SENSOR_PARAMETERS.items() if isinstance(item, Parameter)]
+    found += [item for item in effects if item.type == "FLOAT"]
+    assert len(found) > 60
+    for item in found:
+        assert item.description.endswith(CONSTANT) and not item.is_animatable, item.identifier
 
 
 def test_bounds_of_panels_are_those_that_are_checked(settings):
