@@ -132,10 +132,10 @@ class PALPATE_OT_gap_plan(modal_job.ModalJob, bpy.types.Operator):
 
 
 class PALPATE_OT_gap_add(support.ErrorReporting, bpy.types.Operator):
-    """Replace the sensor's parameters and effects by the fitted ones"""
+    """Replace the parameters and all effects of the sensor by the fitted ones"""
 
     bl_idname = "palpate.gap_add"
-    bl_label = "Add to Sensor"
+    bl_label = "Use Fitted Sensor"
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
@@ -185,35 +185,29 @@ class PALPATE_OT_gap_show(support.ErrorReporting, bpy.types.Operator):
 
 
 class PALPATE_OT_gap_report(modal_job.ModalJob, bpy.types.Operator):
-    """Write the report, the amended sensor and the plots into a folder. ESC stops it and keeps an earlier report"""
+    """Write the report, the amended sensor and the plots into a folder of their own beside the rig, as rig-report. ESC stops it
+    and keeps an earlier report"""
 
     bl_idname = "palpate.gap_report"
-    bl_label = "Write Report…"
+    bl_label = "Write Report"
     bl_options = {"REGISTER"}
     stopped = "Stopped; an earlier report is unchanged"
 
-    directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE"})
+    directory: StringProperty(
+        name="Folder", description="Another folder, for scripts", subtype="DIR_PATH", options={"SKIP_SAVE"}
+    )
 
     @classmethod
     def poll(cls, context):
         return support.poll_gap_found(cls, context) and cls.poll_not_running()
 
-    def invoke(self, context, _event):
-        self._asked = True
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
-
-    def execute(self, context):
-        """Write beside the window once the user has chosen a folder; in one go for scripts, which name it themselves."""
-        if getattr(self, "_asked", False):
-            return self.report_errors_of(lambda: self._start(context))
-        return super().execute(context)
-
     def job(self, context):
         from ..core.gap.report import summary
         from ..core.io.file_writing import writable_folder
 
-        folder = writable_folder(bpy.path.abspath(self.directory), create=True)
+        rig = gap_results.rig_path(context.object)
+        beside = rig.with_name(f"{rig.stem}-report")
+        folder = writable_folder(bpy.path.abspath(self.directory) if self.directory else beside, create=True)
         result = gap_results.of(context.object)
         yield from summary.write_report(result.diagnosis, folder, result.errors)
         return folder / "report.html"

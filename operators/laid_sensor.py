@@ -86,12 +86,10 @@ class PALPATE_OT_skin_add(support.ErrorReporting, bpy.types.Operator):
     )
     spacing: FloatProperty(
         name="Spacing (m)",
-        description="From texel to texel, m",
-        default=0.0,
+        description="From texel to texel, m; 0: after the size of the object",
         min=0.0,
         precision=5,
         step=0.01,
-        options={"SKIP_SAVE"},
     )
     rows: IntProperty(name="Rows", description="Of the array", default=14, min=2, soft_max=128)
     columns: IntProperty(name="Columns", description="Of the array", default=6, min=2, soft_max=128)
@@ -118,11 +116,6 @@ class PALPATE_OT_skin_add(support.ErrorReporting, bpy.types.Operator):
     def poll(cls, context):
         return support.poll_mesh_object(cls, context)
 
-    def invoke(self, context, _event):
-        if not self.spacing:
-            self.spacing = laid_sensors.usual_spacing(context.object, context.scene)
-        return self.execute(context)
-
     def run(self, context):
         carrier = context.object
         source = self._source(carrier)
@@ -148,14 +141,8 @@ class PALPATE_OT_skin_add(support.ErrorReporting, bpy.types.Operator):
         layout.use_property_split = True
         layout.prop(self, "source")
         layout.prop(self, "method")
-        names = {
-            "ARRAY": ("rows", "columns", "pitch_x", "pitch_y", "shift_x", "shift_y", "angle"),
-            "GRID": ("spacing", "angle"),
-            "NOISE": ("spacing", "seed"),
-            "VERTICES": (),
-        }[self.method]
         column = layout.column()
-        for name in (*names, "lift"):
+        for name in laid_sensor_properties.FIELDS[self.method]:
             column.prop(self, name)
 
 

@@ -2,7 +2,7 @@
 """Measured data of the real sensor: what the model misses against them."""
 
 from ..addon.measured import gap_results, planned_probe
-from .subpanels import Subpanel, draw_sentences
+from .subpanels import Subpanel, draw_operator_fields, draw_sentences
 
 
 class Measured(Subpanel):
@@ -19,7 +19,9 @@ class Measured(Subpanel):
         row.operator("palpate.measured_logs", text="", icon="FILE_NEW")
         column = layout.column(align=True)  # beside one another their names are cut off in a narrow editor
         column.operator("palpate.gap_find", icon="VIEWZOOM")
+        column = layout.column(align=True)
         column.operator("palpate.gap_plan", icon="CON_FOLLOWPATH")
+        draw_operator_fields(column, context, "palpate.gap_plan", "depth", "speed", "duration")
         plan = planned_probe.sentence_of(context.object)
         if plan:
             draw_sentences(column, plan, "CON_FOLLOWPATH", context)
@@ -35,7 +37,7 @@ class Measured(Subpanel):
         if result.lines and result.caution:
             draw_sentences(box, result.caution, "ERROR", context)
         if result.lines:
-            layout.operator("palpate.gap_add", icon="ADD")
+            layout.operator("palpate.gap_add", icon="PASTEDOWN")
         layout.operator("palpate.gap_curves", icon="FCURVE")
         row = layout.row(align=True)
         shown = gap_results.shown_on(context.object)

@@ -5,13 +5,14 @@ import bpy
 
 from ..addon.authoring import laid_sensors, sensor_report
 from ..addon.display import bake_display
+from ..addon.properties import laid_sensor_properties
 from ..addon.properties.scene_units import name_in_units
 from ..addon.scene import attached_objects
 from ..addon.session import first_use, frame_status, session_state
 from ..core.figures.quantities import QUANTITIES, Extent
 from ..core.model.sensor_parameters import CONTACT, FRICTION, HUNT_CROSSLEY, LINEAR, READOUT, SENSOR_PARAMETERS
 from ..operators import presets
-from .subpanels import ROOT, Subpanel, draw_named, draw_sentences
+from .subpanels import ROOT, Subpanel, draw_named, draw_operator_fields, draw_sentences
 
 
 class Root(Subpanel):
@@ -41,15 +42,16 @@ class Root(Subpanel):
             column.operator("palpate.role_set", text="Make Target").role = "TARGET"
             column.operator("palpate.sensor_add", text="Make Pad").role = "PAD"
             column.operator("palpate.weight_paint", text="Paint a Sensor", icon="WPAINT_HLT")
-            column.operator("palpate.skin_add", icon="MOD_SHRINKWRAP")
+            _draw_lay_texels(layout.box(), context)
             return
         row = layout.row(align=True)
         row.prop(settings, "role")
         row.operator("palpate.sensor_remove", text="", icon="X")
         if settings.role in {"SENSOR", "PAD"}:
             column = layout.column(align=True)  # beside one another their names are cut off in a narrow editor
-            column.operator("palpate.probe_add", icon="MESH_UVSPHERE")
             column.operator("palpate.parameters_copy", icon="COPYDOWN")
+            column.operator("palpate.probe_add", icon="MESH_UVSPHERE")
+            draw_operator_fields(column, context, "palpate.probe_add", "shape", "size", "depth")
 
 
 class Skins(Subpanel):
@@ -74,7 +76,7 @@ class Skins(Subpanel):
             row.label(text=f"Lies on '{obj.parent.name}'" if obj.parent else "Lies on nothing", icon="MOD_SHRINKWRAP")
             if obj.parent:
                 row.operator("palpate.object_activate", text="", icon="RESTRICT_SELECT_OFF").name = obj.parent.name
-            for name in SKIN_FIELDS[own.method]:
+            for name in laid_sensor_properties.FIELDS[own.method]:
                 box.prop(own, name_in_units(own, name, context.scene))
             layout.operator("palpate.skin_update", icon="FILE_REFRESH")
             return
@@ -82,16 +84,15 @@ class Skins(Subpanel):
             row = layout.row(align=True)
             row.prop(skin, "name", text="", icon="MOD_SHRINKWRAP")
             row.operator("palpate.object_activate", text="", icon="RESTRICT_SELECT_OFF").name = skin.name
-        layout.operator("palpate.skin_add", icon="ADD")
+        _draw_lay_texels(layout, context)
 
 
-SKIN_FIELDS = {
-    "ARRAY": ("rows", "columns", "pitch_x", "pitch_y", "shift_x", "shift_y", "angle", "lift"),
-    "GRID": ("spacing", "angle", "lift"),
-    "NOISE": ("spacing", "seed", "lift"),
-    "VERTICES": ("lift",),
-}
-"""Settings that each pattern is made from."""
+def _draw_lay_texels(layout, context) -> None:
+    """Draw the button that lays texels, and below it what it lays."""
+    column = layout.column(align=True)
+    column.operator("palpate.skin_add", icon="MOD_SHRINKWRAP")
+    pattern = context.window_manager.operator_properties_last("palpate.skin_add")
+    draw_operator_fields(column, context, "palpate.skin_add", "method", *laid_sensor_properties.FIELDS[pattern.method])
 
 
 class Region(Subpanel):

@@ -65,6 +65,13 @@ def draw_named(layout, settings, key: str, text: str = "") -> None:
     split.prop(settings, key, text="")
 
 
+def draw_operator_fields(layout, context, operator: str, *names: str) -> None:
+    """Draw settings of an operator, which its button uses: those of its last run, as Blender keeps them for the session."""
+    settings = context.window_manager.operator_properties_last(operator)
+    for name in names:
+        layout.prop(settings, name)
+
+
 def draw_sentences(layout, text: str, icon: str, context) -> None:
     """Draw text, wrapped to the width of the panel."""
     letters = int((context.region.width / context.preferences.system.ui_scale - 70) / 6.2)

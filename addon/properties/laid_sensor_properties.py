@@ -14,6 +14,14 @@ SKIN_METHODS = (
     ("VERTICES", "Vertices", "One texel for each vertex of the region"),
 )
 
+FIELDS = {
+    "ARRAY": ("rows", "columns", "pitch_x", "pitch_y", "shift_x", "shift_y", "angle", "lift"),
+    "GRID": ("spacing", "angle", "lift"),
+    "NOISE": ("spacing", "seed", "lift"),
+    "VERTICES": ("lift",),
+}
+"""Settings that each pattern is made from."""
+
 
 def _length(name: str, text: str, **more):
     """Return a property that is a length in metres."""

@@ -39,6 +39,8 @@ def test_from_a_rig_to_an_amended_sensor(scene, rig_file, tmp_path):
     result = gap_results.of(obj)
     assert "creep" in result.headline
 
+    obj.palpate.effects.add().kind = "noise"  # the fitted sensor has none, and takes its place
+    assert bpy.ops.palpate.gap_add.get_rna_type().name == "Use Fitted Sensor"
     assert bpy.ops.palpate.gap_add() == {"FINISHED"}
     assert [item.kind for item in obj.palpate.effects] == ["creep"]
     assert obj.palpate.k == pytest.approx(80.0, rel=0.1)
@@ -64,6 +66,10 @@ def test_from_a_rig_to_an_amended_sensor(scene, rig_file, tmp_path):
     assert bpy.data.images["Palpate Gap Curves"].size[0] > 500
     assert bpy.ops.palpate.gap_report(directory=str(tmp_path / "report")) == {"FINISHED"}
     assert json.loads((tmp_path / "report" / "gap.json").read_text())["found"][0]["effect"] == "creep"
+    before = set(rig_file.parent.iterdir())
+    assert bpy.ops.palpate.gap_report() == {"FINISHED"}
+    assert set(rig_file.parent.iterdir()) - before == {rig_file.parent / "rig-report"}
+    assert (rig_file.parent / "rig-report" / "report.html").is_file()
 
 
 def test_stopping_keeps_what_was_known(scene, rig_file):

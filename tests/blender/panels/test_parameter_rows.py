@@ -9,16 +9,19 @@ import pytest
 
 from palpate.addon.properties.scene_units import ENDING
 from palpate.core.model.sensor_parameters import HUNT_CROSSLEY, LINEAR, SENSOR_PARAMETERS
-from palpate.panels import sensor
+from palpate.panels import gap, sensor
 
 
-def drawn(settings, part) -> Counter:
-    """How often a panel draws each property, in whatever units, on a layout that only writes down what it is asked for."""
+def drawn(settings, part, owner=None) -> Counter:
+    """How often a panel draws each property, in whatever units, on a layout that only writes down what it is asked for.
+
+    Those of all owners, or of one.
+    """
     found, layout = Counter(), MagicMock()
     for nested in ("column", "row", "split", "box"):
         getattr(layout, nested).return_value = layout
-    layout.prop.side_effect = lambda _owner, name, **_how: found.update([name.removesuffix(ENDING)])
-    context = MagicMock(scene=bpy.context.scene, object=bpy.context.object)
+    layout.prop.side_effect = lambda one, name, **_how: found.update([name.removesuffix(ENDING)] if owner in (None, one) else [])
+    context = MagicMock(scene=bpy.context.scene, object=bpy.context.object, window_manager=bpy.context.window_manager)
     context.region.width, context.preferences.system.ui_scale = 300, 1.0
     part.draw_part(None, layout, settings, context)
     return found
@@ -44,3 +47,31 @@ def test_a_parameter_without_a_place_comes_last(monkeypatch):
     monkeypatch.setattr(sensor, "SENSOR_PARAMETERS", more)
     assert drawn(bpy.context.object.palpate, sensor.Friction)["mass"] == 1
     assert drawn(bpy.context.object.palpate, sensor.Contact)["mass"] == 0
+
+
+@pytest.mark.parametrize(
+    ("part", "operator", "fields"),
+    [
+        (sensor.Root, "palpate.skin_add", {"method", "spacing", "seed", "lift"}),
+        (sensor.Root, "palpate.probe_add", {"shape", "size", "depth"}),
+        (gap.Measured, "palpate.gap_plan", {"depth", "speed", "duration"}),
+    ],
+)
+def test_a_panel_has_the_settings_of_its_buttons(part, operator, fields):
+    """They were only in Adjust Last Operation, after the operator had done its work once with others."""
+    bpy.ops.mesh.primitive_grid_add(size=0.05)
+    settings = bpy.context.object.palpate
+    if operator != "palpate.skin_add":
+        settings.role = "SENSOR"
+    own = bpy.context.window_manager.operator_properties_last(operator)
+    assert drawn(settings, part, owner=own).keys() >= fields
+
+
+def test_a_button_uses_the_settings_of_the_panel():
+    bpy.ops.mesh.primitive_grid_add(size=0.05)
+    own = bpy.context.window_manager.operator_properties_last("palpate.skin_add")
+    own.method, own.spacing = "GRID", 0.01
+    assert bpy.ops.palpate.skin_add("INVOKE_DEFAULT", True) == {"FINISHED"}  # as a button does
+    assert bpy.context.object.palpate.skin.method == "GRID"
+    assert bpy.context.object.palpate.skin.spacing == pytest.approx(0.01)
+    own.method, own.spacing = "NOISE", 0.0

@@ -55,7 +55,7 @@ def road(ui):
         bpy.ops.wm.window_close()
     yield 1.0
 
-    # Add to Sensor
+    # Use Fitted Sensor
     yield from ui.press("palpate.gap_add()")
     yield 0.5
     ui.check(sorted(one.kind for one in obj("Tactile Pad").palpate.effects) == named, "they are on the sensor")
