@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..addon.session import session_state
 from ..core.jobs.job_runner import SlicedJob, run_job
 from . import support
 
@@ -17,15 +18,13 @@ class ModalJob(support.ErrorReporting):
     """
 
     stopped = "Stopped"
-    _in_window = 0
-    """How many runs of this operator are going on beside the window."""
-
     @classmethod
     def poll_not_running(cls) -> bool:
         """Poll: this operator is not running already, so that its button is grey meanwhile."""
-        if cls._in_window:
+        is_running = cls.__name__ in session_state.session.jobs
+        if is_running:
             cls.poll_message_set("It is running; ESC stops it")
-        return not cls._in_window
+        return not is_running
 
     def invoke(self, context, _event):
         if bpy.app.background:
@@ -46,7 +45,8 @@ class ModalJob(support.ErrorReporting):
         self._timer = manager.event_timer_add(0.01, window=context.window)
         manager.progress_begin(0.0, 1.0)
         manager.modal_handler_add(self)
-        type(self)._in_window += 1  # noqa: SLF001
+        session_state.session.jobs[type(self).__name__] = self._running.progress
+        redraw_panels(context)
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
@@ -75,7 +75,7 @@ class ModalJob(support.ErrorReporting):
         if self._running.is_done:
             self.done(self._running.result)
             return {"FINISHED"}
-        progress = self._running.progress
+        progress = session_state.session.jobs[type(self).__name__] = self._running.progress
         context.window_manager.progress_update(progress.share)
         context.workspace.status_text_set(f"{progress.text}, {progress.share:.0%}    ESC: stop")
         redraw_panels(context)
@@ -88,7 +88,7 @@ class ModalJob(support.ErrorReporting):
 
     def _end(self, context):
         """Remove timer and progress."""
-        type(self)._in_window -= 1  # noqa: SLF001
+        session_state.session.jobs.pop(type(self).__name__, None)
         self._running.cancel()
         context.window_manager.event_timer_remove(self._timer)
         context.window_manager.progress_end()

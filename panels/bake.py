@@ -5,7 +5,7 @@ from ..addon.display import baked_scene
 from ..addon.properties import scene_properties
 from ..addon.properties.scene_units import name_in_units
 from ..addon.session import frame_status, session_state
-from .subpanels import Subpanel, draw_named, draw_sentences
+from .subpanels import Subpanel, draw_choices, draw_job, draw_named, draw_progress, draw_sentences
 
 
 class Bake(Subpanel):
@@ -28,7 +28,7 @@ class Bake(Subpanel):
         progress = session_state.session.bake_progress
         if progress is not None:
             text = "Compiling the solver" if progress.frame is None else progress.text
-            layout.progress(text=f"{text} (ESC: stop)", factor=progress.share)
+            draw_progress(layout, text, progress.share)
             return
         row = layout.row(align=True)
         row.operator("palpate.bake", text=f"Bake {scene.frame_start}–{scene.frame_end}", icon="RENDER_ANIMATION")
@@ -36,7 +36,7 @@ class Bake(Subpanel):
             row.operator("palpate.bake_clear", text="", icon="TRASH")
         else:
             row = layout.row(align=True)
-            row.operator("palpate.catch_up")
+            draw_job(row, "palpate.catch_up")
             row.operator("palpate.reset", text="Reset")
         status = frame_status.status_of(scene)
         draw_sentences(layout, status.text, "INFO", context)
@@ -88,9 +88,9 @@ class Figures(Subpanel):
     def draw_part(self, layout, _settings, context):
         own = context.scene.palpate.figures
         layout.prop(own, "folder", text="")
-        layout.grid_flow(columns=1, even_columns=True, align=True).prop(own, "kinds")
+        draw_choices(layout, own, "kinds")
         if own.kinds & {"STRIP", "CURVES", "NUMBERS"}:
-            layout.row(align=True).prop(own, "formats")
+            draw_choices(layout, own, "formats")
             layout.prop(own, "width")
             layout.prop(own, "dpi")
         layout.prop(own, "sensors")
@@ -114,10 +114,8 @@ class Figures(Subpanel):
             column.prop(own, "markers")
             if own.markers:
                 column.prop(own, name_in_units(own, "marker_pitch", context.scene))
-        layout.use_property_split = False
-        layout.label(text="Data:")
-        layout.grid_flow(columns=1, even_columns=True, align=True).prop(own, "exports")
-        layout.operator("palpate.figures_make", icon="RENDER_STILL")
+        draw_choices(layout, own, "exports")
+        draw_job(layout, "palpate.figures_make", icon="RENDER_STILL")
 
 
 SUBPANELS = (Display, Figures)

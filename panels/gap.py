@@ -2,7 +2,7 @@
 """Measured data of the real sensor: what the model misses against them."""
 
 from ..addon.measured import gap_results, planned_probe
-from .subpanels import Subpanel, draw_operator_fields, draw_sentences
+from .subpanels import Subpanel, draw_job, draw_operator_fields, draw_sentences
 
 
 class Measured(Subpanel):
@@ -18,9 +18,9 @@ class Measured(Subpanel):
         row.operator("palpate.measured_open", text="", icon="FILE_FOLDER")
         row.operator("palpate.measured_logs", text="", icon="FILE_NEW")
         column = layout.column(align=True)  # beside one another their names are cut off in a narrow editor
-        column.operator("palpate.gap_find", icon="VIEWZOOM")
+        draw_job(column, "palpate.gap_find", icon="VIEWZOOM")
         column = layout.column(align=True)
-        column.operator("palpate.gap_plan", icon="CON_FOLLOWPATH")
+        draw_job(column, "palpate.gap_plan", icon="CON_FOLLOWPATH")
         draw_operator_fields(column, context, "palpate.gap_plan", "depth", "speed", "duration")
         plan = planned_probe.sentence_of(context.object)
         if plan:
@@ -46,7 +46,7 @@ class Measured(Subpanel):
             row.operator("palpate.gap_show", text=text, icon="COLOR", depress=is_shown).amended = amended
         if shown is not None:
             draw_sentences(layout, f"Black: no error. Bright yellow: {shown.scale.words(shown.scale.high)}.", "COLOR", context)
-        layout.operator("palpate.gap_report", icon="EXPORT")
+        draw_job(layout, "palpate.gap_report", icon="EXPORT")
 
 
 SUBPANELS = (Measured,)

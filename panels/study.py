@@ -3,7 +3,7 @@
 
 from ..addon.properties.study_properties import WORDS
 from ..addon.session import session_state
-from .subpanels import Subpanel, draw_named, draw_sentences
+from .subpanels import Subpanel, draw_named, draw_progress, draw_sentences
 
 HINT = "Right-click on a number and choose Vary in Study."
 
@@ -38,7 +38,7 @@ class Study(Subpanel):
         layout.prop(own, "file", text="")
         progress = session_state.session.study_progress
         if progress is not None:
-            layout.progress(text=f"{progress.text} (ESC: stop)", factor=progress.share)
+            draw_progress(layout, progress.text, progress.share)
             return
         layout.operator("palpate.study_run", icon="PLAY")
         row = layout.row(align=True)

@@ -7,7 +7,9 @@ import textwrap
 
 import bpy
 
+from ..addon.properties.figure_properties import check_box
 from ..addon.scene import participants
+from ..addon.session import session_state
 
 PLACES = {
     "": {"bl_space_type": "PROPERTIES", "bl_region_type": "WINDOW", "bl_context": "physics"},
@@ -63,6 +65,29 @@ def draw_named(layout, settings, key: str, text: str = "") -> None:
     split = layout.split(factor=0.42)
     split.label(text=f"{name}:")
     split.prop(settings, key, text="")
+
+
+def draw_job(layout, operator: str, **how) -> None:
+    """Draw the button of an operator that works beside the window; while it works, how far it has come."""
+    module, name = operator.split(".")
+    progress = session_state.session.jobs.get(f"{module.upper()}_OT_{name}")
+    if progress is None:
+        layout.operator(operator, **how)
+    else:
+        draw_progress(layout, progress.text, progress.share)
+
+
+def draw_progress(layout, text: str, share: float) -> None:
+    """Draw how far something has come that ESC stops."""
+    layout.progress(text=f"{text} (ESC: stop)", factor=share)
+
+
+def draw_choices(layout, settings, key: str) -> None:
+    """Draw the choices of which several may be taken, one below the other: side by side their names would be cut off."""
+    choices = settings.bl_rna.properties[key]
+    column = layout.column(heading=choices.name)
+    for item in choices.enum_items:
+        column.prop(settings, check_box(key, item.identifier))
 
 
 def draw_operator_fields(layout, context, operator: str, *names: str) -> None:

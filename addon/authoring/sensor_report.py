@@ -136,14 +136,16 @@ def _compute(obj, scene) -> Report:
     missing = "" if hidden else missing  # a problem with a button
     metres = units.metres_per_unit(scene)
     reach = units.as_typed(obj.palpate.max_penetration)
+    notes: list[str] = []
     try:
-        sensor, mesh = sensor_reader.sensor_in_own_frame(scene, obj, depsgraph)
         notes = mesh_arrays.sensor_arrays(obj, depsgraph)[1]
+        sensor, mesh = sensor_reader.sensor_in_own_frame(scene, obj, depsgraph)
         around = _around(obj, depsgraph, metres) if laid_sensors.is_laid(obj) and obj.parent else None
         found = hidden + problems.object_problems(obj, notes)
         found += problems.texel_problems(obj, mesh, sensor.texels, reach, around)
     except PalpateError as error:
-        return Report(None, reach, metres, None, [problems.problem_of_error(obj, error)], advice, missing)
+        modified = [problems.Problem("MODIFIER", note) for note in notes]  # perhaps why nothing is where it was painted
+        return Report(None, reach, metres, None, [problems.problem_of_error(obj, error), *modified], advice, missing)
     return Report(sensor.texels, reach, metres, mesh if around is None else around, found, advice, missing)
 
 

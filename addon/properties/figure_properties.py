@@ -36,7 +36,34 @@ EXPORTS = tuple((exporter.name.upper(), exporter.title, exporter.description) fo
 _plain: dict = {"options": set()}  # a setting has no keyframes
 
 
-class PALPATE_PG_figures(bpy.types.PropertyGroup):
+def check_box(key: str, identifier: str) -> str:
+    """Return the name of the property that takes one choice of `kinds`, `exports` or `formats`."""
+    return f"{key}_{identifier.lower()}"
+
+
+def _check_boxes(key: str, items: tuple) -> dict:
+    """Return properties by which a panel shows choices as check boxes: Blender only has buttons, and Shift, for a set."""
+
+    def box(identifier: str, label: str, text: str):
+        def read(settings) -> bool:
+            return identifier in getattr(settings, key)
+
+        def write(settings, value: bool) -> None:
+            others = getattr(settings, key) - {identifier}
+            setattr(settings, key, others | {identifier} if value else others)
+
+        return BoolProperty(name=label, description=text, get=read, set=write, **_plain)
+
+    return {check_box(key, item[0]): box(*item) for item in items}
+
+
+class CheckBoxes:
+    """The choices of which several may be taken, each as a check box."""
+
+    __annotations__ = _check_boxes("kinds", KINDS) | _check_boxes("exports", EXPORTS) | _check_boxes("formats", FORMATS)
+
+
+class PALPATE_PG_figures(CheckBoxes, bpy.types.PropertyGroup):
     """`Scene.palpate.figures`"""
 
     folder: StringProperty(
@@ -48,20 +75,20 @@ class PALPATE_PG_figures(bpy.types.PropertyGroup):
     )
     kinds: EnumProperty(
         name="Figures",
-        description="Figures to make; Shift-click adds one to those chosen",
+        description="Figures to make",
         items=KINDS,
         default={"SCENE", "STRIP", "CURVES", "NUMBERS"},
         options={"ENUM_FLAG"},
     )
     exports: EnumProperty(
         name="Data",
-        description="Data to write with the figures; Shift-click adds one to those chosen",
+        description="Data to write with the figures",
         items=EXPORTS,
         options={"ENUM_FLAG"},
     )
     formats: EnumProperty(
         name="Files",
-        description="File formats of figures that are not renders; Shift-click adds one to those chosen",
+        description="File formats of figures that are not renders",
         items=FORMATS,
         default={"PNG", "PDF"},
         options={"ENUM_FLAG"},

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.errors import MeshError, SensorError
-from .display_names import REST_POSITION
+from .display_names import MODIFIERS, REST_POSITION
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,9 @@ def sensor_arrays(obj, depsgraph) -> tuple[MeshArrays, list[str]]:
         final = read_arrays(mesh)
     if len(final.vertices) == len(base.vertices):
         return final, []
+    own = [modifier.name for modifier in obj.modifiers if modifier.show_viewport and modifier.name not in MODIFIERS]
+    names = ", ".join(f"'{name}'" for name in own)
     return base, [
-        f"A modifier changes the number of vertices of sensor '{obj.name}': texels stand on the vertices without modifiers, "
-        "apply it to have them on the new ones."
+        f"A modifier ({names}) changes the number of vertices of sensor '{obj.name}': texels stand on the vertices without "
+        "modifiers, apply it to have them on the new ones."
     ]

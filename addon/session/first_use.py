@@ -48,7 +48,8 @@ POLL_INTERVAL = 0.5
 class _Compilation:
     """The process that compiles, the file that it writes to, when it started (monotonic clock), and what is known of its end.
 
-    `share` is the part of its time that had passed when it last finished a function, and `seconds` how long it may take in all.
+    `share` is the part of its time that had passed when it last finished a function, `seconds` how long it may take in all, and
+    `shown` the largest part that was shown: a bar never goes back.
     """
 
     process: subprocess.Popen
@@ -56,6 +57,7 @@ class _Compilation:
     started: float
     share: float = 0.0
     seconds: float = USUAL_SECONDS
+    shown: float = 0.0
 
     def passed(self) -> float:
         """Return the part of the time that has passed, from 0 to 0.99; `share` is measured, and what follows it estimated."""
@@ -63,10 +65,11 @@ class _Compilation:
         with suppress(OSError, ValueError, IndexError):  # nothing has been written yet
             written = json.loads(self.log.read_bytes().splitlines()[-1])
             share = COUNTED_SHARE * written["done"] / written["total"]
-            if share > max(self.share, 0.08):
-                self.share, self.seconds = share, now / share
+            if share > self.share:  # the first functions take longer than their share: what is usual counts as much as they leave
+                self.share, self.seconds = share, now + (1.0 - share) * (now + (1.0 - share) * USUAL_SECONDS)
         self.seconds = max(self.seconds, now / 0.99)
-        return now / self.seconds
+        self.shown = max(self.shown, self.share, now / self.seconds)
+        return self.shown
 
 
 _compilation: _Compilation | None = None

@@ -54,6 +54,18 @@ def test_a_scene_that_makes_no_run_says_what_is_missing():
     assert "give at least one other object the role Target" in look(sensor(grid())).missing
 
 
+def test_a_painted_vertex_below_a_subdivision_names_the_modifier_at_once():
+    obj = sensor(cube())
+    obj.modifiers.new("Subdivision", "SUBSURF").levels = 4
+    group = obj.vertex_groups.new(name="Painted")
+    group.add([0], 1.0, "REPLACE")
+    obj.palpate.region, obj.palpate.vertex_group = "GROUP", "Painted"
+    found = look(obj).problems
+    assert [problem.kind for problem in found] == ["REGION", "MODIFIER"] and "Subdivision" in found[1].text
+    fix(obj, "MODIFIER")
+    assert "MODIFIER" not in kinds(obj)
+
+
 def hide_collection(target):
     collection = bpy.data.collections.new("Objects")
     bpy.context.scene.collection.children.link(collection)

@@ -167,7 +167,23 @@ def test_the_progress_goes_on_while_the_last_functions_are_compiled(monkeypatch,
         log.write_text(json.dumps({"done": done, "total": 185}) + "\n")
         said.append((round(first_use.progress().share, 2), first_use.progress().text.rpartition(", ")[2]))
     assert said[0] == (0.01, "about 40 s more")
-    assert said[3:] == [(0.77, "about 7 s more"), (0.84, "about 5 s more"), (0.94, "about 2 s more"), (0.99, "nearly done")]
+    assert said[3:] == [(0.77, "about 7 s more"), (0.83, "about 5 s more"), (0.92, "about 2 s more"), (0.99, "nearly done")]
+
+
+def test_the_bar_never_goes_back_and_the_first_functions_promise_no_minutes(monkeypatch, tmp_path):
+    """On a busy machine 28 s were promised, then 144 s, then 40 s."""
+    log, clock = tmp_path / "log", [0.0]
+    monkeypatch.setattr(first_use.time, "monotonic", lambda: clock[0])
+    monkeypatch.setattr(first_use, "is_ready", lambda: False)
+    monkeypatch.setattr(first_use, "_compilation", first_use._Compilation(None, log, 0.0))
+    shares, seconds = [], []
+    for clock[0], done in ((1.0, 0), (12.0, 4), (14.0, 20), (20.0, 60), (30.0, 110), (45.0, 160), (55.0, 179), (62.0, 179)):
+        log.write_text(json.dumps({"done": done, "total": 185}) + "\n")
+        shares.append(first_use.progress().share)
+        words = first_use.progress().text.rpartition(", ")[2]
+        seconds.append(float(words.split()[1]) if words.startswith("about") else 0.0)
+    assert shares == sorted(shares) and shares[-1] > 0.85
+    assert max(seconds) < 60.0 and max(np.diff(seconds)) < 20.0
 
 
 def test_when_it_fails_the_solver_is_compiled_at_its_first_use(window, capfd):
