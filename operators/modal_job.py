@@ -18,6 +18,7 @@ class ModalJob(support.ErrorReporting):
     """
 
     stopped = "Stopped"
+
     @classmethod
     def poll_not_running(cls) -> bool:
         """Poll: this operator is not running already, so that its button is grey meanwhile."""

@@ -65,7 +65,7 @@ class _Compilation:
         with suppress(OSError, ValueError, IndexError):  # nothing has been written yet
             written = json.loads(self.log.read_bytes().splitlines()[-1])
             share = COUNTED_SHARE * written["done"] / written["total"]
-            if share > self.share:  # the first functions take longer than their share: what is usual counts as much as they leave
+            if share > self.share:  # the first functions take longer than their share; the usual time counts for what is left
                 self.share, self.seconds = share, now + (1.0 - share) * (now + (1.0 - share) * USUAL_SECONDS)
         self.seconds = max(self.seconds, now / 0.99)
         self.shown = max(self.shown, self.share, now / self.seconds)

@@ -39,7 +39,7 @@ class Session:
     study_progress: object = None
     """The last Progress of the running study, for the panel; None when no study runs."""
     jobs: dict[str, object] = field(default_factory=dict)
-    """By the identifier of an operator that works beside the window: its last Progress, for the panel; None before the first."""
+    """By the class of an operator that works beside the window: its last Progress, for the panel."""
     unreadable_settings: dict[str, str] = field(default_factory=dict)
     """By scene or object name: why its settings could not be read."""
 

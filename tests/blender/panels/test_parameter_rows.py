@@ -8,8 +8,10 @@ import bpy
 import pytest
 
 from palpate.addon.properties.scene_units import ENDING
+from palpate.addon.session import session_state
+from palpate.core.jobs.progress import Progress
 from palpate.core.model.sensor_parameters import HUNT_CROSSLEY, LINEAR, SENSOR_PARAMETERS
-from palpate.panels import gap, sensor
+from palpate.panels import bake, gap, sensor
 
 
 def drawn(settings, part, owner=None) -> Counter:
@@ -20,7 +22,11 @@ def drawn(settings, part, owner=None) -> Counter:
     found, layout = Counter(), MagicMock()
     for nested in ("column", "row", "split", "box"):
         getattr(layout, nested).return_value = layout
-    layout.prop.side_effect = lambda one, name, **_how: found.update([name.removesuffix(ENDING)] if owner in (None, one) else [])
+
+    def prop(one, name, **_how):
+        found.update([name.removesuffix(ENDING)] if owner in (None, one) else [])
+
+    layout.prop.side_effect = prop
     context = MagicMock(scene=bpy.context.scene, object=bpy.context.object, window_manager=bpy.context.window_manager)
     context.region.width, context.preferences.system.ui_scale = 300, 1.0
     part.draw_part(None, layout, settings, context)
@@ -75,3 +81,33 @@ def test_a_button_uses_the_settings_of_the_panel():
     assert bpy.context.object.palpate.skin.method == "GRID"
     assert bpy.context.object.palpate.skin.spacing == pytest.approx(0.01)
     own.method, own.spacing = "NOISE", 0.0
+
+
+def test_the_kinds_of_figures_are_check_boxes_of_one_column():
+    bpy.ops.mesh.primitive_grid_add(size=0.05)
+    own = bpy.context.scene.palpate.figures
+    boxes = {"kinds_scene", "kinds_strip", "kinds_curves", "kinds_numbers", "kinds_video", "kinds_gel"}
+    boxes |= {"formats_png", "formats_pdf", "formats_svg", "exports_csv", "exports_hdf5", "exports_mcap"}
+    assert drawn(bpy.context.object.palpate, bake.Figures).keys() >= boxes
+    own.kinds_strip, own.kinds_gel, own.exports_csv = False, True, True  # a click each, without Shift
+    assert own.kinds == {"SCENE", "CURVES", "NUMBERS", "GEL"} and own.exports == {"CSV"}
+    own.kinds = {"VIDEO"}
+    assert own.kinds_video and not own.kinds_scene and own.bl_rna.properties["kinds_video"].name == "Video"
+
+
+@pytest.mark.parametrize("operator", ["palpate.gap_find", "palpate.gap_plan", "palpate.figures_make", "palpate.catch_up"])
+def test_long_work_has_a_bar_where_its_button_was(operator, monkeypatch):
+    bpy.ops.mesh.primitive_grid_add(size=0.05)
+    settings = bpy.context.object.palpate
+    settings.role = "SENSOR"
+    kind = getattr(bpy.types, f"PALPATE_OT_{operator.split('.')[1]}")
+    monkeypatch.setattr(session_state.session, "jobs", {kind.__name__: Progress("Working", 1, 4, 7)})
+    layout = MagicMock()
+    for nested in ("column", "row", "split", "box", "grid_flow"):
+        getattr(layout, nested).return_value = layout
+    context = MagicMock(scene=bpy.context.scene, object=bpy.context.object, window_manager=bpy.context.window_manager)
+    context.region.width, context.preferences.system.ui_scale = 300, 1.0
+    for part in (gap.Measured, bake.Bake, bake.Figures):
+        part.draw_part(None, layout, settings, context)
+    layout.progress.assert_called_once_with(text="Working: frame 7 (ESC: stop)", factor=0.25)
+    assert operator not in [call.args[0] for call in layout.operator.call_args_list]
