@@ -39,8 +39,8 @@ class PALPATE_OT_measured_open(support.ErrorReporting, support.FileChooser, bpy.
 
 class PALPATE_OT_measured_logs(support.ErrorReporting, support.FileChooser, bpy.types.Operator):
     """Make a rig from logs of the real sensor (CSV, NPZ, MAT; HDF5, MCAP and bags where their packages are installed) in the
-    folder rig beside them, and show what was read. What no log says is asked in answers.toml there: complete it and choose the
-    logs again"""
+    folder rig beside them, and show what was read. Rows, columns and pitch are those of the active sensor. What no log says is
+    asked in answers.toml there: complete it and choose the logs again"""
 
     bl_idname = "palpate.measured_logs"
     bl_label = "Rig from Logs…"
@@ -59,7 +59,7 @@ class PALPATE_OT_measured_logs(support.ErrorReporting, support.FileChooser, bpy.
     def run(self, context):
         names = [item.name for item in self.files if item.name]
         paths = [Path(self.directory) / name for name in names] if names else [Path(self.filepath)]
-        written, plot = log_rigs.make(paths, paths[0].parent / "rig", self.accept)
+        written, plot = log_rigs.make(context, context.object, paths, paths[0].parent / "rig", self.accept)
         context.object.palpate.measured = bpy.path.relpath(str(written.path)) if bpy.data.filepath else str(written.path)
         show_image(context, plot, "Palpate Recordings")
         for note in written.notes:

@@ -49,7 +49,7 @@ def save_toml(context, obj, path) -> None:
 
     values = parameters_of(obj)
     values.check(obj.name)
-    write_sensor(path, SensorModel(obj.name, values, effect_stack.stack(obj), _grid_table(context, obj)))
+    write_sensor(path, SensorModel(obj.name, values, effect_stack.stack(obj), grid_table(context, obj)))
 
 
 def load_toml(context, path) -> tuple:
@@ -87,7 +87,7 @@ def _new_pad(context, model):
     return obj
 
 
-def _grid_table(context, obj) -> dict:
+def grid_table(context, obj) -> dict:
     """Return ``{"grid": …}`` for texels in a plane with rows and columns at a constant pitch, else an empty dict."""
     texels = sensor_reader.sensor_in_own_frame(context.scene, obj, participants.depsgraph_of(context.scene))[0].texels
     layout = texels.layout

@@ -3,13 +3,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from ...core.errors import FileError, counted
+from ...core.errors import FileError, PalpateError, counted
+from ..authoring import exchange
+
+if TYPE_CHECKING:
+    from ...core.gap.logs.answers import Answers
 
 
-def make(paths, folder: Path, accept: bool):
+def make(context, obj, paths, folder: Path, accept: bool):
     """Write a rig and a picture of its recordings; return the rig that was written and the path of the picture.
+
+    The grid of texels is that of the sensor `obj`, where it has as many texels as the logs.
 
     Raises
     ------
@@ -29,7 +37,7 @@ def make(paths, folder: Path, accept: bool):
     if (folder / ANSWERS_NAME).exists():
         answers = read_answers(folder / ANSWERS_NAME)
     else:
-        answers = propose(logs, folder.parent.name or "rig")
+        answers = _with_grid_of(context, obj, propose(logs, folder.parent.name or "rig"))
         answers = confirmed(answers) if accept else answers
         questions = list(answers.open_questions())
         if questions:
@@ -42,3 +50,19 @@ def make(paths, folder: Path, accept: bool):
     plot = folder / PLOT_NAME
     plot_rig(read_rig(written.path), plot)
     return written, plot
+
+
+def _with_grid_of(context, obj, answers: Answers) -> Answers:
+    """Return answers with rows, columns and pitch of a sensor, if it has as many texels and no array says others."""
+    try:
+        known = exchange.grid_table(context, obj).get("grid")
+    except PalpateError:
+        return answers  # it has no texels
+    columns = [logger.columns["texel"] for logger in answers.loggers if "texel" in logger.columns]
+    proposed = answers.sensor.get("grid", {})
+    if known is None or not columns or known["rows"] * known["columns"] != len(columns[0].names):
+        return answers
+    if "grid" not in answers.unsure and any(known[word] != proposed.get(word) for word in ("rows", "columns")):
+        return answers
+    why = answers.why | {"grid": f"that of '{obj.name}' in the scene"}
+    return replace(answers, sensor=answers.sensor | {"grid": known}, why=why, unsure=answers.unsure - {"grid"})

@@ -180,12 +180,36 @@ def test_logs_become_a_rig_with_the_answers_beside_it(scene, tmp_path):
         rows = [",".join(f"{one:.6g}" for one in (t, d, *[max(d, 0.0) * k for k in (1, 2, 3, 4)])) for t, d in zip(time, depth)]
         (tmp_path / name).write_text("t_ms,depth (mm),R1,R2,R3,R4\n" + "\n".join(rows))
     chosen = {"filepath": str(tmp_path / names[0]), "directory": str(tmp_path), "files": [{"name": name} for name in names]}
+    other = pad(columns=3, rows=2)
     with pytest.raises(RuntimeError, match="leave 1 question open, the first: grid of .sensor. is not known"):
         bpy.ops.palpate.measured_logs(**chosen)
-    assert not obj.palpate.measured
+    assert not other.palpate.measured
+    bpy.context.view_layer.objects.active = obj
     answers = tmp_path / "rig" / "answers.toml"
     answers.write_text(answers.read_text().replace('["?", "?"]', "[0.005, 0.005]"))
     assert bpy.ops.palpate.measured_logs(**chosen) == {"FINISHED"}
     assert obj.palpate.measured == str(tmp_path / "rig" / "rig.toml")
     assert bpy.data.images["Palpate Recordings"].size[0] > 500
     assert bpy.ops.palpate.measured_open(filepath=obj.palpate.measured) == {"FINISHED"}
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(14, 6), (6, 14)])
+def test_a_rig_from_logs_has_the_grid_of_the_active_sensor(scene, tmp_path, rows, columns):
+    """84 channels were proposed as 12 rows of 7, with a pitch that was asked in a text file."""
+    bpy.ops.palpate.pad_mesh_add(rows=rows, columns=columns, pitch_x=0.003, pitch_y=0.0034)
+    time = np.arange(600) * 10.0
+    depth = np.interp(time, [0, 1000, 2000, 4000, 5000], [-1.0, -1.0, 1.0, 1.0, -1.0])
+    for i in range(2):
+        readings = [max(0.0, one) * (1.0 + 0.01 * k) for one in depth for k in range(84)]
+        lines = [
+            ",".join(f"{v:.5g}" for v in (t, d, *readings[84 * n : 84 * n + 84])) for n, (t, d) in enumerate(zip(time, depth))
+        ]
+        head = "t_ms,depth (mm)," + ",".join(f"R{k}" for k in range(84))
+        (tmp_path / f"press_{i}.csv").write_text("\n".join([head, *lines]))
+    chosen = {"filepath": str(tmp_path / "press_0.csv"), "directory": str(tmp_path)}
+    assert bpy.ops.palpate.measured_logs(**chosen, files=[{"name": f"press_{i}.csv"} for i in range(2)]) == {"FINISHED"}
+    places = read_rig(bpy.context.object.palpate.measured).texels.position
+    assert len(np.unique(places[:, 1].round(7))) == rows and len(np.unique(places[:, 0].round(7))) == columns
+    assert np.ptp(places[:, 0]) == pytest.approx(0.003 * (columns - 1)) and np.ptp(places[:, 1]) == pytest.approx(
+        0.0034 * (rows - 1)
+    )
