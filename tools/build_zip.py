@@ -299,6 +299,14 @@ def build(
     return partial.replace(target)
 
 
+def description(path: Path) -> str:
+    """Return a line on a zip: its size, and whether the solver has to be compiled at first use."""
+    with zipfile.ZipFile(path) as archive:
+        carries = MACHINE_CODE in archive.namelist()
+    code = "with machine code" if carries else "without machine code: the solver is compiled at first use, in half a minute"
+    return f"{path}  {path.stat().st_size / 1e6:.0f} MB, {code}"
+
+
 def write_zip(path: Path, entries: Mapping[str, bytes]) -> None:
     """Write files, by their names, so that the same files give the same bytes."""
     with zipfile.ZipFile(path, "w") as archive:
@@ -351,7 +359,7 @@ def main(argv: list[str] | None = None) -> int:
         for name in [args.platform] if args.platform else platforms:
             for python in pythons:
                 path = build(name, python, out, with_machine_code=not args.no_machine_code, **made)
-                print(f"{path}  {path.stat().st_size / 1e6:.0f} MB", flush=True)
+                print(description(path), flush=True)
     except BuildError as error:
         print(error, file=sys.stderr)
         return 1

@@ -95,6 +95,15 @@ def test_same_sources_give_the_same_zip(zip_path, tmp_path):
     assert build_zip.build("linux-x64", "3.11", tmp_path).read_bytes() == zip_path.read_bytes()
 
 
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [(build_zip.MACHINE_CODE, ", with machine code"), ("other", "without machine code: the solver is compiled at first use")],
+)
+def test_a_line_says_of_a_zip_whether_it_has_machine_code(tmp_path, name, says):
+    build_zip.write_zip(tmp_path / "palpate.zip", {name: b"code"})
+    assert says in build_zip.description(tmp_path / "palpate.zip")
+
+
 def test_blender_refuses_a_broken_zip(tmp_path):
     broken = tmp_path / "broken.zip"
     with zipfile.ZipFile(broken, "w") as archive:
