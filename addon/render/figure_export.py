@@ -23,7 +23,7 @@ from ...core.io.bake_reader import Bake, frame_index, read_sensors
 from ...core.io.file_list import FileList
 from ...core.io.file_writing import require_space, writable_folder
 from ...core.io.hidden_folder import temporary_folder
-from ...core.jobs.job_runner import run_job
+from ...core.jobs.job_runner import part_of_job
 from ...core.jobs.progress import Job, Progress
 from ...core.response import metrics
 from ..display import bake_identity, baked_scene
@@ -90,8 +90,7 @@ def make_figures(scene, folder, request: FigureRequest) -> Job[list[Path]]:
         if "scene" in request.kinds:
             written["scene"] = yield from _render_pictures(scene, new, request, bake, frames, steps)
         if DRAWN & set(request.kinds):
-            yield steps.next("Drawing figures", frames[0])
-            written |= draw_figures(bake, new, request, frames)
+            written |= yield from draw_figures(bake, new, request, frames, steps)
         if "video" in request.kinds:
             written["video"] = yield from _make_video(scene, new, request, bake, steps)
         if "gel" in request.kinds:
@@ -100,21 +99,25 @@ def make_figures(scene, folder, request: FigureRequest) -> Job[list[Path]]:
         kinds = {f"figures {kind}": paths for kind, paths in written.items()}
         made = files.replace(new, kinds, manifest.bake_id or manifest.digest)
     for kind in request.exports:
-        yield steps.next(f"Writing {kind.upper()}", frames[0])
-        made += run_job(export(bake, kind, folder / f"data_{kind}", request.style))
+        steps.done += 1
+        made += yield from part_of_job(export(bake, kind, folder / f"data_{kind}", request.style), steps.within)
     return made
 
 
-def draw_figures(bake: Bake, folder: Path, request: FigureRequest, frames: Sequence[int]) -> dict[str, list[Path]]:
+def draw_figures(
+    bake: Bake, folder: Path, request: FigureRequest, frames: Sequence[int], steps: _StepCounter
+) -> Job[dict[str, list[Path]]]:
     """Draw strip, curves and numbers, as far as the request names them; return the files of each kind."""
     written: dict[str, list[Path]] = {kind: [] for kind in request.kinds if kind in DRAWN}
     for ending in request.formats:
         parts = (bake.recording, bake.texels)
         if "strip" in request.kinds:
             columns = request.frames if len(request.frames) > 1 else None
+            yield steps.next("Drawing the strip", frames[0])
             tactile_strip(folder / f"strip.{ending}", *parts, columns, request.style)
             written["strip"].append(folder / f"strip.{ending}")
         if "curves" in request.kinds:
+            yield steps.next("Drawing curves", frames[0])
             time_curves(folder / f"curves.{ending}", *parts, bake.parameters, style=request.style)
             written["curves"].append(folder / f"curves.{ending}")
         if "numbers" in request.kinds:
@@ -123,6 +126,7 @@ def draw_figures(bake: Bake, folder: Path, request: FigureRequest, frames: Seque
                     continue  # unreadably many numbers; a sensor that the request names raises an error instead
                 for number in frames:
                     path = folder / f"numbers_{stem}_{number:04d}.{ending}"
+                    yield steps.next("Drawing numbers", number)
                     texel_numbers(path, *parts, name, number, request.style)
                     written["numbers"].append(path)
     return written
@@ -205,8 +209,14 @@ class _StepCounter:
         pictures = len(frames) if "scene" in request.kinds else 0
         video_steps = len(bake.recording.frames) + 1 if "video" in request.kinds else 0
         gel_steps = len(gel_figures.gel_frames(bake, request)) if "gel" in request.kinds else 0
-        self.total = pictures + 1 + len(request.exports) + video_steps + gel_steps
+        drawings = {"strip": 1, "curves": 1, "numbers": len(frames) * len(bake.texels)}
+        drawn = len(request.formats) * sum(drawings[kind] for kind in DRAWN & set(request.kinds))
+        self.total = max(1, pictures + drawn + len(request.exports) + video_steps + gel_steps)
 
     def next(self, stage: str, frame: int) -> Progress:
         self.done = min(self.done + 1, self.total)
         return Progress(stage, self.done, self.total, frame)
+
+    def within(self, part: Progress) -> Progress:
+        """Return how far a job that is the present step has come."""
+        return Progress(part.stage, round(1000 * (self.done - 1 + part.share)), 1000 * self.total, part.frame)

@@ -8,7 +8,7 @@ import pytest
 from blender_scenes import press, save
 
 from palpate.addon.bake.bake import bake
-from palpate.addon.render import figure_request
+from palpate.addon.render import figure_export, figure_request
 from palpate.commands import render
 from palpate.core.errors import ParameterError
 from palpate.core.io.file_list import LIST_NAME
@@ -87,3 +87,14 @@ def test_words_for_frames():
     assert figure_request.frames_of("-2-1") == (-2, -1, 0, 1)
     with pytest.raises(ParameterError, match="1.5"):
         figure_request.frames_of("1.5")
+
+
+def test_the_bar_goes_on_with_every_file_that_is_drawn_and_written(baked):
+    """All drawings were one step, and each export another, during which the window stood still."""
+    scene, _, place = baked
+    request = figure_request.FigureRequest(("strip", "curves", "numbers"), formats=("png", "pdf"), exports=("csv", "npz"))
+    steps = []
+    run_job(figure_export.make_figures(scene, place / "figures", request), lambda step: steps.append((step.stage, step.share)))
+    stages, shares = [stage for stage, _ in steps], [share for _, share in steps]
+    assert [stages.count(f"Drawing {what}") for what in ("the strip", "curves", "numbers")] == [2, 2, 2]
+    assert shares == sorted(shares) and shares[-1] <= 1.0 and len(set(shares)) >= 8
