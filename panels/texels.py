@@ -3,6 +3,7 @@
 
 from ..addon.authoring import problems, sensor_report
 from ..core.geometry.layout.grid_layout import GridLayout
+from ..core.solver.time_step_adviser import benefit
 from .subpanels import Subpanel, draw_sentences
 
 
@@ -33,6 +34,8 @@ class Texels(Subpanel):
             limit = f"{advice.limit * 1e3:.3g} ms" if advice.limit < 1e3 else "none, no body is free"
             box.label(text=f"Stability limit: {limit}")
             box.label(text=f"Recommended step: {advice.dt * 1e3:.3g} ms")
+            if not own.use_auto_dt and (text := benefit(own.dt, advice)):
+                draw_sentences(box, text, "INFO", context)
         elif report.missing:
             draw_sentences(box, report.missing, "INFO", context)
         for problem in report.problems:

@@ -1,10 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The hand of the sample scene: a closed skin without gaps to the fingers that feel, which it follows."""
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
 
+from palpate.addon.scene import scene_reader
+from palpate.core.jobs.job_runner import run_job
+from palpate.core.solver import time_step_adviser
+from palpate.core.solver.simulation import run
 from palpate.sample_blends import hand
 
 
@@ -28,3 +34,22 @@ def test_the_skin_follows_the_fingers_and_stays_at_the_wrist(scene):
     assert near.sum() > 50 and moved[near].min() > 4.9
     assert np.abs(moved[before[:, 1] > 120.0]).max() < 1e-4
     assert np.abs(moved[np.linalg.norm(before - np.array(thumb.location), axis=1) < 60.0]).max() < 1e-4
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.long("steps of 0.02 to 0.04 ms")) for name in ("hand", "grasp_bottle")],
+)
+def test_what_the_recommended_step_buys_is_as_the_panel_says(name, repository):
+    bpy.ops.wm.open_mainfile(filepath=str(repository / "sample_blends" / f"{name}.blend"))
+    scenario = run_job(scene_reader.read_scene(bpy.context.scene)).scenario
+    advice = time_step_adviser.advise(scenario)
+    assert 10.0 < scenario.dt / advice.dt < 25.0
+    set_, fine = run(scenario), run(replace(scenario, dt=None))
+    for sensor, expected in fine.sensors.items():
+        force, found = expected.normal_force, set_.sensors[sensor].normal_force
+        assert np.abs(found.sum(axis=1) - force.sum(axis=1)).max() < time_step_adviser.SUM_ERROR * force.sum(axis=1).max()
+        assert np.abs(found - force).max() < time_step_adviser.TEXEL_ERROR * force.max()
+    words = time_step_adviser.benefit(scenario.dt, advice)
+    assert "sums of forces changed by 0.2% at most, and single texels by 2%" in words
+    assert time_step_adviser.benefit(advice.dt, advice) == ""
