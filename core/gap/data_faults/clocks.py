@@ -127,8 +127,9 @@ def _explained(rig: Rig, trial: Trial, late: float) -> np.ndarray:
     moved = with_shift(trial, late)
     part = _busiest_part(rig, moved)
     stimulus = stimulus_of(_part_of(moved, part), rig)
-    channels = None if trial.reading is None else _strongest_channels(stimulus, MOST_CHANNELS)
-    response = _net_force_along_normal(stimulus) if channels is None else stimulus.trial.reading[:, channels]
+    reading = stimulus.trial.reading
+    channels = None if reading is None else _strongest_channels(stimulus, MOST_CHANNELS)
+    response = _net_force_along_normal(stimulus) if reading is None else reading[:, channels]
     width = max(1, round(SMOOTHING / trial.step))
     good = np.isfinite(response).all(axis=1)
     both = good[width:] & good[:-width]
