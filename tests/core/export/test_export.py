@@ -265,39 +265,6 @@ except FileError as error:
 PATH = {"PYTHONPATH": str(Path(registry.__file__).parents[3])}
 
 
-def test_hdf5_survives_a_disk_that_fills_up_at_any_byte(tmp_path):
-    """The library writes in many pieces, and would crash on each that fails."""
-    pytest.importorskip("resource"), pytest.importorskip("h5py")
-    write_sensor(tmp_path / "bake", "pad", grid_texels(), recording=recording_of(grid_texels(), 600))
-    run_job(export(read_bake(tmp_path / "bake"), "hdf5", tmp_path / "whole"))
-    size = (tmp_path / "whole" / "palpate.h5").stat().st_size
-    limits = [0, 1, 90, *range(1000, size, size // 25), size - 1]
-    script = FULL_DISKS.format(bake=str(tmp_path / "bake"), out=str(tmp_path / "out"), limits=limits)
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env={**os.environ, **PATH})
-    assert done.returncode == 0, done.stderr
-    assert len(limits) > 20 and done.stdout.count("could not be written (file too large)") == len(limits), done.stdout
-
-
-FULL_DISKS = """
-import resource, signal
-from palpate.core.errors import FileError
-from palpate.core.export.formats import hdf5
-from palpate.core.figures.figure_style import FigureStyle
-from palpate.core.io.bake_reader import read_bake
-from palpate.core.jobs.job_runner import run_job
-from pathlib import Path
-bake, out = read_bake({bake!r}), Path({out!r})
-out.mkdir()
-signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-for limit in {limits}:
-    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
-    try:
-        run_job(hdf5.write_hdf5(bake, out, FigureStyle()))
-    except FileError as error:
-        print(error)
-"""
-
-
 def test_hdf5_of_large_arrays_is_written_by_blocks(tmp_path, monkeypatch):
     """Whatever the blocks are, the numbers are the same, and the same bytes are written twice."""
     h5py = pytest.importorskip("h5py")
