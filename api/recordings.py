@@ -222,15 +222,15 @@ class Recording:
         bake = self._described()
         return shown_in_notebooks(curves_figure(bake.recording, bake.texels, bake.parameters, kinds or ("force",)))
 
-    def show(self, t: float | Sequence[float] | None = None, quantity: str = "force") -> Figure:
+    def show(self, quantity: str = "force", t: float | Sequence[float] | None = None) -> Figure:
         """Return a figure with tactile images, which a notebook shows and ``savefig`` writes.
 
         Parameters
         ----------
+        quantity : str
+            That the colours show: "force", "pressure", "reading", "shear", "depth", "slip" or "channels". Arrows are shear.
         t : float or sequence of float, seconds, optional
             The frames nearest to these times. Default: some times over which the forces change.
-        quantity : str
-            "force", "pressure", "reading", "shear", "depth", "slip" or "channels"; arrows are shear.
         """
         from ..core.figures.figure_style import FigureStyle
         from .drawings import shown_in_notebooks

@@ -20,7 +20,7 @@ LEROBOT = "lerobot"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     formats = [*exporters(), LEROBOT]
-    parser.epilog = "Colour map, quantity, limit, width and resolution apply only to the format png."
+    parser.epilog = "Colours and their scale apply to the format png, the quantity also to the images of mcap."
     parser.add_argument("bake", metavar="BAKE", help="a bake folder, the folder of one sensor in it, or a baked .blend")
     parser.add_argument(
         "--format", metavar="KIND", choices=formats, default="csv", help=f"{', '.join(formats)} (default: %(default)s)"

@@ -132,6 +132,7 @@ def show_bake(scene, baked_sensors: list[BakedSensor]) -> None:
         heat_map.apply(item, image, scale)
         markers.keyframe_markers(scene, item, settings.overlays, {"FORCE": scales.force, "TORQUE": scales.moment})
         texel_arrows.build_arrows(scene, item, image, settings.overlays, scales.texel, scales.longest)
+        obj.palpate.tactile_images = image
         obj.palpate.bake_folder = bpy.path.relpath(str(item.folder)) if relative else str(item.folder)
     indentation.show(baked_sensors, settings.indentation_factor if settings.show_indentation else None)
 

@@ -70,3 +70,4 @@ def clear_object(scene, obj) -> None:
         heat_map.clear(obj)
         markers.clear(scene, obj.palpate.uid)
         obj.palpate.bake_folder = ""
+        obj.palpate.property_unset("tactile_images")

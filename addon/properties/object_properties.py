@@ -261,3 +261,5 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
     is_baked: BoolProperty(options={"HIDDEN"})
     made_action: BoolProperty(options={"HIDDEN"})
     bake_folder: StringProperty(options={"HIDDEN"})
+    # Blender saves what has a user: heat maps do not use the images of a bake for every quantity.
+    tactile_images: PointerProperty(type=bpy.types.Image, options={"HIDDEN"})

@@ -208,6 +208,17 @@ def test_a_heat_map_of_palpate_0_1_is_removed_with_its_areas(tmp_path):
     assert not [image.name for image in bpy.data.images if materials.SENSOR_KEY in image]
 
 
+@EVERY
+def test_a_saved_bake_finds_its_files_again(tmp_path, name):
+    scene = scene_with_readings(4)
+    scene.palpate.quantity = name.upper()
+    path = save(tmp_path)
+    run_job(bake(scene))
+    save(tmp_path)
+    found = figure_export.read_scene_bake(reopen(path))
+    assert list(found.texels) == ["Pad"] and len(found.recording.frames) == 4
+
+
 def test_a_heat_map_leaves_the_sensor_that_is_painted_alone():
     scene, pad, _ = press(4)
     run = play(scene, 4)

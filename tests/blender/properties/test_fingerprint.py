@@ -12,7 +12,7 @@ from palpate.addon.properties.scene_units import ENDING
 from palpate.addon.scene import drives, scene_fingerprint
 
 OBJECT_WITHOUT_FORCES = {
-    *("schema_version", "uid", "measured", "made_vertices", "skin", "is_baked", "made_action", "bake_folder"),
+    *("schema_version", "uid", "measured", "made_vertices", "skin", "is_baked", "made_action", "bake_folder", "tactile_images"),
     *("has_start", "start_matrix", "start_channels"),
 }
 """Properties of an object that change no force: identity, file names, and what laying texels or a bake has left."""

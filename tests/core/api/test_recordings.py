@@ -82,7 +82,7 @@ def test_figures_are_shown_by_notebooks(recording):
         recording.plot(),
         recording.plot("force", "slip"),
         recording.show(t=0.1),
-        recording.show((0.0, 0.2), "pressure"),
+        recording.show("pressure", (0.0, 0.2)),
     ):
         assert figure._repr_png_().startswith(b"\x89PNG")
     assert "data:image/png;base64," in recording._repr_html_()

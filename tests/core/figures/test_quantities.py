@@ -103,7 +103,7 @@ def test_a_script_shows_it(recorded, name):
     from palpate.api.recordings import Recording
 
     texels, recording = recorded
-    shown = Recording.of(recording, {"pad": (texels, Painted(), SensorParameters(unit="V"))}).show([0.17], quantity=name)
+    shown = Recording.of(recording, {"pad": (texels, Painted(), SensorParameters(unit="V"))}).show(name, [0.17])
     values, unit = EXPECTED[name](recording.sensors["pad"], texels)
     image = shown.axes[0].images[0]
     assert image.get_array().data[texels.layout.row, texels.layout.column] == pytest.approx(values[4])
