@@ -264,7 +264,7 @@ class UI:
         clipboard = bpy.context.window_manager
         clipboard.clipboard = ""
         with self.context(area, kind):
-            if bpy.context.property is not None:
+            if bpy.context.property is not None and bpy.ops.ui.copy_data_path_button.poll():
                 # its own path lacks the groups the property is in; the one for the clipboard has them
                 bpy.ops.ui.copy_data_path_button(full_path=True)
                 return re.sub(r'^bpy\.data\.\w+\["(?:[^"\\]|\\.)*"\]\.', "", clipboard.clipboard)

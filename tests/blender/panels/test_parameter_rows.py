@@ -80,6 +80,7 @@ def test_a_button_uses_the_settings_of_the_panel():
     assert bpy.ops.palpate.skin_add("INVOKE_DEFAULT", True) == {"FINISHED"}  # as a button does
     assert bpy.context.object.palpate.skin.method == "GRID"
     assert bpy.context.object.palpate.skin.spacing == pytest.approx(0.01)
+    own = bpy.context.window_manager.operator_properties_last("palpate.skin_add")  # running the operator has replaced them
     own.method, own.spacing = "NOISE", 0.0
 
 
