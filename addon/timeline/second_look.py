@@ -101,11 +101,13 @@ def look_again(scene) -> None:
         return
     run = live_cache.get(scene)
     frame, part = animation_time.current_frame(scene)
-    if part or run is None and scene.session_uid not in _dropped:
-        return
-    has_moved = run is not None and frame in run.frames and live_cache.has_moved(scene, depsgraph, run)
+    is_shown = run is not None and frame in run.frames
+    if part or not is_shown and scene.session_uid not in _dropped:
+        return  # no numbers were taken away
+    has_moved = is_shown and live_cache.has_moved(scene, depsgraph, run)
     if run is not None and not has_moved and not live_cache.is_stale(scene, depsgraph, run):
-        _dropped.discard(scene.session_uid)
+        if is_shown:
+            _dropped.discard(scene.session_uid)
         return
     live_cache.drop(scene)
     overlays.clear(scene)

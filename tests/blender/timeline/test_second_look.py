@@ -161,6 +161,18 @@ def test_what_would_take_long_is_computed_later_and_after_each_change(monkeypatc
     assert later == [True, True, True] and frame_status.status_of(scene).frame.frame == 5
 
 
+def test_a_change_where_nothing_is_computed_yet_computes_nothing(monkeypatch):
+    """As after a jump to frame 90,000 that the user has stopped, to go on with his work there."""
+    later = []
+    monkeypatch.setattr(second_look, "compute_later", lambda: later.append(True))
+    scene, pad, _ = press(frames=9)
+    play_to(scene, 2)
+    scene.frame_set(8)
+    pad.palpate.k *= 2
+    second_look.look_again(scene)
+    assert later == [] and frame_status.status_of(scene).frame is None
+
+
 @pytest.mark.parametrize("is_keyframed", [True, False])
 def test_what_is_moved_with_a_keyframe_or_has_none_is_computed_again(monkeypatch, is_keyframed):
     monkeypatch.setattr(second_look, "QUICK", 60.0)
