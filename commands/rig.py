@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..core.errors import FileError, counted
-from . import checks, console, log_questions
+from . import checks, console
 
 if TYPE_CHECKING:
     from ..core.gap.logs.answers import Answers
@@ -41,6 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..core.gap.logs.log_table import with_distinct_names
     from ..core.gap.logs.preview import preview_rows
     from ..core.gap.logs.proposal import propose
+    from ..core.gap.logs.questions import asked
     from ..core.gap.logs.template import ANSWERS_NAME, PLOT_NAME, write_template
 
     with console.Interrupt.raised_at_once():
@@ -58,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
             found = propose(logs, Path(arguments.out).resolve().name or "rig")
             found = log_answers.confirmed(found) if arguments.yes else found
             if sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty():
-                found = log_questions.asked(found)
+                found = asked(found)
             _require_complete(found, arguments.out)
             if not (Path(arguments.out) / ANSWERS_NAME).exists():  # whatever is refused later can be corrected there
                 write_template(found, arguments.out)

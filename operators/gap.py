@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measured data: choose a rig, find the gap, show it, add what is missing."""
 
+import json
+import textwrap
 from pathlib import Path
 
 import bpy
@@ -40,7 +42,7 @@ class PALPATE_OT_measured_open(support.ErrorReporting, support.FileChooser, bpy.
 class PALPATE_OT_measured_logs(support.ErrorReporting, support.FileChooser, bpy.types.Operator):
     """Make a rig from logs of the real sensor (CSV, NPZ, MAT; HDF5, MCAP and bags where their packages are installed) in the
     folder rig beside them, and show what was read. Rows, columns and pitch are those of the active sensor. What no log says is
-    asked in answers.toml there: complete it and choose the logs again"""
+    asked"""
 
     bl_idname = "palpate.measured_logs"
     bl_label = "Rig from Logs…"
@@ -58,13 +60,51 @@ class PALPATE_OT_measured_logs(support.ErrorReporting, support.FileChooser, bpy.
 
     def run(self, context):
         names = [item.name for item in self.files if item.name]
-        paths = [Path(self.directory) / name for name in names] if names else [Path(self.filepath)]
-        written, plot = log_rigs.make(context, context.object, paths, paths[0].parent / "rig", self.accept)
-        context.object.palpate.measured = bpy.path.relpath(str(written.path)) if bpy.data.filepath else str(written.path)
-        show_image(context, plot, "Palpate Recordings")
-        for note in written.notes:
-            self.report({"WARNING"}, note)
-        self.report({"INFO"}, f"Wrote {written.path}")
+        paths = [str(Path(self.directory) / name) for name in names] if names else [self.filepath]
+        _make_rig(self, context, paths, self.accept, [])
+
+
+class PALPATE_OT_log_question(support.ErrorReporting, bpy.types.Operator):
+    """Answer a question that the logs leave open, as in the brackets; an empty reply takes what is in them"""
+
+    bl_idname = "palpate.log_question"
+    bl_label = "Rig from Logs"
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
+
+    question: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+    state: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+    reply: StringProperty(name="Reply", description="As in the brackets; empty: what is in them", options={"SKIP_SAVE"})
+
+    def invoke(self, context, _event):
+        return context.window_manager.invoke_props_dialog(self, width=600)
+
+    def draw(self, _context):
+        for line in self.question.splitlines():
+            for part in textwrap.wrap(line, 100):
+                self.layout.label(text=part)
+        self.layout.prop(self, "reply", text="")
+
+    def run(self, context):
+        state = json.loads(self.state)
+        _make_rig(self, context, state["paths"], state["accept"], [*state["replies"], self.reply])
+
+
+def _make_rig(operator, context, paths: list[str], accept: bool, replies: list[str]) -> None:
+    """Make a rig of logs, or ask the next question; without a window nobody is asked."""
+    from ..core.gap.logs.questions import OpenQuestion
+
+    folder = Path(paths[0]).parent / "rig"
+    try:
+        written, plot = log_rigs.make(context, context.object, paths, folder, accept, None if bpy.app.background else replies)
+    except OpenQuestion as question:
+        state = json.dumps({"paths": paths, "accept": accept, "replies": replies})
+        bpy.ops.palpate.log_question("INVOKE_DEFAULT", question=str(question), state=state)
+        return
+    context.object.palpate.measured = bpy.path.relpath(str(written.path)) if bpy.data.filepath else str(written.path)
+    show_image(context, plot, "Palpate Recordings")
+    for note in written.notes:
+        operator.report({"WARNING"}, note)
+    operator.report({"INFO"}, f"Wrote {written.path}")
 
 
 class PALPATE_OT_gap_find(modal_job.ModalJob, bpy.types.Operator):
@@ -219,6 +259,7 @@ class PALPATE_OT_gap_report(modal_job.ModalJob, bpy.types.Operator):
 CLASSES = (
     PALPATE_OT_measured_open,
     PALPATE_OT_measured_logs,
+    PALPATE_OT_log_question,
     PALPATE_OT_gap_find,
     PALPATE_OT_gap_plan,
     PALPATE_OT_gap_add,

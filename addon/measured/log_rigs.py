@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,13 +15,16 @@ if TYPE_CHECKING:
     from ...core.gap.logs.answers import Answers
 
 
-def make(context, obj, paths, folder: Path, accept: bool):
+def make(context, obj, paths, folder: Path, accept: bool, replies: Sequence[str] | None = None):
     """Write a rig and a picture of its recordings; return the rig that was written and the path of the picture.
 
-    The grid of texels is that of the sensor `obj`, where it has as many texels as the logs.
+    The grid of texels is that of the sensor `obj`, where it has as many texels as the logs. `replies` are those to the open
+    questions, in turn; None where nobody can be asked.
 
     Raises
     ------
+    OpenQuestion
+        There is no reply to this question yet.
     FileError
         A log cannot be used, or questions are open: then `answers.toml` in the folder asks them.
     """
@@ -30,6 +34,7 @@ def make(context, obj, paths, folder: Path, accept: bool):
     from ...core.gap.logs.new_rig import write_rig
     from ...core.gap.logs.preview import plot_rig
     from ...core.gap.logs.proposal import propose
+    from ...core.gap.logs.questions import answered
     from ...core.gap.logs.template import ANSWERS_NAME, PLOT_NAME, write_template
     from ...core.jobs.job_runner import run_job
 
@@ -39,6 +44,7 @@ def make(context, obj, paths, folder: Path, accept: bool):
     else:
         answers = _with_grid_of(context, obj, propose(logs, folder.parent.name or "rig"))
         answers = confirmed(answers) if accept else answers
+        answers = answers if replies is None else answered(answers, replies)
         questions = list(answers.open_questions())
         if questions:
             path = write_template(answers, folder)

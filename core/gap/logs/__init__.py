@@ -6,4 +6,4 @@ not known, as :mod:`.answers`. A user completes them. :mod:`.new_rig` writes the
 what.
 """
 
-__all__ = ["answers", "log_file", "log_table", "new_rig", "preview", "proposal", "template"]
+__all__ = ["answers", "log_file", "log_table", "new_rig", "preview", "proposal", "questions", "template"]

@@ -2,6 +2,7 @@
 """Measured data in Blender: a rig is opened, its gap found and shown, and what is missing put on the sensor."""
 
 import json
+from functools import partial
 
 import bpy
 import gap_cases as cases
@@ -9,10 +10,11 @@ import numpy as np
 import pytest
 from blender_scenes import grid
 
-from palpate.addon.measured import gap_results, planned_probe
+from palpate.addon.measured import gap_results, log_rigs, planned_probe
 from palpate.commands import main
 from palpate.core.errors import SceneError
 from palpate.core.gap.dataset.rig import read_rig
+from palpate.core.gap.logs.questions import OpenQuestion
 from palpate.core.jobs.job_runner import SlicedJob
 from palpate.core.solver import precompile
 
@@ -184,6 +186,14 @@ def test_logs_become_a_rig_with_the_answers_beside_it(scene, tmp_path):
     with pytest.raises(RuntimeError, match="leave 1 question open, the first: grid of .sensor. is not known"):
         bpy.ops.palpate.measured_logs(**chosen)
     assert not other.palpate.measured
+    paths = [tmp_path / name for name in names]
+    made = partial(log_rigs.make, bpy.context, other, paths, tmp_path / "asked", False)  # as the dialog asks, one by one
+    with pytest.raises(OpenQuestion, match="grid .4 texels; the number of rows is a guess"):
+        made([])
+    with pytest.raises(OpenQuestion, match="written as in the brackets"):
+        made(["2 by 2"])
+    written, _ = made(["2 by 2", "{ rows = 2, columns = 2, pitch = [0.005, 0.005] }"])
+    assert len(read_rig(written.path).texels) == 4
     bpy.context.view_layer.objects.active = obj
     answers = tmp_path / "rig" / "answers.toml"
     answers.write_text(answers.read_text().replace('["?", "?"]', "[0.005, 0.005]"))

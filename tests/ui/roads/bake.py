@@ -17,6 +17,7 @@ def road(ui):
     yield from ui.tab("PHYSICS")
     yield from solver(ui)
     yield from play(ui, scene)
+    yield from render(ui, scene)
     yield from jump(ui, scene)
     yield from bake(ui, scene)
     yield from change(ui)
@@ -42,8 +43,32 @@ def play(ui, scene):
     ui.check(obj("Cube").location.z == height, "and forward again shows the same")
     before = status().frame
     obj("Pad").palpate.k *= 2
-    yield from ui.becomes(lambda: status().frame is not before, "a stiffer skin removes or renews the numbers")
+    yield from ui.becomes(lambda: status().frame not in (None, before), "a stiffer skin renews the numbers by itself")
     ui.check(scene.frame_current == frame, "at the same frame")
+
+
+def render(ui, scene):
+    """Ctrl F12 on a scene that is not baked: the window of the render says that free bodies stay."""
+    session = palpate("addon.session.session_state").session
+    scene.frame_set(1)
+    scene.render.engine, scene.render.filepath, scene.frame_end = "BLENDER_WORKBENCH", str(ui.out / "frame_"), 3
+    scene.render.resolution_x, scene.render.resolution_y = 320, 200
+    bpy.ops.object.camera_add(location=(0.0, -9.0, 3.0), rotation=(1.3, 0.0, 0.0))
+    scene.camera = bpy.context.object
+    ui.window.view_layer.objects.active = obj("Pad")
+    with ui.context(ui.area("VIEW_3D")):
+        bpy.ops.render.render("INVOKE_DEFAULT", animation=True)
+    yield from ui.wait_until(
+        lambda: (ui.out / "frame_0003.png").is_file() and not session.rendering, "three frames are rendered"
+    )
+    ui.check("is rendered without forces" in session.render_note, "it says what the frames lack")
+    yield 1.0
+    yield from ui.screenshot("render")
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[-1]):
+        bpy.ops.wm.window_close()
+    yield 1.0
+    bpy.data.objects.remove(scene.camera)
+    scene.frame_end = 100_000
 
 
 def jump(ui, scene):

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from log_rigs import new_rig, template, write_csv
 
-from palpate.commands import log_questions, main
+from palpate.commands import main
 from palpate.core.errors import FileError
 from palpate.core.gap.dataset.rig import read_rig
+from palpate.core.gap.logs import questions
 from palpate.core.gap.logs.column_meaning import families
 from palpate.core.gap.logs.log_file import read_log
 from palpate.core.gap.logs.log_table import with_distinct_names
@@ -167,6 +168,6 @@ def test_readings_with_large_noise_that_follow_the_load_are_contact(tmp_path):
 def test_a_constant_is_typed_at_the_terminal(tmp_path):
     replies = {"grid": "{ rows = 3, columns = 4, pitch = [0.004, 0.004] }", "shape": "{ sphere = 0.015 }", "x": "0.004"}
     answers = proposal(write_csv(tmp_path / "run.csv", press(silent=10)))
-    found = log_questions.asked(answers, lambda question: replies.get(question.split(" ")[0], ""))
+    found = questions.asked(answers, lambda question: replies.get(question.split(" ")[0], ""))
     own = found.loggers[0].columns
     assert (own["x"].constant, own["y"].constant) == (0.004, 0.0) and not list(found.open_questions())

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from log_rigs import new_rig, template, write_csv
 
-from palpate.commands import log_questions, main
+from palpate.commands import main
 from palpate.core.errors import FileError
 from palpate.core.gap.dataset.rig import read_rig
+from palpate.core.gap.logs import questions
 from palpate.core.gap.logs.answers import answers_text, confirmed, read_answers
 from palpate.core.gap.logs.log_file import read_log
 from palpate.core.gap.logs.new_rig import write_rig
@@ -323,8 +324,8 @@ def test_questions_at_the_terminal_are_answered_as_in_the_file(tmp_path):
     found = propose([read_log(log)])
     column = found.loggers[0].columns["depth"]
     assert not column.sure
-    answered = log_questions.asked(found, lambda question: "way mm")
+    answered = questions.asked(found, lambda question: "way mm")
     assert answered.loggers[0].columns["depth"].names == ("way",) and not list(answered.open_questions())
-    answered = log_questions.asked(found, lambda question: "")
+    answered = questions.asked(found, lambda question: "")
     assert answered.loggers[0].columns["depth"].names == ("indentation",)
     assert next(typed) == ""

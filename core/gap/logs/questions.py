@@ -1,18 +1,34 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Asks at the terminal what logs leave open; what is typed is written as in a file of answers."""
+"""Asks what logs leave open, at the terminal or in a dialog; what is typed is written as in a file of answers."""
 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from ..core.gap.logs.answers import Answers, ColumnAnswer, LoggerAnswer, has_unknown, toml_value
-from ..core.io.csv_table import is_number
+from ...io.csv_table import is_number
+from .answers import Answers, ColumnAnswer, LoggerAnswer, has_unknown, toml_value
 
 LEFT_OUT = "-"
 """What is typed for a column that is not to be used."""
+
+
+class OpenQuestion(Exception):
+    """A question to which there is no reply yet; its text is what to ask."""
+
+
+def answered(answers: Answers, replies: Sequence[str]) -> Answers:
+    """Return answers in which the open questions have these replies, in turn; raise :class:`OpenQuestion` for the next one."""
+    waiting = iter(replies)
+
+    def ask(question: str) -> str:
+        for reply in waiting:
+            return reply
+        raise OpenQuestion(question)
+
+    return asked(answers, ask)
 
 
 def asked(answers: Answers, ask: Callable[[str], str] = input) -> Answers:
@@ -35,15 +51,15 @@ def asked(answers: Answers, ask: Callable[[str], str] = input) -> Answers:
 def _asked_words(words: dict[str, Any], answers: Answers, ask: Callable[[str], str]) -> dict[str, Any]:
     found = {}
     for word, value in words.items():
-        found[word] = value
+        found[word], hint = value, ""
         while has_unknown(found[word]) or (word in answers.unsure and found[word] is value):
-            typed = ask(f"{word} ({answers.why.get(word, '')})\n  [{toml_value(value)}] ").strip()
+            typed = ask(f"{word} ({answers.why.get(word, '')}){hint}\n  [{toml_value(value)}] ").strip()
             if not typed and not has_unknown(value):
                 break
             try:
                 found[word] = tomllib.loads(f"value = {typed}")["value"]
             except tomllib.TOMLDecodeError:
-                print("  write it as in the brackets")
+                hint = ", written as in the brackets"
     return found
 
 
@@ -60,10 +76,10 @@ def _asked_column(name: str, column: ColumnAnswer, logger: LoggerAnswer, ask: Ca
         if not typed and is_open:
             continue
         if typed and column.constant is not None and is_number(typed):
-            column = replace(column, constant=float(typed), why="typed at the terminal")
+            column = replace(column, constant=float(typed), why="typed by the user")
         elif typed:
             source, _, unit = typed.rpartition(" ") if column.unit and " " in typed else (typed, "", column.unit)
-            column = replace(column, names=(source,), unit=unit, constant=None, rate=0.0, why="typed at the terminal")
+            column = replace(column, names=(source,), unit=unit, constant=None, rate=0.0, why="typed by the user")
             if has_unknown(list(column.names)) or column.unit == "?":
                 continue
         column = replace(column, sure=True)
