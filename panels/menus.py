@@ -135,7 +135,6 @@ ENTRIES = (
     ("VIEW3D_MT_sculpt", _draw),
     ("UI_MT_button_context_menu", _draw_button),
     ("PHYSICS_PT_add", _draw_physics),
-    ("IMAGE_HT_header", _draw_render),
 )
 
 
@@ -143,9 +142,11 @@ def register():
     bpy.utils.register_class(PALPATE_MT_object)
     for menu, draw in ENTRIES:
         getattr(bpy.types, menu).append(draw)
+    bpy.types.IMAGE_HT_header.prepend(_draw_render)  # at its beginning: the end is cut off in a small window
 
 
 def unregister():
+    bpy.types.IMAGE_HT_header.remove(_draw_render)
     for menu, draw in reversed(ENTRIES):
         getattr(bpy.types, menu).remove(draw)
     bpy.utils.unregister_class(PALPATE_MT_object)
