@@ -37,7 +37,6 @@ from palpate.core.gap.logs.proposal import propose
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.sampling.texel_arrays import pad_array
 from palpate.core.geometry.texels import texels_from_region
-from palpate.core.io import tactile_exr
 from palpate.core.io.csv_table import read_table
 from palpate.core.io.recording_npz import load_recording, save_recording
 from palpate.core.io.scenario_npz import load_scenario, save_scenario
@@ -385,14 +384,6 @@ def texel_files() -> Files:
     return files_of(lambda folder: save_sensor(folder / "sensor.npz", round_texels(), Painted(k=np.ones(13))))
 
 
-def image_files() -> Files:
-    """A tactile image."""
-    texels = grid_texels()
-    frame = recording_of(texels, frames=4).sensors["pad"].at(2)
-    about = {"sensor": "pad", "time": "0.1"}
-    return files_of(lambda folder: tactile_exr.write_exrs([folder / "tactile.exr"], texels.layout, [frame], [about]))
-
-
 def exported_sensor(kind: str) -> Files:
     """The files of a small pad exported for another program."""
     array = pad_array(3, 2, (0.003, 0.003), 0.0)
@@ -562,7 +553,6 @@ def readers() -> dict[str, Reader]:
         "typed table": Reader(damaged({"foam.csv": FOAM}), _read_typed),
         "study": Reader(_toml("study.toml", tomllib.loads(study)), _read_study),
         "scenario": Reader(scene, lambda folder: load_scenario(folder / "pad.npz")),
-        "image": Reader(later(image_files), lambda folder: tactile_exr.read_exr(folder / "tactile.exr")),
         "recording": Reader(later(recording_files), lambda folder: load_recording(folder / "recording.npz")),
         "texels": Reader(later(texel_files), lambda folder: load_sensor(folder / "sensor.npz")),
         "answers": Reader(answers, _read_answers),

@@ -7,6 +7,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
+import OpenEXR
 
 from palpate.core.geometry.layout.grid_layout import GridLayout
 from palpate.core.geometry.layout.texture_maps import UVLayout
@@ -138,3 +139,17 @@ def pictures_of(layout: GridLayout | UVLayout, frame: SensorFrame) -> dict[str, 
     values |= {"R": frame.normal_force, "G": frame.shear[:, 0], "B": frame.shear[:, 1]}
     pictures = {name: layout.image(own.astype(float)).astype(np.float32) for name, own in values.items()}
     return {**pictures, "contact": (pictures["contact"] >= 0.5).astype(np.float32)}
+
+
+def read_image(path: str | Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """Return the channels of an image as OpenEXR reads them, the top row first, and the attributes that are texts."""
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        channels = {name: channel.pixels for name, channel in file.channels().items()}
+        return channels, {name: value for name, value in file.header().items() if isinstance(value, str)}
+
+
+def read_exr(path: str | Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """Return the channels of a tactile image, row 0 at the bottom, and its metadata."""
+    channels, attributes = read_image(path)
+    about = {name.removeprefix("palpate."): value for name, value in attributes.items() if name.startswith("palpate.")}
+    return {name: picture[::-1] for name, picture in channels.items()}, about

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""OpenEXR images of 32-bit floats with named channels and attributes, written and read by a library.
+"""OpenEXR images of 32-bit floats with named channels and attributes, written by a library.
 
 The library is OpenEXR, from PyPI. In a Blender that is linked against an OpenEXR of its own, the dynamic linker would mix the
 symbols of the two, and the first file written would end the process (seen in Debian's Blender 4.3). There the images go through
@@ -19,21 +19,14 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileError
-from .input_files import require_regular
 
-_MOST_PACKED = 1100
-"""Bytes of pixels per byte of a file. ZIP cannot compress better, so a header that promises more is damaged."""
 _NO_DATE = "1980:01:01 00:00:00"
 """OpenImageIO would write the present time, and equal images would differ."""
 
 
-class FormatError(ValueError):
-    """The file is damaged, or no OpenEXR image."""
-
-
 @cache
 def library() -> str:
-    """Return the module that reads and writes images in this process, OpenEXR or OpenImageIO."""
+    """Return the module that writes images in this process, OpenEXR or OpenImageIO."""
     return "OpenImageIO" if _process_is_linked_against_openexr() else "OpenEXR"
 
 
@@ -95,64 +88,3 @@ def _os_error(message: str) -> OSError:
     """Return the error of the system that a library's message names, as in "Failed to write. No space left on device."."""
     number = next((number for number in errno.errorcode if os.strerror(number) in message), None)
     return OSError(errno.EIO, " ".join(message.split())) if number is None else OSError(number, os.strerror(number))
-
-
-def read_image(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """Read an image.
-
-    Returns
-    -------
-    channels : dict of str to (height, width) float32
-        The first row is the top of the picture.
-    attributes : dict of str to str
-        Those of type string.
-
-    Raises
-    ------
-    FileError, OSError
-        The file cannot be read.
-    FormatError
-        The file is damaged, or no OpenEXR image.
-    """
-    require_regular(path)
-    size = os.path.getsize(path)
-    with open(path, "rb"):  # the libraries do not say why a file cannot be opened
-        pass
-    read = _read_by_openexr if library() == "OpenEXR" else _read_by_openimageio
-    try:
-        return read(os.fspath(path), size)
-    except (FileError, FormatError):
-        raise
-    except Exception as error:  # damage raises half a dozen kinds
-        raise FormatError(" ".join(str(error).split()) or type(error).__name__) from error
-
-
-def _read_by_openexr(path: str, size: int) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    import OpenEXR
-
-    header = OpenEXR.File(path, separate_channels=True, header_only=True).header()
-    low, high = (np.asarray(corner, int) for corner in header["dataWindow"])
-    _require_pixels(high - low + 1, len(header["channels"]), size)
-    channels = OpenEXR.File(path, separate_channels=True).channels()
-    texts = {name: value for name, value in header.items() if isinstance(value, str)}
-    return {name: channel.pixels.astype(np.float32) for name, channel in channels.items()}, texts
-
-
-def _read_by_openimageio(path: str, size: int) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    oiio = _openimageio()
-    image = oiio.ImageInput.open(path)
-    if image is None:
-        raise FormatError(oiio.geterror())
-    spec = image.spec()
-    _require_pixels(np.array([spec.width, spec.height]), spec.nchannels, size)
-    pixels = image.read_image("float")
-    if pixels is None or image.format_name() != "openexr":
-        raise FormatError(image.geterror())
-    texts = {one.name: one.value for one in spec.extra_attribs if isinstance(one.value, str)}
-    return {name: np.ascontiguousarray(pixels[..., i]) for i, name in enumerate(spec.channelnames)}, texts
-
-
-def _require_pixels(shape: np.ndarray, channels: int, size: int) -> None:
-    """Raise FormatError if a file of `size` bytes cannot hold an image of this width and height."""
-    if (shape < 1).any() or 2 * channels * int(shape[0]) * int(shape[1]) > _MOST_PACKED * size:
-        raise FormatError("it is too short for its size")

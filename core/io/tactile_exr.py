@@ -18,19 +18,19 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import FileError, ParameterError, os_error_reason
+from ..errors import ParameterError
 from ..geometry.layout.grid_layout import GridLayout, grid_of_places
 from ..geometry.layout.texture_maps import UVLayout
 from ..geometry.texels import Texels
 from ..model.recording import Frame, SensorFrame
 from ..model.sensor import Sensor
 from ..model.vector_readings import VectorReadings
-from .exr_file import FormatError, read_image, write_image
+from .exr_file import write_image
 from .file_list import FileList
 from .file_writing import writable_folder, write_file
 
 CHANNELS = ("R", "G", "B", "reading", "depth", "slip", "contact")
-"""Names of the channels, in the order in which :func:`read_exr` returns them."""
+"""Names of the channels."""
 
 CHANNEL_LAYER = "channels"
 """Name of the vector layer that images of a sensor with several channels have besides."""
@@ -153,35 +153,6 @@ def channel_layout(texels: Texels, channels: VectorReadings) -> GridLayout:
     middle = np.argmin(np.sum((texels.position - texels.position.mean(axis=0)) ** 2, axis=1))
     along, normal = texels.tangent[middle], texels.normal[middle]
     return grid_of_places(channels.place, along, np.cross(normal, along))
-
-
-def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """Read the channels and the metadata of a tactile image.
-
-    Returns
-    -------
-    channels : dict of str to (height, width) float32
-        Row 0 at the bottom; those of :data:`CHANNELS` first, others after them.
-    metadata : dict of str to str
-        As given to :func:`write_exrs`.
-
-    Raises
-    ------
-    FileError
-        There is no such file, or it is damaged or not an OpenEXR image.
-    """
-    if not Path(path).is_file():
-        raise FileError(f"'{path}' does not exist: bake first, or choose another file.")
-    try:
-        pictures, attributes = read_image(path)
-    except OSError as error:
-        raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): check its permissions.") from error
-    except FormatError as error:
-        raise FileError(f"'{path}' is damaged or not an OpenEXR image ({error}): bake again.") from error
-    found = {name: np.ascontiguousarray(picture[::-1]) for name, picture in pictures.items()}
-    order = [name for name in CHANNELS if name in found] + [name for name in found if name not in CHANNELS]
-    metadata = {key.removeprefix(_PREFIX): value for key, value in attributes.items() if key.startswith(_PREFIX)}
-    return {name: found[name] for name in order}, metadata
 
 
 LAYER, AXES = "field", "XYZ"

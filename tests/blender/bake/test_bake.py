@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 import pytest
 from blender_scenes import changes, contents, cube, dump, grid, press, press_and_drop, reopen, save, visible
+from sample_bake import read_exr
 
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import heat_map, marker_meshes, materials
@@ -15,7 +16,6 @@ from palpate.core.io.bake_folder import read_manifest
 from palpate.core.io.bake_reader import read_bake
 from palpate.core.io.hidden_folder import LOCK_NAME, PRIVATE_FOLDER
 from palpate.core.io.recording_npz import load_recording
-from palpate.core.io.tactile_exr import read_exr
 from palpate.core.jobs.job_runner import SlicedJob, run_job
 
 

@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from blender_scenes import press, reopen, save, visible
+from sample_bake import read_exr
 
 from palpate import sensors_from_blend
 from palpate.addon.bake.bake import bake
@@ -16,7 +17,7 @@ from palpate.core.errors import PalpateError
 from palpate.core.export.registry import export
 from palpate.core.io.bake_folder import read_manifest
 from palpate.core.io.bake_reader import read_bake
-from palpate.core.io.tactile_exr import channel_layout, read_exr
+from palpate.core.io.tactile_exr import channel_layout
 from palpate.core.jobs.job_runner import run_job
 from palpate.core.skins import skin_presets
 from palpate.panels import sensor as panel

@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 import pytest
 from blender_scenes import ball, save
+from sample_bake import read_exr
 
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import materials
@@ -12,7 +13,6 @@ from palpate.addon.scene import participants, scene_reader, sensor_reader, uv_la
 from palpate.addon.session import frame_status
 from palpate.core.errors import SensorError
 from palpate.core.io.bake_folder import frame_file
-from palpate.core.io.tactile_exr import read_exr
 from palpate.core.jobs.job_runner import run_job
 
 

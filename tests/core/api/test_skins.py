@@ -6,10 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from sample_bake import read_image
 from scipy.spatial.transform import Rotation
 
 import palpate as pp
-from palpate.core.io.exr_file import read_image
 from palpate.core.skins.layer import texel_displacements
 
 

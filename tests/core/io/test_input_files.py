@@ -12,7 +12,6 @@ from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.io.bake_folder import read_manifest
 from palpate.core.io.bake_reader import read_bake
 from palpate.core.io.csv_table import read_table
-from palpate.core.io.exr_file import read_image
 from palpate.core.io.input_files import open_regular, read_bytes
 from palpate.core.io.recording_npz import load_recording
 from palpate.core.io.sensor_npz import load_sensor
@@ -20,7 +19,6 @@ from palpate.core.io.sensor_toml import read_sensor
 from palpate.core.simulators.openrave_file import read_openrave
 
 READERS = (
-    read_image,
     load_recording,
     load_sensor,
     read_bytes,

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from sample_bake import read_exr
 from small_study import begun, rows_of, write_study
 from study_scenes import HEAD, tiny_scene
 
@@ -17,7 +18,6 @@ from palpate.core.io.bake_folder import IMAGE_LIST_NAME, check_sha256, frame_fil
 from palpate.core.io.bake_reader import read_bake
 from palpate.core.io.recording_npz import load_recording
 from palpate.core.io.scenario_npz import save_scenario
-from palpate.core.io.tactile_exr import read_exr
 from palpate.core.study.progress import part_files
 from palpate.sweep import driver
 from palpate.sweep.driver import dask_client
