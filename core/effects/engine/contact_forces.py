@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contact forces of a sensor with effects along a known motion: over a whole signal, or step by step with equal results."""
+"""Contact forces of a sensor with effects along a known motion."""
 
 from __future__ import annotations
 
@@ -7,22 +7,18 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ...compiled.kernels import plain
-from ...laws.contact_law import LINEAR_EXPONENT, ContactLaw, contact_law
+from ...laws.contact_law import ContactLaw, contact_law
 from ...laws.normal_force import damped_force, elastic_force
 from ...model.effect import Effect
 from .compiled_program import (
     PointRange,
     TexelContacts,
-    TexelMotion,
-    apply_force_laws,
     apply_friction_laws,
     compile_program,
     constants_of,
     law_over_time,
-    write_base_law,
 )
 from .registry import complete_values, in_signal_order
 from .step_lengths import steps_of
@@ -104,53 +100,3 @@ def friction_factors(effects: Sequence[Effect], speed: np.ndarray, force: np.nda
     contacts.speed[0], contacts.force[0] = speed.ravel(), force.ravel()
     apply_friction_laws(0, contacts, PointRange(0, 0, n, np.arange(n), 0, 0), program, program.memory(n))
     return contacts.friction_factor.reshape(speed.shape), contacts.extra_viscosity.reshape(speed.shape)
-
-
-class StepwiseNormalForces:
-    """Normal forces step by step, as the solver needs them: any number of trial evaluations, then the step itself.
-
-    Parameters
-    ----------
-    effects : sequence of Effect
-        Effects on readings are ignored.
-    parameters : SensorParameters
-    dt : (m,) float, s
-        Lengths of step that will occur.
-    points : int
-        Number of contact points.
-    """
-
-    def __init__(self, effects: Sequence[Effect], parameters: SensorParameters, dt: ArrayLike, points: int):
-        self.parameters = parameters
-        self.program = compile_program([effects], dt)
-        self.memory = self.program.memory(points)
-        self._contacts = TexelContacts.zeros(1, points)
-        self._points = PointRange(0, 0, points, np.arange(points), 0, 0)
-
-    def step(
-        self, length: int, depth: np.ndarray, rate: np.ndarray, slide: np.ndarray | None = None, commit: bool = True
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return forces and tangents at the end of a step.
-
-        Parameters
-        ----------
-        length : int
-            Index of the length of the step.
-        depth, rate, slide : (n,) float, m, m/s, m
-            Depth at the end of the step, its rate during the step, and the distance slid in the step.
-        commit : bool
-            Update the memory of the effects. If false, the step is only evaluated.
-
-        Returns
-        -------
-        force : (n,) float, N
-        by_depth, by_rate : (n,) float, N/m and N·s/m
-            Derivatives of the force.
-        """
-        law, contacts = contact_law(self.parameters), self._contacts
-        slide = np.zeros(len(depth)) if slide is None else slide
-        for i in range(len(depth)):
-            write_base_law(contacts, 0, i, TexelMotion(depth[i], rate[i], slide[i], 0.0), law)
-        linear = law.exponent == LINEAR_EXPONENT
-        apply_force_laws(0, length, contacts, self._points, linear, self.program, self.memory, commit)
-        return contacts.force[0].copy(), contacts.by_depth[0].copy(), contacts.by_rate[0].copy()

@@ -2,8 +2,9 @@
 """Contact forces with effects along a known motion."""
 
 import numpy as np
+from stepwise_forces import StepwiseNormalForces
 
-from palpate.core.effects.engine.contact_forces import StepwiseNormalForces, normal_forces
+from palpate.core.effects.engine.contact_forces import normal_forces
 from palpate.core.effects.engine.registry import effect
 from palpate.core.model.sensor_parameters import SensorParameters
 

@@ -3,9 +3,10 @@
 
 import numpy as np
 import pytest
+from stepwise_forces import StepwiseNormalForces
 
 from palpate.core.effects.engine import specification
-from palpate.core.effects.engine.contact_forces import StepwiseNormalForces, friction_factors, normal_forces
+from palpate.core.effects.engine.contact_forces import friction_factors, normal_forces
 from palpate.core.effects.engine.readout_chain import ReadoutChain, readings
 from palpate.core.effects.engine.registry import actual_placement, check, effect, form_of, from_dict, kind_of, library, to_dict
 from palpate.core.effects.engine.specification import TransducerArray
