@@ -23,6 +23,8 @@ LIFT = 0.004
 """Distance of the overlay from the sensor's surface, as a share of the sensor's size: at zero the two would flicker."""
 ARROW_SHARE = 1.0
 """Length of the longest arrow, as a share of the largest sensor's size, as on a bake."""
+PAINT_MODES = {"WEIGHT_PAINT", "VERTEX_PAINT", "TEXTURE_PAINT", "SCULPT"}
+"""Modes that change an object stroke by stroke."""
 SHOWING_MATERIALS = {"RENDERED"}
 """Kinds of shading in which a bake's own materials suffice. In the light of Material Preview, which is not the user's choice,
 they are up to 7 % darker than their bar."""
@@ -61,7 +63,21 @@ class SensorOverlay:
 
 
 _overlays: dict[int, list[SensorOverlay]] = {}
+_shown: dict[int, tuple] = {}
+"""By scene: the settings of the display with which a frame was shown last."""
 _handle = None
+
+
+def _settings_of(scene) -> tuple:
+    """Return the settings of the display on which overlays depend."""
+    own = scene.palpate
+    indentation_factor = own.indentation_factor if own.show_indentation else 0.0
+    return bake_display.figure_style(scene), own.show_overlay, own.show_inset, indentation_factor
+
+
+def is_up_to_date(scene) -> bool:
+    """Return True unless settings of the display have changed since a frame of a live simulation was shown."""
+    return _shown.get(scene.session_uid) in (None, _settings_of(scene))
 
 
 def show(scene, run, frame) -> None:
@@ -69,13 +85,12 @@ def show(scene, run, frame) -> None:
     if bpy.app.background:
         return
     settings = scene.palpate
-    if not (settings.show_overlay or settings.show_inset):
-        clear(scene)
-        return
-    if settings.show_overlay:
-        _overlays[scene.session_uid] = sensor_overlays(scene, run, frame)
+    _overlays[scene.session_uid] = sensor_overlays(scene, run, frame) if settings.show_overlay else []
     if settings.show_inset:
         inset.show(scene, inset_content(scene, run, frame))
+    else:
+        inset.clear(scene)
+    _shown[scene.session_uid] = _settings_of(scene)
     redraw.views()
 
 
@@ -217,9 +232,11 @@ def clear(scene=None) -> None:
     """Stop showing the overlays of a scene, or of all scenes."""
     if scene is None:
         _overlays.clear()
+        _shown.clear()
         inset.clear()
     else:
         _overlays.pop(scene.session_uid, None)
+        _shown.pop(scene.session_uid, None)
         inset.clear(scene)
     redraw.views()
 

@@ -73,10 +73,15 @@ def _look() -> float | None:
 
 
 def note_edit(scene, obj) -> None:
-    """Take away what is shown of a frame once painting or editing has changed an object of the simulation."""
-    if obj.palpate.role == "NONE" or obj.name not in session_state.session.changed_geometry:
+    """Say so once painting has changed what a shown frame was computed from; it is computed again in Object Mode."""
+    session = session_state.session
+    if obj.palpate.role == "NONE" or obj.name not in session.changed_geometry or obj.mode not in overlays.PAINT_MODES:
         return
-    if frame_status.status_of(scene).frame is not None:
+    depsgraph, run = participants.depsgraph_of(scene), live_cache.get(scene)
+    if baked_scene.baked_objects(scene):
+        baked_frames.show(scene, depsgraph)
+    elif run is not None and frame_status.status_of(scene).frame is not None and live_cache.is_stale(scene, depsgraph, run):
+        session.changed_geometry.add(obj.name)  # it is looked at again in Object Mode
         overlays.clear(scene)
         frame_status.set_status(scene, f"'{obj.name}' has changed since this frame was computed: go on in Object Mode.")
 
@@ -108,6 +113,8 @@ def look_again(scene) -> None:
     if run is not None and not has_moved and not live_cache.is_stale(scene, depsgraph, run):
         if is_shown:
             _dropped.discard(scene.session_uid)
+            if not overlays.is_up_to_date(scene):
+                overlays.show(scene, run, run.frames[frame])
         return
     live_cache.drop(scene)
     overlays.clear(scene)

@@ -48,8 +48,11 @@ def between(low: float, high: float) -> tuple[float, float]:
     """Return a scale from a number below the least value to one above the largest: rest need be neither zero nor an end."""
     if low == 0.0 or low > high:
         return from_zero(low, high)
-    step = metrics.rounded_limit(max(high - low, 1e-6 * max(abs(low), abs(high)))) / 10.0
-    return step * math.floor(low / step), step * math.ceil(high / step + 0.5)
+    least = max(high - low, 1e-6 * max(abs(low), abs(high))) / 10.0
+    power = 10.0 ** math.floor(math.log10(least))
+    step = power * next(step for step in (1, 2, 5, 10) if least <= step * power * (1 + 1e-9))
+    first, last = math.floor(low / step), math.ceil(high / step)
+    return step * first, step * max(last, first + 1)
 
 
 @dataclass(frozen=True)

@@ -243,17 +243,39 @@ def test_views_without_materials_show_the_colours_of_a_bake_on_both_sides(tmp_pa
 
 def test_the_first_stroke_puts_what_is_shown_out_of_date():
     scene, pad, _ = press(frames=4)
+    group = pad.vertex_groups.new(name="Texels")
+    group.add(list(range(84)), 1.0, "REPLACE")
+    pad.palpate.region, pad.palpate.vertex_group = "GROUP", "Texels"
     bpy.context.view_layer.objects.active = pad
     for frame in range(1, 5):
         scene.frame_set(frame)
+    bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
     second_look.note_edit(scene, pad)
     assert frame_status.status_of(scene).frame is not None  # entering a mode changes nothing
-    group = pad.vertex_groups.new(name="Texels")
-    bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
-    group.add(list(range(20)), 1.0, "REPLACE")
-    pad.data.update_tag()
-    bpy.context.view_layer.update()
-    second_look.note_edit(scene, pad)
-    status = frame_status.status_of(scene)
-    assert status.frame is None and status.text == "'Pad' has changed since this frame was computed: go on in Object Mode."
+    said = "'Pad' has changed since this frame was computed: go on in Object Mode."
+    for is_painted in (False, True):
+        if is_painted:
+            group.add(list(range(20)), 0.0, "REPLACE")
+        pad.data.update_tag()
+        bpy.context.view_layer.update()
+        second_look.note_edit(scene, pad)
+        assert (frame_status.status_of(scene).text == said) is is_painted
+        assert (frame_status.status_of(scene).frame is None) is is_painted
     bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.update()
+    second_look.look_again(scene)
+    assert len(frame_status.status_of(scene).frame.sensors["Pad"].reading) == 64  # computed again, with the new texels
+
+
+def test_another_quantity_is_shown_at_once(monkeypatch):
+    scene, *_ = press(frames=4)
+    for frame in range(1, 5):
+        scene.frame_set(frame)
+    shown = []
+    monkeypatch.setattr(overlays, "show", lambda scene, run, frame: shown.append((scene.palpate.quantity, frame.frame)))
+    overlays._shown[scene.session_uid] = overlays._settings_of(scene)
+    second_look.look_again(scene)
+    assert not shown
+    scene.palpate.quantity = "READING"
+    second_look.look_again(scene)
+    assert shown == [("READING", 4)]

@@ -114,7 +114,8 @@ def test_scales_end_at_round_numbers_around_their_values():
     assert quantities.from_zero(0.01, 0.11) == pytest.approx((0.0, 0.15)) and quantities.from_zero(0.0, 0.0) == (0.0, 1.5)
     assert quantities.about_zero(-0.11, 0.01) == pytest.approx((-0.15, 0.15))
     assert quantities.between(0.0, 0.11) == pytest.approx((0.0, 0.15))
-    assert quantities.between(512.0, 700.0) == pytest.approx((500.0, 720.0))
+    assert quantities.between(512.0, 700.0) == pytest.approx((500.0, 700.0))
+    assert quantities.between(4.17, 5.0) == pytest.approx((4.1, 5.0))
     low, high = quantities.between(-3.2, 4.9)
     assert -4.0 <= low <= -3.2 and 4.9 <= high <= 7.0
     low, high = quantities.between(512.0, 512.0)
