@@ -113,6 +113,7 @@ def test_blender_refuses_a_broken_zip(tmp_path):
         build_zip.validate(broken)
 
 
+@pytest.mark.long("reads all wheels of a zip")
 @pytest.mark.parametrize("missing", ["llvmlite", "tzdata"])
 def test_a_missing_wheel_is_noticed(missing):
     wheels = [wheel for wheel in build_zip.wheels_for("linux-x64", "3.11") if not wheel.name.startswith(missing)]

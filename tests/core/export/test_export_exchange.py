@@ -81,6 +81,7 @@ def test_an_export_takes_the_place_of_the_earlier_one(out):
     assert run_job(export(NEW, "text", out)) == written
 
 
+@pytest.mark.long("exports thrice for each step")
 def test_stopped_at_any_step_the_list_says_so_and_the_next_export_is_whole(out, tmp_path):
     states = []
     for number in range(1, 100):
