@@ -255,33 +255,12 @@ def _halton_points(dimensions: int, count: int) -> np.ndarray:
     return points
 
 
-@dataclass
+@dataclass(frozen=True)
 class FittedCandidate:
-    """A candidate that was fitted on top of a model.
-
-    Attributes
-    ----------
-    candidate : Candidate
-    fit : Fit
-    held_out : (trials, 2) float
-        Sum of squares of each trial, of readings and of forces, under fits that have not seen it, in units of the noise.
-    """
+    """A candidate that was fitted on top of a model: the last effect of `fit`."""
 
     candidate: Candidate
     fit: Fit
-    held_out: np.ndarray
-
-    @property
-    def mean(self) -> float:
-        """Mean square on unseen stretches."""
-        return float(self.held_out.sum() / self.fit.count.sum())
-
-    @property
-    def parameter_count(self) -> int:
-        """Number of parameters of the candidate."""
-        n = len(self.fit.model.effects)
-        values = self.fit.model.effects[n - 1].values
-        return sum(len(v) if isinstance(v, tuple) else 1 for v in values.values())
 
 
 def parameters_at_bounds(model: Model, free: Sequence[FreeParameter], index: int) -> dict[str, float]:
@@ -360,6 +339,12 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
                 continue
             found.append(one)
     return found
+
+
+def is_free_already(candidate: Candidate, free: Sequence[FreeParameter]) -> bool:
+    """Return whether the base model has a candidate as a free parameter: a common offset is its `zero`."""
+    same = candidate.form.same_as
+    return bool(same) and any(item.effect < 0 and item.name == same for item in free)
 
 
 def has_signed_channels(predictors: Sequence[Predictor], model: Model) -> bool:

@@ -9,9 +9,9 @@ from palpate.benchmarks._hidden import sessions
 from palpate.benchmarks._rows import sure_names
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.forward.predictor import Model, predictors_of
-from palpate.core.gap.selection.between_recordings import as_one_session
 from palpate.core.gap.selection.candidates import candidates
 from palpate.core.gap.selection.diagnosis import diagnose
+from palpate.core.gap.selection.recording_differences import as_one_session
 from palpate.core.jobs.job_runner import run_job
 
 
