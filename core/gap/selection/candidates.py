@@ -16,7 +16,6 @@ from ...errors import EffectError
 from ...geometry.layout.grid_layout import GridLayout
 from ...model.effect import Effect
 from ...model.parameter import Parameter
-from ..dataset.sessions import COMMON
 from ..fitting.least_squares import Fit, FreeParameter, value_of
 from ..fitting.noise_floor import coverage
 from ..forward.predictor import Model, Predictor
@@ -296,7 +295,7 @@ def parameters_at_bounds(model: Model, free: Sequence[FreeParameter], index: int
 def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]:
     """Return the candidates that could show in these recordings at all.
 
-    A gain that changes by itself is a warm-up where a session says how the time went on from recording to recording. Elsewhere
+    A gain that changes by itself is a warm-up in a session, in which the time goes on from recording to recording. Elsewhere
     each recording begins with an untouched sensor, and such a gain is a form of drift.
     """
     posed = any(p.trial.stimulus == "pose" for p in predictors)
@@ -306,7 +305,7 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
     in_rows = isinstance(predictors[0].rig.texels.layout, GridLayout)
     loaded = all(p.trial.stimulus == "force" for p in predictors)
     cannot = unidentifiable(coverage(predictors))
-    on_clock = all(p.session is not None and p.trial.session != COMMON for p in predictors)
+    on_clock = all(p.session is not None for p in predictors)
     warmed = _warmth(predictors) >= LEAST_WARMTH
     heights_open = all(isinstance(p.trial.contact_height, str) for p in predictors if p.trial.stimulus == "pose")
     signed = has_signed_channels(predictors, model)

@@ -14,12 +14,14 @@ from pathlib import Path
 import numpy as np
 
 from ..dataset.rig import Rig
-from ..dataset.sessions import COMMON, TrialHistory, on_common_clocks
+from ..dataset.sessions import TrialHistory, on_common_clocks
 from ..dataset.trial import Trial
 from ..forward.predictor import Model, Predictor, number_name
 
 LEAST_RECORDINGS = 3
 """Number of fitted recordings from which on they are compared: of two, each may be the odd one."""
+ASSUMED = "assumed"
+"""Name of the session that no rig names."""
 ODD_TIMES = 5.0
 """A recording alone differs if its distance from the middle gain and level is this many times that of any other. It sets a
 sentence and no name."""
@@ -100,7 +102,7 @@ def as_one_session(rig: Rig) -> Rig | None:
     """
     if len({trial.stimulus == "force" for trial in rig.trials}) > 1:
         return None
-    trials, _ = on_common_clocks(rig.trials, [TrialHistory(COMMON)] * len(rig.trials), "own", Path(rig.name))
+    trials, _ = on_common_clocks(rig.trials, [TrialHistory(ASSUMED)] * len(rig.trials), "own", Path(rig.name))
     return replace(rig, trials=tuple(trials))
 
 

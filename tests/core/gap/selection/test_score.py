@@ -116,7 +116,17 @@ def test_the_noise_is_what_the_best_model_leaves_without_load():
     slow = model(1.0).sums
     slow.rest[:, : BLOCKS // 2] *= 3.0
     assert noise_level.noise_level([slow]).error[0] > 5 * noise_level.noise_level([settled]).error[0]
-    assert noise_level.noise_level([settled]).error[0] == rule_numbers.LEAST_NOISE_ERROR  # all blocks are alike
+    white = np.sqrt(2 * noise_level.WHITE / (BLOCKS * COUNT))  # all blocks are alike: the error of white noise, twice
+    assert noise_level.noise_level([settled]).error[0] == pytest.approx(white)
+    many = noise_level.measured_noise(np.full((BLOCKS, 2), 1e9))
+    assert many.error[0] == pytest.approx(rule_numbers.LEAST_NOISE_ERROR, rel=1e-3)
+
+
+def test_noise_of_hardly_any_value_without_load_is_that_which_was_measured():
+    few = model(1.0).sums
+    few.rest[:] *= 300.0
+    few.rest_count[:] *= 0.01
+    assert noise_level.noise_level([few]).under(np.ones(BLOCKS))[0] == 1.0
 
 
 # --- each number of the rule, on models that were fitted once
