@@ -130,7 +130,7 @@ def _plain(value):
         return settings(value)
     if isinstance(value, bpy.types.bpy_prop_collection):
         return [settings(item) for item in value]
-    if isinstance(value, bpy.types.Object):
+    if isinstance(value, bpy.types.ID):
         return value.name
     return value if value is None or isinstance(value, str | int | float) else tuple(value)
 
