@@ -35,21 +35,42 @@ def soon() -> None:
         return
     if not bpy.app.timers.is_registered(_look):
         bpy.app.timers.register(_look, first_interval=DELAY)
-    if bpy.app.timers.is_registered(playback.offer_to_compute):
+    if bpy.app.timers.is_registered(_compute_missing):
         compute_later()
 
 
 def compute_later() -> None:
     """Compute the missing frames, with progress, once nothing has changed for a while."""
-    if bpy.app.timers.is_registered(playback.offer_to_compute):
-        bpy.app.timers.unregister(playback.offer_to_compute)
+    if bpy.app.timers.is_registered(_compute_missing):
+        bpy.app.timers.unregister(_compute_missing)
     if not bpy.app.background:
-        bpy.app.timers.register(playback.offer_to_compute, first_interval=PAUSE)
+        bpy.app.timers.register(_compute_missing, first_interval=PAUSE)
+
+
+def _compute_missing() -> float | None:
+    """Timer: compute the missing frames, or come back later where the user is in the middle of something."""
+    if _user_is_busy():
+        return PAUSE
+    return playback.offer_to_compute()
+
+
+def _user_is_busy() -> bool:
+    """Return True while an object is moved, or edited: computing would put it back. Blender 4.2 does not tell the former."""
+    for window in bpy.context.window_manager.windows:
+        if getattr(window, "modal_operators", ()) or _edited(window) is not None:
+            return True
+    return False
+
+
+def _edited(window):
+    """Return the object that is edited or painted in a window, or None; leaving that mode is a change of its own."""
+    active = window.view_layer.objects.active
+    return active if active is not None and active.mode not in ("OBJECT", "POSE") else None
 
 
 def stop() -> None:
     """Forget what was to be looked at."""
-    for timer in (_look, playback.offer_to_compute):
+    for timer in (_look, _compute_missing):
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)
     _seconds_per_frame.clear()
@@ -61,12 +82,10 @@ def _look() -> float | None:
     if session_state.session.catching_up:
         return DELAY
     for window in bpy.context.window_manager.windows:
-        if getattr(window, "modal_operators", ()):  # moving an object, say: computing would put it back; not told by 4.2
+        if getattr(window, "modal_operators", ()):
             return DELAY
-        active = window.view_layer.objects.active
-        is_edited = active is not None and active.mode not in ("OBJECT", "POSE")  # leaving the mode is a change of its own
-        if is_edited:
-            note_edit(window.scene, active)
+        if (edited := _edited(window)) is not None:
+            note_edit(window.scene, edited)
         elif not window.screen.is_animation_playing:  # playing looks at each frame
             look_again(window.scene)
     return None

@@ -161,6 +161,15 @@ def test_what_would_take_long_is_computed_later_and_after_each_change(monkeypatc
     assert later == [True, True, True] and frame_status.status_of(scene).frame.frame == 5
 
 
+def test_what_is_computed_later_waits_for_the_users_hands(monkeypatch):
+    begun = []
+    monkeypatch.setattr(playback, "offer_to_compute", lambda: begun.append(True))
+    monkeypatch.setattr(second_look, "_user_is_busy", lambda: True)  # an object is being moved
+    assert second_look._compute_missing() == second_look.PAUSE and begun == []
+    monkeypatch.setattr(second_look, "_user_is_busy", lambda: False)
+    assert second_look._compute_missing() is None and begun == [True]
+
+
 def test_a_change_where_nothing_is_computed_yet_computes_nothing(monkeypatch):
     """As after a jump to frame 90,000 that the user has stopped, to go on with his work there."""
     later = []

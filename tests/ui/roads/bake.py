@@ -69,6 +69,7 @@ def render(ui, scene):
         bpy.ops.wm.window_close()
     yield 1.0
     bpy.data.objects.remove(scene.camera)
+    obj("Pad").select_set(True)
     scene.frame_end = 100_000
 
 
