@@ -17,7 +17,9 @@ from palpate.core.jobs.job_runner import run_job
 
 
 @pytest.fixture(autouse=True)
-def forget():
+def forget(monkeypatch):
+    """Frames are computed at once however busy the machine is; nothing of a test is left to the next one."""
+    monkeypatch.setattr(second_look, "QUICK", 60.0)
     yield
     second_look.stop()
 
@@ -121,8 +123,7 @@ def test_warnings_of_a_bake_stay_in_its_status(tmp_path):
     assert "maximum penetration" in frame_status.status_of(bpy.context.scene).warnings
 
 
-def test_a_slider_gives_the_numbers_of_playing_anew(monkeypatch):
-    monkeypatch.setattr(second_look, "QUICK", 60.0)
+def test_a_slider_gives_the_numbers_of_playing_anew():
     scene, pad, *_ = press_and_drop(frames=6)
     play_to(scene, 5)
     soft = frame_status.status_of(scene).frame.sensors["Pad"].normal_force
@@ -183,8 +184,7 @@ def test_a_change_where_nothing_is_computed_yet_computes_nothing(monkeypatch):
 
 
 @pytest.mark.parametrize("is_keyframed", [True, False])
-def test_what_is_moved_with_a_keyframe_or_has_none_is_computed_again(monkeypatch, is_keyframed):
-    monkeypatch.setattr(second_look, "QUICK", 60.0)
+def test_what_is_moved_with_a_keyframe_or_has_none_is_computed_again(is_keyframed):
     scene, pad, target = press(frames=6)
     play_to(scene, 5)
     before = frame_status.status_of(scene).frame.sensors["Pad"].normal_force.sum()
@@ -198,8 +198,7 @@ def test_what_is_moved_with_a_keyframe_or_has_none_is_computed_again(monkeypatch
     assert frame_status.status_of(scene).frame.sensors["Pad"].normal_force.sum() > 1.2 * before
 
 
-def test_what_is_moved_without_a_keyframe_stays_where_it_was_put(monkeypatch):
-    monkeypatch.setattr(second_look, "QUICK", 60.0)
+def test_what_is_moved_without_a_keyframe_stays_where_it_was_put():
     scene, _, target = press(frames=6)
     play_to(scene, 5)
     target.location.x = 0.003
@@ -208,8 +207,7 @@ def test_what_is_moved_without_a_keyframe_stays_where_it_was_put(monkeypatch):
     assert frame_status.status_of(scene).text.startswith("Out of date")
 
 
-def test_a_hidden_target_is_named_and_computed_again_when_it_is_shown(monkeypatch):
-    monkeypatch.setattr(second_look, "QUICK", 60.0)
+def test_a_hidden_target_is_named_and_computed_again_when_it_is_shown():
     scene, _, target = press(frames=6)
     play_to(scene, 5)
     before = frame_status.status_of(scene).frame.sensors["Pad"].normal_force
