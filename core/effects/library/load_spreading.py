@@ -42,6 +42,25 @@ def open_rim(values: Values, transducers: TransducerArray) -> CouplingMatrix:
     return coupling_matrix(transducers.position, lambda r: np.exp(-0.5 * (r / width) ** 2) / whole, 5.0 * width, None)
 
 
+def bell(values: Values, transducers: TransducerArray) -> CouplingMatrix:
+    """Weights ``(1 + r²/s²)^(−p)`` over their sum on a square lattice that goes on beyond the texels, as for :func:`open_rim`.
+
+    With width and power it comes near to any isotropic weight that falls with the distance.
+    """
+    width, power = max(scalar(values, "width"), 1e-9), scalar(values, "power")
+    whole = _bell_sum(width / float(np.sqrt(np.median(transducers.area))), power)
+    return coupling_matrix(transducers.position, lambda r: (1.0 + (r / width) ** 2) ** -power / whole, 12.0 * width, None)
+
+
+def _bell_sum(width: float, power: float) -> float:
+    """Sum of ``(1 + r²/s²)^(−p)`` over a square lattice of pitch 1: one by one near the middle, and as an integral beyond."""
+    near = np.arange(-LATTICE_REACH, LATTICE_REACH + 1.0)
+    square = near[:, None] ** 2 + near[None] ** 2
+    inside = square <= LATTICE_REACH**2
+    beyond = np.pi * width**2 / (power - 1.0) * (1.0 + (LATTICE_REACH / width) ** 2) ** (1.0 - power)
+    return float(((1.0 + square[inside] / width**2) ** -power).sum() + beyond)
+
+
 def _lattice_sum(width: float) -> float:
     """Sum of ``exp(−r²/2s²)`` over a square lattice of pitch 1."""
     reach = np.arange(1.0, 10.0 * width + 2.0)
@@ -57,6 +76,8 @@ def _spread(transducers: TransducerArray, weight: Callable[[np.ndarray], np.ndar
     return coupling_matrix(transducers.position, weight, reach, np.full_like(transducers.area, np.median(transducers.area)))
 
 
+LATTICE_REACH = 40
+"""Distance, in pitches, up to which the weights of a bell are summed one by one."""
 _WIDTH = Parameter("width", "m", 0.003, 0.0, 0.1, "Spread s of a point load.")
 
 
@@ -98,6 +119,14 @@ KIND = Kind(
             (_WIDTH,),
             neutral={"width": 0.0},
             coupling=open_rim,
+        ),
+        Form(
+            "bell",
+            "rᵢ = Σⱼ wᵢⱼ fⱼ,  w ∝ (1 + r²/s²)^(−p) over all lattice points",
+            "Moffat, Astron. Astrophys. 3 (1969): a point-spread function of any tail; p = 5/2 is Boussinesq's",
+            (_WIDTH, Parameter("power", "1", 2.0, 1.1, 8.0, "Power p with which the weight falls: a large one is a Gaussian.")),
+            neutral={"width": 0.0},
+            coupling=bell,
         ),
     ),
     experiment="press single texels with a pin narrower than a texel",

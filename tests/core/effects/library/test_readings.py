@@ -256,6 +256,20 @@ def test_the_elastic_half_space_is_boussinesqs():
     np.testing.assert_allclose(found, stress * pitch**2, rtol=1e-2)  # what lies beyond the sheet's edge, and the cells' size
 
 
+@pytest.mark.parametrize(("power", "width"), [(1.5, 0.002), (2.5, 0.003), (6.0, 0.006)])
+def test_a_bell_has_the_right_shape_and_loses_what_falls_beyond_the_rim(power, width):
+    """Its weights are those of an endless lattice: the sum over a far larger one is nearly one."""
+    texel = 7 * COLUMNS + 3
+    found = read(effect("load-spreading", "bell", width=width, power=power), image(texel))[0]
+    distance = np.linalg.norm(POSITION - POSITION[texel], axis=1)
+    np.testing.assert_allclose(found / found[texel], (1 + (distance / width) ** 2) ** -power, rtol=1e-12)
+    lattice = PITCH * np.arange(-600.0, 601.0)
+    square = lattice[:, None] ** 2 + lattice[None] ** 2
+    whole = ((1 + square / width**2) ** -power)[square <= lattice[-1] ** 2].sum()
+    assert found[texel] == pytest.approx(1.0 / whole, rel=3e-3)  # a Lorentzian's tail goes on even there
+    assert found.sum() < 1.0
+
+
 def test_crosstalk():
     texel = 7 * COLUMNS + 3
     found = read(effect("crosstalk", "neighbours", share=0.1), image(texel))[0].reshape(ROWS, COLUMNS)
