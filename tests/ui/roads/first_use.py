@@ -57,5 +57,5 @@ def road(ui):
     ui.check(preparing()._gave_up is False, "beside the window")
     kernels = palpate("core.compiled.kernels")
     yield from ui.wait_until(lambda: not kernels.are_interpreted(), "what plays has changed over")
-    ui.check(max(forces("Pad")) > 0.0, "and goes on")
+    yield from ui.wait_until(lambda: max(forces("Pad")) > 0.0, "and goes on")
     yield from ui.key("SPACE")
