@@ -236,9 +236,9 @@ class Body:
         motion = self.path.motion(fps)
         if self.mass is None:
             return model.Body(self.name, motion), []
-        center, inertia, said = mass_properties(self.mesh, self.mass, self.name)
+        center, inertia, notes = mass_properties(self.mesh, self.mass, self.name)
         made = model.Body(self.name, motion, True, self.mass, center, inertia, self.velocity, self.angular_velocity)
-        return made, said
+        return made, notes
 
     def __repr__(self) -> str:
         size = " × ".join(f"{1e3 * edge:.3g}" for edge in np.ptp(self.mesh.vertices, axis=0))

@@ -276,10 +276,15 @@ def draws_through(scene, space) -> bool:
     return scene.palpate.show_through or view_shading.is_xray(space.shading)
 
 
+def is_edited(obj) -> bool:
+    """Return True if there is an object, and it is painted, sculpted or edited."""
+    return obj is not None and obj.mode not in ("OBJECT", "POSE")
+
+
 def edited_objects(context) -> set[int]:
     """Return Blender's numbers of the objects that are painted, sculpted or edited, which a heat map would hide."""
     active = context.object
-    if active is None or active.mode in ("OBJECT", "POSE"):
+    if not is_edited(active):
         return set()
     return {obj.session_uid for obj in context.objects_in_mode} | {active.session_uid}
 

@@ -65,7 +65,7 @@ def _user_is_busy() -> bool:
 def _edited(window):
     """Return the object that is edited or painted in a window, or None; leaving that mode is a change of its own."""
     active = window.view_layer.objects.active
-    return active if active is not None and active.mode not in ("OBJECT", "POSE") else None
+    return active if overlays.is_edited(active) else None
 
 
 def stop() -> None:

@@ -77,7 +77,8 @@ def _spread(transducers: TransducerArray, weight: Callable[[np.ndarray], np.ndar
 
 
 LATTICE_REACH = 40
-"""Distance, in pitches, up to which the weights of a bell are summed one by one."""
+"""Distance, in pitches, up to which the weights of a bell are summed one by one. For widths up to 30 pitches and powers from
+1.1 to 8 the sum differs by less than 1e-4 from that with 1000; with 10 it would by 3e-3."""
 _WIDTH = Parameter("width", "m", 0.003, 0.0, 0.1, "Spread s of a point load.")
 
 

@@ -47,9 +47,9 @@ REACH, SHIFTS = 1.5, 25
 LEADS = np.concatenate([[0.0], np.geomspace(1e-3, 0.1, 13)])
 """Seconds by which a viscous response may lead its load: damping divided by stiffness."""
 MOST_LOADS = 1_000_000
-"""Loads of the part of a recording from which a shift is refined."""
+"""Loads of the part of a recording from which a shift is refined: each of its arrays has 8 MB."""
 MOST_KNOWN = 0.9
-"""Share of the samples of the best known channel that a channel has to have."""
+"""Share of the samples of the best known channel that a channel has to have: a sample counts where all chosen ones have it."""
 
 
 @dataclass(frozen=True)
