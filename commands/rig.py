@@ -36,13 +36,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from ..core.gap.logs import answers as log_answers
+    from ..core.gap.logs.answers import read_answers
     from ..core.gap.logs.log_file import read_log
     from ..core.gap.logs.log_table import with_distinct_names
     from ..core.gap.logs.preview import preview_rows
     from ..core.gap.logs.proposal import propose
     from ..core.gap.logs.questions import asked
-    from ..core.gap.logs.template import ANSWERS_NAME, PLOT_NAME, write_template
+    from ..core.gap.logs.template import ANSWERS_NAME, PLOT_NAME, answers_or_template
 
     with console.Interrupt.raised_at_once():
         logs = with_distinct_names([read_log(path) for path in arguments.logs])
@@ -53,47 +53,29 @@ def run(arguments: argparse.Namespace) -> int:
             return 0
         if not arguments.out:
             raise FileError("A rig needs a folder: give one with --out, or --preview to see what is in the logs.")
+        outputs = [Path(arguments.out) / name for name in (ANSWERS_NAME, PLOT_NAME)]
+        checks.outputs_are_no_inputs(outputs, arguments.logs)
         if arguments.answers:
-            found = log_answers.read_answers(arguments.answers)
+            answers = read_answers(arguments.answers)
         else:
-            found = propose(logs, Path(arguments.out).resolve().name or "rig")
-            found = log_answers.confirmed(found) if arguments.yes else found
+            proposal = propose(logs, Path(arguments.out).resolve().name or "rig")
+            proposal = proposal.confirmed() if arguments.yes else proposal
             if sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty():
-                found = asked(found)
-            _require_complete(found, arguments.out)
-            if not (Path(arguments.out) / ANSWERS_NAME).exists():  # whatever is refused later can be corrected there
-                write_template(found, arguments.out)
-        checks.outputs_are_no_inputs((Path(arguments.out) / name for name in (ANSWERS_NAME, PLOT_NAME)), arguments.logs)
-        _write(logs, found, arguments.out)
+                proposal = asked(proposal)
+            for question in proposal.questions:
+                print(f"question: {question}")
+            answers = answers_or_template(proposal, arguments.out, f"and repeat the command with --answers '{outputs[0]}'")
+        _write(logs, answers, arguments.out)
     return 0
 
 
-def _require_complete(found: Answers, out: str) -> None:
-    """Write a template of the answers and raise FileError where questions are open."""
-    from ..core.gap.logs.template import ANSWERS_NAME, write_template
-
-    questions = list(found.open_questions())
-    if not questions:
-        return
-    path = Path(out) / ANSWERS_NAME
-    if path.exists():
-        raise FileError(f"'{path}' has answers already: give it with --answers, or remove it for a new template.")
-    write_template(found, out)
-    for question in questions:
-        print(f"question: {question}")
-    raise FileError(
-        f"The logs leave {counted(len(questions), 'question')} open: answer them in '{path}', and give the command again with "
-        f"--answers '{path}'."
-    )
-
-
-def _write(logs: list[LogFile], found: Answers, out: str) -> None:
+def _write(logs: list[LogFile], answers: Answers, out: str) -> None:
     from ..core.gap.dataset.rig import read_rig
     from ..core.gap.logs.new_rig import write_rig
     from ..core.gap.logs.preview import plot_rig
     from ..core.gap.logs.template import PLOT_NAME
 
-    written = console.run_with_progress_bar("rig new", write_rig(logs, found, out), unit="recording")
+    written = console.run_with_progress_bar("rig new", write_rig(logs, answers, out), unit="recording")
     rig = read_rig(written.path)
     plot_rig(rig, written.path.parent / PLOT_NAME)
     for note in dict.fromkeys([*(note for log in logs for note in log.notes), *written.notes, *rig.warnings]):

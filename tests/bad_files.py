@@ -30,7 +30,7 @@ from palpate.core.errors import PalpateError
 from palpate.core.gap.calibration.friction import read_friction
 from palpate.core.gap.calibration.stiffness import read_foam
 from palpate.core.gap.dataset.rig import read_rig
-from palpate.core.gap.logs.answers import answers_text, confirmed, read_answers
+from palpate.core.gap.logs.answers import answers_of, read_answers
 from palpate.core.gap.logs.log_file import read_log
 from palpate.core.gap.logs.new_rig import write_rig
 from palpate.core.gap.logs.proposal import propose
@@ -510,16 +510,15 @@ def rig_from_log(name: str, folder: Path) -> None:
     for table in log.tables:
         assert {len(column) for column in table.columns.values()} == {table.sample_count}, "columns of several lengths"
         assert not any(np.isinf(column).any() for column in table.columns.values()), "a number that is not finite"
-    answers = replace(confirmed(propose([log])), sensor=LOG_SENSOR)
-    answers_text(answers)
-    if not list(answers.open_questions()):
-        run_job(write_rig([log], answers, folder / "rig"))
+    found = propose([log]).confirmed()
+    proposal = replace(found, guesses=tuple(one for one in found.guesses if one.table not in ("sensor", "indenter")))
+    if not proposal.questions:
+        run_job(write_rig([log], replace(answers_of(proposal), sensor=LOG_SENSOR), folder / "rig"))
         _read_rig(folder / "rig")
 
 
 def _read_answers(folder: Path) -> None:
     answers = read_answers(folder / "answers.toml")
-    answers_text(answers)
     run_job(write_rig([read_log(folder / "log.csv")], answers, folder / "rig"))
     _read_rig(folder / "rig")
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Logs as CSV files, their answers as a user completes them, and the rig that follows."""
 
-from palpate.core.gap.logs.answers import answers_text, read_answers
+from palpate.core.gap.logs.answers import read_answers
 from palpate.core.gap.logs.log_file import read_log
 from palpate.core.gap.logs.new_rig import write_rig
 from palpate.core.gap.logs.proposal import propose
@@ -16,7 +16,7 @@ def write_csv(path, columns):
 
 def template(folder, logs, **replacements):
     """Answers as a user completes them: the proposal with its questions filled in."""
-    text = answers_text(propose([read_log(path) for path in logs]))
+    text = propose([read_log(path) for path in logs]).text
     text = text.replace('pitch = ["?", "?"]', "pitch = [0.005, 0.005]")
     for old, new in replacements.items():
         assert old.replace("_", " ") in text or old in text, text

@@ -8,11 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...core.errors import FileError, PalpateError, counted
+from ...core.errors import PalpateError
 from ..authoring import exchange
 
 if TYPE_CHECKING:
-    from ...core.gap.logs.answers import Answers
+    from ...core.gap.logs.guess import Proposal
 
 
 def make(context, obj, paths, folder: Path, accept: bool, replies: Sequence[str] | None = None):
@@ -29,46 +29,39 @@ def make(context, obj, paths, folder: Path, accept: bool, replies: Sequence[str]
         A log cannot be used, or questions are open: then `answers.toml` in the folder asks them.
     """
     from ...core.gap.dataset.rig import read_rig
-    from ...core.gap.logs.answers import confirmed, read_answers
+    from ...core.gap.logs.answers import read_answers
     from ...core.gap.logs.log_file import read_log
     from ...core.gap.logs.new_rig import write_rig
     from ...core.gap.logs.preview import plot_rig
     from ...core.gap.logs.proposal import propose
     from ...core.gap.logs.questions import answered
-    from ...core.gap.logs.template import ANSWERS_NAME, PLOT_NAME, write_template
+    from ...core.gap.logs.template import ANSWERS_NAME, PLOT_NAME, answers_or_template
     from ...core.jobs.job_runner import run_job
 
     logs = [read_log(path) for path in paths]
     if (folder / ANSWERS_NAME).exists():
         answers = read_answers(folder / ANSWERS_NAME)
     else:
-        answers = _with_grid_of(context, obj, propose(logs, folder.parent.name or "rig"))
-        answers = confirmed(answers) if accept else answers
-        answers = answers if replies is None else answered(answers, replies)
-        questions = list(answers.open_questions())
-        if questions:
-            path = write_template(answers, folder)
-            raise FileError(
-                f"The logs leave {counted(len(questions), 'question')} open, the first: {questions[0][:-1]}; answer in "
-                f"'{path}' with a text editor, and choose the logs again."
-            )
+        proposal = _with_grid_of(context, obj, propose(logs, folder.parent.name or "rig"))
+        proposal = proposal.confirmed() if accept else proposal
+        proposal = proposal if replies is None else answered(proposal, replies)
+        answers = answers_or_template(proposal, folder, "with a text editor, and choose the logs again")
     written = run_job(write_rig(logs, answers, folder))
     plot = folder / PLOT_NAME
     plot_rig(read_rig(written.path), plot)
     return written, plot
 
 
-def _with_grid_of(context, obj, answers: Answers) -> Answers:
-    """Return answers with rows, columns and pitch of a sensor, if it has as many texels and no array says others."""
+def _with_grid_of(context, obj, proposal: Proposal) -> Proposal:
+    """Return a proposal with rows, columns and pitch of a sensor, if it has as many texels and no array says others."""
     try:
         known = exchange.grid_table(context, obj).get("grid")
     except PalpateError:
-        return answers  # it has no texels
-    columns = [logger.columns["texel"] for logger in answers.loggers if "texel" in logger.columns]
-    proposed = answers.sensor.get("grid", {})
-    if known is None or not columns or known["rows"] * known["columns"] != len(columns[0].names):
-        return answers
-    if "grid" not in answers.unsure and any(known[word] != proposed.get(word) for word in ("rows", "columns")):
-        return answers
-    why = answers.why | {"grid": f"that of '{obj.name}' in the scene"}
-    return replace(answers, sensor=answers.sensor | {"grid": known}, why=why, unsure=answers.unsure - {"grid"})
+        return proposal  # it has no texels
+    grid = proposal.of("sensor", "grid")
+    is_same = known is not None and all(known[word] == grid.value[word] for word in ("rows", "columns"))
+    if known is None or known["rows"] * known["columns"] != grid.value["rows"] * grid.value["columns"]:
+        return proposal
+    if grid.evidence != "thin" and not is_same:
+        return proposal
+    return proposal.with_guess(replace(grid, value=known, reason=f"that of '{obj.name}' in the scene", evidence="stated"))

@@ -5,7 +5,7 @@
 
     [[trial]]
     file = "press_0.csv"                                                  # what drove the sensor
-    readings = { file = "press_0_readings.csv", late = 12.453, uncertainty = 0.004 }
+    readings = { file = "press_0_readings.csv", late = 12.453 }
 
 `late` is how many seconds more the second clock shows at the same moment. The columns of the first file are interpolated at the
 times of the second.
@@ -39,13 +39,10 @@ class SecondLogger:
         As the rig writes it; it is checked where it is opened.
     late : float, s
         The second clock's time of an event minus the first one's.
-    uncertainty : float, s
-        Of `late`.
     """
 
     file: Any = None
     late: Annotated[float, wanted("write seconds", ge=-LARGEST_SHIFT, le=LARGEST_SHIFT)] = 0.0
-    uncertainty: Annotated[float, wanted("write seconds", ge=0.0, le=LARGEST_SHIFT)] = 0.0
 
 
 def joined(

@@ -25,14 +25,10 @@ LEAST_OVERLAP = 0.5
 """Least share of the changes of each logger that must lie where both recorded."""
 LEAST_CORRELATION, MOST_RIVAL = 0.5, 0.6
 """The shift is sure if the correlation of changes is at least this, and that at any other shift less than this share of it.
-They were chosen on 100 recordings of six presses with noise, of which 98 pass and 3 are off by more than four standard errors
-and 0.05 s; how these were made was not kept. Of 100 others (benchmarks/RESULTS.md) 100 pass with a noise of 2 and
-of 10 % of the largest force, and 97 with 30 %, and none is off. Of 200 pairs of unrelated recordings 36 pass, as presses look
-alike: the correlation cannot tell whose files they are."""
-LEAST_UNCERTAINTY = 0.5
-"""Samples of the slower logger: the parts of a recording share the error of the model, as where the force is no line."""
-WINDOWS = 8
-"""Parts of a recording whose shifts tell the uncertainty."""
+They were chosen on 100 recordings of six presses with noise, of which 98 pass and 3 are off (by more than 0.05 s and four
+standard errors); how these were made was not kept. Of 100 others (benchmarks/RESULTS.md) 100 pass with a noise of 2 and of 10 %
+of the largest force, and 97 with 30 %, and none is off. Of 200 pairs of unrelated recordings 36 pass, as presses look alike:
+the correlation cannot tell whose files they are."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +39,6 @@ class ClockShift:
     ----------
     late : float, s
         The second clock's time of an event minus the first one's.
-    uncertainty : float, s
-        Standard error, from the scatter of the shift between parts of the recording.
     correlation : float
         Of the changes with this shift.
     rival : float
@@ -52,7 +46,6 @@ class ClockShift:
     """
 
     late: float
-    uncertainty: float
     correlation: float
     rival: float
 
@@ -60,6 +53,11 @@ class ClockShift:
     def is_sure(self) -> bool:
         """True if the recordings tell the shift."""
         return self.correlation >= LEAST_CORRELATION and self.rival < MOST_RIVAL
+
+    @property
+    def quality(self) -> str:
+        """How well the recordings tell it, in words."""
+        return f"correlation {self.correlation:.2f}, elsewhere at most {self.correlation * self.rival:.2f}"
 
 
 def clock_shift(first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.ndarray]) -> ClockShift | None:
@@ -112,9 +110,8 @@ def _shift_of(cause: np.ndarray, answer: np.ndarray, step: float, offset: float)
     elsewhere = size.copy()
     elsewhere[max(0, top - width) : top + width + 1] = 0.0
     lag = lags[top] + peak_offset(size, top)
-    error = _scatter(cause, answer, int(lags[top]), width, float(np.sign(correlation[top]))) * step
     rival = float(elsewhere.max()) / float(size[top])
-    return ClockShift(offset + lag * step, max(error, LEAST_UNCERTAINTY * step), float(size[top]), rival)
+    return ClockShift(offset + lag * step, float(size[top]), rival)
 
 
 def _on_grid(times: np.ndarray, values: np.ndarray, step: float) -> np.ndarray:
@@ -157,27 +154,3 @@ def _lobe(size: np.ndarray, top: int) -> int:
     right = np.flatnonzero(size[top:] < 0.5 * size[top])
     left = np.flatnonzero(size[top::-1] < 0.5 * size[top])
     return 2 * max(3, int(min(right[0] if len(right) else len(size), left[0] if len(left) else len(size))))
-
-
-def _scatter(cause: np.ndarray, answer: np.ndarray, lag: int, width: int, sign: float) -> float:
-    """Return the standard error of the shift in samples, from parts of the recording."""
-    begin, end = max(0, -lag), min(len(cause), len(answer) - lag)
-    edges = np.linspace(begin, end, WINDOWS + 1).astype(int)
-    shifts, weights = [], []
-    for one, other in zip(edges[:-1], edges[1:]):
-        near = np.arange(-width, width + 1)
-        near = near[(one + lag + near >= 0) & (other + lag + near <= len(answer))]
-        part = cause[one:other]
-        if len(near) < 3 or not part.any():
-            continue
-        products = np.array([sign * float(part @ answer[one + lag + k : other + lag + k]) for k in near])
-        top = int(products.argmax())
-        if products[top] > 0.0 and 0 < top < len(near) - 1:
-            shifts.append(near[top] + peak_offset(products, top))
-            weights.append(float(part @ part))
-    if len(shifts) < 2:
-        return float(width)
-    share = np.array(weights) / np.sum(weights)
-    mean = float(share @ np.array(shifts))
-    parts = 1.0 / float(share @ share)
-    return float(np.sqrt(share @ (np.array(shifts) - mean) ** 2 / max(parts - 1.0, 0.5)))

@@ -16,6 +16,7 @@ import numpy as np
 
 from ...io.csv_table import UNITS
 from ..dataset.column_names import QUANTITIES
+from .guess import Evidence
 
 GRAVITY = 9.80665
 """m/s²: a gram on a scale is a force."""
@@ -242,22 +243,22 @@ def families(columns: Sequence[str], follows: Callable[[str], float]) -> list[Fa
     return sorted(found, key=lambda one: (one.follows < best - MUCH_LESS, not one.is_named, -len(one.columns)))
 
 
-def time_unit(values: np.ndarray, stated: str) -> tuple[str, str, bool]:
-    """Return the unit of time stamps, why, and whether that is sure."""
+def time_unit(values: np.ndarray, stated: str) -> tuple[str, str, Evidence]:
+    """Return the unit of time stamps, why, and the evidence."""
     if stated in LOG_UNITS["s"]:
-        return stated, "the file says so", True
+        return stated, "the file says so", "stated"
     known = values[np.isfinite(values)]
     steps = np.diff(known)
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
     size = float(np.abs(known).max()) if len(known) else 0.0
     for unit, seconds in (("ns", 1e-9), ("us", 1e-6), ("ms", 1e-3), ("s", 1.0)):
         if 1e9 <= size * seconds < 3e9 and step * seconds < 10.0:
-            return unit, "such numbers count from 1970", True
+            return unit, "such numbers count from 1970", "shown"
     if 0.0 < step <= 0.5:
-        return "s", f"samples are {step:.3g} s apart", True
+        return "s", f"samples are {step:.3g} s apart", "shown"
     if step <= 500.0:
-        return "ms", f"samples are {step:.4g} apart", False
-    return "us", f"samples are {step:.4g} apart", False
+        return "ms", f"samples are {step:.4g} apart", "thin"
+    return "us", f"samples are {step:.4g} apart", "thin"
 
 
 def is_since_1970(values: np.ndarray, unit: str) -> bool:
@@ -266,34 +267,38 @@ def is_since_1970(values: np.ndarray, unit: str) -> bool:
     return len(known) > 0 and float(known.min()) * LOG_UNITS["s"][unit] > SINCE_1970
 
 
-def length_unit(span: float, stated: str) -> tuple[str, str, bool]:
-    """Return the unit of a length whose values span so much, why, and whether that is sure."""
+def length_unit(span: float, stated: str) -> tuple[str, str, Evidence]:
+    """Return the unit of a length whose values span so much, why, and the evidence."""
     if stated in LOG_UNITS["m"]:
-        return stated, "the file says so", True
+        return stated, "the file says so", "stated"
     if span > LARGEST_METRES:
-        return "mm", f"it moves by {span:.4g}, too much for metres", False
-    return "m", f"it moves by {span:.4g}", False
+        return "mm", f"it moves by {span:.4g}, too much for metres", "thin"
+    return "m", f"it moves by {span:.4g}", "thin"
 
 
-def temperature_unit(values: np.ndarray, stated: str) -> tuple[str, str, bool]:
-    """Return the unit of temperatures, why, and whether that is sure."""
+def temperature_unit(values: np.ndarray, stated: str) -> tuple[str, str, Evidence]:
+    """Return the unit of temperatures, why, and the evidence."""
     if stated in LOG_UNITS["°C"]:
-        return stated, "the file says so", True
+        return stated, "the file says so", "stated"
     known = values[np.isfinite(values)]
     middle = float(np.median(known)) if len(known) else 0.0
     if middle > HOTTEST_KELVIN or middle < -COLDEST_KELVIN:
-        return "?", f"it is about {middle:.4g}, which is no temperature: write unit, factor and zero, or remove the line", False
+        return (
+            "?",
+            f"it is about {middle:.4g}, which is no temperature: write unit, factor and zero, or remove the line",
+            "thin",
+        )
     if middle > COLDEST_KELVIN:
-        return "K", f"it is about {middle:.4g}", False
-    return "°C", f"it is about {middle:.4g}", False
+        return "K", f"it is about {middle:.4g}", "thin"
+    return "°C", f"it is about {middle:.4g}", "thin"
 
 
-def force_unit(stated: str, span: float = 0.0) -> tuple[str, str, bool]:
-    """Return the unit of a force whose values span so much, why, and whether that is sure."""
+def force_unit(stated: str, span: float = 0.0) -> tuple[str, str, Evidence]:
+    """Return the unit of a force whose values span so much, why, and the evidence."""
     if stated in LOG_UNITS["N"] or stated in PRESSURES:
-        return stated, "the file says so", True
+        return stated, "the file says so", "stated"
     if stated:
-        return "?", f"it is in {stated}: write N, and the newtons per {stated} as factor", False
+        return "?", f"it is in {stated}: write N, and the newtons per {stated} as factor", "thin"
     if span > LARGEST_NEWTONS:
-        return "g", f"no unit is stated, and it changes by {span:.4g}, too much for newtons: grams on a scale", True
-    return "N", "no unit is stated", False
+        return "g", f"no unit is stated, and it changes by {span:.4g}, too much for newtons: grams on a scale", "thin"
+    return "N", "no unit is stated", "thin"

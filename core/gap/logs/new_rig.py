@@ -19,16 +19,14 @@ from ...jobs.progress import Job, Progress
 from ..dataset.column_names import INVERSE, QUANTITIES, ZEROS
 from ..dataset.rig import FORMAT, read_rig
 from ..dataset.second_logger import interpolated, with_steady_signs
-from .answers import Answers, ColumnAnswer, LoggerAnswer, RecordingAnswer, toml_value
+from .answers import Answers, ColumnAnswer, LoggerAnswer, RecordingAnswer
 from .clock_alignment import ClockShift, clock_shift
+from .column_behaviour import contact_of, correlation, is_unordered
 from .column_meaning import LOG_UNITS, PRESSURES, READING_UNITS, SINCE_1970
+from .guess import toml_value
 from .log_table import FEWEST_ROWS, LogFile, LogTable, with_distinct_names
-from .proposal import table_of
-from .unnamed_columns import contact_of, correlation, is_unordered
 
 RIG_NAME = "rig.toml"
-MOST_REPEATED = 0.02
-"""Share of repeated time stamps up to which their samples are averaged without being asked."""
 LONGEST_PAUSE = 10.0
 """Pause between two samples, in usual steps, from which on it is mentioned."""
 LARGEST_MOTION, LARGEST_FORCE, SMALLEST_MOTION = 1.5, 1e4, 1e-7
@@ -70,7 +68,6 @@ def write_rig(logs: Sequence[LogFile], answers: Answers, folder: str | os.PathLi
     ----------
     logs : sequence of LogFile
     answers : Answers
-        Complete: a question that is open raises an error.
     folder : path
         Created if it is missing. The rig of an earlier call in it is replaced.
 
@@ -85,8 +82,6 @@ def write_rig(logs: Sequence[LogFile], answers: Answers, folder: str | os.PathLi
         The answers and the logs do not fit together, a unit must be wrong, a recording shows no contact, time stamps cannot be
         used, or a file cannot be written. An earlier rig is then as it was.
     """
-    for question in answers.open_questions():
-        raise FileError(f"{question[:-1]}: answer it before the rig is written.")
     logs = with_distinct_names(logs)
     folder = writable_folder(folder, create=True)
     recordings = [one for one in answers.recordings if one.use != "leave out"]
@@ -103,7 +98,7 @@ def write_rig(logs: Sequence[LogFile], answers: Answers, folder: str | os.PathLi
             yield Progress(recording.name, number, len(recordings) + 1)
             tables = [_columns_of(by_name, file, answers, notes) for file in recording.files]
             trials.append(_trial(recording, tables, names[recording.name], new, written, notes))
-        text = _rig_text(logs, answers, trials, notes)
+        text = _rig_text(answers, trials, notes)
         with atomic_write(new / RIG_NAME) as temporary:
             temporary.write_text(text, encoding="utf-8", newline="\n")
         read_rig(new / RIG_NAME)
@@ -144,7 +139,7 @@ def _columns_of(logs: Mapping[str, LogFile], file: str, answers: Answers, notes:
     for quantity, answer in logger.columns.items():
         if quantity != "time" and quantity not in constants:
             for i, name in enumerate(answer.names):
-                found = table_of(log.tables, name)
+                found = _table_of(log.tables, name)
                 if found is None:
                     raise FileError(f"'{file}' has no column '{name}', which the answers name for {quantity}: check its name.")
                 table, own = found
@@ -152,10 +147,7 @@ def _columns_of(logs: Mapping[str, LogFile], file: str, answers: Answers, notes:
                 tables.setdefault(table.name, (table, {}))[1][column] = _in_si(quantity, answer, table.columns[own])
     if not tables:
         raise FileError(f"The answers use no column of '{file}': name its columns, or leave the file out.")
-    parts = [
-        _on_clock(columns, _clock_of(log, table, logger, columns), logger.columns.get("time"), log, notes)
-        for table, columns in tables.values()
-    ]
+    parts = [_on_clock(columns, _clock_of(log, table, logger, columns), log, notes) for table, columns in tables.values()]
     made = _on_one_clock(parts, log, notes)
     made |= {quantity: np.full(len(made["time"]), value) for quantity, value in constants.items() if value is not None}
     time = logger.columns.get("time")
@@ -167,6 +159,12 @@ def _columns_of(logs: Mapping[str, LogFile], file: str, answers: Answers, notes:
         )
         made = {name: column if name == "time" else column[order] for name, column in made.items()}
     return made
+
+
+def _table_of(tables: Sequence[LogTable], name: str) -> tuple[LogTable, str] | None:
+    """Return the table that has a column of a name, full or short, and its name in that table."""
+    by_full = ((table, own) for table in tables for own in table.columns if table.full_name(own) == name)
+    return next(by_full, None) or next(((table, name) for table in tables if name in table.columns), None)
 
 
 def _in_si(quantity: str, answer: ColumnAnswer, values: np.ndarray) -> np.ndarray:
@@ -192,7 +190,7 @@ def _clock_of(log: LogFile, table: LogTable, logger: LoggerAnswer, columns: Mapp
     if answer.rate:
         return np.arange(table.sample_count) / answer.rate
     for name in answer.names:
-        found = table_of([table], name) or table_of(log.tables, name)
+        found = _table_of([table], name) or _table_of(log.tables, name)
         if found is None:
             continue
         values = found[0].columns[found[1]]
@@ -205,10 +203,8 @@ def _clock_of(log: LogFile, table: LogTable, logger: LoggerAnswer, columns: Mapp
     raise FileError(f"'{log.name}' has no column '{answer.names[0]}', which the answers name for time: check its name.")
 
 
-def _on_clock(
-    columns: dict[str, np.ndarray], time: np.ndarray, answer: ColumnAnswer | None, log: LogFile, notes: list[str]
-) -> dict[str, np.ndarray]:
-    """Return columns with a clock that rises; samples without a stamp are left out, those with equal stamps as answered."""
+def _on_clock(columns: dict[str, np.ndarray], time: np.ndarray, log: LogFile, notes: list[str]) -> dict[str, np.ndarray]:
+    """Return columns with a clock that rises: without samples that have no stamp, and with equal stamps spread."""
     name = log.name
     known = np.isfinite(time)
     if not known.all():
@@ -221,23 +217,14 @@ def _on_clock(
             f"The time of '{name}' goes backwards after sample {back[0] + 1} ({time[back[0] + 1]:.10g} s after "
             f"{time[back[0]]:.10g} s): cut the file where the clock was reset, or sort it."
         )
-    share = float((steps == 0).mean()) if len(steps) else 1.0
-    treatment = answer.repeated if answer else "refuse"
-    if share and treatment == "refuse" and share <= MOST_REPEATED:
-        treatment = "mean"
-    if share and treatment == "refuse":
-        raise FileError(
-            f"{share:.0%} of the time stamps of '{name}' repeat the one before: write repeated = \"spread\" at time if the "
-            'stamps are coarser than the samples, or repeated = "mean" if samples are there twice.'
-        )
-    if share and treatment == "mean":
-        stamps, inverse = np.unique(time, return_inverse=True)
-        columns = {key: _mean_of_equal(column, inverse, len(stamps)) for key, column in columns.items()}
-        notes.append(f"'{name}': {len(time) - len(stamps)} samples with the stamp of another were averaged with it.")
-        time = stamps
-    elif share:
+    is_twice = np.append(False, (steps == 0) & np.all([_same(c[1:], c[:-1]) for c in columns.values()], axis=0))
+    if is_twice.any():
+        notes.append(f"'{name}': {int(is_twice.sum())} samples that are there twice, with one stamp, were left out.")
+        time, columns = time[~is_twice], {key: column[~is_twice] for key, column in columns.items()}
+    share = float((np.diff(time) == 0).mean())
+    if share:
         time = _spread(time)
-        notes.append(f"'{name}': samples with equal stamps ({share:.0%}) were spread evenly up to the next stamp.")
+        notes.append(f"'{name}': samples with equal stamps ({share:.1%}) were spread evenly up to the next stamp.")
     steps = np.diff(time)
     usual = float(np.median(steps)) if len(steps) else 0.0
     if len(steps) and steps.max() > LONGEST_PAUSE * usual:
@@ -245,12 +232,8 @@ def _on_clock(
     return {"time": time, **columns}
 
 
-def _mean_of_equal(values: np.ndarray, group: np.ndarray, count: int) -> np.ndarray:
-    known = np.isfinite(values)
-    total = np.bincount(group[known], values[known], count)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        found: np.ndarray = total / np.bincount(group[known], minlength=count)
-    return found
+def _same(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    return (one == other) | (np.isnan(one) & np.isnan(other))
 
 
 def _spread(time: np.ndarray) -> np.ndarray:
@@ -325,14 +308,13 @@ def _trial(
         start = float(driven["time"][0])
         is_one_clock = abs(float(answered["time"][0]) - start) < 86400.0
         second = start if is_one_clock else float(answered["time"][0])
-        late, uncertainty, why = _lateness(recording, driven, answered, start - second)
+        late, why = _lateness(recording, driven, answered, start - second)
         notes.append(f"'{recording.name}': {why}.")
         _check_contact(answered, recording.name)
         written.append(_write_csv(folder / f"{name}.csv", driven, start))
         written.append(_write_csv(folder / f"{name}_readings.csv", answered, second))
         lines += [f"# {why}"]
-        readings = {"file": f"{name}_readings.csv", "late": late, "uncertainty": uncertainty}
-        lines += [f"readings = {toml_value(readings)}"]
+        lines += [f"readings = {toml_value({'file': f'{name}_readings.csv', 'late': late})}"]
     stamp = f"times count from {start:.3f} s of the log's clock; " if abs(start) > 1e-9 else ""
     return [*lines, f"# {stamp}read from {', '.join(recording.files)}", ""]
 
@@ -355,38 +337,23 @@ def _used_part(recording: RecordingAnswer, table: dict[str, np.ndarray]) -> dict
 
 def _lateness(
     recording: RecordingAnswer, driven: dict[str, np.ndarray], answered: dict[str, np.ndarray], apart: float
-) -> tuple[float, float, str]:
-    """Return how late the second clock is, by the zeros of both files, its uncertainty, and why."""
+) -> tuple[float, str]:
+    """Return how late the second clock is, by the zeros of both files, and why."""
     if recording.late is not None:
-        late = recording.late + apart
-        return late, recording.uncertainty or 0.0, f"the answers say that the second clock is {recording.late:.6g} s late"
+        return recording.late + apart, f"the answers say that the second clock is {recording.late:.6g} s late"
     found = _shift(driven, answered)
     if min(driven["time"][0], answered["time"][0]) > SINCE_1970:
-        seen = f" (changes agree best with {found.late:.2g} ± {found.uncertainty:.2g} s)" if found and found.is_sure else ""
-        why = f"the two clocks show the time of day and count as one{seen}: late = … in its [[recording]] shifts one"
-        return apart, 0.0, why
+        seen = f" (changes agree best with {found.late:.2g} s)" if found and found.is_sure else ""
+        return apart, f"the two clocks show the time of day and count as one{seen}: late = … in its [[recording]] shifts one"
+    best = "do not change" if found is None else f"agree best with a shift of {found.late:.4g} s ({found.quality})"
     if found is None or not found.is_sure:
-        seen = (
-            "do not change"
-            if found is None
-            else (
-                f"agree best with a shift of {found.late:.4g} s (correlation {found.correlation:.2f}, elsewhere "
-                f"{found.correlation * found.rival:.2f})"
-            )
-        )
         raise FileError(
-            f"The two files of '{recording.name}' {seen}, which does not tell how late the second clock is: write late = … in "
+            f"The two files of '{recording.name}' {best}, which does not tell how late the second clock is: write late = … in "
             "seconds into its [[recording]], 0 if one computer stamped both."
         )
-    late = round(found.late + apart, 6)
-    return (
-        late,
-        round(found.uncertainty, 6),
-        (
-            f"the second clock is {found.late:.6g} ± {found.uncertainty:.2g} s late, by the correlation of changes ("
-            f"{found.correlation:.2f}; at any other shift at most {found.correlation * found.rival:.2f})"
-        ),
-    )
+    return round(
+        found.late + apart, 6
+    ), f"the second clock is {found.late:.6g} s late, by the correlation of changes ({found.quality})"
 
 
 def _shift(driven: dict[str, np.ndarray], answered: dict[str, np.ndarray]) -> ClockShift | None:
@@ -466,34 +433,12 @@ def _write_csv(path: Path, table: Mapping[str, np.ndarray], start: float) -> Pat
 # --- the rig
 
 
-def _rig_text(logs: Sequence[LogFile], answers: Answers, trials: Sequence[Sequence[str]], notes: Sequence[str]) -> str:
-    lines = [f'format = "{FORMAT}"', f"name = {toml_value(answers.name)}", "", "# Made from logs by `palpate rig new`:"]
-    for logger in answers.loggers:
-        files = [log for log in logs if any(fnmatch.fnmatchcase(log.name, one) for one in logger.files)]
-        if files:
-            lines.append(f"# {', '.join(log.name for log in files)} ({files[0].kind})")
-        lines += [f"#   {_taken(quantity, answer)}" for quantity, answer in logger.columns.items()]
-    left = [one.name for one in answers.recordings if one.use == "leave out"]
-    lines += [f"# left out: {', '.join(left)}"] if left else []
-    lines += [f"# {note}" for note in dict.fromkeys([*notes, *answers.notes])]
+def _rig_text(answers: Answers, trials: Sequence[Sequence[str]], notes: Sequence[str]) -> str:
+    """Return the rig, with the answers and their reasons as comments."""
+    lines = [f'format = "{FORMAT}"', f"name = {toml_value(answers.name)}", "", "# Made from logs by `palpate rig new`, with"]
+    lines += [f"#   {line}".rstrip() for line in answers.text.splitlines() if not line.startswith("#")]
+    lines += [f"# {note}" for note in dict.fromkeys(notes)]
     for table, words in (("sensor", answers.sensor), ("indenter", answers.indenter)):
         if words:
-            lines += ["", f"[{table}]"]
-            for word, value in words.items():
-                why = answers.why.get(word, "")
-                lines.append(f"{word} = {toml_value(value)}" + (f"  # {why}" if why else ""))
+            lines += ["", f"[{table}]", *(f"{word} = {toml_value(value)}" for word, value in words.items())]
     return "\n".join([*lines, "", *(line for trial in trials for line in trial)])
-
-
-def _taken(quantity: str, answer: ColumnAnswer) -> str:
-    """Return in words what a quantity was made from."""
-    if quantity == "time" and answer.rate:
-        return f"time: {answer.rate:g} samples per second"
-    if answer.constant is not None:
-        return f"{quantity} = {answer.constant:g}: {answer.why}"
-    names = answer.names[0] if len(answer.names) == 1 else f"{answer.names[0]} … {answer.names[-1]} ({len(answer.names)})"
-    parts = [f"{quantity} = {names}", f"in {answer.unit}" if answer.unit else ""]
-    parts += [f"minus {answer.zero:.6g}"] if answer.zero else []
-    parts += [f"times {answer.factor:.6g}"] if answer.factor != 1.0 else []
-    parts += [f"on {answer.area:g} m²"] if answer.area else []
-    return " ".join(filter(None, parts)) + (f": {answer.why}" if answer.why else "")

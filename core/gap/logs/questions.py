@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from ...io.csv_table import is_number
-from .answers import Answers, ColumnAnswer, LoggerAnswer, has_unknown, toml_value
+from .column_meaning import KNOWN_UNITS
+from .guess import Guess, Proposal, toml_value
 
 LEFT_OUT = "-"
 """What is typed for a column that is not to be used."""
@@ -19,8 +19,8 @@ class OpenQuestion(Exception):
     """A question to which there is no reply yet; its text is what to ask."""
 
 
-def answered(answers: Answers, replies: Sequence[str]) -> Answers:
-    """Return answers in which the open questions have these replies, in turn; raise :class:`OpenQuestion` for the next one."""
+def answered(proposal: Proposal, replies: Sequence[str]) -> Proposal:
+    """Return a proposal whose open questions have these replies, in turn; raise :class:`OpenQuestion` for the next one."""
     waiting = iter(replies)
 
     def ask(question: str) -> str:
@@ -28,59 +28,36 @@ def answered(answers: Answers, replies: Sequence[str]) -> Answers:
             return reply
         raise OpenQuestion(question)
 
-    return asked(answers, ask)
+    return asked(proposal, ask)
 
 
-def asked(answers: Answers, ask: Callable[[str], str] = input) -> Answers:
-    """Return answers in which every open question was put to the user; Enter keeps what is proposed."""
-    sensor, indenter = (_asked_words(words, answers, ask) for words in (answers.sensor, answers.indenter))
-    loggers = tuple(
-        LoggerAnswer(
-            logger.files,
-            {
-                name: column
-                for name, one in logger.columns.items()
-                if (column := _asked_column(name, one, logger, ask)) is not None
-            },
-        )
-        for logger in answers.loggers
-    )
-    return replace(answers, sensor=sensor, indenter=indenter, loggers=loggers, unsure=frozenset())
+def asked(proposal: Proposal, ask: Callable[[str], str] = input) -> Proposal:
+    """Return a proposal of which every open guess was put to the user; Enter keeps what is proposed."""
+    found = (_asked(guess, ask) for guess in proposal.guesses)
+    return replace(proposal, guesses=tuple(guess for guess in found if guess is not None))
 
 
-def _asked_words(words: dict[str, Any], answers: Answers, ask: Callable[[str], str]) -> dict[str, Any]:
-    found = {}
-    for word, value in words.items():
-        found[word], hint = value, ""
-        while has_unknown(found[word]) or (word in answers.unsure and found[word] is value):
-            typed = ask(f"{word} ({answers.why.get(word, '')}){hint}\n  [{toml_value(value)}] ").strip()
-            if not typed and not has_unknown(value):
-                break
-            try:
-                found[word] = tomllib.loads(f"value = {typed}")["value"]
-            except tomllib.TOMLDecodeError:
-                hint = ", written as in the brackets"
-    return found
-
-
-def _asked_column(name: str, column: ColumnAnswer, logger: LoggerAnswer, ask: Callable[[str], str]) -> ColumnAnswer | None:
-    """Return what a column is after the question about it; None if it is not to be used."""
-    while not column.sure:
-        is_open = has_unknown(list(column.names)) or column.unit == "?"
-        shown = (
-            f"{column.names[0] if column.names else column.rate or column.constant}{' ' + column.unit if column.unit else ''}"
-        )
-        typed = ask(f"{name} of {logger.files[0]}: column and unit, {LEFT_OUT} for none ({column.why})\n  [{shown}] ").strip()
-        if typed == LEFT_OUT:
+def _asked(guess: Guess, ask: Callable[[str], str]) -> Guess | None:
+    """Return a guess after the question about it; None if the column is not to be used."""
+    is_column = guess.table == "logger.columns"
+    choice = f": the column and its unit, {LEFT_OUT} for none" if is_column else ", as in the brackets"
+    while guess.is_open:
+        typed = ask(f"{guess.what}{choice} ({guess.reason})\n  [{toml_value(guess.value)}] ").strip()
+        if typed == LEFT_OUT and is_column:
             return None
-        if not typed and is_open:
-            continue
-        if typed and column.constant is not None and is_number(typed):
-            column = replace(column, constant=float(typed), why="typed by the user")
-        elif typed:
-            source, _, unit = typed.rpartition(" ") if column.unit and " " in typed else (typed, "", column.unit)
-            column = replace(column, names=(source,), unit=unit, constant=None, rate=0.0, why="typed by the user")
-            if has_unknown(list(column.names)) or column.unit == "?":
-                continue
-        column = replace(column, sure=True)
-    return column
+        value = _typed(typed, guess) if typed else guess.value
+        guess = replace(guess, value=value, evidence="stated") if value is not None else guess
+    return guess
+
+
+def _typed(typed: str, guess: Guess) -> Any:
+    """Return what was typed as TOML; of a column its name and its unit are enough. None if it is neither."""
+    try:
+        return tomllib.loads(f"value = {typed}")["value"]
+    except tomllib.TOMLDecodeError:
+        if guess.table != "logger.columns":
+            return None
+        name, _, unit = typed.rpartition(" ")
+        is_unit = name and unit in KNOWN_UNITS
+        kept = {word: guess.value[word] for word in ("unit", "area") if isinstance(guess.value, dict) and word in guess.value}
+        return {**kept, "name": name, "unit": unit} if is_unit else {**kept, "name": typed}

@@ -188,9 +188,9 @@ def test_logs_become_a_rig_with_the_answers_beside_it(scene, tmp_path):
     assert not other.palpate.measured
     paths = [tmp_path / name for name in names]
     made = partial(log_rigs.make, bpy.context, other, paths, tmp_path / "asked", False)  # as the dialog asks, one by one
-    with pytest.raises(OpenQuestion, match="grid .4 texels; the number of rows is a guess"):
+    with pytest.raises(OpenQuestion, match="grid of .sensor., as in the brackets .4 texels; the number of rows is a guess"):
         made([])
-    with pytest.raises(OpenQuestion, match="written as in the brackets"):
+    with pytest.raises(OpenQuestion, match="as in the brackets"):
         made(["2 by 2"])
     written, _ = made(["2 by 2", "{ rows = 2, columns = 2, pitch = [0.005, 0.005] }"])
     assert len(read_rig(written.path).texels) == 4

@@ -70,7 +70,7 @@ def test_what_a_log_calls_a_temperature():
     assert meaning_of("temperature_degC").quantity == meaning_of("Temp [K]").quantity == "temperature"
     assert meaning_of("Temp [K]").unit == "K"
     assert temperature_unit(np.array([295.0, 296.0]), "")[0] == "K" and temperature_unit(np.array([21.0]), "")[0] == "°C"
-    assert temperature_unit(np.array([70.0]), "°F") == ("°F", "the file says so", True)
+    assert temperature_unit(np.array([70.0]), "°F") == ("°F", "the file says so", "stated")
 
 
 @pytest.mark.long("a whole diagnosis of warm and cold recordings")

@@ -11,6 +11,7 @@ from palpate.commands import main
 from palpate.core.errors import FileError
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.logs import questions
+from palpate.core.gap.logs.answers import answers_of
 from palpate.core.gap.logs.column_meaning import families
 from palpate.core.gap.logs.log_file import read_log
 from palpate.core.gap.logs.log_table import with_distinct_names
@@ -30,7 +31,7 @@ def proposal(*paths):
 
 
 def columns_of(*paths):
-    return proposal(*paths).loggers[0].columns
+    return proposal(*paths).columns()
 
 
 @pytest.mark.parametrize("pattern", ["taxel_{i}_{axis}", "B{axis}0{i}", "sensors_0.taxels_{i}.{axis}"])
@@ -41,8 +42,8 @@ def test_of_the_axes_of_taxels_the_one_that_follows_the_load_is_proposed_and_ask
         pattern.format(i=i, axis=axis): values + noise(400, level=4.0) for i in range(4) for axis, values in axes.items()
     }
     answer = columns_of(write_csv(tmp_path / "skin.csv", columns))["texel"]
-    assert answer.names == tuple(pattern.format(i=i, axis="z") for i in range(4)) and not answer.sure
-    assert "follow the load by 1.00, others that could be meant: " in answer.why and "0.0" in answer.why
+    assert answer.value == {"name": pattern.format(i="{}", axis="z"), "first": 0, "count": 4} and answer.evidence == "thin"
+    assert "follow the load by 1.00, others that could be meant: " in answer.reason and "0.0" in answer.reason
 
 
 def test_electrodes_that_follow_the_load_go_before_a_larger_family_that_does_not():
@@ -65,7 +66,7 @@ def test_calibration_points_in_no_order_are_sorted_by_the_load(tmp_path):
     }
     log = write_csv(tmp_path / "points.csv", columns)
     answer = columns_of(log)["time"]
-    assert answer.rate == 1.0 and not answer.sure and "these are points" in answer.why
+    assert answer.value == {"rate": 1.0} and answer.evidence == "thin" and "these are points" in answer.reason
     (trial,) = read_rig(new_rig(tmp_path / "rig", [log], template(tmp_path, [log])).path).trials
     np.testing.assert_allclose(trial.level, np.sort(load), atol=1e-9)
     np.testing.assert_allclose(trial.reading[:, 1], 10.0 + 2.0 * np.sort(load), atol=0.1)
@@ -78,10 +79,10 @@ def test_matrices_in_files_are_frames_with_the_load_of_their_names(tmp_path):
         paths.append(tmp_path / f"mat_{load:.3f}kPa.csv")
         paths[-1].write_text("\n".join(",".join(f"{value:03.0f}" for value in row) for row in frame) + "\n")
     answers = proposal(*reversed(paths))
-    own = answers.loggers[0].columns
-    assert not own["time"].sure and "each file is a frame" in own["time"].why and own["force"].lacks_area
-    assert answers.sensor["grid"]["rows"] == 8 and answers.sensor["grid"]["columns"] == 6
-    assert any("area of force" in question for question in answers.open_questions())
+    own = answers.columns()
+    assert own["time"].evidence == "thin" and "each file is a frame" in own["time"].reason
+    assert own["force"].value["area"] == "?" and "the area on which the pressure acts" in own["force"].question
+    assert answers.of("sensor", "grid").value == {"rows": 8, "columns": 6, "pitch": ["?", "?"]}
     path = template(tmp_path, paths, **{'area = "?"': "area = 2e-3"})
     (trial,) = read_rig(new_rig(tmp_path / "rig", paths, path).path).trials
     np.testing.assert_allclose(trial.level, 2.0 * np.array(list(frames)), atol=1e-9)
@@ -108,9 +109,9 @@ def press(silent):
 def test_one_axis_that_most_texels_do_not_feel_is_an_indenter_at_a_place(tmp_path):
     log = write_csv(tmp_path / "run.csv", press(silent=10))
     answers = proposal(log)
-    own = answers.loggers[0].columns
-    assert [own[axis].constant for axis in "xy"] == [0.0, 0.0] and own["z"].factor == 1.0 and "depth" not in own
-    assert "10 of 12 texels never answer" in own["z"].why and answers.indenter["shape"] == {"sphere": "?"}
+    own = answers.columns()
+    assert [own[axis].value for axis in "xy"] == [0.0, 0.0] and "factor" not in own["z"].value and "depth" not in own
+    assert "10 of 12 texels never answer" in own["z"].reason and answers.of("indenter", "shape").value == {"sphere": "?"}
     path = template(tmp_path, [log], **{'sphere = "?"': "sphere = 0.015", "x = 0.0": "x = 0.004"})
     (trial,) = read_rig(new_rig(tmp_path / "rig", [log], path).path).trials
     assert trial.stimulus == "pose" and isinstance(trial.contact_height, str)
@@ -121,11 +122,8 @@ def test_one_axis_that_most_texels_do_not_feel_is_an_indenter_at_a_place(tmp_pat
 
 def test_one_axis_that_all_texels_feel_is_a_depth_and_says_what_that_means(tmp_path):
     own = columns_of(write_csv(tmp_path / "run.csv", press(silent=0)))
-    assert (
-        own["depth"].factor == -1.0
-        and not own["depth"].sure
-        and "as a plate does: for a ball write x, y and z" in own["depth"].why
-    )
+    assert own["depth"].value["factor"] == -1.0 and own["depth"].evidence == "thin"
+    assert "as a plate does: for a ball write x, y and z" in own["depth"].reason
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -133,20 +131,21 @@ def test_a_load_that_is_never_zero_has_no_zero_and_its_own_sign(tmp_path, sign):
     load = 2.0 + np.sin(1.5 * TIME + 0.3)
     columns = {"time": TIME, "fz": sign * load} | {f"taxel{i}": 400.0 * load + noise(400) for i in range(4)}
     force = columns_of(write_csv(tmp_path / "slide.csv", columns))["force"]
-    assert force.zero == 0.0 and force.factor == sign and "nothing shows it without load" in force.why
+    assert "zero" not in force.value and force.value.get("factor", 1.0) == sign
+    assert "nothing shows it without load" in force.reason
 
 
 def test_a_load_that_rests_at_its_beginning_has_its_zero_there(tmp_path):
     columns = {"time": TIME, "fz": 0.4 + 3.0 * np.where(TIME < 2.0, 0.0, LOAD)}
     columns |= {f"taxel{i}": 400.0 * columns["fz"] for i in range(4)}
     force = columns_of(write_csv(tmp_path / "press.csv", columns))["force"]
-    assert force.zero == pytest.approx(0.4) and "is subtracted" in force.why
+    assert force.value["zero"] == pytest.approx(0.4) and "is subtracted" in force.reason and force.evidence == "thin"
 
 
 def test_a_number_that_is_no_temperature_is_asked(tmp_path):
     columns = {"time": TIME, "force": LOAD, "Temp0": 757.0 + noise(400)} | {f"texel_{i}": 10.0 * LOAD for i in range(3)}
     own = columns_of(write_csv(tmp_path / "a.csv", columns))["temperature"]
-    assert own.unit == "?" and "no temperature" in own.why
+    assert own.value["unit"] == "?" and "no temperature" in own.reason
 
 
 def test_the_template_is_written_before_anything_is_refused(tmp_path, capsys):
@@ -169,5 +168,27 @@ def test_a_constant_is_typed_at_the_terminal(tmp_path):
     replies = {"grid": "{ rows = 3, columns = 4, pitch = [0.004, 0.004] }", "shape": "{ sphere = 0.015 }", "x": "0.004"}
     answers = proposal(write_csv(tmp_path / "run.csv", press(silent=10)))
     found = questions.asked(answers, lambda question: replies.get(question.split(" ")[0], ""))
-    own = found.loggers[0].columns
-    assert (own["x"].constant, own["y"].constant) == (0.004, 0.0) and not list(found.open_questions())
+    own = answers_of(found).loggers[0].columns
+    assert (own["x"].constant, own["y"].constant) == (0.004, 0.0)
+
+
+@pytest.mark.parametrize("case", ["press", "skin", "pressure", "unnamed"])
+def test_every_guess_is_a_line_with_its_reason_that_is_corrected_there(tmp_path, case):
+    """The template and the questions are one list: each line has its value, its reason and a mark where it is to be checked."""
+    axes = {f"taxel_{i}_{axis}": 100.0 * LOAD + noise(400) for i in range(3) for axis in "xyz"}
+    columns = {
+        "press": press(10),
+        "skin": {"time": TIME, "Fz": LOAD, **axes},
+        "pressure": {"time": TIME, "P (kPa)": LOAD, **axes},
+        "unnamed": {f"{i}": values for i, values in enumerate([TIME, LOAD, 5.0 * LOAD])},
+    }
+    found = proposal(write_csv(tmp_path / "a.csv", columns[case]))
+    lines = found.text.splitlines()
+    for guess in found.guesses:
+        mark = "  # CHECK: " if guess.evidence == "thin" else "  # "
+        assert guess.line in lines and (not guess.reason or guess.line.endswith(mark + guess.reason))
+        assert guess.reason or not guess.is_open
+        assert (guess.question in found.questions) == (guess.is_unknown or guess.evidence == "thin")
+    put = []
+    questions.asked(found.confirmed(), lambda question: put.append(question) or "1")
+    assert len(put) == sum(guess.is_unknown for guess in found.guesses)

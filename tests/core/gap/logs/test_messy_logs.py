@@ -7,11 +7,11 @@ import pytest
 from palpate.commands import main
 from palpate.core.errors import FileError
 from palpate.core.gap.dataset.rig import read_rig
+from palpate.core.gap.logs.column_behaviour import is_force
 from palpate.core.gap.logs.log_file import read_log
 from palpate.core.gap.logs.log_table import with_distinct_names
 from palpate.core.gap.logs.missing_codes import missing_code
 from palpate.core.gap.logs.proposal import propose
-from palpate.core.gap.logs.unnamed_columns import is_force, is_steady, names_of_what_drove
 
 GRAM = 9.80665e-3
 CHANNELS = 6
@@ -49,9 +49,15 @@ def write_files(folder, seed):
     return [states, sensor]
 
 
-def test_raw_files_become_a_rig_without_an_answer(tmp_path, capsys):
+def test_of_raw_files_what_drove_is_asked_with_how_far_each_column_reaches(tmp_path, capsys):
     logs = write_files(tmp_path / "a_1", 1) + write_files(tmp_path / "b_2", 2)
-    assert main(["rig", "new", *map(str, logs), "--out", str(tmp_path / "rig")]) == 0
+    command = ["rig", "new", *map(str, logs), "--out", str(tmp_path / "rig")]
+    assert main(command) == 1
+    assert "column_3: -100, column_4: 276.1 to 288, column_5: 0 to 2" in capsys.readouterr().out
+    answers = tmp_path / "rig" / "answers.toml"
+    text = answers.read_text().replace('depth = { name = "?", unit = "m" }', 'force = { name = "column_5", unit = "g" }')
+    answers.write_text(text.replace('pitch = ["?", "?"]', "pitch = [0.01, 0.01]"))
+    assert main([*command, "--answers", str(answers)]) == 0
     said = capsys.readouterr().out
     assert "-1 in 'column_5' (50% of its samples) counts as missing" in said
     rig = read_rig(tmp_path / "rig" / "rig.toml")
@@ -65,7 +71,7 @@ def test_raw_files_become_a_rig_without_an_answer(tmp_path, capsys):
         np.testing.assert_allclose(trial.level[used], GRAM * np.interp(at, clock - clock[0], force), atol=0.01 * 25)
         assert np.abs(trial.reading[used][:, 2]).max() == pytest.approx(np.abs(readings[:, 2]).max(), rel=1e-6)
     text = (tmp_path / "rig" / "rig.toml").read_text()
-    assert "force = column_5 in g" in text and "late = 0.0" in text and "texel = column_2 … column_7 (6)" in text
+    assert "late = 0.0" in text and 'texel = { name = "column_{}", first = 2, count = 6 }  # CHECK: 6 columns' in text
     assert (tmp_path / "rig" / "recordings.png").stat().st_size > 10_000
 
 
@@ -88,22 +94,9 @@ def test_columns_that_rise_with_the_clock_are_no_texels(tmp_path):
     np.savetxt(tmp_path / "sensor_1.csv", table, "%.9f", delimiter=",")
     np.savetxt(tmp_path / "stage_1.csv", np.column_stack([time, force]), "%.9f", delimiter=",")
     found = propose([read_log(tmp_path / "sensor_1.csv"), read_log(tmp_path / "stage_1.csv")])
-    (names,) = [one.columns["texel"].names for one in found.loggers if "texel" in one.columns]
-    assert names == tuple(f"column_{i}" for i in range(3, 9))
-    assert is_steady(clock, np.arange(len(clock))) and not is_steady(clock, readings[:, 0])
-
-
-def test_what_drove_is_known_by_its_behaviour():
-    _, height, force, _, _ = press(1)
-    still = np.full(len(height), 3.5)
-    assert is_force(force) and not is_force(height) and not is_force(force + 300.0)
-    assert {name: found[0] for name, found in names_of_what_drove({"a": still, "b": height, "c": force}).items()} == {
-        "c": "force"
-    }
-    assert {name: found[0] for name, found in names_of_what_drove({"a": still, "b": height}).items()} == {"b": "z"}
-    three = names_of_what_drove({"a": height, "b": height - 5.0, "c": 2.0 * height})
-    assert [found[0] for found in three.values()] == ["x", "y", "z"]
-    assert names_of_what_drove({"a": height, "b": height - 5.0}) == {}
+    (texels,) = [guess for guess in found.guesses if guess.word == "texel"]
+    assert texels.value == {"name": "column_{}", "first": 3, "count": 6}
+    assert is_force(force) and not is_force(force + 300.0)
 
 
 def test_equal_names_in_equal_folders_are_refused(tmp_path):

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How columns behave: what their names and units do not say."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+ZERO, RESTS, BELOW = 0.02, 0.05, 0.05
+"""A force is within the first share of its range of zero for at least the second share of its samples, and not below zero by
+more than the third."""
+ORDERED = 0.5
+"""Correlation of a load with itself one sample later below which the samples are points in no order."""
+
+
+def is_unnamed(names: Sequence[str]) -> bool:
+    """Return True if the columns of a table have no names but numbers."""
+    return all(re.fullmatch(r"column_\d+", name) for name in names)
+
+
+def is_force(values: np.ndarray) -> bool:
+    """Return True if values behave as a force of contact."""
+    known = values[np.isfinite(values)]
+    low, high = np.percentile(known, [0.1, 99.9])
+    span = float(high - low)
+    return bool(span > 0.0 and low > -BELOW * span and (np.abs(known) < ZERO * span).mean() > RESTS)
+
+
+def correlation(one: np.ndarray, other: np.ndarray) -> float:
+    """Return the correlation of two columns where both are known, without its sign; 0 if one does not change."""
+    known = np.isfinite(one) & np.isfinite(other)
+    if known.sum() < 8 or np.ptp(one[known]) == 0.0 or np.ptp(other[known]) == 0.0:
+        return 0.0
+    return abs(float(np.corrcoef(one[known], other[known])[0, 1]))
+
+
+def is_unordered(load: np.ndarray) -> bool:
+    """Return True if a load jumps from sample to sample, as in a table of calibration points."""
+    known = load[np.isfinite(load)]
+    return len(known) >= 16 and float(np.ptp(known)) > 0.0 and float(np.corrcoef(known[:-1], known[1:])[0, 1]) < ORDERED
+
+
+def contact_of(values: np.ndarray) -> float:
+    """Return how far values, averaged over five samples, leave their noise from sample to sample, in units of that."""
+    known = values[np.isfinite(values)]
+    if len(known) < 8:
+        return 0.0
+    noise = 1.4826 * float(np.median(np.abs(np.diff(known)))) / np.sqrt(2.0)
+    span = float(np.ptp(np.convolve(known, np.full(5, 0.2), mode="valid")))
+    return np.inf if span > 0.0 and noise == 0.0 else span / noise if noise else 0.0
