@@ -17,11 +17,11 @@ from ..core.gap.dataset.rig import Rig
 from ..core.gap.dataset.rig import read_rig as read_rig_file
 from ..core.gap.report.comparison import GapErrors, gap_errors
 from ..core.gap.selection.findings import Diagnosis
-from ..core.geometry.layout.grid_layout import GridLayout
+from ..core.geometry.grid_layout import GridLayout
 from ..core.geometry.mesh import TriangleMesh
-from ..core.jobs.progress import Job
-from ..core.model.effect import Value
+from ..core.jobs import Job
 from ..core.model.sensor import Sensor as ModelSensor
+from ..core.model.sensor import Value
 from . import arguments
 from .arguments import ArgumentError
 from .running import ShowProgress, finished, prepare_solver

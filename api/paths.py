@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.io.csv_table import read_table
-from ..core.model.motion import Motion
+from ..core.model.body import Motion
 from .arguments import ArgumentError, numbers, quaternion
 
 POSITION, TURN = ("x", "y", "z"), ("qw", "qx", "qy", "qz")

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from ..core.export.exporter import Exporter
     from ..core.figures.figure_style import FigureStyle
-    from ..core.model.vector_readings import VectorReadings
+    from ..core.model.recording import VectorReadings
     from ..core.skins.magnetic_skin import MagneticSkin
 
 UNITS = {"slip": "m/s", "depth": "m", "contact": "", "net_torque": "N m", "centre_of_pressure": "m"}
@@ -140,7 +140,7 @@ class Recording:
         PalpateError
             The sensor has no such read-out, the skin belongs to another sensor, or a magnet is pressed into a magnetometer.
         """
-        from ..core.skins.layer import texel_displacements
+        from ..core.skins.magnetic_skin import texel_displacements
 
         if skin is None:
             own = self.bake.recording.sensors[self.name].channels
@@ -275,7 +275,7 @@ class Recording:
             Colours of pictures.
         progress : bool or callable
         """
-        from ..core.export.registry import export
+        from ..core.export.exporter import export
 
         return finished(export(self._described(), kind, folder, style), progress, "export", "sensor")
 

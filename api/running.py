@@ -6,9 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 
-from ..core.jobs.job_runner import run_job
-from ..core.jobs.progress import Job, Progress, Result
-from ..core.jobs.progress_bar import shown_progress
+from ..core.jobs import Job, Progress, Result, run_job, shown_progress
 
 ShowProgress = bool | Callable[[Progress], None]
 """True for a bar in a terminal or notebook, False for none, or a function that is called with each :class:`.Progress`."""

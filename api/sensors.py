@@ -16,12 +16,12 @@ from numpy.typing import ArrayLike
 
 from ..core.effects.engine.registry import check, effect, from_dict
 from ..core.errors import FileError, MeshError
-from ..core.geometry.layout.grid_layout import GridLayout
+from ..core.geometry.grid_layout import GridLayout
 from ..core.geometry.mesh import TriangleMesh, checked_mesh
 from ..core.geometry.rotations import quaternion_product, rotation_matrices
 from ..core.geometry.texels import Texels, texels_from_region, texels_with_normals
 from ..core.io.sensor_toml import SensorModel, write_sensor
-from ..core.model.effect import Effect
+from ..core.model.sensor import Effect
 from ..core.model.sensor import Sensor as ModelSensor
 from ..core.model.sensor_parameters import SensorParameters
 from ..core.simulators.sensor_format import Written
@@ -85,7 +85,7 @@ class Sensor(SensorOnMesh):
         PalpateError
             An argument has a wrong type, shape or value.
         """
-        from ..core.geometry.sampling.texel_arrays import pad_array
+        from ..core.geometry.texel_arrays import pad_array
 
         number = (arguments.count(rows, "rows"), arguments.count(columns, "columns"))
         steps = arguments.numbers(np.tile(pitch, 2) if np.ndim(pitch) == 0 else pitch, (2,), "pitch")
@@ -244,7 +244,7 @@ def read_sensor(path: str | os.PathLike[str], name: str | None = None) -> Sensor
     if is_probe_list(path):
         item = read_probe_list(path)
         return Sensor(item.sensor, item.mesh, item.surface, item.position, item.quaternion)
-    from ..core.simulators.registry import import_sensors
+    from ..core.simulators.sensor_format import import_sensors
 
     sensors = import_sensors(path)[1]
     chosen = [one for one in sensors if name in (None, one.name)]
@@ -330,7 +330,7 @@ def _chosen_vertices(region: ArrayLike | None, vertices: int) -> np.ndarray:
 def _spread(mesh: TriangleMesh, chosen: np.ndarray, texels: int, name: str) -> tuple[TriangleMesh, np.ndarray]:
     """Return a mesh whose vertices are so many texels, spread evenly over the region, and their normals."""
     from ..core.geometry.point_surface import triangles_between
-    from ..core.geometry.sampling.even_points import even_points
+    from ..core.geometry.scattered_points import even_points
 
     inside = chosen[mesh.triangles].all(axis=1)
     if not inside.any():
@@ -383,6 +383,6 @@ def export_sensor(sensor: SensorOnMesh | Sequence[SensorOnMesh], kind: str, fold
     PalpateError
         The format is unknown, or a file cannot be written.
     """
-    from ..core.simulators.registry import export_sensors
+    from ..core.simulators.sensor_format import export_sensors
 
     return export_sensors(arguments.as_list(sensor, SensorOnMesh, "sensor", "a Sensor"), kind, folder)

@@ -10,8 +10,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from ..core.model import body as model
-from ..core.model.scenario import Scenario
-from ..core.model.target import Target
+from ..core.model.scenario import Scenario, Target
 from . import arguments
 from .arguments import ArgumentError
 from .bodies import Body

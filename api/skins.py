@@ -18,7 +18,7 @@ from .drawings import shown_in_notebooks
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..core.model.vector_readings import VectorReadings
+    from ..core.model.recording import VectorReadings
     from ..core.skins.magnetic_skin import MagneticSkin
     from .sensors import Sensor
 

@@ -63,7 +63,7 @@ def examined(write: Write, kind: str, number: int) -> tuple[set[str], Any]:
     """Return what is surely named in a case, and the diagnosis."""
     from palpate.core.gap.dataset.rig import read_rig
     from palpate.core.gap.selection.diagnosis import diagnose
-    from palpate.core.jobs.job_runner import run_job
+    from palpate.core.jobs import run_job
 
     with tempfile.TemporaryDirectory() as folder:
         result = run_job(diagnose(read_rig(write(kind, number, Path(folder)))))

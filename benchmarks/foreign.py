@@ -139,7 +139,7 @@ def examine_rig(folder: str, case: str, answer: dict) -> dict:
     from palpate.core.effects.engine.registry import library
     from palpate.core.gap.dataset.rig import read_rig
     from palpate.core.gap.selection.diagnosis import diagnose
-    from palpate.core.jobs.job_runner import run_job
+    from palpate.core.jobs import run_job
 
     began = time.process_time()
     result = run_job(diagnose(read_rig(Path(folder) / case / "rig.toml")))

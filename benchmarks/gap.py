@@ -116,7 +116,7 @@ def examined(case: cases.Case, write: Callable[[cases.Case, Path], Path] = cases
     """Have a case diagnosed from the files that `write` makes in a folder, and hold the outcome against the answer."""
     from palpate.core.gap.dataset.rig import read_rig
     from palpate.core.gap.selection.diagnosis import diagnose
-    from palpate.core.jobs.job_runner import run_job
+    from palpate.core.jobs import run_job
 
     with tempfile.TemporaryDirectory() as folder:
         rig_path = write(case, Path(folder))
@@ -139,7 +139,7 @@ def examined(case: cases.Case, write: Callable[[cases.Case, Path], Path] = cases
 def score(case: cases.Case, result: Any) -> dict[str, Any]:
     """Return what was said of a case and how right it is."""
     from palpate.core.gap.report.amended_sensor import with_mean_gain_moved
-    from palpate.core.gap.report.experiments import next_experiment
+    from palpate.core.gap.report.sentences import next_experiment
 
     model = with_mean_gain_moved(result)
     sure = sorted(sure_names(result))
@@ -179,8 +179,8 @@ def closed(case: cases.Case, result: Any, model: Any) -> float | None:
 
     The gap is the root mean square of truth minus prediction, readings and forces each in units of their range.
     """
-    from palpate.core.effects.engine.declarations import SCATTER
     from palpate.core.effects.engine.registry import names_found_by
+    from palpate.core.effects.engine.specification import SCATTER
 
     if case.kind not in (*FORMULAS, *cases.SEVERAL) or set(case.answer) & set(names_found_by(SCATTER)):
         return None  # of noise no model could close a gap

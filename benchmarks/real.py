@@ -78,7 +78,7 @@ def diagnosed(recording: Recording, folder: Path) -> Any:
     from palpate.core.gap.dataset.rig import read_rig
     from palpate.core.gap.selection.diagnosis import diagnose
     from palpate.core.gap.selection.findings import Diagnosis
-    from palpate.core.jobs.job_runner import run_job
+    from palpate.core.jobs import run_job
 
     result = run_job(diagnose(read_rig(recording.write(folder / "rig"))))
     assert isinstance(result, Diagnosis)

@@ -61,7 +61,7 @@ def _examined(kind: str, clock: str, number: int) -> tuple[str, bool]:
     from palpate.core.gap.dataset.rig import read_rig
     from palpate.core.gap.report.comparison import gap_errors
     from palpate.core.gap.selection.diagnosis import diagnose
-    from palpate.core.jobs.job_runner import run_job
+    from palpate.core.jobs import run_job
 
     case, began = sessions.draw(kind, clock, number), time.process_time()
     with tempfile.TemporaryDirectory() as folder:

@@ -21,12 +21,10 @@ from solver_scenes import GRAVITY, free_body, grid_mesh
 
 from palpate.core.geometry.mesh import TriangleMesh, checked_mesh
 from palpate.core.geometry.texels import texels_from_region
-from palpate.core.model.body import Body
-from palpate.core.model.motion import Motion
-from palpate.core.model.scenario import Scenario
+from palpate.core.model.body import Body, Motion
+from palpate.core.model.scenario import Scenario, Target
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import SensorParameters
-from palpate.core.model.target import Target
 from palpate.core.solver.simulation import Simulation
 
 SIDE = 0.047

@@ -32,12 +32,10 @@ from solver_scenes import shape
 from palpate.core.compiled.thread_team import count_of_cores
 from palpate.core.geometry.texels import texels_from_region
 from palpate.core.io.scenario_npz import save_scenario
-from palpate.core.model.body import Body
-from palpate.core.model.motion import Motion
-from palpate.core.model.scenario import Scenario
+from palpate.core.model.body import Body, Motion
+from palpate.core.model.scenario import Scenario, Target
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import SensorParameters
-from palpate.core.model.target import Target
 from palpate.core.solver.simulation import Simulation
 from palpate.core.study.variation import varied_scenario
 from palpate.sweep.dataset import publish

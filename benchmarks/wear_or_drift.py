@@ -50,7 +50,7 @@ def _examined(kind: str, number: int) -> tuple[set[str], list[tuple[str, ...]], 
     from palpate.core.gap.dataset.rig import read_rig
     from palpate.core.gap.selection.confidence import SURE
     from palpate.core.gap.selection.diagnosis import diagnose
-    from palpate.core.jobs.job_runner import run_job
+    from palpate.core.jobs import run_job
 
     began = clock.process_time()
     with tempfile.TemporaryDirectory() as folder:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core.errors import FileError, SceneError
 from ..core.io.file_writing import writable_folder
-from ..core.response.metrics import net_shear
+from ..core.response import net_shear
 from . import blender, console
 
 if TYPE_CHECKING:

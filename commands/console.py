@@ -18,11 +18,9 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from typing import Any, NoReturn
 
+from ..core import jobs as bars
 from ..core.errors import PalpateError
-from ..core.jobs import progress_bar as bars
-from ..core.jobs.job_runner import run_job
-from ..core.jobs.progress import Job, Progress, Result
-from ..core.jobs.progress_bar import progress_bar as progress_bar
+from ..core.jobs import Job, Progress, Result, run_job
 
 
 class Interrupt:

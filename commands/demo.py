@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..core import response
 from ..core.figures.figure_style import FigureStyle
 from ..core.figures.picture_labels import Label, label_picture
 from ..core.figures.tactile_strip import tactile_strip
 from ..core.figures.time_curves import force_curves
 from ..core.io.file_writing import remove_unfinished_files, writable_folder
-from ..core.response import metrics
 from . import blender, console, figure_options
 from .bake import bake_with_progress, report
 
@@ -147,7 +147,7 @@ def _labels(scene: Any, recording: Recording, sensors: dict[str, Sensor], demo: 
     i = int(np.searchsorted(recording.frames, demo.PICTURE_FRAME))
     pressed, at_rest = recording.sensors[demo.PAD_A], recording.sensors[demo.PAD_B]
     normal = pressed.normal_force[i].sum()
-    shear = np.linalg.norm(metrics.net_shear(pressed, sensors[demo.PAD_A].texels)[i])
+    shear = np.linalg.norm(response.net_shear(pressed, sensors[demo.PAD_A].texels)[i])
     weight, carriers = at_rest.normal_force[i].sum(), np.count_nonzero(at_rest.contact[i])
     words = {
         demo.BALL: f"Steel ball, slipping\n{normal:.2f} N normal, {shear:.2f} N shear",
@@ -164,9 +164,9 @@ def _slide(recording: Recording, sensor: Sensor) -> str:
     """Return how friction builds up under the ball until it slips, as a table."""
     readings, mu = recording.sensors[sensor.name], sensor.parameters
     normal = readings.normal_force.sum(axis=1)
-    shear = np.linalg.norm(metrics.net_shear(readings, sensor.texels), axis=1)
-    share = metrics.mobilised_friction(readings, sensor.texels, mu.mus)
-    slipping = metrics.slipping(readings, mu)
+    shear = np.linalg.norm(response.net_shear(readings, sensor.texels), axis=1)
+    share = response.mobilised_friction(readings, sensor.texels, mu.mus)
+    slipping = response.slipping(readings, mu)
     rows = [("frame", "time", "normal", "shear", "shear / µs·normal", "texels slipping")]
     touching = np.flatnonzero(normal > 0)
     for i in touching[:: max(1, len(touching) // 10)]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from ..core.errors import FileError
 from ..core.io.file_writing import writable_folder
 from ..core.io.input_files import require_regular
-from ..core.simulators.registry import written_formats
+from ..core.simulators.sensor_format import written_formats
 from ..core.simulators.sensor_on_mesh import SensorOnMesh
 from . import blender, checks, console
 

@@ -29,6 +29,7 @@ from palpate.addon.render import render, render_setup
 from palpate.addon.render.video import encode_video
 from palpate.commands.bake import bake_with_progress
 from palpate.commands.console import blender_output_hidden
+from palpate.core import response
 from palpate.core.figures import color_maps
 from palpate.core.figures.figure_canvas import new_figure, save_figure, tidy_axes
 from palpate.core.figures.figure_style import INK, NORMAL_COLOUR, SHEAR_COLOUR, FigureStyle
@@ -36,8 +37,7 @@ from palpate.core.figures.quantities import Extent, Scale
 from palpate.core.figures.tactile_image import SensorView, draw_colour_bar
 from palpate.core.gap.report.plots import overview
 from palpate.core.geometry.texels import Texels
-from palpate.core.jobs.progress_bar import progress_bar
-from palpate.core.response import metrics
+from palpate.core.jobs import progress_bar
 from palpate.sample_blends import demo, hand, scene_builder, weighing
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -173,7 +173,7 @@ def touch_of(recording, texels: Mapping[str, Texels], frame: int) -> Touch:
     i = int(np.searchsorted(recording.frames, frame))
     seen = recording.sensors
     found = {name: (own, seen[name].normal_force[i], seen[name].shear[i]) for name, own in texels.items()}
-    return Touch(found, STYLE.scale(recording, texels), metrics.peak_shear(recording))
+    return Touch(found, STYLE.scale(recording, texels), response.peak_shear(recording))
 
 
 def draw_touch(figure, touch: Touch, place: Place) -> None:
@@ -306,9 +306,9 @@ def slip(film: Film) -> None:
     baked = bake_with_progress(scene)
     recording, (sensor,) = baked.recording, [one for one in baked.scenario.sensors if one.name == demo.PAD_A]
     seen, mu, texels = recording.sensors[sensor.name], sensor.parameters, {sensor.name: sensor.texels}
-    shear = np.linalg.norm(metrics.net_shear(seen, sensor.texels), axis=1)
+    shear = np.linalg.norm(response.net_shear(seen, sensor.texels), axis=1)
     limit = mu.mus * seen.normal_force.sum(axis=1)
-    sliding, title = metrics.slipping(seen, mu).sum(axis=1), "3  Shear and slip"
+    sliding, title = response.slipping(seen, mu).sum(axis=1), "3  Shear and slip"
     curves = {"shear": (shear, SHEAR_COLOUR, "-"), "static limit": (limit, INK, "--")}
     scene.frame_set(demo.PICTURE_FRAME)
     shown = render.bounding_box_corners([scene.objects[name] for name in (demo.PAD_A, f"{demo.PAD_A} base", demo.BALL)])
@@ -453,7 +453,7 @@ def simulator(film: Film) -> None:
     obj, cube, title = scene.objects[weighing.PAD], scene.objects[weighing.CUBE], "5  In a simulator's loop"
     pad = pp.sensor_of(obj)
     moments = mujoco_moments(pad, 0.8, 96)
-    scale = force_scale(metrics.scale_limit(2.0 * WEIGHT / len(pad.texels)))  # the impact is far above the scale
+    scale = force_scale(response.scale_limit(2.0 * WEIGHT / len(pad.texels)))  # the impact is far above the scale
     strongest = max(float(np.linalg.norm(one.shear, axis=1).max()) for one in moments)
     time, lift = np.array([one.time for one in moments]), np.array([one.lift for one in moments])
     curves = {"on the cube": (lift, NORMAL_COLOUR, "-"), "weight": (np.full(len(time), WEIGHT), INK, "--")}

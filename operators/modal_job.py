@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ..addon.session import session_state
-from ..core.jobs.job_runner import SlicedJob, run_job
+from ..core.jobs import SlicedJob, run_job
 from . import support
 
 

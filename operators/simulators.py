@@ -10,7 +10,7 @@ from . import support
 
 
 def _format_items(_self, _context):
-    from ..core.simulators.registry import written_formats
+    from ..core.simulators.sensor_format import written_formats
 
     _format_items.kept = [(name, item.title, item.description) for name, item in written_formats().items()]
     return _format_items.kept  # Blender does not keep the texts itself
@@ -35,7 +35,7 @@ class PALPATE_OT_sensor_export(support.ErrorReporting, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def run(self, context):
-        from ..core.simulators.registry import export_sensors
+        from ..core.simulators.sensor_format import export_sensors
 
         names = [obj.name for obj in context.selected_objects if obj.palpate.role in {"SENSOR", "PAD"}]
         sensors = sensor_exchange.sensors_on_meshes(context.scene, names)

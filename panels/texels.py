@@ -2,7 +2,7 @@
 """Panel of a sensor's texels: their number and density, the advised time step, and problems with a button that fixes each."""
 
 from ..addon.authoring import problems, sensor_report
-from ..core.geometry.layout.grid_layout import GridLayout
+from ..core.geometry.grid_layout import GridLayout
 from ..core.solver.time_step_adviser import benefit
 from .subpanels import Subpanel, draw_sentences
 

@@ -13,7 +13,7 @@ import numpy as np
 from ..addon.bake import bake as baking
 from ..addon.render import render
 from ..addon.scene import scene_reader
-from ..core.jobs.job_runner import run_job
+from ..core.jobs import run_job
 from ..core.model.recording import Recording
 from ..core.model.scenario import Scenario
 

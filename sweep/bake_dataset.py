@@ -9,7 +9,7 @@ from ..core.errors import FileError, os_error_reason
 from ..core.export.exporter import Exporter, sensor_progress
 from ..core.figures.figure_style import FigureStyle
 from ..core.io.bake_reader import Bake
-from ..core.jobs.progress import Job
+from ..core.jobs import Job
 from .features import bake_frames
 from .lerobot import LeRobotWriter
 from .parts import require_pyarrow

@@ -17,19 +17,19 @@ from typing import Any
 
 import numpy as np
 
+from ..core import response
 from ..core.errors import FileError, PalpateError
-from ..core.geometry.layout.grid_layout import GridLayout
+from ..core.geometry.grid_layout import GridLayout
 from ..core.geometry.texels import Texels
 from ..core.io.bake_folder import folder_names
 from ..core.io.bake_reader import Bake
 from ..core.io.file_writing import atomic_write
-from ..core.io.sensor_npz import load_sensor, save_sensor
+from ..core.io.recording_npz import load_sensor, save_sensor
 from ..core.model.digest import digest_of
 from ..core.model.recording import Recording, SensorRecording
 from ..core.model.scenario import Scenario
 from ..core.model.sensor_parameters import Painted, SensorParameters
 from ..core.model.shared_results import SharedResults
-from ..core.response import metrics
 from ..core.study.study_file import Study
 
 POSE_AXES = ("x", "y", "z", "qw", "qx", "qy", "qz")
@@ -289,7 +289,7 @@ def _texel_features(name: str, sensor: _SensorRun, style: FrameStyle) -> Iterato
     yield Feature(f"observation.reading.{name}", style.dtype, shape, names, sensor.parameters.unit, about), readings
     touch = placed("bool", arrays.contact)
     yield Feature(f"contact.touch.{name}", "bool", shape, names, "1", "Which texels touch something."), touch
-    slips = placed("bool", metrics.slipping(arrays, sensor.parameters, sensor.painted))
+    slips = placed("bool", response.slipping(arrays, sensor.parameters, sensor.painted))
     about = "Which texels touch, move, and are at the limit of friction."
     yield Feature(f"contact.slip.{name}", "bool", shape, names, "1", about), slips
 

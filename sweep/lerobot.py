@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.geometry.layout.grid_layout import GridLayout
+from ..core.geometry.grid_layout import GridLayout
 from ..core.geometry.texels import Texels
 from .features import AXES, TIMESTAMP, Feature, Layout, varied_feature
 from .parts import COMPRESSION

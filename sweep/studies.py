@@ -16,7 +16,7 @@ from ..core.compiled.thread_team import count_of_cores
 from ..core.errors import FileError, PalpateError
 from ..core.io.file_writing import writable_folder
 from ..core.io.hidden_folder import FolderLock
-from ..core.jobs.progress import Progress
+from ..core.jobs import Progress
 from ..core.study.progress import STUDY_NAME
 from ..core.study.study_file import read_study
 from . import driver, study_folder

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import errno
+import math
 import os
 import shutil
 import threading
@@ -16,14 +17,30 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..core.errors import FileError, PalpateError, os_error_reason
-from ..core.jobs.job_runner import run_job
-from ..core.model.recording import Recording
+from ..core.geometry.rotations import rotation_matrices
+from ..core.io.bake_folder import (
+    IMAGE_LIST_NAME,
+    RECORDING_NAME,
+    checksum_line,
+    folder_names,
+    frame_file,
+    manifest_of,
+    write_manifest,
+)
+from ..core.io.file_writing import file_sha256
+from ..core.io.recording_npz import SENSOR_NAME, save_recording, save_sensor
+from ..core.io.tactile_exr import describe, nearest_places, write_exrs
+from ..core.jobs import run_job
+from ..core.model.recording import Recording, SensorRecording
 from ..core.model.scenario import Scenario
+from ..core.model.sensor import Sensor
 from ..core.model.shared_results import SharedResults
-from ..core.study.metrics import metrics_of
+from ..core.response import net_shear, share_on, slipping
+from ..core.study.presses import Press, place_of
 from ..core.study.progress import RUNS, STUDY_NAME
-from ..core.study.run_folder import write_run_folder
 from ..core.study.scene_property import is_scene_property, scene_values
 from ..core.study.study_file import SCENE, Run
 from ..core.study.variation import PRESS, varied_scenario
@@ -32,6 +49,153 @@ from .parts import RunResult, write_part
 from .program import Program, frozen_program, require_allowed
 from .scene_evaluation import REFUSE, SceneReader
 from .study_folder import OpenStudy, resume_study
+
+# Metrics of a run of a study.
+#
+# ======================  ============================================================================================
+# ``max_normal_force``    N, largest sum of the texels' normal forces
+# ``max_texel_force``     N, largest normal force of a texel
+# ``max_shear``           N, largest magnitude of the sum of shear
+# ``max_depth``           m
+# ``max_contact_texels``  largest number of texels that touch at once
+# ``first_contact``       s, first frame with a contact; missing where nothing touches
+# ``first_slip``          s, first frame in which a texel slips; missing where none does
+# ``max_slip_share``      largest share of the normal force on slipping texels
+# ``end_normal_force``    N, at the last frame
+# ======================  ============================================================================================
+#
+# With several sensors each name begins with that of the sensor. ``BODY.held`` is 1 when a free body is still within reach of a
+# sensor at the last frame and that sensor feels something, else 0; ``BODY.fall`` is how far its centre of mass has moved along
+# gravity, m. ``press.x``, ``y``, ``z`` are the place of a press in the frame of the sensor's body, m.
+
+
+def metrics_of(scenario: Scenario, recording: Recording, press: Press | None = None) -> dict[str, float]:
+    """Return the metrics of a run by name.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Of the run.
+    recording : Recording
+    press : Press, optional
+        That the run has made.
+    """
+    read_out = [sensor for sensor in scenario.sensors if sensor.readout]
+    found: dict[str, float] = {}
+    for sensor in read_out:
+        start = f"{sensor.name}." if len(read_out) > 1 else ""
+        own = _sensor_metrics(sensor, recording.sensors[sensor.name], recording.times)
+        found |= {f"{start}{name}": value for name, value in own.items()}
+    for index, body in enumerate(scenario.bodies):
+        if body.free:
+            found[f"{body.name}.held"] = float(_is_held(index, scenario, recording))
+            found[f"{body.name}.fall"] = _fall(index, scenario, recording)
+    if press is not None:
+        found |= {f"press.{axis}": float(value) for axis, value in zip("xyz", place_of(scenario, press), strict=True)}
+    return found
+
+
+def _sensor_metrics(sensor: Sensor, measured: SensorRecording, times: np.ndarray) -> dict[str, float]:
+    normal, touching = measured.normal_force.sum(axis=1), np.asarray(measured.contact, bool)
+    slips = slipping(measured, sensor.parameters, sensor.painted)
+    found = {
+        "max_normal_force": float(normal.max()),
+        "max_texel_force": float(measured.normal_force.max()),
+        "max_shear": float(np.linalg.norm(net_shear(measured, sensor.texels), axis=1).max()),
+        "max_depth": float(measured.depth.max()),
+        "max_contact_texels": float(touching.sum(axis=1).max()),
+        "max_slip_share": float(share_on(slips, measured).max()),
+        "end_normal_force": float(normal[-1]),
+    }
+    for name, happens in (("first_contact", touching), ("first_slip", slips)):
+        frames = np.flatnonzero(happens.any(axis=1))
+        if len(frames):
+            found[name] = float(times[frames[0]])
+    return found
+
+
+def _fall(index: int, scenario: Scenario, recording: Recording) -> float:
+    size = np.linalg.norm(scenario.gravity)
+    if size == 0.0:
+        return 0.0
+    center = _centers(index, scenario, recording)
+    return float((center[-1] - center[0]) @ scenario.gravity / size)
+
+
+def _centers(index: int, scenario: Scenario, recording: Recording) -> np.ndarray:
+    """Return where the centre of mass of a body is at the first and at the last frame, (2, 3) m, world."""
+    poses = recording.poses[[0, -1], index]
+    return poses[:, :3] + np.einsum("fij,j->fi", rotation_matrices(poses[:, 3:]), scenario.bodies[index].center_of_mass)
+
+
+def _is_held(index: int, scenario: Scenario, recording: Recording) -> bool:
+    """Return whether a free body is near a sensor in contact at the last frame."""
+    center = _centers(index, scenario, recording)[1]
+    own = [target for target in scenario.targets if target.body == index]
+    middle = scenario.bodies[index].center_of_mass
+    reach = max((float(np.linalg.norm(target.mesh.vertices - middle, axis=1).max()) for target in own), default=0.0)
+    for sensor in scenario.sensors:
+        if sensor.body == index or not sensor.readout or not recording.sensors[sensor.name].contact[-1].any():
+            continue
+        pose = recording.poses[-1, sensor.body]
+        texels = pose[:3] + sensor.texels.position @ rotation_matrices(pose[None, 3:])[0].T
+        if np.linalg.norm(texels - center, axis=1).min() <= reach + sensor.parameters.max_penetration:
+            return True
+    return False
+
+
+MOST_PIXELS = 1 << 20
+"""Pixels that are in memory at once; one call for many small images is faster than one for each."""
+
+
+def write_run_folder(folder: Path, scenario: Scenario, recording: Recording, images: bool) -> None:
+    """Write a folder for each sensor into the folder of a run.
+
+    Parameters
+    ----------
+    folder : Path
+    scenario : Scenario
+        That was computed.
+    recording : Recording
+    images : bool
+        True for a tactile image of each frame.
+
+    Raises
+    ------
+    FileError, OSError
+        A file cannot be written.
+    """
+    names = folder_names(recording.sensors)
+    for sensor in scenario.sensors:
+        if not sensor.readout:
+            continue
+        own = folder / names[sensor.name]
+        own.mkdir()
+        alone = replace(recording, sensors={sensor.name: recording.sensors[sensor.name]})
+        save_recording(own / RECORDING_NAME, alone, atomic=False)
+        save_sensor(own / SENSOR_NAME, sensor.texels, sensor.painted, atomic=False)
+        files = [RECORDING_NAME, SENSOR_NAME]
+        if images:
+            _write_images(own, sensor, recording)
+            files.append(IMAGE_LIST_NAME)  # it lists the images
+        digests = {name: file_sha256(own / name) for name in files}
+        write_manifest(own, manifest_of(scenario, sensor, recording, digests))
+
+
+def _write_images(folder: Path, sensor: Sensor, recording: Recording) -> None:
+    """Write an image for each frame of a sensor, and the list of their SHA-256."""
+    at_once = max(1, MOST_PIXELS // math.prod(sensor.texels.layout.shape))
+    nearest = nearest_places(sensor.texels, recording.sensors[sensor.name].channels)
+    lines = []
+    numbers = [int(frame) for frame in recording.frames]
+    for start in range(0, len(numbers), at_once):
+        frames = [recording.at(number) for number in numbers[start : start + at_once]]
+        paths = [folder / frame_file(frame.frame) for frame in frames]
+        headers = [describe(sensor, frame, recording.digest) for frame in frames]
+        write_exrs(paths, sensor.texels.layout, [frame.sensors[sensor.name] for frame in frames], headers, nearest)
+        lines += [checksum_line(path.name, file_sha256(path)) for path in paths]
+    (folder / IMAGE_LIST_NAME).write_bytes(b"".join(lines))
+
 
 PART_BYTES = 256 << 20
 """Numbers of frames from which on a batch writes what it has into a part and goes on with another, as they are in memory."""

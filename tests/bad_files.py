@@ -35,19 +35,17 @@ from palpate.core.gap.logs.log_file import read_log
 from palpate.core.gap.logs.new_rig import write_rig
 from palpate.core.gap.logs.proposal import propose
 from palpate.core.geometry.mesh import TriangleMesh
-from palpate.core.geometry.sampling.texel_arrays import pad_array
+from palpate.core.geometry.texel_arrays import pad_array
 from palpate.core.geometry.texels import texels_from_region
 from palpate.core.io.csv_table import read_table
-from palpate.core.io.recording_npz import load_recording, save_recording
+from palpate.core.io.recording_npz import load_recording, load_sensor, save_recording, save_sensor
 from palpate.core.io.scenario_npz import load_scenario, save_scenario
-from palpate.core.io.sensor_npz import load_sensor, save_sensor
 from palpate.core.io.sensor_toml import FORMAT, read_sensor
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
 from palpate.core.simulators.openrave_file import OpenRaveSensor, openrave_xml, read_openrave
-from palpate.core.simulators.registry import export_sensors, import_sensors
-from palpate.core.simulators.sensor_format import FoundSensor
+from palpate.core.simulators.sensor_format import FoundSensor, export_sensors, import_sensors
 from palpate.core.simulators.sensor_on_mesh import SensorOnMesh
 from palpate.core.study.study_file import Runs, plan_for, read_study
 

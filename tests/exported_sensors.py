@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from palpate.core.geometry.mesh import TriangleMesh
-from palpate.core.geometry.sampling.texel_arrays import pad_array
+from palpate.core.geometry.texel_arrays import pad_array
 from palpate.core.geometry.texels import texels_from_region
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import Painted, SensorParameters

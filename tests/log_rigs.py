@@ -5,7 +5,7 @@ from palpate.core.gap.logs.answers import read_answers
 from palpate.core.gap.logs.log_file import read_log
 from palpate.core.gap.logs.new_rig import write_rig
 from palpate.core.gap.logs.proposal import propose
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 
 def write_csv(path, columns):

@@ -11,7 +11,7 @@ import tomli_w
 
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.selection.diagnosis import SELECTION_BEGINS, diagnose
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 SHAPES: list[dict[str, Any]] = [{"sphere": 0.008}, {"box": [0.004, 0.004, 0.01]}, {"cylinder": [0.003, 0.01]}]
 HEIGHTS = (0.0, 2e-4, -3e-4, "free", 0.05)

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 
-from palpate.core.geometry.layout.grid_layout import GridLayout
-from palpate.core.geometry.layout.texture_maps import UVLayout
+from palpate.core.geometry.grid_layout import GridLayout
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.texels import Texels, texels_from_region
+from palpate.core.geometry.texture_maps import UVLayout
 from palpate.core.io.bake_folder import (
     IMAGE_LIST_NAME,
     RECORDING_NAME,
@@ -23,8 +23,7 @@ from palpate.core.io.bake_folder import (
     write_manifest,
 )
 from palpate.core.io.file_writing import file_sha256
-from palpate.core.io.recording_npz import save_recording
-from palpate.core.io.sensor_npz import SENSOR_NAME, save_sensor
+from palpate.core.io.recording_npz import SENSOR_NAME, save_recording, save_sensor
 from palpate.core.io.tactile_exr import write_exrs
 from palpate.core.model.recording import Recording, SensorFrame, SensorRecording
 from palpate.core.model.sensor_parameters import Painted, SensorParameters

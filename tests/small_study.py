@@ -13,12 +13,10 @@ from sample_bake import grid_texels
 
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.io.scenario_npz import save_scenario
-from palpate.core.model.body import Body
-from palpate.core.model.motion import Motion
-from palpate.core.model.scenario import Scenario
+from palpate.core.model.body import Body, Motion
+from palpate.core.model.scenario import Scenario, Target
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import SensorParameters
-from palpate.core.model.target import Target
 from palpate.sweep.parts import Parts
 from palpate.sweep.scene_evaluation import ALLOW
 from palpate.sweep.study_folder import OpenStudy, begin_study

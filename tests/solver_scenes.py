@@ -9,13 +9,10 @@ import trimesh
 from palpate.core.geometry.mesh import TriangleMesh, checked_mesh, mass_properties
 from palpate.core.geometry.rotations import rotation_matrices
 from palpate.core.geometry.texels import Texels, texels_from_region
-from palpate.core.model.body import Body
-from palpate.core.model.drive import Drive
-from palpate.core.model.motion import Motion, Signal
-from palpate.core.model.scenario import Scenario
+from palpate.core.model.body import Body, Drive, Motion, Signal
+from palpate.core.model.scenario import Scenario, Target
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import SensorParameters
-from palpate.core.model.target import Target
 
 GRAVITY = 9.81
 LEVEL = (1.0, 0.0, 0.0, 0.0)

@@ -17,7 +17,7 @@ from palpate.core.effects.engine.compiled_program import (
     write_base_law,
 )
 from palpate.core.laws.contact_law import LINEAR_EXPONENT, contact_law
-from palpate.core.model.effect import Effect
+from palpate.core.model.sensor import Effect
 from palpate.core.model.sensor_parameters import SensorParameters
 
 

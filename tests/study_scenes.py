@@ -4,11 +4,9 @@
 import trimesh
 from solver_scenes import box, free_body, pad, shape
 
-from palpate.core.model.body import Body
-from palpate.core.model.motion import Motion
-from palpate.core.model.scenario import Scenario
+from palpate.core.model.body import Body, Motion
+from palpate.core.model.scenario import Scenario, Target
 from palpate.core.model.sensor import Sensor
-from palpate.core.model.target import Target
 
 BALL_RADIUS = 0.006
 HEAD = 'format = "palpate-sweep/1"\nscene = "tiny.npz"\n'

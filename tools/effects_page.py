@@ -203,7 +203,7 @@ def _over_speed(axes, kind):
 
 def _peaks(axes, kind):
     """Draw the peak reading of each of forty pressings under steady sliding."""
-    from palpate.core.effects.engine.declarations import cycles
+    from palpate.core.effects.engine.specification import cycles
 
     time = np.linspace(0, 40, 4001)
     texel = _pressed(time, cycles(40, time), np.full(len(time), 1e-3))
@@ -259,7 +259,7 @@ DRAWINGS = {
     "texel": _texels,
     "ball": _ball,
 }
-"""What draws the experiments of core/effects/engine/declarations.py."""
+"""What draws the experiments of core/effects/engine/specification.py."""
 
 
 def main() -> int:

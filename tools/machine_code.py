@@ -37,9 +37,9 @@ def _choose_processor() -> None:
     """Tell numba for which processor it compiles; this holds when numba is imported afterwards."""
     import llvmlite.binding as llvm
 
-    from palpate.core.compiled import processors
+    from palpate.core.compiled import machine_code
 
-    found = processors.target()
+    found = machine_code.target()
     if found is None:
         sys.exit("No common processor is known for this architecture: the solver is compiled at first use.")
     name, features = found

@@ -7,7 +7,7 @@ import numpy as np
 from bpy_extras.object_utils import object_data_add
 
 from ...core.errors import SceneError
-from ...core.geometry.layout.grid_layout import GridLayout
+from ...core.geometry.grid_layout import GridLayout
 from ...core.model.sensor_parameters import SensorParameters
 from ..properties import effect_stack, parameter_properties
 from ..scene import participants, sensor_reader

@@ -16,15 +16,8 @@ import numpy as np
 
 from ...core.errors import SensorError
 from ...core.geometry.mesh import TriangleMesh, checked_mesh, vertex_normals
-from ...core.geometry.sampling.poisson_disk import scatter
-from ...core.geometry.sampling.texel_arrays import (
-    TexelMesh,
-    filled_region,
-    pad_array,
-    region_middle,
-    shifted_pose,
-    wrapped_array,
-)
+from ...core.geometry.scattered_points import scatter
+from ...core.geometry.texel_arrays import TexelMesh, filled_region, pad_array, region_middle, shifted_pose, wrapped_array
 from ..scene import mesh_arrays, participants, sensor_regions
 from ..session import identity, transforms, units
 from . import sensor_presets, sensors, surface_binding

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...core.errors import FileError, SceneError
 from ...core.geometry.mesh import TriangleMesh, vertex_normals
-from ...core.geometry.plausible_size import require_sensor_size
+from ...core.simulators.sensor_format import require_sensor_size
 from ..properties import effect_stack
 from ..scene import mesh_arrays
 from ..scene.display_names import STATED_NORMAL
@@ -72,7 +72,7 @@ def import_file(context, path, names=()) -> tuple[list, list[str]]:
 def _found_in(context, path) -> list:
     if Path(path).suffix.lower() == ".blend":
         return _read_gentact(context, path)
-    from ...core.simulators.registry import import_sensors
+    from ...core.simulators.sensor_format import import_sensors
 
     return import_sensors(path)[1]
 

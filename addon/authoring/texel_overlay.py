@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
-from ...core.geometry.layout.grid_layout import GridLayout
+from ...core.geometry.grid_layout import GridLayout
 from ..scene.display_names import GAP_COLORS
 from ..session import frame_status, transforms, view_shading
 from . import sensor_report

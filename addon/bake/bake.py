@@ -11,8 +11,7 @@ import bpy
 from ...core.errors import SceneError
 from ...core.io.bake_folder import BakeOwner
 from ...core.io.bake_reader import Bake
-from ...core.jobs.job_runner import part_of_job
-from ...core.jobs.progress import Job, Progress
+from ...core.jobs import Job, Progress, part_of_job
 from ...core.model.recording import Frame, Recording
 from ...core.model.scenario import Scenario
 from ...core.skins.channel_readouts import with_clipping_warnings
@@ -45,7 +44,7 @@ def bake(scene, into_scene: bool = True, images: bool = True, blend: bake_files.
     """Compute the whole frame range of a scene, write the files, and put the result into the scene.
 
     Nothing in the scene changes before the last step, and an earlier bake stays as it is until then, also if the generator is
-    closed. A kill in the last step may leave files of both bakes, which their readers say (:mod:`...core.io.bake_replacement`).
+    closed. A kill in the last step may leave files of both bakes, which their readers say (:mod:`...core.io.bake_folder`).
 
     Parameters
     ----------

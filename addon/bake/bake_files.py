@@ -16,25 +16,26 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import FileError, os_error_reason
-from ...core.io import bake_replacement
 from ...core.io.bake_folder import (
     BAKE_FILE_NAMES,
     MANIFEST_FORMAT,
     MANIFEST_NAME,
     RECORDING_NAME,
     BakeOwner,
+    begin_bake,
+    discard_bake,
     folder_names,
     manifest_of,
     other_owner,
+    publish_bake,
     read_manifest,
     write_manifest,
 )
 from ...core.io.file_writing import bake_bytes, file_sha256, require_space, writable_folder
 from ...core.io.hidden_folder import PRIVATE_FOLDER, FolderLock, is_private_folder
 from ...core.io.input_files import read_bytes
-from ...core.io.recording_npz import save_recording
+from ...core.io.recording_npz import SENSOR_NAME, save_recording, save_sensor
 from ...core.io.row_tables import FrameTable
-from ...core.io.sensor_npz import SENSOR_NAME, save_sensor
 from ...core.model.recording import Frame, Recording
 from ...core.model.scenario import Scenario
 from .bake_images import BakeImages
@@ -163,7 +164,7 @@ class BakeFiles:
         self._lock = FolderLock(writable_folder(self.folder, create=True))
         try:
             with _refusals_named(self.folder):
-                new = bake_replacement.begin(self.folder)
+                new = begin_bake(self.folder)
                 self._check_replaceable()
                 self._new = {name: new / self._names[name] for name in self._sensors}
                 for own in self._new.values():
@@ -181,7 +182,7 @@ class BakeFiles:
         if self._images is not None:
             self._images.stop()
         with suppress(OSError):  # the next bake tries again
-            bake_replacement.discard(self.folder)
+            discard_bake(self.folder)
         self._lock.release()
 
     def write(self, frame: Frame) -> None:
@@ -236,11 +237,11 @@ class BakeFiles:
         names = [self._names[name] for name in self._sensors]
         with _refusals_named(self.folder):
             if blend is None:
-                bake_replacement.replace(self.folder, names)
+                publish_bake(self.folder, names)
                 return
             try:
                 blend.prepare()
-                bake_replacement.replace(self.folder, names, blend.exchange)
+                publish_bake(self.folder, names, blend.exchange)
             finally:
                 blend.waiting.unlink(missing_ok=True)
 

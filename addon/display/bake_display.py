@@ -13,12 +13,12 @@ from itertools import combinations
 import bpy
 import numpy as np
 
+from ...core import response
 from ...core.errors import SceneError
 from ...core.figures.figure_style import FigureStyle
 from ...core.figures.quantities import Extent
 from ...core.io.bake_folder import frame_file
 from ...core.io.bake_reader import Bake, read_sensors
-from ...core.response import metrics
 from ..properties import scene_properties
 from ..scene import baked_names
 from ..session import units
@@ -59,7 +59,7 @@ class Scales:
         size = max((item.size for item in baked_sensors), default=1.0)
         unit = baked_sensors[0].scale if baked_sensors else 1.0
         largest_force = _largest(np.linalg.norm(item.readings.net_force, axis=1) for item in baked_sensors)
-        largest_moment = _largest(np.linalg.norm(metrics.free_moment(item.readings), axis=1) for item in baked_sensors)
+        largest_moment = _largest(np.linalg.norm(response.free_moment(item.readings), axis=1) for item in baked_sensors)
         force = units.as_typed(settings.arrow_scale) / unit
         if settings.use_auto_arrow:
             force = min(size / largest_force, _max_scale_of_facing_arrows(baked_sensors)) if largest_force > 0 else 0.0

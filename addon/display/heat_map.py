@@ -7,8 +7,8 @@ import bpy
 import numpy as np
 
 from ...core.figures.quantities import Scale
-from ...core.geometry.layout.texture_maps import UVLayout
 from ...core.geometry.texels import Texels
+from ...core.geometry.texture_maps import UVLayout
 from ..scene import mesh_arrays
 from ..scene.display_names import HEAT_MAP_MODIFIER, OLD_MATERIAL, UV_MAP
 from . import materials, played_table

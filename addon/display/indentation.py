@@ -4,7 +4,7 @@
 Geometry nodes subdivide the sensor's faces and move their vertices inwards. They read the penetration from an image that is
 packed into the .blend, with a row for each frame, so that the surface plays in any Blender and without the files of the bake.
 Between the texels the penetration is the surface of Catmull and Clark, which Blender's node for subdivision makes
-(:mod:`....core.geometry.smooth_depth`). The user's mesh keeps its vertices.
+(:mod:`....core.geometry.grid_layout`). The user's mesh keeps its vertices.
 
 What reads a scene must not take the indented surface for the sensor's shape: :func:`.mesh_arrays.evaluated_mesh` gives the mesh
 without it.
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...core.geometry.smooth_depth import NEIGHBOUR_WEIGHT, SHARPENINGS
+from ...core.geometry.grid_layout import NEIGHBOUR_WEIGHT, SHARPENINGS
 from ..scene import mesh_arrays
 from ..scene.display_names import INDENTATION_MODIFIER, MODIFIERS, REST_POSITION
 from ..session import transforms

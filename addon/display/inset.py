@@ -10,10 +10,9 @@ import numpy as np
 
 from ...core.figures import color_maps
 from ...core.figures.quantities import Scale
-from ...core.geometry.layout.grid_layout import GridLayout
-from ...core.geometry.layout.texture_maps import UVLayout
-from ...core.geometry.projection import Projection, projection_of
-from ...core.geometry.texels import Texels
+from ...core.geometry.grid_layout import GridLayout
+from ...core.geometry.texels import Projection, Texels, projection_of
+from ...core.geometry.texture_maps import UVLayout
 from ..session import redraw
 
 MAX_SENSORS = 4

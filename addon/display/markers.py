@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 from mathutils import Quaternion, Vector
 
-from ...core.response import metrics
+from ...core import response
 from ..session import fcurves, identity
 from . import marker_meshes, materials
 from .baked_sensor import BakedSensor
@@ -94,7 +94,7 @@ def _force(sensor: BakedSensor) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _torque(sensor: BakedSensor) -> tuple[np.ndarray, np.ndarray]:
-    moment = metrics.free_moment(sensor.readings)
+    moment = response.free_moment(sensor.readings)
     return -moment, np.linalg.norm(moment, axis=1)
 
 
@@ -103,7 +103,7 @@ def _centre(sensor: BakedSensor) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _slip(sensor: BakedSensor) -> tuple[np.ndarray, np.ndarray]:
-    share = metrics.slip_share(sensor.readings, sensor.parameters, sensor.painted)
+    share = response.slip_share(sensor.readings, sensor.parameters, sensor.painted)
     return _outward_direction(sensor), share * RING_SHARE * sensor.size
 
 

@@ -17,8 +17,7 @@ import numpy as np
 from ...core.errors import SceneError
 from ...core.figures import color_maps
 from ...core.figures.quantities import ERROR, Scale, error_scale
-from ...core.jobs.job_runner import part_of_job
-from ...core.jobs.progress import Progress
+from ...core.jobs import Progress, part_of_job
 from ..authoring import exchange
 from ..properties import effect_stack
 from ..scene import participants, sensor_reader
@@ -90,8 +89,8 @@ def find(obj):
     """
     from ...api.gap import read_rig, search
     from ...core.gap.report import sentences
-    from ...core.gap.report.experiments import next_experiment
     from ...core.gap.report.plots import picture
+    from ...core.gap.report.sentences import next_experiment
 
     yield from first_use.wait()
     yield Progress("Reading the recordings", 0, 1000)

@@ -36,7 +36,7 @@ def make(context, obj, paths, folder: Path, accept: bool, replies: Sequence[str]
     from ...core.gap.logs.proposal import propose
     from ...core.gap.logs.questions import answered
     from ...core.gap.logs.template import ANSWERS_NAME, PLOT_NAME, answers_or_template
-    from ...core.jobs.job_runner import run_job
+    from ...core.jobs import run_job
 
     logs = [read_log(path) for path in paths]
     if (folder / ANSWERS_NAME).exists():

@@ -10,8 +10,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import SceneError
-from ...core.jobs.job_runner import part_of_job
-from ...core.jobs.progress import Progress
+from ...core.jobs import Progress, part_of_job
 from ..session import fcurves, first_use, identity, transforms, units
 from . import gap_results
 

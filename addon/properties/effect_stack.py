@@ -16,8 +16,8 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from ...core.effects.engine import registry
 from ...core.effects.engine.specification import Form, Kind
 from ...core.errors import EffectError
-from ...core.model.effect import Effect
 from ...core.model.parameter import Parameter
+from ...core.model.sensor import Effect
 from ..session import units
 from .parameter_properties import CONSTANT, FIXED, float_property, unit_in_words, with_unit
 

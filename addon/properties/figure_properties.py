@@ -14,7 +14,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ...core.export.registry import exporters
+from ...core.export.exporter import exporters
 from ...core.figures.gel_image import LIGHT_ANGLES, MARKERS_ALONG, GelStyle
 from . import path_options
 from .scene_units import in_units

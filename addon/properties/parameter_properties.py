@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 from bpy.props import EnumProperty, FloatProperty, StringProperty
 
-from ...core.model.drive import DRIVE_PARAMETERS
+from ...core.model.body import DRIVE_PARAMETERS
 from ...core.model.parameter import ChoiceParameter, Parameter, Specification
 from ...core.model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters
 from ..session import session_state, units

@@ -12,8 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ...core import response
 from ...core.errors import SceneError
-from ...core.export.registry import export, exporters
+from ...core.export.exporter import export, exporters
 from ...core.figures.side_by_side import side_by_side
 from ...core.figures.tactile_strip import tactile_strip
 from ...core.figures.texel_numbers import MOST, texel_numbers
@@ -23,9 +24,7 @@ from ...core.io.bake_reader import Bake, frame_index, read_sensors
 from ...core.io.file_list import FileList
 from ...core.io.file_writing import require_space, writable_folder
 from ...core.io.hidden_folder import temporary_folder
-from ...core.jobs.job_runner import part_of_job
-from ...core.jobs.progress import Job, Progress
-from ...core.response import metrics
+from ...core.jobs import Job, Progress, part_of_job
 from ..display import bake_identity, baked_scene
 from . import figure_size, gel_figures, loaded_texels, render, render_setup, see_through, video, workbench_colors
 from .figure_request import FigureRequest
@@ -198,7 +197,7 @@ def _draw_nothing(_number: int) -> None:
 
 def _default_frame(bake: Bake, at_peak: bool) -> int:
     """Return the frame of the pictures where none is named."""
-    return metrics.peak_frame(bake.recording) if at_peak else metrics.settled_frame(bake.recording)
+    return response.peak_frame(bake.recording) if at_peak else response.settled_frame(bake.recording)
 
 
 class _StepCounter:

@@ -6,13 +6,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from ...core import response
 from ...core.errors import SensorError
 from ...core.figures.gel_image import image_size, require_grid, write_gel_image
-from ...core.geometry.layout.grid_layout import GridLayout
+from ...core.geometry.grid_layout import GridLayout
 from ...core.io.bake_folder import file_stems
 from ...core.io.bake_reader import Bake, frame_index
-from ...core.jobs.progress import Job, Progress
-from ...core.response import metrics
+from ...core.jobs import Job, Progress
 from .figure_request import FigureRequest
 
 
@@ -20,7 +20,7 @@ def gel_frames(bake: Bake, request: FigureRequest) -> tuple[int, ...]:
     """Return the frames of which images are wanted: those that are named, that of the peak, or all of the bake."""
     if request.frames:
         return request.frames
-    return (metrics.peak_frame(bake.recording),) if request.at_peak else tuple(int(number) for number in bake.recording.frames)
+    return (response.peak_frame(bake.recording),) if request.at_peak else tuple(int(number) for number in bake.recording.frames)
 
 
 def gel_sensors(bake: Bake, request: FigureRequest) -> list[str]:

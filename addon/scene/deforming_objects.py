@@ -15,10 +15,8 @@ from ...core.errors import SceneError
 from ...core.geometry.mesh import TriangleMesh
 from ...core.geometry.texels import DeformedTexels
 from ...core.io.row_tables import RowTable, motion_table
-from ...core.model.deformation import Deformation
-from ...core.model.scenario import Scenario
-from ...core.model.sensor import Sensor
-from ...core.model.target import Target
+from ...core.model.scenario import Scenario, Target
+from ...core.model.sensor import Deformation, Sensor
 from ..session import fcurves, identity
 from . import display_names, mesh_arrays
 from .mesh_snapshot import MeshSnapshot

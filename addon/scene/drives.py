@@ -10,8 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.errors import SceneError
-from ...core.model.drive import Drive
-from ...core.model.motion import Signal
+from ...core.model.body import Drive, Signal
 from ..properties.parameter_properties import DRIVE_PARAMETER_PROPERTIES, drive_parameters
 from ..session import transforms, units
 

@@ -14,16 +14,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...core.effects.engine.sensor_effects import check_scenario
+from ...core.effects.engine.registry import check_scenario
 from ...core.errors import SceneError
 from ...core.geometry.mesh import TriangleMesh, mass_properties
 from ...core.io.row_tables import motion_table
-from ...core.jobs.progress import Progress
-from ...core.model.body import Body
-from ...core.model.motion import Motion, Signal
-from ...core.model.scenario import Scenario
+from ...core.jobs import Progress
+from ...core.model.body import Body, Motion, Signal
+from ...core.model.scenario import Scenario, Target
 from ...core.model.sensor import Sensor
-from ...core.model.target import Target
 from ..properties import start_transforms
 from ..session import animation_time, identity, session_state, units
 from . import (

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from ...core.errors import ImageError
-from ...core.geometry.layout.texture_maps import UVLayout, mapped_layout
 from ...core.geometry.texels import Texels
+from ...core.geometry.texture_maps import UVLayout, mapped_layout
 from . import display_names, mesh_arrays
 
 IMAGE_PROPERTIES = ("image_layout", "image_map", "image_size", "image_filter")

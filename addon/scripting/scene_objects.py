@@ -10,7 +10,7 @@ from ...api import arguments
 from ...api.arguments import ArgumentError
 from ...api.sensors import Sensor
 from ...core.errors import PalpateError
-from ...core.jobs.job_runner import run_job
+from ...core.jobs import run_job
 from ...core.model.scenario import Scenario
 
 

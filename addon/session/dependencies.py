@@ -37,7 +37,7 @@ def debug_info() -> str:
     """Return what a maintainer needs to know about this installation, as plain text."""
     import bpy
 
-    from ...core.io import exr_file
+    from ...core.io import tactile_exr
 
     missing = missing_modules()
     return "\n".join(
@@ -46,7 +46,7 @@ def debug_info() -> str:
             f"Blender {bpy.app.version_string} ({bpy.app.build_platform.decode(errors='replace')})",
             f"Python {sys.version.split()[0]} on {platform.platform()} ({platform.machine()})",
             f"missing: {', '.join(missing) or 'nothing'}",
-            f"tactile images: by {exr_file.library()}",
+            f"tactile images: by {tactile_exr.library()}",
             *(f"{name}: {importlib.util.find_spec(name).origin}" for name in REQUIRED_MODULES if name not in missing),
         ]
     )

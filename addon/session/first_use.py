@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from ...core.jobs.progress import Progress
+from ...core.jobs import Progress
 from ...core.solver import precompile, precompile_process
 from . import dependencies, redraw
 

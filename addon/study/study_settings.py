@@ -109,7 +109,7 @@ def _object_entry(found: Found, obj) -> Entry | None:
 
 
 def _drive_entry(obj, key: str, number: float) -> Entry | None:
-    from ...core.model.drive import DRIVE_PARAMETERS
+    from ...core.model.body import DRIVE_PARAMETERS
 
     if key in DRIVE_PARAMETER_PROPERTIES:
         name = DRIVE_PARAMETER_PROPERTIES[key]

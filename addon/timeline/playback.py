@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import PalpateError
-from ...core.jobs.progress import Progress
+from ...core.jobs import Progress
 from ..display import baked_scene, materials, overlays
 from ..properties import start_transforms
 from ..scene import participants, scene_fingerprint

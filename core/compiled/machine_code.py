@@ -2,7 +2,7 @@
 """Machine code of the kernels that comes with the extension, so that its first use need not wait for the compiler.
 
 ``tools/machine_code.py`` compiles all kernels for a processor that nearly all computers of an architecture contain
-(:mod:`.processors`) and packs them into one file, which a zip carries. :func:`install` puts them into numba's cache where the
+(:mod:`.machine_code`) and packs them into one file, which a zip carries. :func:`install` puts them into numba's cache where the
 processor has what they need and numba, Python and the kernels are the same; otherwise they are compiled as without the file.
 The numbers are the same: no kernel lets the compiler reorder arithmetic.
 """
@@ -19,17 +19,36 @@ import zlib
 from pathlib import Path
 from typing import Any
 
-from . import processors
-from .kernel_fingerprint import fingerprint
+from .kernels import fingerprint
 from .numba_internals import CAN_PACK, dumps, processor_features, rebuild_environment, reduced_overloads, save_overload
+
+X86_64_V3 = ["avx", "avx2", "bmi", "bmi2", "cmov", "cx16", "cx8", "f16c", "fma", "fxsr", "lzcnt", "mmx", "movbe", "popcnt"]
+X86_64_V3 += ["sahf", "sse", "sse2", "sse3", "sse4.1", "sse4.2", "ssse3", "xsave"]
+ARM64 = ["aes", "crc", "fp-armv8", "fullfp16", "lse", "neon", "sha2"]
+TARGETS = {"x86_64": ("x86-64-v3", X86_64_V3), "arm64": ("apple-m1", ARM64)}
+"""By architecture: LLVM's name of the processor that is compiled for, and the features that a processor must have to run the
+code. x86-64-v3 is Intel since Haswell (2013) and AMD since Excavator (2015). Code for arm64 was never tried."""
+ARCHITECTURES = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "arm64", "aarch64": "arm64"}
+"""What systems call an architecture, in small letters."""
+
+
+def architecture() -> str:
+    """Return the name of this processor's architecture; empty where none is compiled for."""
+    return ARCHITECTURES.get(platform.machine().lower(), "")
+
+
+def target() -> tuple[str, list[str]] | None:
+    """Return the processor that is compiled for on this architecture, and its features; None if there is none."""
+    return TARGETS.get(architecture())
+
 
 PACKED_FILE = Path(__file__).parent / "machine_code.bin"
 """Where a zip carries the file."""
 
 
 def pack(kernels: list[Any]) -> bytes:
-    """Return the machine code of kernels that this process has compiled for :func:`.processors.target`: JSON, then a pickle."""
-    found = processors.target()
+    """Return the machine code of kernels that this process has compiled for :func:`target`: JSON, then a pickle."""
+    found = target()
     assert found is not None
     entries = {name: own for name, kernel in sorted(_by_name(kernels).items()) if (own := reduced_overloads(kernel))}
     body = zlib.compress(dumps(entries), 9)
@@ -95,7 +114,7 @@ def _made_by() -> dict[str, str]:
         "numba": version("numba"),
         "llvmlite": version("llvmlite"),
         "python": str(sys.implementation.cache_tag),
-        "system": f"{platform.system()}-{processors.architecture()}",
+        "system": f"{platform.system()}-{architecture()}",
     }
 
 

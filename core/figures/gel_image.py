@@ -16,12 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
+from .. import response
 from ..errors import ParameterError, SensorError
-from ..geometry.layout.grid_layout import GridLayout
-from ..geometry.smooth_depth import smooth_depth
+from ..geometry.grid_layout import GridLayout, smooth_depth
 from ..geometry.texels import Texels
 from ..model.recording import SensorFrame
-from ..response import metrics
 from . import color_maps
 from .figure_canvas import save_pixels
 from .tactile_image import SensorView
@@ -155,7 +154,7 @@ def marker_places(texels: Texels, name: str, pitch: float | None) -> tuple[np.nd
     pitch : float, metres
     """
     sides = np.array(_lengths(texels))
-    pitch = pitch or metrics.rounded_limit(float(sides.max()) / MARKERS_ALONG)
+    pitch = pitch or response.rounded_limit(float(sides.max()) / MARKERS_ALONG)
     counts = np.maximum(np.floor(sides / pitch), 1.0)
     if counts.prod() > MOST_MARKERS:
         raise ParameterError(

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .. import response
 from ..geometry.texels import Texels
 from ..model.recording import Recording
-from ..response import metrics
 from .figure_canvas import new_figure, save_figure
 from .figure_style import FONT, FigureStyle
 from .tactile_image import SensorView, draw_colour_bar
@@ -71,7 +71,7 @@ def label_picture(
     background.set_axis_off()
 
     sensors = recording.at(frame).sensors
-    scale, strongest = style.scale(recording, texels), metrics.peak_shear(recording)
+    scale, strongest = style.scale(recording, texels), response.peak_shear(recording)
     views = [SensorView.of(texels[name], recording.sensors[name].normal_force.sum(axis=0)) for name in texels]
     image = None
     # A column at the right edge: one tactile image per sensor over each other, the colour bar beside them.

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from .. import response
 from ..errors import ParameterError
 from ..geometry.texels import Texels
 from ..io.tactile_exr import nearest_places
 from ..model.recording import SensorArrays
-from ..response import metrics
 from . import color_maps
 
 FINER = {"N": "mN", "kPa": "Pa", "mm": "µm", "mm/s": "µm/s", "T": "mT", "V": "mV"}
@@ -35,7 +35,7 @@ Span = Callable[[float, float], tuple[float, float]]
 
 def from_zero(_low: float, high: float) -> tuple[float, float]:
     """Return a scale from zero to a round number above the largest value; of a load that is zero, to a number above one."""
-    return 0.0, metrics.scale_limit(high if high > 0.0 else 1.0)
+    return 0.0, response.scale_limit(high if high > 0.0 else 1.0)
 
 
 def about_zero(low: float, high: float) -> tuple[float, float]:

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .. import response
 from ..geometry.texels import Texels
 from ..io.bake_reader import frame_index
 from ..model.recording import Recording, SensorRecording
-from ..response import metrics
 from .figure_canvas import new_figure, save_figure, tidy_axes
 from .figure_style import FONT, INK, SERIES, SMALL, FigureStyle
 from .tactile_image import (
@@ -81,7 +81,7 @@ def side_by_side(
     axes.imshow(picture, aspect="auto", interpolation="antialiased")
     axes.set_axis_off()
 
-    scale, strongest = style.scale(recording, texels), metrics.peak_shear(recording)
+    scale, strongest = style.scale(recording, texels), response.peak_shear(recording)
     left, room = wide + _MARGIN, _SIDE - 2 * _MARGIN
     parts = [_Part.of(own, recording.sensors[name], strongest) for name, own in shown.items()]
     places = _placed(parts, room, _TALL - _CURVE - _BAR - _MARGIN)

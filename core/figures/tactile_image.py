@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..geometry.layout.grid_layout import GridLayout
+from ..geometry.grid_layout import GridLayout
 from ..geometry.texels import Texels
 from . import color_maps
 from .figure_style import FONT, INK, SMALL

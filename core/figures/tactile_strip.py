@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .. import response
 from ..geometry.texels import Texels
 from ..model.recording import Recording
-from ..response import metrics
 from .figure_canvas import new_figure, save_figure
 from .figure_style import FONT, GREY, INK, SMALL, FigureStyle
 from .quantities import Scale
@@ -59,7 +59,7 @@ def strip_figure(
     style : FigureStyle, optional
     """
     style = style or FigureStyle()
-    chosen = metrics.choose_frames(recording, COLUMNS[style.width]) if frames is None else np.asarray(frames)
+    chosen = response.choose_frames(recording, COLUMNS[style.width]) if frames is None else np.asarray(frames)
     views = [SensorView.of(own, recording.sensors[name].normal_force.sum(axis=0)) for name, own in texels.items()]
     page = _Page.of(style.width_inches, len(chosen), views)
     strip = _Strip(
@@ -67,7 +67,7 @@ def strip_figure(
         page=page,
         recording=recording,
         index=np.searchsorted(recording.frames, chosen),
-        strongest_shear=metrics.peak_shear(recording),
+        strongest_shear=response.peak_shear(recording),
         scale=style.scale(recording, texels),
     )
     image, y = None, page.height - _ABOVE

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import SensorError
-from ..geometry.layout.grid_layout import GridLayout
+from ..geometry.grid_layout import GridLayout
 from ..geometry.texels import Texels
 from ..model.recording import Recording
 from .figure_canvas import new_figure, save_figure

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .. import response
 from ..errors import ParameterError
 from ..geometry.texels import Texels
 from ..model.recording import Recording
 from ..model.sensor_parameters import SensorParameters
-from ..response import metrics
 from .figure_canvas import new_figure, save_figure, tidy_axes
 from .figure_style import FONT, INK, NORMAL_COLOUR, SERIES, SHEAR_COLOUR, SMALL, FigureStyle
 
@@ -56,7 +56,7 @@ def curves_figure(
     Parameters
     ----------
     kinds : sequence of {"force", "slip", "pressure centre"}
-        "slip" is the share of the normal force that rests on slipping texels (:func:`.metrics.slip_share`); the centre of
+        "slip" is the share of the normal force that rests on slipping texels (:func:`.response.slip_share`); the centre of
         pressure is along the sensor's x and y axes, from the origin of its body.
     marks : sequence of float, seconds
         Times at which a thin line stands, as those of a strip's images.
@@ -131,12 +131,12 @@ class _Pen:
 def _force(axes: Axes, recording: Recording, name: str, texels: Texels, _: SensorParameters, pen: _Pen) -> None:
     sensor = recording.sensors[name]
     axes.plot(recording.times, sensor.normal_force.sum(axis=1), **pen.solid)
-    axes.plot(recording.times, np.linalg.norm(metrics.net_shear(sensor, texels), axis=1), **pen.dashed)
+    axes.plot(recording.times, np.linalg.norm(response.net_shear(sensor, texels), axis=1), **pen.dashed)
     axes.set_ylabel("force (N)")
 
 
 def _slip(axes: Axes, recording: Recording, name: str, _: Texels, parameters: SensorParameters, pen: _Pen) -> None:
-    share = metrics.slip_share(recording.sensors[name], parameters)
+    share = response.slip_share(recording.sensors[name], parameters)
     axes.plot(recording.times, 100 * share, **pen.solid)
     axes.set_ylabel("slipping\n(% of load)")
 
@@ -230,7 +230,7 @@ def force_curves(
                 color=NORMAL_COLOUR,
             )
         else:
-            shear = np.linalg.norm(metrics.net_shear(sensor, texels[name]), axis=1)
+            shear = np.linalg.norm(response.net_shear(sensor, texels[name]), axis=1)
             axes.fill_between(
                 recording.times,
                 mu.mud * normal,

@@ -2,22 +2,21 @@
 """Geometry: triangle meshes, texels on them, contact points of texels, and the images that texels become.
 
 :mod:`.mesh` checks meshes and computes their normals, areas and mass properties; :mod:`.bvh` finds where segments meet them.
-:mod:`.texels` makes texels of a region's vertices, and :mod:`.projection` shows them from outside. :mod:`.layout` arranges
-texels as images, and :mod:`.sampling` places texels on a surface that has none. :mod:`.point_surface` joins points of a
-surface by triangles. :mod:`.smooth_depth` is the smooth surface of penetration between texels in rows and columns.
+:mod:`.texels` makes texels of a region's vertices and shows them from outside. :mod:`.grid_layout` and :mod:`.texture_maps`
+arrange texels as images. :mod:`.texel_arrays` and :mod:`.scattered_points` place texels on a surface that has none.
+:mod:`.point_surface` joins points of a surface by triangles.
 """
 
 __all__ = [
     "bvh",
     "contact_points",
-    "layout",
+    "grid_layout",
     "mesh",
-    "plausible_size",
     "point_surface",
-    "projection",
     "rotations",
-    "sampling",
+    "scattered_points",
     "shapes",
-    "smooth_depth",
+    "texel_arrays",
     "texels",
+    "texture_maps",
 ]

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .layout.grid_layout import GridLayout
+from .grid_layout import GridLayout
 from .texels import Texels
 
 

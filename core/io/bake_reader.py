@@ -18,11 +18,9 @@ from ..errors import FileError, PalpateError
 from ..geometry.texels import Texels
 from ..model.recording import Recording
 from ..model.sensor_parameters import Painted, SensorParameters
-from .bake_folder import MANIFEST_NAME, RECORDING_NAME, Manifest, read_manifest
-from .bake_replacement import is_interrupted
+from .bake_folder import MANIFEST_NAME, RECORDING_NAME, Manifest, is_interrupted, read_manifest
 from .hidden_folder import PRIVATE_FOLDER
-from .recording_npz import load_recording
-from .sensor_npz import SENSOR_NAME, load_sensor
+from .recording_npz import SENSOR_NAME, load_recording, load_sensor
 from .sensor_toml import stated_parameters
 
 

@@ -5,7 +5,7 @@ Members: ``header.npy`` (JSON text), ``frames``, ``times``, ``poses``, ``velocit
 header's list, ``sensor_<i>/normal_force`` and so on with the names of :class:`.recording.SensorRecording`. A sensor with
 several channels also has ``sensor_<i>/channels/values`` and ``…/clipped``, whose unit, names and places are in the header.
 
-A file that also has the sensors (:func:`save_with_sensors`) has ``sensor_<i>/texels/…`` as in :mod:`.sensor_npz`, and
+A file that also has the sensors (:func:`save_with_sensors`) has ``sensor_<i>/texels/…`` as in :mod:`.recording_npz`, and
 ``sensor_<i>/parameters`` (JSON text). A program that reads recordings reads these files, too.
 """
 
@@ -13,19 +13,153 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import asdict
+import struct
+import tokenize
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, fields
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import FileError, ParameterError
+from ..errors import FileError, ParameterError, os_error_reason
+from ..geometry.grid_layout import GridLayout
 from ..geometry.texels import Texels
-from ..model.recording import SENSOR_FIELDS, Recording, SensorRecording, row_blocks
+from ..geometry.texture_maps import UVLayout
+from ..model.recording import CLIPPED, SENSOR_FIELDS, VALUES, Recording, SensorRecording, VectorReadings, row_blocks
 from ..model.sensor_parameters import Painted, SensorParameters
-from ..model.vector_readings import CLIPPED, VALUES, VectorReadings
-from .npz import open_arrays, write_arrays
-from .sensor_npz import sensor_arrays, sensor_in
+from .file_writing import write_file
+from .input_files import open_regular
 from .sensor_toml import stated_parameters
+
+DAMAGED = (
+    ValueError,
+    KeyError,
+    TypeError,
+    AttributeError,
+    EOFError,
+    RuntimeError,
+    NotImplementedError,  # by zipfile, of a compression that it does not know
+    MemoryError,
+    OverflowError,
+    SyntaxError,
+    struct.error,
+    tokenize.TokenError,  # by numpy, of the header of an array
+    zipfile.BadZipFile,
+    zlib.error,
+)
+"""Exceptions that reading a damaged archive may raise."""
+
+
+def write_arrays(path: str | os.PathLike, arrays: Mapping[str, np.ndarray], atomic: bool = True) -> None:
+    """Write arrays as .npz, as :func:`.write_file` does; equal arrays give equal bytes.
+
+    Parameters
+    ----------
+    path : path
+    arrays : mapping of str to ndarray
+    atomic : bool
+
+    Raises
+    ------
+    FileError
+        The file cannot be written.
+    """
+    if any(array.dtype.hasobject for array in arrays.values()):
+        raise ValueError("objects are not written: reading them would run code")
+    with write_file(path, atomic) as temporary, open(temporary, "wb") as file:
+        np.savez_compressed(file, **{name: array.copy("C") if array.flags.fnc else array for name, array in arrays.items()})
+
+
+@contextmanager
+def open_arrays(path: str | os.PathLike, what: str, advice: str) -> Iterator[Any]:
+    """Give the arrays of an .npz file by name, and say in one sentence what is wrong with it.
+
+    Parameters
+    ----------
+    path : path
+    what : str
+        What the file should be, as in "recording".
+    advice : str
+        What to do if it is missing or damaged.
+
+    Raises
+    ------
+    FileError
+        There is no such file, it cannot be read, or the body of the ``with`` statement meets damage (:data:`DAMAGED`).
+    """
+    if not Path(path).exists():
+        raise FileError(f"'{path}' does not exist: {advice}, or choose another file.")
+    try:
+        with open_regular(path) as file, np.load(file, allow_pickle=False) as members:
+            yield members
+    except OSError as error:
+        raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): choose another file.") from error
+    except DAMAGED as error:
+        raise FileError(f"'{path}' is damaged or no {what} ({error}): {advice}.") from error
+
+
+SENSOR_FORMAT = "palpate-sensor/1"
+SENSOR_NAME = "sensor.npz"
+
+_ARRAYS = tuple(item.name for item in fields(Texels) if item.name != "layout")
+_LAYOUTS: dict[str, type[GridLayout] | type[UVLayout]] = {"grid": GridLayout, "uv": UVLayout}
+
+
+def save_sensor(path: str | os.PathLike, texels: Texels, painted: Painted | None = None, atomic: bool = True) -> None:
+    """Write texels, their layout and what is painted on them as .npz, as :func:`.write_file` does.
+
+    Raises
+    ------
+    FileError
+        The file cannot be written.
+    """
+    write_arrays(path, sensor_arrays(texels, painted), atomic)
+
+
+def sensor_arrays(texels: Texels, painted: Painted | None = None) -> dict[str, np.ndarray]:
+    """Return the members of the file by name."""
+    kind = next(name for name, cls in _LAYOUTS.items() if isinstance(texels.layout, cls))
+    arrays = {"format": np.array(SENSOR_FORMAT), "layout": np.array(kind)}
+    arrays |= {name: np.asarray(getattr(texels, name)) for name in _ARRAYS}
+    arrays |= {f"layout/{item.name}": np.asarray(getattr(texels.layout, item.name)) for item in fields(texels.layout)}
+    for item in fields(painted or Painted()):
+        values = getattr(painted, item.name, None)
+        if values is not None:
+            arrays[f"painted/{item.name}"] = np.asarray(values)
+    return arrays
+
+
+def load_sensor(path: str | os.PathLike) -> tuple[Texels, Painted]:
+    """Read what :func:`save_sensor` wrote.
+
+    Raises
+    ------
+    FileError
+        There is no such file, or it is damaged or something else.
+    """
+    with open_arrays(path, "sensor", "bake again with this version") as members:
+        return sensor_in(members)
+
+
+def sensor_in(members: Any) -> tuple[Texels, Painted]:
+    """Return the sensor whose members an archive gives by name; raises what :data:`DAMAGED` lists."""
+    if str(members["format"]) != SENSOR_FORMAT:
+        raise ValueError(f"its format is not '{SENSOR_FORMAT}'")
+    cls = _LAYOUTS[str(members["layout"])]
+    stored = {item.name: f"layout/{item.name}" for item in fields(cls)}
+    layout: Any = cls(**{name: _plain(members[key]) for name, key in stored.items() if key in members.files})
+    texels = Texels(**{name: members[name] for name in _ARRAYS}, layout=layout)
+    found = {item.name: f"painted/{item.name}" for item in fields(Painted)}
+    return texels, Painted(**{name: np.asarray(members[key], float) for name, key in found.items() if key in members.files})
+
+
+def _plain(value: np.ndarray) -> Any:
+    return value if value.ndim else value.item()
+
 
 RECORDING_FORMAT = "palpate-recording/2"
 

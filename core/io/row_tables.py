@@ -19,9 +19,8 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from ..errors import FileError, os_error_reason
-from ..model.recording import SENSOR_FIELDS, Frame, Recording, SensorRecording
+from ..model.recording import CLIPPED, SENSOR_FIELDS, VALUES, Frame, Recording, SensorRecording, VectorReadings
 from ..model.scenario import Scenario
-from ..model.vector_readings import CLIPPED, VALUES, VectorReadings
 
 IN_MEMORY_BYTES = 1 << 24
 """Bytes of a table that stay in memory: hours of animation of a rigid body."""

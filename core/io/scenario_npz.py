@@ -15,24 +15,18 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileError
-from ..geometry.layout.grid_layout import GridLayout
-from ..geometry.layout.texture_maps import UVLayout
+from ..geometry.grid_layout import GridLayout
 from ..geometry.mesh import TriangleMesh
 from ..geometry.texels import Texels
-from ..model.body import Body
-from ..model.deformation import Deformation
+from ..geometry.texture_maps import UVLayout
+from ..model.body import Body, Drive, Motion, Signal
 from ..model.digest import stated_fields
-from ..model.drive import Drive
-from ..model.effect import Effect
-from ..model.motion import Motion, Signal
-from ..model.scenario import Scenario
-from ..model.sensor import Sensor
+from ..model.scenario import Scenario, Target
+from ..model.sensor import Deformation, Effect, Sensor
 from ..model.sensor_parameters import Painted, SensorParameters
-from ..model.target import Target
-from ..skins.channel_readouts import LinearReadout, MagneticReadout
+from ..skins.channel_readouts import LinearReadout, MagneticReadout, ReadoutMatrix
 from ..skins.magnetic_skin import MagneticSkin, Magnetometers, Magnets
-from ..skins.readout_matrix import ReadoutMatrix
-from .npz import open_arrays, write_arrays
+from .recording_npz import open_arrays, write_arrays
 
 SCENARIO_FORMAT = "palpate-scenario/1"
 

@@ -30,7 +30,7 @@ from typing import Annotated, Any
 
 from ..effects.engine.registry import check, from_dict, to_dict
 from ..errors import FileError, PalpateError
-from ..model.effect import Effect
+from ..model.sensor import Effect
 from ..model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters
 from .file_writing import atomic_write
 from .input_files import checked_name, is_number, read_toml

@@ -5,4 +5,4 @@ They are small compiled functions that take a :class:`.ContactLaw`. The solver, 
 calibration call them; none of those writes a formula of its own.
 """
 
-__all__ = ["contact_law", "contact_stiffness", "friction", "normal_force", "series_compliance"]
+__all__ = ["contact_law", "contact_stiffness", "friction", "normal_force"]

@@ -9,18 +9,11 @@ specifications. A :class:`.recording.Recording` holds the results.
 
 __all__ = [
     "body",
-    "deformation",
     "digest",
-    "drive",
-    "effect",
-    "motion",
     "parameter",
-    "pose_interpolation",
     "recording",
     "scenario",
     "sensor",
     "sensor_parameters",
     "shared_results",
-    "target",
-    "vector_readings",
 ]

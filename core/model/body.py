@@ -5,11 +5,227 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import IntEnum
+from math import inf
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from .drive import Drive
-from .motion import Motion
+from ..errors import ParameterError
+from ..geometry.rotations import quaternion_product, quaternions_from_vectors, rotation_vectors
+from .parameter import Parameter, specifications, specified
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Poses of the frame of a body over time. :attr:`.Scenario.interpolation` says how they are interpolated.
+
+    Attributes
+    ----------
+    times : (m,) float, seconds, increasing
+    positions : (m, 3) float, metres, world frame
+    quaternions : (m, 4) float, unit, (w, x, y, z), body to world
+    """
+
+    times: np.ndarray
+    positions: np.ndarray
+    quaternions: np.ndarray
+
+    @classmethod
+    def at_rest(cls, position: ArrayLike = (0.0, 0.0, 0.0), quaternion: ArrayLike = (1.0, 0.0, 0.0, 0.0)) -> Motion:
+        """Return the motion of a body that stays where it is."""
+        return cls(np.zeros(1), np.atleast_2d(np.array(position, float)), np.atleast_2d(np.array(quaternion, float)))
+
+    def extended(self, time: float, position: np.ndarray, quaternion: np.ndarray) -> Motion:
+        """Return this motion with one more sample at its end. The timeline reads poses frame by frame."""
+        return Motion(
+            np.append(self.times, time), np.vstack([self.positions, position]), np.vstack([self.quaternions, quaternion])
+        )
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A number over time: linear between samples, and constant before the first and after the last.
+
+    Attributes
+    ----------
+    times : (m,) float, seconds, increasing
+    values : (m,) float
+    """
+
+    times: np.ndarray
+    values: np.ndarray
+
+    @classmethod
+    def constant(cls, value: float) -> Signal:
+        """Return the signal that never changes."""
+        return cls(np.zeros(1), np.array([float(value)]))
+
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """Return the (n,) values at (n,) times."""
+        return np.interp(times, self.times, self.values)
+
+    def extended(self, time: float, value: float) -> Signal:
+        """Return this signal with one more sample at its end."""
+        return Signal(np.append(self.times, time), np.append(self.values, value))
+
+
+def poses_at(motion: Motion, times: np.ndarray, interpolation: str = "linear") -> tuple[np.ndarray, np.ndarray]:
+    """Interpolate a motion; it is held before its first and after its last sample, and samples are met exactly.
+
+    ``linear``: linear in position, constant angular velocity.
+
+    ``smooth``: a cubic in position and a cumulative cubic Bézier curve of rotations (Kim, Kim and Shin, SIGGRAPH 1995), with
+    continuous velocity. The velocity at a sample is that of the parabola through it and the two samples before. No later
+    sample is needed, so the timeline, which receives a motion frame by frame, gives the same numbers as a bake.
+
+    Parameters
+    ----------
+    motion : Motion
+    times : (n,) float, seconds
+    interpolation : str
+
+    Returns
+    -------
+    positions : (n, 3) float, metres
+    quaternions : (n, 4) float
+    """
+    if len(motion.times) == 1:
+        n = len(times)
+        return np.repeat(motion.positions, n, axis=0), np.repeat(motion.quaternions, n, axis=0)
+    times = np.clip(times, motion.times[0], motion.times[-1])
+    right = np.clip(np.searchsorted(motion.times, times, side="left"), 1, len(motion.times) - 1)
+    left = right - 1
+    share = ((times - motion.times[left]) / (motion.times[right] - motion.times[left]))[:, None]
+    between = _smooth if interpolation == "smooth" else _linear
+    positions, turned = between(motion, left, share)
+    from_quaternion, to_quaternion = motion.quaternions[left], motion.quaternions[right]
+    quaternions = np.where(share == 1.0, to_quaternion, np.where(share == 0.0, from_quaternion, turned))
+    return np.where(share == 1.0, motion.positions[right], positions), quaternions
+
+
+def _linear(motion: Motion, left: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    first = left.min(initial=len(motion.times))  # the times may be many between few samples
+    samples = np.arange(first, left.max(initial=-1) + 1)
+    turn = _turns(motion, samples)
+    start, end = motion.positions[left], motion.positions[left + 1]
+    positions = start + share * (end - start)
+    if turn.any():
+        turned = quaternion_product(quaternions_from_vectors(share * turn[left - first]), motion.quaternions[left])
+    else:  # a share of no turn is none
+        turned = quaternion_product(quaternions_from_vectors(turn), motion.quaternions[samples])[left - first]
+    return positions, turned
+
+
+def _smooth(motion: Motion, left: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    span, rest = (motion.times[left + 1] - motion.times[left])[:, None], 1.0 - share
+    (v0, w0), (v1, w1) = _velocities(motion, left), _velocities(motion, left + 1)
+    start, end = motion.positions[left], motion.positions[left + 1]
+    # Bernstein polynomials; those of the rotation are their sums from the back.
+    b1, b2, b3 = 3 * share * rest**2, 3 * share**2 * rest, share**3
+    positions = start + b1 * (v0 * span / 3) + b2 * (end - start - v1 * span / 3) + b3 * (end - start)
+    first, last = w0 * span / 3, w1 * span / 3
+    from_start = quaternion_product(quaternions_from_vectors(first), motion.quaternions[left])
+    to_end = quaternion_product(quaternions_from_vectors(-last), motion.quaternions[left + 1])
+    middle = rotation_vectors(quaternion_product(to_end, _conjugate(from_start)))
+    turned = motion.quaternions[left]
+    for weight, turn in ((b1 + b2 + b3, first), (b2 + b3, middle), (b3, last)):
+        turned = quaternion_product(quaternions_from_vectors(weight * turn), turned)
+    return positions, turned
+
+
+def _velocities(motion: Motion, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 3) velocities and angular velocities at samples: of the parabola through each and the two before.
+
+    At the first sample, and at the second, it is the mean velocity between them.
+    """
+    last = np.maximum(at - 1, 0)  # intervals by their left ends
+    before = np.maximum(at - 2, 0)
+    h, g = ((motion.times[i + 1] - motion.times[i])[:, None] for i in (last, before))
+    bend = h / (h + g)
+    slopes = []
+    for change in (lambda i: motion.positions[i + 1] - motion.positions[i], lambda i: _turns(motion, i)):
+        slope = change(last) / h
+        slopes.append(slope + bend * (slope - change(before) / g))
+    return slopes[0], slopes[1]
+
+
+def _turns(motion: Motion, left: np.ndarray) -> np.ndarray:
+    """(n, 3) rotation vectors from samples to those that follow them."""
+    return rotation_vectors(quaternion_product(motion.quaternions[left + 1], _conjugate(motion.quaternions[left])))
+
+
+def _conjugate(quaternions: np.ndarray) -> np.ndarray:
+    return quaternions * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+CONTROLS = ("position", "velocity", "force")
+"""The target of a :class:`Drive` is a distance along the axis (m), a speed (m/s) or the sum of a sensor's forces (N)."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """An actuator that moves its body along one axis with a limited force.
+
+    The body follows the motion of its carrier, and the drive adds a displacement along the axis. The force of the actuator is
+    ``stiffness (x* - x) + damping (v* - v)`` plus a feed-forward of the body's weight and of the carrier's acceleration. The
+    sum is limited to `max_force`.
+
+    Attributes
+    ----------
+    control : str
+        One of :data:`CONTROLS`.
+    target : Signal
+        For position control in m, counted from where the motion puts the body; else in m/s or N.
+    axis : (3,) float
+        Unit vector of positive displacements; a finger closes along it.
+    axis_in_world : bool
+        True when the axis is fixed in the world; False when it is fixed in the frame of the body and turns with it.
+    stiffness, damping, max_force, max_speed, settling, period : float
+        See the specifications below. `settling` is the time constant of :class:`.actuators.GripControl`.
+    sensor : int
+        For force control: index of the sensor whose sum of normal forces is controlled.
+    leader : int or None
+        Index of the body whose drive also moves this body: both move by the same distance, each along its own axis, as the two
+        fingers of a parallel gripper do. Of this drive only the axis counts then. Forces are those of each body.
+    """
+
+    control: str = "position"
+    target: Signal = field(default_factory=lambda: Signal.constant(0.0))
+    axis: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    axis_in_world: bool = False
+    # fmt: off
+    stiffness: float = specified(Parameter(
+        "stiffness", "N/m", 1e5, 0.0, inf, "Position control: force per metre of error", label="Stiffness"))
+    damping: float = specified(Parameter(
+        "damping", "N·s/m", 1e3, 0.0, inf, "Force per m/s of error", above_low=True, label="Damping"))
+    max_force: float = specified(Parameter(
+        "max_force", "N", 40.0, 0.0, inf, "Largest force of the drive", label="Max Force"))
+    max_speed: float = specified(Parameter(
+        "max_speed", "m/s", 0.05, 0.0, inf, "Largest speed that the drive commands", above_low=True, label="Max Speed",
+        note="Force control approaches with it"))
+    sensor: int = -1
+    settling: float = specified(Parameter(
+        "settling", "s", 0.1, 0.0, inf, "Force control: time constant of the error", above_low=True, label="Settling",
+        note="Longer than the foam's oscillation"))
+    period: float = specified(Parameter(
+        "period", "s", 1e-3, 0.0, inf, "Force control: sampling period of the sensor", above_low=True))
+    # fmt: on
+    leader: int | None = None
+
+    def check(self, name: str) -> None:
+        """Raise :class:`ParameterError` for the first value of the drive of body `name` that has no meaning."""
+        if self.control not in CONTROLS:
+            raise ParameterError(f"The control of '{name}' is '{self.control}': choose one of {', '.join(CONTROLS)}.")
+        for key, specification in DRIVE_PARAMETERS.items():
+            specification.check(getattr(self, key), f"driven body '{name}'")
+        if not (np.isfinite(self.axis).all() and abs(np.linalg.norm(self.axis) - 1.0) < 1e-6):
+            raise ParameterError(f"The axis of driven body '{name}' is not a unit vector: give it a direction.")
+        if not np.isfinite(self.target.values).all():
+            raise ParameterError(f"The target of driven body '{name}' is NaN or infinite: check its keyframes and drivers.")
+
+
+DRIVE_PARAMETERS = specifications(Drive)
+"""The specifications of a drive's parameters by name."""
 
 
 class Mode(IntEnum):

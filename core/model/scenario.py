@@ -8,10 +8,38 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import ParameterError, SceneError
+from ..geometry.mesh import TriangleMesh
 from .body import Body
 from .digest import digest_of
-from .sensor import Sensor
-from .target import Target
+from .sensor import Deformation, Sensor
+
+
+@dataclass(frozen=True)
+class Target:
+    """A surface that sensors can be in contact with.
+
+    Attributes
+    ----------
+    name : str
+    body : int
+        Index in :attr:`.Scenario.bodies`.
+    mesh : TriangleMesh
+        In the frame of its body, metres; its shape at the first frame.
+    deformation : Deformation or None
+        How its vertices move when the target is not rigid.
+    sensor : int or None
+        Index of the sensor whose surface this is, when the target is the soft surface of another sensor.
+    smooth : bool
+        True when contact normals are interpolated between the vertices, as for smooth shading; False when they are the normals
+        of the triangles.
+    """
+
+    name: str
+    body: int
+    mesh: TriangleMesh
+    deformation: Deformation | None = None
+    smooth: bool = False
+    sensor: int | None = None
 
 
 @dataclass(frozen=True)
@@ -32,7 +60,7 @@ class Scenario:
     name : str
         Of the scene, for messages.
     interpolation : str
-        How motions are interpolated between their samples: ``linear`` or ``smooth`` (:mod:`.pose_interpolation`).
+        How motions are interpolated between their samples: ``linear`` or ``smooth`` (:mod:`.body`).
     """
 
     bodies: tuple[Body, ...]
@@ -54,7 +82,7 @@ class Scenario:
     def check(self) -> None:
         """Raise a :class:`.PalpateError` when the parts do not make a run.
 
-        Effects are checked by :func:`.sensor_effects.check_scenario`, which also calls this method.
+        Effects are checked by :func:`.registry.check_scenario`, which also calls this method.
         """
         if self.frame_end < self.frame_start:
             raise SceneError(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sensors for other simulators and from them: one module per format in :mod:`.formats`, found by the registry.
+"""Sensors for other simulators and from them: one module per format in :mod:`.formats`, found by :mod:`.sensor_format`.
 
 A new format is one new module in :mod:`.formats` that defines a ``FORMAT``; the command line, the menus and the checks take it
 from there. :mod:`.pressed_sensor` computes Palpate's forces inside the loop of another simulator, and :mod:`.pressed_sensors`
@@ -15,7 +15,6 @@ __all__ = [
     "pressed_sensor",
     "pressed_sensors",
     "probe_list",
-    "registry",
     "sensor_format",
     "sensor_on_mesh",
     "warp",

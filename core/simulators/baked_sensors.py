@@ -16,8 +16,7 @@ from ..geometry.mesh import TriangleMesh
 from ..io.bake_folder import MANIFEST_NAME, UNCHANGED_NOTE, BakeOwner, Manifest, other_owner
 from ..io.bake_reader import Bake, read_bake
 from ..io.input_files import read_bytes
-from ..model.effect import Effect
-from ..model.sensor import Sensor
+from ..model.sensor import Effect, Sensor
 from .sensor_on_mesh import SensorOnMesh
 
 DEFAULT_FOLDER = "palpate-bake"

@@ -17,10 +17,19 @@ import numpy as np
 from ..effects.engine.contact_forces import normal_forces
 from ..effects.engine.registry import form_of, kind_of
 from ..errors import ParameterError
-from ..model.effect import Effect
+from ..model.sensor import Effect
 from ..model.sensor_parameters import DEPTH_PER_THICKNESS
-from .mujoco_load import CONTACTS, LEAST_DAMPING, REFERENCE_MASS
 from .sensor_on_mesh import SensorOnMesh
+
+REFERENCE_MASS = 1.0
+"""kg. MuJoCo's contact stiffness is an acceleration per depth: a body sinks in by g times a constant, whatever its mass. The
+constant is ours for a body of this mass."""
+CONTACTS = 4
+"""Contacts of a box that stands on the sensor; they share MuJoCo's stiffness, so the depth is (1 - d) g / (4 stiffness). A
+test compares both depths. This holds with elliptic cones; pyramids make contacts stiffer."""
+LEAST_DAMPING = 1e-9
+"""N·s/m. MuJoCo knows the format of `solref` by both numbers being below zero."""
+
 
 SAMPLES = 400
 """Depths at which forces are compared."""

@@ -14,10 +14,10 @@ import numpy as np
 
 from ..effects.engine.registry import check, from_dict, to_dict
 from ..errors import FileError, PalpateError
-from ..geometry.layout.grid_layout import GridLayout
-from ..geometry.layout.texture_maps import uv_layout
+from ..geometry.grid_layout import GridLayout
 from ..geometry.mesh import TriangleMesh, checked_mesh
 from ..geometry.texels import Texels
+from ..geometry.texture_maps import uv_layout
 from ..io.file_writing import write_file
 from ..io.input_files import checked_name, read_bounded
 from ..io.schema import known_words

@@ -3,21 +3,112 @@
 
 from __future__ import annotations
 
+import importlib
 import os
+import pkgutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
+from types import ModuleType
+from xml.etree import ElementTree
 
 import numpy as np
 
-from ..errors import FileError
+from ..errors import FileError, PalpateError, SensorError
 from ..geometry.mesh import TriangleMesh, checked_mesh
-from ..geometry.plausible_size import require_sensor_size
 from ..geometry.texels import texels_with_normals
-from ..model.effect import Effect
-from ..model.sensor import Sensor
+from ..io.file_list import FileList
+from ..io.file_writing import require_space, writable_folder, write_file
+from ..io.input_files import require_xml_text
+from ..model.sensor import Effect, Sensor
 from ..model.sensor_parameters import SensorParameters
 from .sensor_on_mesh import SensorOnMesh
+
+LARGEST_SENSOR, SMALLEST_SENSOR = 3.0, 2e-4
+"""Metres. The largest sensors are mats and floors of 2 m; the smallest, on tips of catheters, have 1 mm."""
+LARGEST_PITCH, SMALLEST_PITCH = 0.3, 1e-6
+"""Metres between neighbouring texels: cells of floors have 0.1 to 0.2 m, nanofibre arrays micrometres."""
+UNITS = {"millimetres": 1e-3, "centimetres": 1e-2, "micrometres": 1e-6, "inches": 0.0254}
+
+
+def require_sensor_size(points: np.ndarray, name: str, what: str = "sensor") -> None:
+    """Raise SensorError if a sensor, or the distance between its texels, cannot be as large as its coordinates in metres say.
+
+    Parameters
+    ----------
+    points : (n, 3) float, metres
+        Places of its texels, or vertices of its surface.
+    name : str
+    what : str
+        What is checked, for the message.
+    """
+    from scipy.spatial import cKDTree
+
+    if len(points) < 2:
+        return
+    span = float(np.ptp(points, axis=0).max())
+    distance = cKDTree(points).query(points, 2)[0][:, 1]
+    pitch = float(np.median(distance[distance > 0.0])) if (distance > 0.0).any() else 0.0
+    if SMALLEST_SENSOR <= span <= LARGEST_SENSOR and pitch <= LARGEST_PITCH and (pitch >= SMALLEST_PITCH or what != "sensor"):
+        return
+    size = f"{span:.3g} m across" if not SMALLEST_SENSOR <= span <= LARGEST_SENSOR else f"of texels {pitch:.3g} m apart"
+    possible = [word for word, metres in UNITS.items() if SMALLEST_SENSOR <= span * metres <= LARGEST_SENSOR / 3.0]
+    asked = f"are its coordinates in {possible[0]}? Scale it by {UNITS[possible[0]]:g}" if possible else "give metres"
+    raise SensorError(f"The {what} '{name}' would be {size}, and lengths are metres: {asked}.")
+
+
+def optional_package(name: str, why: str, package: str | None = None) -> ModuleType:
+    """Return a module, or raise FileError with the command that installs its package.
+
+    Parameters
+    ----------
+    name : str
+        Of the module.
+    why : str
+        What needs it, as a clause.
+    package : str, optional
+        What is installed. Default: the name of the module.
+    """
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        wanted = package or name
+        raise FileError(f"{why}, and the package {wanted} is missing: pip install {wanted}.") from error
+
+
+DIGITS = 9
+"""Digits of a number: nine make every float32 its own, and simulators store meshes as float32."""
+
+
+def numbers(values: np.ndarray | list[float] | tuple[float, ...] | float, digits: int = DIGITS) -> str:
+    """Return numbers side by side as text; minus zero is written as zero."""
+    flat = np.ravel(np.asarray(values))
+    if flat.dtype.kind in "iu":
+        return " ".join(map(str, flat.tolist()))
+    return " ".join(f"{value:.{digits}g}" for value in (flat + 0.0).tolist())
+
+
+def add(parent: ElementTree.Element, tag: str, **attributes: str) -> ElementTree.Element:
+    """Add an element; an attribute `class_` stands for ``class``. Raises FileError for a name that XML cannot hold."""
+    for value in attributes.values():
+        require_xml_text(value)
+    return ElementTree.SubElement(parent, tag, {key.rstrip("_"): value for key, value in attributes.items()})
+
+
+def comment(parent: ElementTree.Element, text: str) -> None:
+    """Add a comment. XML allows no two hyphens side by side in it."""
+    require_xml_text(text)
+    while "--" in text:
+        text = text.replace("--", "- -")
+    parent.append(ElementTree.Comment(f" {text} "))
+
+
+def write_xml(path: Path, root: ElementTree.Element) -> None:
+    """Write an element as an indented file."""
+    ElementTree.indent(root)
+    with write_file(path, atomic=False) as place:
+        place.write_bytes(b'<?xml version="1.0" encoding="utf-8"?>\n' + ElementTree.tostring(root, encoding="utf-8") + b"\n")
 
 
 @dataclass(frozen=True)
@@ -127,3 +218,95 @@ class SensorFormat:
     write: Write | None = None
     read: Read | None = None
     holds: Holds | None = None
+
+
+FORMATS = f"{__package__}.formats"
+"""The package of the formats."""
+BYTES_PER_VERTEX = 1000
+"""Estimate from above of what a vertex of a mesh, its share of the faces and a texel on it take in a text file; a URDF with a
+frame for each texel has 700."""
+
+
+@cache
+def formats() -> dict[str, SensorFormat]:
+    """Return every format by its name, in alphabetical order."""
+    package = importlib.import_module(FORMATS)
+    names = sorted(module.name for module in pkgutil.iter_modules(package.__path__))
+    found = [importlib.import_module(f"{FORMATS}.{name}").FORMAT for name in names]
+    return {item.name: item for item in found}
+
+
+def written_formats() -> dict[str, SensorFormat]:
+    """Return the formats that sensors can be written in."""
+    return {name: item for name, item in formats().items() if item.write is not None}
+
+
+def export_sensors(sensors: Sequence[SensorOnMesh], kind: str, folder: str | os.PathLike) -> Written:
+    """Write sensors in a format of another simulator.
+
+    Parameters
+    ----------
+    sensors : sequence of SensorOnMesh
+    kind : str
+        Name of a format, as "mjcf".
+    folder : path
+        Created if it is missing, with the folders above it.
+
+    Returns
+    -------
+    Written
+        The files take the place of those that an earlier export of this format left, which stay as they are until all new
+        ones are complete (:mod:`..io.file_list`).
+
+    Raises
+    ------
+    PalpateError
+        The format is unknown, there is no sensor, the disk has too little space, or a file cannot be written.
+    """
+    known = written_formats()
+    write = known[kind].write if kind in known else None
+    if write is None:
+        raise PalpateError(f"Sensors are not written as '{kind}': choose from {', '.join(known)}.")
+    if not sensors:
+        raise PalpateError("There is no sensor to write: make one with Physics › Palpate › Make Sensor.")
+    vertices = sum(len(item.mesh.vertices) + len((item.surface or item.mesh).vertices) for item in sensors)
+    require_space(folder, BYTES_PER_VERTEX * vertices, "The export")
+    folder = writable_folder(folder, create=True)
+    files = FileList(folder)
+    with files.new_files("sensor") as new:
+        written = write(sensors, new)
+        return Written(files.replace(new, {f"sensor {kind}": written.files}), written.notes)
+
+
+def import_sensors(path: str | os.PathLike) -> tuple[SensorFormat, list[FoundSensor]]:
+    """Read the sensors of a file of another program.
+
+    Returns
+    -------
+    format : SensorFormat
+        That of the file.
+    sensors : list of FoundSensor
+        At least one.
+
+    Raises
+    ------
+    FileError
+        There is no such file, it is damaged, or it holds no sensor of a known format.
+    """
+    readable = [item for item in formats().values() if item.read is not None and item.holds is not None]
+    for item in readable:
+        if item.holds is not None and item.read is not None and item.holds(path):
+            found = item.read(path)
+            for sensor in found:
+                _require_finite(path, sensor)
+            return item, found
+    titles = ", ".join(item.title for item in readable)
+    raise FileError(f"'{path}' holds no sensor that can be read: give a file of one of these, {titles}.")
+
+
+def _require_finite(path: str | os.PathLike, sensor: FoundSensor) -> None:
+    """Raise FileError for a sensor with a number that is none: a reader of another program may let it pass."""
+    for name, value in vars(sensor).items():
+        if isinstance(value, np.ndarray) and value.dtype.kind == "f" and not np.isfinite(value).all():
+            what = name.replace("_", " ")
+            raise FileError(f"The {what} of sensor '{sensor.name}' in '{path}' is NaN or infinite: correct the file.")

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from ..geometry.layout.grid_layout import GridLayout
+from ..geometry.grid_layout import GridLayout
 from ..geometry.mesh import TriangleMesh, is_closed, vertex_normals
 from ..model.sensor import Sensor
 from ..model.sensor_parameters import DEPTH_PER_THICKNESS

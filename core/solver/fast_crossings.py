@@ -14,10 +14,9 @@ import numpy as np
 
 from ..compiled.kernels import kernel
 from ..geometry.rotations import rotation_matrices
-from ..model.scenario import Scenario
+from ..model.scenario import Scenario, Target
 from ..model.sensor import Sensor
 from ..model.shared_results import SharedResults
-from ..model.target import Target
 
 LARGEST_SHARE = 0.5
 """Share of the maximum penetration that a target may go into a sensor in one step: so it is found in two steps at least."""

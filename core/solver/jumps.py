@@ -18,8 +18,8 @@ from ..compiled.kernels import address_of, addressed_kernel, are_interpreted, in
 from ..compiled.struct_reference import address_of_fields, by_reference
 from ..geometry.mesh import TriangleMesh, face_normals, is_closed
 from ..geometry.rotations import rotate
-from ..geometry.sampling.straightest_geodesics import nearest_point
 from ..geometry.shapes import BOX, PLANE, Shape, Vector
+from ..geometry.texel_arrays import nearest_point
 from ..geometry.texels import Texels
 from .pressing import PressedTexels
 

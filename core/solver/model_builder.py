@@ -8,16 +8,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..effects.engine.compiled_program import EffectProgram, compile_program
-from ..effects.engine.sensor_effects import mounted_texels
+from ..effects.engine.registry import mounted_texels
 from ..geometry.contact_points import ContactPoints
 from ..geometry.mesh import TriangleMesh
 from ..geometry.rotations import rotation_matrices
-from ..laws.contact_law import ContactLaw, contact_law
-from ..laws.series_compliance import coupling
+from ..laws.contact_law import ContactLaw, contact_law, coupling
 from ..model.scenario import Scenario
 from ..model.sensor import Sensor
 from ..model.shared_results import SharedResults
-from .detection.deforming_surfaces import bounding_sphere, point_rows
+from .detection.deformation import bounding_sphere, point_rows
 from .detection.neighbour_lists import MAX_RADIUS_SHARE
 from .dynamics.actuators import drive_table
 from .dynamics.modes import number_unknowns

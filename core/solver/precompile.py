@@ -23,7 +23,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..compiled.kernel_fingerprint import fingerprint
+from ..compiled.kernels import fingerprint
 
 if TYPE_CHECKING:
     from ..model.scenario import Scenario
@@ -177,11 +177,9 @@ def scenario() -> Scenario:
 
     from ..geometry.mesh import TriangleMesh
     from ..geometry.texels import texels_from_region
-    from ..model.body import Body
-    from ..model.motion import Motion
-    from ..model.scenario import Scenario
+    from ..model.body import Body, Motion
+    from ..model.scenario import Scenario, Target
     from ..model.sensor import Sensor
-    from ..model.target import Target
 
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
     quads = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])

@@ -15,11 +15,9 @@ from ..errors import ParameterError
 from ..geometry.mesh import TriangleMesh
 from ..geometry.shapes import Shape
 from ..laws.contact_law import contact_law
-from ..model.body import Body
-from ..model.motion import Motion
-from ..model.scenario import Scenario
+from ..model.body import Body, Motion
+from ..model.scenario import Scenario, Target
 from ..model.sensor import Sensor
-from ..model.target import Target
 from .detection.detection_data import TargetShapes
 from .detection.shape_contacts import blocks_of_points
 from .model_builder import step_program
@@ -35,8 +33,8 @@ from .pressing import (
     make_environments,
 )
 from .simulation import Simulation
+from .structures import workspace_for
 from .workspace import Workspace
-from .workspace_builder import workspace_for
 
 
 class PressedModel:

@@ -16,11 +16,10 @@ import numpy as np
 
 from ..compiled.thread_team import helper_threads
 from ..effects.engine.readout_chain import ReadoutChain
-from ..effects.engine.sensor_effects import check_scenario, mounted_texels
+from ..effects.engine.registry import check_scenario, mounted_texels
 from ..geometry.rotations import quaternion_product, rotation_matrices, rotation_vectors
-from ..jobs.job_runner import run_job
-from ..jobs.progress import Job, Progress
-from ..model.pose_interpolation import poses_at
+from ..jobs import Job, Progress, run_job
+from ..model.body import poses_at
 from ..model.recording import BLOCK_BYTES, Frame, Recording, SensorRecording
 from ..model.scenario import Scenario
 from ..model.shared_results import SharedResults
@@ -28,11 +27,10 @@ from ..skins.channel_readouts import with_clipping_warnings
 from .detection.deformation import refit_boxes, set_moment
 from .detection.detection_data import DetectionData
 from .detection.narrow_phase import count_too_deep
-from .dynamics.drive_commands import DriveCommands
+from .dynamics.actuators import DriveCommands
 from .dynamics.modes import driven_bodies
-from .dynamics.passivity import credit_initial_contacts
+from .dynamics.passivity import contacts_of, credit_initial_contacts
 from .fast_crossings import FastCrossings, path_of_moved_bodies
-from .found_contacts import contacts_of
 from .model_builder import texel_starts
 from .parallel_loops import find_all_contacts, help_with_loops, prepare_pair_loops
 from .solver_model import SolverModel, State

@@ -105,7 +105,7 @@ class Pairs(NamedTuple):
     law : (q, 10) float
         Contact law of one contact point of each pair: the fields of :class:`.ContactLaw`.
     force_weight : (q,) float
-        Factor with which the pair's force moves the bodies (see :mod:`.series_compliance`).
+        Factor with which the pair's force moves the bodies (see :mod:`.contact_law`).
     force_share : (q,) float
         Share of a texel's force with which one of its contact points moves the bodies, the weight included.
     overlap_share : (q,) float

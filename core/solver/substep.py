@@ -18,7 +18,7 @@ from .detection.deformation import refit_boxes, set_moment
 from .detection.detection_data import DetectionData
 from .detection.narrow_phase import count_too_deep
 from .dynamics.actuators import move_drives
-from .dynamics.effect_memory import commit_effect_memory
+from .dynamics.effect_kernels import commit_effect_memory
 from .dynamics.modes import move, place, prescribe_velocity, write_inertia
 from .fast_crossings import BodiesInFrame, CrossingLimits, may_cross
 from .implicit_velocities import solve_velocities

@@ -13,7 +13,19 @@ from ..effects.engine.compiled_program import TexelMotion, has_effects
 from ..laws.contact_law import LINEAR_EXPONENT, ContactLaw, read_law
 from ..laws.friction import bristle_rate, deflection_scale, friction_force, max_bristle_deflection
 from ..laws.normal_force import linear_normal_force, normal_force
-from .contact_rows import BRISTLE, DEPTH, FRICTION, LANES, NORMAL, POINT, PUSH, SIZE, SPEED, read_vector, write_vector
+from .detection.detection_data import (
+    BRISTLE,
+    DEPTH,
+    FRICTION,
+    LANES,
+    NORMAL,
+    POINT,
+    PUSH,
+    SIZE,
+    SPEED,
+    read_vector,
+    write_vector,
+)
 from .dynamics.effect_kernels import NOW, apply_effects, force_and_friction_law, lane_range, press_texel
 from .dynamics.relative_kinematics import motion_values, point_law, row_of, row_velocity, velocity_at, write_pair_motion
 from .solver_model import SolverModel, State

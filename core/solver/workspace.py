@@ -61,7 +61,7 @@ class ContactWork(NamedTuple):
     Attributes
     ----------
     rows : (blocks, ROW) float
-        One row per contact, in blocks (see :mod:`.contact_rows`).
+        One row per contact, in blocks (see :mod:`.detection.detection_data`).
     slots : (blocks, LANES) int
         Slot of each row in :class:`.State`.
     surface_velocity : (blocks, 3 · LANES) float

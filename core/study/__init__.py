@@ -2,17 +2,14 @@
 """Studies: one scene run many times with varied numbers.
 
 :mod:`.study_file` reads what varies, :mod:`.design` chooses the values of every run, :mod:`.variation` and :mod:`.presses` put
-them into a scenario, :mod:`.metrics` sums a run up, :mod:`.run_folder` writes the files of a run that has a folder, and
-:mod:`.progress` counts runs. Nothing here starts processes: the package ``sweep`` does.
+them into a scenario, and :mod:`.progress` counts runs. Nothing here starts processes: the package ``sweep`` does.
 """
 
 __all__ = [
     "design",
     "mesh_choices",
-    "metrics",
     "presses",
     "progress",
-    "run_folder",
     "scene_property",
     "study_file",
     "variation",

@@ -17,9 +17,7 @@ from ..errors import SceneError
 from ..geometry.mesh import mass_properties
 from ..geometry.rotations import quaternion_product, quaternions_from_vectors, rotation_matrices
 from ..geometry.texels import Texels
-from ..model.body import Body
-from ..model.drive import Drive
-from ..model.motion import Motion, Signal
+from ..model.body import Body, Drive, Motion, Signal
 from ..model.parameter import Parameter, specifications, specified
 from ..model.scenario import Scenario
 from ..model.sensor import Sensor

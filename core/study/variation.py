@@ -28,18 +28,14 @@ from typing import Any
 
 import numpy as np
 
-from ..effects.engine.registry import effect, form_of, kind_of, library
-from ..effects.engine.sensor_effects import check_scenario
+from ..effects.engine.registry import check_scenario, effect, form_of, kind_of, library
 from ..errors import PalpateError, ParameterError, did_you_mean
 from ..geometry.mesh import TriangleMesh, mass_properties
 from ..geometry.rotations import quaternion_product, quaternions_from_vectors, rotation_matrices
-from ..model.body import Body
-from ..model.drive import DRIVE_PARAMETERS
-from ..model.effect import Effect
-from ..model.motion import Motion, Signal
+from ..model.body import DRIVE_PARAMETERS, Body, Motion, Signal
 from ..model.parameter import ChoiceParameter, Parameter, Specification, TextParameter
 from ..model.scenario import Scenario
-from ..model.sensor import Sensor
+from ..model.sensor import Effect, Sensor
 from ..model.sensor_parameters import SENSOR_PARAMETERS
 from ..model.shared_results import SharedResults
 from .presses import PRESS_PARAMETERS, Press, with_press

@@ -12,11 +12,10 @@ from solver_scenes import about, box, cube_on_pad, free_body, pad, shape
 
 from oracles.sweep import moving, stored
 from palpate.core.geometry.rotations import quaternion_product, rotation_matrices
-from palpate.core.model.motion import Motion
-from palpate.core.model.scenario import Scenario
+from palpate.core.model.body import Motion
+from palpate.core.model.scenario import Scenario, Target
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import SensorParameters
-from palpate.core.model.target import Target
 from palpate.core.solver.simulation import Simulation, run
 
 STIFF = {"sigma0": 1e3, "sigma1": 10.0, "x0": 0.01}

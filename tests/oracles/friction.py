@@ -9,12 +9,10 @@ from solver_scenes import GRAVITY, about, box, pad, pressed
 
 from oracles.contact_laws import bristle_rate, friction_force, steady_friction
 from oracles.foundation import punch
-from palpate.core.model.body import Body
-from palpate.core.model.motion import Motion
-from palpate.core.model.scenario import Scenario
+from palpate.core.model.body import Body, Motion
+from palpate.core.model.scenario import Scenario, Target
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import SensorParameters
-from palpate.core.model.target import Target
 from palpate.core.solver.simulation import run
 
 LUGRE = SensorParameters(k=100.0, cn=0.0, sigma0=400.0, sigma1=0.5, ct=0.05, x0=0.02)

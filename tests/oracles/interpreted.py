@@ -17,9 +17,9 @@ from solver_scenes import pad, pressed
 from oracles.sweep import random_case, random_turn
 from palpate.core.compiled import kernels
 from palpate.core.effects.engine.registry import effect, library
-from palpate.core.model.deformation import Deformation
 from palpate.core.model.recording import SENSOR_FIELDS, Frame
 from palpate.core.model.scenario import Scenario
+from palpate.core.model.sensor import Deformation
 from palpate.core.solver.simulation import Simulation
 
 FRAMES = 4

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from palpate.core.model.motion import Motion
+from palpate.core.model.body import Motion
 from palpate.core.model.recording import Recording
 from palpate.core.model.scenario import Scenario
 from palpate.core.model.sensor_parameters import HUNT_CROSSLEY, SensorParameters

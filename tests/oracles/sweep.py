@@ -10,12 +10,10 @@ import trimesh
 from solver_scenes import GRAVITY, box, free_body, pad, shape
 
 from palpate.core.geometry.rotations import rotation_matrices
-from palpate.core.model.body import Body
-from palpate.core.model.motion import Motion
-from palpate.core.model.scenario import Scenario
+from palpate.core.model.body import Body, Motion
+from palpate.core.model.scenario import Scenario, Target
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import SensorParameters
-from palpate.core.model.target import Target
 from palpate.core.solver.simulation import Simulation
 
 

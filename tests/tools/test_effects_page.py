@@ -4,8 +4,8 @@
 import effects_page
 import pytest
 
-from palpate.core.effects.engine.declarations import DRAWINGS
 from palpate.core.effects.engine.registry import library
+from palpate.core.effects.engine.specification import DRAWINGS
 
 
 def test_the_page_is_that_of_this_library():

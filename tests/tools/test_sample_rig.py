@@ -8,7 +8,7 @@ import sample_rig
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.report.comparison import gap_errors
 from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 
 def test_the_sample_rig_is_what_its_script_writes(tmp_path):

@@ -34,7 +34,7 @@ from ...compiled.kernels import (
 from ...compiled.struct_reference import by_reference
 from ...laws.contact_law import ContactLaw
 from ...laws.normal_force import damped_force_derivatives, damping_coefficient, elastic_force, elastic_stiffness
-from ...model.effect import Effect, Value, Values
+from ...model.sensor import Effect, Value, Values
 from .registry import complete_values, in_signal_order
 from .specification import Form, TexelInput
 

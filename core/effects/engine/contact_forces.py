@@ -11,7 +11,7 @@ import numpy as np
 from ...compiled.kernels import plain
 from ...laws.contact_law import ContactLaw, contact_law
 from ...laws.normal_force import damped_force, elastic_force
-from ...model.effect import Effect
+from ...model.sensor import Effect
 from .compiled_program import (
     PointRange,
     TexelContacts,
@@ -20,8 +20,8 @@ from .compiled_program import (
     constants_of,
     law_over_time,
 )
+from .readout_chain import steps_of
 from .registry import complete_values, in_signal_order
-from .step_lengths import steps_of
 
 if TYPE_CHECKING:
     from ...model.sensor_parameters import SensorParameters

@@ -6,13 +6,16 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 
 from ...errors import EffectError, suggestion
-from ...model.effect import Effect, Value
+from ...geometry.texels import Texels
+from ...model.scenario import Scenario
+from ...model.sensor import Effect, Sensor, Value
 from .specification import SITES_OF_ACTION, Form, Kind
 
 LIBRARY = f"{__package__.rpartition('.')[0]}.library"
@@ -51,17 +54,17 @@ def only_name_where(condition: Callable[[Kind], bool]) -> str:
 
 
 def names_known_from(feature: str) -> tuple[str, ...]:
-    """Return the names of the kinds that are known from a feature of recordings, one of :data:`.declarations.FEATURES`."""
+    """Return the names of the kinds that are known from a feature of recordings, one of :data:`.specification.FEATURES`."""
     return names_where(lambda kind: feature in kind.known_from)
 
 
 def names_in_family(family: str) -> tuple[str, ...]:
-    """Return the names of the kinds of a family, one of :data:`.declarations.FAMILIES`."""
+    """Return the names of the kinds of a family, one of :data:`.specification.FAMILIES`."""
     return names_where(lambda kind: family in kind.families)
 
 
 def names_found_by(way: str) -> tuple[str, ...]:
-    """Return the names of the kinds that are found in one way, one of :data:`.declarations.FOUND_BY`."""
+    """Return the names of the kinds that are found in one way, one of :data:`.specification.FOUND_BY`."""
     return names_where(lambda kind: kind.found_by == way)
 
 
@@ -222,3 +225,30 @@ def _plain(value: Any) -> Value:
     """Return a number, or numbers as a tuple, from any kind of array."""
     numbers = np.asarray(value, dtype=float)
     return float(numbers) if numbers.ndim == 0 else tuple(float(number) for number in numbers.ravel())
+
+
+def check_scenario(scenario: Scenario) -> None:
+    """Raise a :class:`PalpateError` when a scenario cannot be run or an effect of a sensor is not valid.
+
+    Parameters
+    ----------
+    scenario : Scenario
+
+    Raises
+    ------
+    PalpateError
+        See :meth:`.Scenario.check` and :func:`check`.
+    """
+    scenario.check()
+    for sensor in scenario.sensors:
+        check(sensor.effects, sensor.name, len(sensor.texels), sensor.parameters.gain)
+
+
+def mounted_texels(sensor: Sensor) -> Texels:
+    """Return the texels of a sensor where its effects put them, in the frame of its body.
+
+    Effects such as misalignment move texels. Without such an effect the sensor's own texels are returned.
+    """
+    texels = sensor.texels
+    position, normal, tangent = actual_placement(sensor.effects, texels.position, texels.normal, texels.tangent)
+    return texels if position is texels.position else replace(texels, position=position, normal=normal, tangent=tangent)

@@ -17,7 +17,7 @@ Laws and friction laws are compiled, so they use only numbers, arrays and :mod:`
 import nothing heavy, because Blender's panels list them.
 
 Nothing outside the library names an effect. What others need to know of it is stated in its ``KIND``, in the words of
-:mod:`.declarations`.
+:mod:`.specification`.
 """
 
 from __future__ import annotations
@@ -30,10 +30,102 @@ from typing import NamedTuple
 import numpy as np
 
 from ...errors import EffectError
-from ...model.effect import Value, Values
 from ...model.parameter import Parameter
+from ...model.sensor import Value, Values
 from .coupling_matrix import CouplingMatrix
-from .declarations import DRAWINGS, FAMILIES, FEATURES, FIT, FOUND_BY, GAIN_FALLS_WITH, NEEDS, SIGNATURES, Drawing
+
+# What a kind states for the rest of the package: how recordings show it, how it is searched for, and how it is drawn.
+#
+# The gap analysis, the plans of experiments, the reports and the documentation know no effect by its name. They read what
+# :class:`Kind` and :class:`Form` state in the words of this module.
+
+FEATURES = {
+    "unloading": "what is different after unloading; the loading curve alone could be that of a nonlinear spring",
+    "timing": "what happens at one depth at different times, or at one time after different speeds",
+    "rest": "what happens while a texel is without load, or in the same way under different loads",
+    "places": "how neighbours differ as the load moves; at one place it is some pattern of texels that grows with the load",
+    "cycles": "how a second cycle differs from the first; in a single cycle it lowers the unloading curve",
+}
+"""Features of recordings by which an effect is known. Recordings without them do not identify it, however well it fits."""
+FAMILIES = {
+    "spreading": "passes a part of a texel's load on to its neighbours, in a pattern that each sensor has of its own",
+    "nonlinear": "bends the curve of reading over load",
+    "loop": "opens a loop between loading and unloading at any speed; the loading curve of the loop is bent as well",
+    "late": "answers late, so that it lowers the unloading curve of a single cycle",
+    "moving": "lets a reading move while nothing else does",
+    "losing": "loses force with what was pressed; how fast the loss dies away is a matter of the formula",
+}
+"""Families of effects that resemble each other, so that a better fit says little which of them acts."""
+
+FIT, SILENT_TEXELS, STEPS, SCATTER = "fit", "silent texels", "steps", "scatter"
+FOUND_BY = {
+    FIT: "a fit of its formulas",
+    SILENT_TEXELS: "readings that hardly follow the load",
+    STEPS: "steps in the readings",
+    SCATTER: "the residual of the final model; predictions are without it",
+}
+"""How an effect is found in recordings."""
+SIGNATURES = {
+    "pull": "readings below zero where it predicts a pull",
+    "unloaded": "readings without load, from the beginning of the trials on",
+    "end": "it comes to an end within the session",
+}
+"""What a fit of an effect must show to be reported under its name, if it may otherwise stand for something else."""
+NEEDS = {
+    "temperature": "temperatures that were recorded and vary",
+    "clock": "recordings of which a session says how the time went on between them",
+    "no clock": "recordings of which each begins with an untouched sensor",
+    "signed channels": "channels of which some rise and others fall under the same load",
+    "axes": "the same, with a number of channels that is a multiple of three",
+}
+"""What recordings must hold for an effect, or a form of it, to be a candidate."""
+GAIN_FALLS_WITH = {"use": "what the sensor was pressed", "clock": "the time"}
+"""With what the gain falls from recording to recording."""
+DRAWINGS = {
+    "time": "reading over time, for a course of depths",
+    "depth": "force over depth, for a course of depths",
+    "force": "reading over force",
+    "speed": "friction at 1 N over the sliding speed",
+    "pressings": "peak reading of each of forty pressings under steady sliding",
+    "row": "readings of a column of texels with a load on one of them",
+    "texel": "readings of single texels under the same load",
+    "ball": "forces of a ball along a column of texels",
+}
+"""Experiments in which effects are drawn."""
+
+
+def _twenty_seconds() -> np.ndarray:
+    return np.linspace(0, 20, 2001)
+
+
+def _press_and_hold() -> np.ndarray:
+    return 0.002 * np.interp(_twenty_seconds(), [0, 1, 1.3, 12, 12.3, 20], [0, 0, 1, 1, 0, 0])
+
+
+def cycles(count: int, time: np.ndarray, depth: float = 0.002) -> np.ndarray:
+    """Return the course of the depth (m) in so many presses in the form of a cosine."""
+    return depth * 0.5 * (1 - np.cos(2 * np.pi * count * time / time[-1]))
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """The experiment in which the documentation draws the forms of an effect.
+
+    Attributes
+    ----------
+    over : str
+        One of :data:`DRAWINGS`.
+    time, depth : (T,) float, s and m
+        Course of the depth, for a drawing over time or depth: a press that is held, if none is given.
+    values : dict of str to dict
+        By the name of a form, values that replace its defaults.
+    """
+
+    over: str = "time"
+    time: np.ndarray = field(default_factory=_twenty_seconds)
+    depth: np.ndarray = field(default_factory=_press_and_hold)
+    values: dict[str, dict[str, float]] = field(default_factory=dict)
+
 
 SITES_OF_ACTION = ("contact", "pad", "readout")
 """Where an effect acts, in the order in which a load passes: `contact` changes the contact law itself and has no memory, `pad`
@@ -161,7 +253,7 @@ class Form:
     same_as : str
         Parameter of the base model that does the same; the form is no candidate where that is free.
     needs : str
-        What recordings must hold for this form, one of :data:`.declarations.NEEDS`, if it differs from the kind's.
+        What recordings must hold for this form, one of :data:`NEEDS`, if it differs from the kind's.
     """
 
     name: str
@@ -221,21 +313,21 @@ class Kind:
     drawing : Drawing
         The experiment in which the documentation draws it.
     known_from : tuple of str
-        Features of recordings without which they do not identify it, of :data:`.declarations.FEATURES`.
+        Features of recordings without which they do not identify it, of :data:`FEATURES`.
     families : tuple of str
-        Which effects resemble it, of :data:`.declarations.FAMILIES`.
+        Which effects resemble it, of :data:`FAMILIES`.
     is_gain_of_texels : bool
         Whether it gives each texel a gain of its own.
     found_by : str
-        How it is found in recordings, one of :data:`.declarations.FOUND_BY`.
+        How it is found in recordings, one of :data:`FOUND_BY`.
     signature : str
-        What a fit must show, one of :data:`.declarations.SIGNATURES`; empty if nothing more is asked.
+        What a fit must show, one of :data:`SIGNATURES`; empty if nothing more is asked.
     needs : str
-        What recordings must hold, one of :data:`.declarations.NEEDS`; empty if nothing more is asked.
+        What recordings must hold, one of :data:`NEEDS`; empty if nothing more is asked.
     known_parameters : tuple of str
         Parameters that a fit leaves at their neutral values, because the recordings hold them.
     gain_falls_with : str
-        With what it lowers the gain from recording to recording, one of :data:`.declarations.GAIN_FALLS_WITH`; at most one
+        With what it lowers the gain from recording to recording, one of :data:`GAIN_FALLS_WITH`; at most one
         kind for each. Empty if it does not, or not alone.
     """
 

@@ -11,10 +11,9 @@ import math
 
 import numpy as np
 
-from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing
-from ..engine.specification import Form, Kind, TexelInput, constants_from, scalar
+from ...model.sensor import Values
+from ..engine.specification import Drawing, Form, Kind, TexelInput, constants_from, scalar
 
 
 def constant(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:

@@ -6,10 +6,9 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import EffectError
-from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing
-from ..engine.specification import Form, Kind, TransducerArray, scalar
+from ...model.sensor import Values
+from ..engine.specification import Drawing, Form, Kind, TransducerArray, scalar
 
 AXES = ("x", "y", "z")
 

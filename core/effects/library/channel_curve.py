@@ -5,10 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing
-from ..engine.specification import Form, Kind, TransducerArray
+from ...model.sensor import Values
+from ..engine.specification import Drawing, Form, Kind, TransducerArray
 
 POWERS = ("offset", "factor", "second", "third", "fourth", "fifth")
 """Parameters by the power of the force that they multiply."""

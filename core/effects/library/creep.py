@@ -12,8 +12,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...model.effect import Values
 from ...model.parameter import Parameter
+from ...model.sensor import Values
 from ..engine.specification import Form, Kind, TexelInput, scalar
 
 LOG_RATES = np.arange(-13.75, 2.76, 1.25)

@@ -6,11 +6,10 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import EffectError
-from ...model.effect import Values
 from ...model.parameter import Parameter
+from ...model.sensor import Values
 from ..engine.coupling_matrix import CouplingMatrix, coupling_matrix, nearest_distance
-from ..engine.declarations import Drawing
-from ..engine.specification import Form, Kind, TransducerArray, scalar
+from ..engine.specification import Drawing, Form, Kind, TransducerArray, scalar
 
 
 def neighbours(values: Values, transducers: TransducerArray) -> CouplingMatrix:

@@ -5,11 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import SILENT_TEXELS, Drawing
+from ...model.sensor import Values
 from ..engine.random_streams import uniform
-from ..engine.specification import Form, Kind, TransducerArray, scalar
+from ..engine.specification import SILENT_TEXELS, Drawing, Form, Kind, TransducerArray, scalar
 
 
 def _dead(values: Values, seed: int, texels: int) -> np.ndarray:

@@ -5,11 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing
+from ...model.sensor import Values
 from ..engine.random_streams import random_walk
-from ..engine.specification import Form, Kind, TransducerArray, scalar
+from ..engine.specification import Drawing, Form, Kind, TransducerArray, scalar
 
 MINUTE = 60.0
 """Seconds after which the amounts of the form "listed" hold."""

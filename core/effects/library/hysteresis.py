@@ -12,10 +12,9 @@ import math
 
 import numpy as np
 
-from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing, cycles
-from ..engine.specification import Form, Kind, TexelInput, constants_from, scalar
+from ...model.sensor import Values
+from ..engine.specification import Drawing, Form, Kind, TexelInput, constants_from, cycles, scalar
 
 ELEMENTS = 4
 """Number of elements of the operators; their thresholds are spread evenly around the given one."""

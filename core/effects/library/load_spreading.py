@@ -7,11 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...model.effect import Values
 from ...model.parameter import Parameter
+from ...model.sensor import Values
 from ..engine.coupling_matrix import CouplingMatrix, coupling_matrix
-from ..engine.declarations import Drawing
-from ..engine.specification import Form, Kind, TransducerArray, scalar
+from ..engine.specification import Drawing, Form, Kind, TransducerArray, scalar
 
 
 def gaussian(values: Values, transducers: TransducerArray) -> CouplingMatrix:

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing
-from ..engine.specification import Form, Kind, scalar
+from ...model.sensor import Values
+from ..engine.specification import Drawing, Form, Kind, scalar
 
 
 def displaced(

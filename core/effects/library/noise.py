@@ -5,11 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import SCATTER, Drawing
+from ...model.sensor import Values
 from ..engine.random_streams import normal, ticks
-from ..engine.specification import Form, Kind, TransducerArray, scalar
+from ..engine.specification import SCATTER, Drawing, Form, Kind, TransducerArray, scalar
 
 
 def white(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:

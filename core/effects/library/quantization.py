@@ -7,10 +7,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import STEPS, Drawing
-from ..engine.specification import Form, Kind, TransducerArray, scalar
+from ...model.sensor import Values
+from ..engine.specification import STEPS, Drawing, Form, Kind, TransducerArray, scalar
 
 
 def rounded(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:

@@ -7,10 +7,9 @@ import math
 
 import numpy as np
 
-from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing
-from ..engine.specification import Form, Kind, TransducerArray, scalar
+from ...model.sensor import Values
+from ..engine.specification import Drawing, Form, Kind, TransducerArray, scalar
 
 _LEVEL = Parameter("level", "unit", 1.0, 1e-4, 1e5, "Largest reading L, counted from the reading without load.", log=True)
 

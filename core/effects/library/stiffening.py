@@ -11,8 +11,7 @@ import math
 import numpy as np
 
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing
-from ..engine.specification import Form, Kind, TexelInput, constants_from
+from ..engine.specification import Drawing, Form, Kind, TexelInput, constants_from
 
 
 def polynomial(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:

@@ -8,8 +8,7 @@ import math
 import numpy as np
 
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing
-from ..engine.specification import Form, Kind, constants_from
+from ..engine.specification import Drawing, Form, Kind, constants_from
 
 
 def gaussian(speed: float, force: float, constants: np.ndarray) -> tuple[float, float]:

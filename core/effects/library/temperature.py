@@ -5,10 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing
-from ..engine.specification import Form, Kind, TransducerArray, scalar
+from ...model.sensor import Values
+from ..engine.specification import Drawing, Form, Kind, TransducerArray, scalar
 
 REFERENCE = 25.0
 """°C at which sensors are commonly specified, and from which recorded temperatures count in a fit."""

@@ -6,8 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing
-from ..engine.specification import Form, Kind, constants_from
+from ..engine.specification import Drawing, Form, Kind, constants_from
 
 
 def linear(speed: float, force: float, constants: np.ndarray) -> tuple[float, float]:

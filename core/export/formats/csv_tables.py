@@ -9,16 +9,16 @@ from pathlib import Path
 
 import numpy as np
 
+from ... import response
 from ...figures.figure_style import FigureStyle
-from ...geometry.layout.grid_layout import GridLayout
+from ...geometry.grid_layout import GridLayout
 from ...geometry.texels import Texels
 from ...io.bake_folder import folder_names
 from ...io.bake_reader import Bake
 from ...io.csv_table import harmless_cell
 from ...io.file_writing import atomic_write, writable_folder
-from ...jobs.progress import Job
+from ...jobs import Job
 from ...model.recording import Recording, SensorRecording
-from ...response import metrics
 from ..exporter import Exporter, channel_labels, sensor_progress
 
 _QUANTITIES = ("normal_force", "shear_x", "shear_y", "depth", "slip", "contact", "reading")
@@ -96,9 +96,9 @@ def _sums(bake: Bake, name: str, part: Recording) -> np.ndarray:
         [
             _clock(part),
             recorded.normal_force.sum(axis=1),
-            np.linalg.norm(metrics.net_shear(recorded, texels), axis=1),
+            np.linalg.norm(response.net_shear(recorded, texels), axis=1),
             recorded.contact.sum(axis=1),
-            metrics.slip_share(recorded, bake.parameters[name], bake.painted[name]),
+            response.slip_share(recorded, bake.parameters[name], bake.painted[name]),
             recorded.net_force,
             recorded.net_torque,
             recorded.centre_of_pressure,

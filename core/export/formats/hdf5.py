@@ -14,7 +14,7 @@ from ...errors import PalpateError
 from ...figures.figure_style import FigureStyle
 from ...io.bake_reader import Bake
 from ...io.file_writing import write_file
-from ...jobs.progress import Job
+from ...jobs import Job
 from ..exporter import UNITS, Exporter, bake_arrays, sensor_progress
 
 _BLOCK_BYTES = 1 << 22

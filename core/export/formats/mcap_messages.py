@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +16,99 @@ import numpy as np
 from ...errors import PalpateError
 from ...figures.figure_style import FigureStyle
 from ...figures.quantities import Quantity
-from ...geometry.layout.grid_layout import GridLayout
+from ...geometry.grid_layout import GridLayout
 from ...io.bake_reader import Bake
 from ...io.file_writing import write_file
 from ...io.recording_npz import described
-from ...jobs.progress import Job
-from ...model.recording import Recording
-from ...model.vector_readings import VectorReadings
-from .. import ros2_messages
+from ...jobs import Job
+from ...model.recording import Recording, VectorReadings
 from ..exporter import Exporter, sensor_progress, uncompressed_bytes
+
+POINT_CLOUD = "sensor_msgs/msg/PointCloud2"
+IMAGE = "sensor_msgs/msg/Image"
+WRENCH = "geometry_msgs/msg/WrenchStamped"
+POINT = "geometry_msgs/msg/PointStamped"
+TRANSFORMS = "tf2_msgs/msg/TFMessage"
+
+_UINT8, _FLOAT32 = 2, 7
+_FIELD_TYPES = {"|u1": _UINT8, "<f4": _FLOAT32}
+
+
+@cache
+def _store() -> Any:
+    """Return the messages of ROS 2 Humble, which Rolling has unchanged."""
+    from rosbags.typesys import Stores, get_typestore
+
+    return get_typestore(Stores.ROS2_HUMBLE)
+
+
+def definition(name: str) -> str:
+    """Return the definition of a message with those of all messages in it, as in MCAP's schemas of encoding ``ros2msg``."""
+    text, _ = _store().generate_msgdef(name, ros_version=2)
+    return str(text)
+
+
+def _part(name: str, *values: Any) -> Any:
+    return _store().types[name](*values)
+
+
+def _header(time: int, frame: str) -> Any:
+    """Return a ``std_msgs/Header``; the time is in nanoseconds."""
+    return _part("std_msgs/msg/Header", _part("builtin_interfaces/msg/Time", *divmod(time, 1_000_000_000)), frame)
+
+
+def _vector(values: Iterable[float]) -> Any:
+    return _part("geometry_msgs/msg/Vector3", *map(float, values))
+
+
+def _message(kind: str, *values: Any) -> bytes:
+    return bytes(_store().serialize_cdr(_part(kind, *values), kind))
+
+
+def point_cloud(time: int, frame: str, points: np.ndarray) -> bytes:
+    """Return a ``PointCloud2``.
+
+    Parameters
+    ----------
+    time : int, nanoseconds
+    frame : str
+    points : (n,) structured array
+        Its fields, float32 or uint8, become the fields of the points; x, y and z are among them.
+    """
+    kinds = points.dtype.fields or {}
+    about = ((name, offset, _FIELD_TYPES[kind.str], 1) for name, (kind, offset, *_) in kinds.items())
+    fields = [_part("sensor_msgs/msg/PointField", *one) for one in about]
+    data = np.frombuffer(points.tobytes(), np.uint8)
+    return _message(
+        POINT_CLOUD, _header(time, frame), 1, len(points), fields, False, points.dtype.itemsize, points.nbytes, data, True
+    )
+
+
+def image(time: int, frame: str, pixels: np.ndarray) -> bytes:
+    """Return an ``Image`` of one float32 channel (``32FC1``); `pixels` is (height, width), the top row first."""
+    data = np.frombuffer(np.ascontiguousarray(pixels, "<f4").tobytes(), np.uint8)
+    return _message(IMAGE, _header(time, frame), *pixels.shape, "32FC1", 0, 4 * pixels.shape[1], data)
+
+
+def wrench(time: int, frame: str, force: np.ndarray, torque: np.ndarray) -> bytes:
+    """Return a ``WrenchStamped`` of a force (N) and a torque (N·m), (3,) each."""
+    return _message(WRENCH, _header(time, frame), _part("geometry_msgs/msg/Wrench", _vector(force), _vector(torque)))
+
+
+def point(time: int, frame: str, position: np.ndarray) -> bytes:
+    """Return a ``PointStamped`` at a position, (3,) m."""
+    return _message(POINT, _header(time, frame), _part("geometry_msgs/msg/Point", *map(float, position)))
+
+
+def transforms(time: int, parent: str, children: Sequence[str], poses: np.ndarray) -> bytes:
+    """Return a ``TFMessage`` with the pose of each child frame, (b, 7): origin in metres and quaternion (w, x, y, z)."""
+    stamped = []
+    for child, (x, y, z, qw, qx, qy, qz) in zip(children, poses, strict=True):
+        turned = _part("geometry_msgs/msg/Quaternion", float(qx), float(qy), float(qz), float(qw))
+        pose = _part("geometry_msgs/msg/Transform", _vector((x, y, z)), turned)
+        stamped.append(_part("geometry_msgs/msg/TransformStamped", _header(time, parent), child, pose))
+    return _message(TRANSFORMS, stamped)
+
 
 WORLD = "world"
 """Frame of the world."""
@@ -71,12 +156,12 @@ class _Output:
         self._frames = {name: self._frame_of(name) for name in bake.texels}
         topics = topic_names(bake.texels)
         kinds = {
-            "texels": ros2_messages.POINT_CLOUD,
-            "tactile_image": ros2_messages.IMAGE,
-            "wrench": ros2_messages.WRENCH,
-            "centre_of_pressure": ros2_messages.POINT,
+            "texels": POINT_CLOUD,
+            "tactile_image": IMAGE,
+            "wrench": WRENCH,
+            "centre_of_pressure": POINT,
         }
-        self._transforms = self._channel("/tf", ros2_messages.TRANSFORMS)
+        self._transforms = self._channel("/tf", TRANSFORMS)
         self._channels = {
             name: {what: self._channel(f"{topic}/{what}", kind) for what, kind in kinds.items()}
             for name, topic in topics.items()
@@ -84,7 +169,7 @@ class _Output:
         self._points = {name: np.zeros(len(texels), _POINT) for name, texels in bake.texels.items()}
         for name, recorded in recording.sensors.items():
             if recorded.channels is not None:
-                self._channels[name]["channels"] = self._channel(f"{topics[name]}/channels", ros2_messages.POINT_CLOUD)
+                self._channels[name]["channels"] = self._channel(f"{topics[name]}/channels", POINT_CLOUD)
         for name, texels in bake.texels.items():
             for axis, values in zip("xyz", texels.position.T):
                 self._points[name][axis] = values
@@ -97,7 +182,7 @@ class _Output:
 
     def _channel(self, topic: str, kind: str) -> int:
         if kind not in self._schemas:
-            text = ros2_messages.definition(kind).encode()
+            text = definition(kind).encode()
             self._schemas[kind] = self._writer.register_schema(kind, "ros2msg", text)
         return int(self._writer.register_channel(topic, "cdr", self._schemas[kind]))
 
@@ -105,7 +190,7 @@ class _Output:
         """Write some of the frames."""
         for i, seconds in enumerate(part.times):
             time = round(float(seconds) * 1e9)
-            poses = ros2_messages.transforms(time, WORLD, list(self._bodies.values()), part.poses[i])
+            poses = transforms(time, WORLD, list(self._bodies.values()), part.poses[i])
             self._message(self._transforms, time, int(part.frames[i]), poses)
             for name, recorded in part.sensors.items():
                 own, frame, points = recorded.at(i), self._frames[name], self._points[name]
@@ -115,13 +200,13 @@ class _Output:
                 texels = self._bake.texels[name]
                 picture = texels.layout.image(self._shown.values(own, texels))[::-1]
                 content = {
-                    "texels": ros2_messages.point_cloud(time, frame, points),
-                    "tactile_image": ros2_messages.image(time, frame, picture),
-                    "wrench": ros2_messages.wrench(time, frame, own.net_force, own.net_torque),
-                    "centre_of_pressure": ros2_messages.point(time, frame, own.centre_of_pressure),
+                    "texels": point_cloud(time, frame, points),
+                    "tactile_image": image(time, frame, picture),
+                    "wrench": wrench(time, frame, own.net_force, own.net_torque),
+                    "centre_of_pressure": point(time, frame, own.centre_of_pressure),
                 }
                 if own.channels is not None:
-                    content["channels"] = ros2_messages.point_cloud(time, frame, _vector_points(own.channels))
+                    content["channels"] = point_cloud(time, frame, _vector_points(own.channels))
                 for what, message in content.items():
                     self._message(self._channels[name][what], time, int(part.frames[i]), message)
 

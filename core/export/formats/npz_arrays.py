@@ -10,8 +10,8 @@ import numpy as np
 from ...figures.figure_style import FigureStyle
 from ...io.bake_folder import folder_names
 from ...io.bake_reader import Bake
-from ...io.npz import write_arrays
-from ...jobs.progress import Job
+from ...io.recording_npz import write_arrays
+from ...jobs import Job
 from ..exporter import Exporter, bake_arrays, sensor_progress
 
 

@@ -15,7 +15,7 @@ from ...io.bake_folder import folder_names
 from ...io.bake_reader import Bake
 from ...io.file_writing import BLOCK, atomic_write, writable_folder
 from ...io.tactile_exr import channel_layout
-from ...jobs.progress import Job
+from ...jobs import Job
 from ...model.recording import row_blocks
 from ..exporter import Exporter, sensor_progress
 

@@ -23,7 +23,7 @@ from ...io.text_table import read_columns
 from ...laws.contact_law import contact_law
 from ...laws.friction import friction_along_path, stribeck_force
 from ...model.sensor_parameters import SensorParameters
-from ..fitting.regression import Estimate, linearised_estimates
+from ..fitting.intervals import Estimate, linearised_estimates
 from .stiffness import MOST_TEXELS
 
 STEADY = ("mus", "mud", "x0", "ct")

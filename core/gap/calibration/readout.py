@@ -15,8 +15,18 @@ import numpy as np
 
 from ...errors import ParameterError
 from ..dataset.rig import Rig
-from .readout_data import ReadoutData, ReadoutRecording, readout_data
-from .readout_methods import ForwardInverse, GaussianProcess, Prediction, Predictor, Ridge, forward_curves, memory_of
+from .readout_methods import (
+    ForwardInverse,
+    GaussianProcess,
+    Prediction,
+    Predictor,
+    ReadoutData,
+    ReadoutRecording,
+    Ridge,
+    forward_curves,
+    memory_of,
+    readout_data,
+)
 
 Method = Ridge | GaussianProcess | ForwardInverse
 MEMORY_TIMES: tuple[tuple[float, ...], ...] = ((), (1.0,), (1.0, 10.0))

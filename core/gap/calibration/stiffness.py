@@ -10,7 +10,7 @@ import numpy as np
 
 from ...errors import FileError, ParameterError
 from ...io.text_table import read_columns
-from ..fitting.regression import Estimate, linear_estimates
+from ..fitting.intervals import Estimate, linear_estimates
 
 STANDARD_GRAVITY = 9.80665
 """Standard acceleration of gravity, which converts masses to forces, m/s²."""

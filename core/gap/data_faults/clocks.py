@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..dataset.rig import Rig
-from ..dataset.shift_peak import peak_offset
+from ..dataset.second_logger import peak_offset
 from ..dataset.trial import Trial
 from ..forward.stimulus import Stimulus, stimulus_of
 from .data_fault import Correction, DataFault

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..dataset.fault_kinds import FAULT_KINDS
-from ..dataset.trial import Trial
+from ..dataset.trial import FAULT_KINDS, Trial
 
 Correction = Callable[[Trial], Trial]
 

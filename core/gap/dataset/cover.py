@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 
 from ...errors import FileError
-from ...geometry.layout.texture_maps import UVLayout
 from ...geometry.texels import Texels
+from ...geometry.texture_maps import UVLayout
 from ...io.input_files import is_number
 from ...io.schema import known_words
 from ...io.sensor_toml import checked_lengths
-from ...skins.layer import pressure_below_point_load
+from ...skins.magnetic_skin import pressure_below_point_load
 
 COVER_WORDS = {"sensors", "strips", "cover"}
 """Words of a [sensor] that describe such a sensor."""

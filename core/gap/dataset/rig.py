@@ -23,12 +23,9 @@ from ...io.sensor_toml import SHAPE_WORDS, checked_grid, checked_lengths, stated
 from ...model.sensor_parameters import DEPTH_PER_THICKNESS, SENSOR_PARAMETERS, SensorParameters, with_dependent_defaults
 from .column_names import ColumnRule, read_column_rules, translated
 from .cover import COVER_WORDS, Cover, read_cover
-from .fault_kinds import FAULT_KINDS
-from .missing_samples import bridged
-from .second_logger import SecondLogger, joined
+from .second_logger import SecondLogger, bridged, joined
 from .sessions import TrialHistory, on_common_clocks, read_history
-from .trial import Trial
-from .trial_words import FREE, SHARED_HEIGHT, SensorHeight, TrialWords, check_free_heights
+from .trial import FAULT_KINDS, FREE, SHARED_HEIGHT, SensorHeight, Trial, TrialWords, check_free_heights
 
 FORMAT = "palpate-rig/1"
 LOWEST_TEMPERATURE, HIGHEST_TEMPERATURE = -273.15, 2000.0
@@ -110,7 +107,7 @@ class Rig:
         The `[sensor]` table of the file.
     warnings : tuple of str
     correct : tuple of str
-        Kinds of faults of the data that are to be put right, keys of :data:`.fault_kinds.FAULT_KINDS`.
+        Kinds of faults of the data that are to be put right, keys of :data:`.trial.FAULT_KINDS`.
     cover : Cover or None
         Over texels at given places, or strips; None if contact is computed at the texels themselves.
     probes : mapping of str to Indenter
@@ -296,7 +293,7 @@ def grid_texels(rows: int, columns: int, pitch_x: float, pitch_y: float) -> Texe
     rows, columns : int
     pitch_x, pitch_y : float, metres
     """
-    from ...geometry.layout.grid_layout import GridLayout
+    from ...geometry.grid_layout import GridLayout
 
     row, column = np.divmod(np.arange(rows * columns), columns)
     x, y = (column - 0.5 * (columns - 1)) * pitch_x, (row - 0.5 * (rows - 1)) * pitch_y

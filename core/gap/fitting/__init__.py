@@ -5,13 +5,4 @@ Least squares with parameters per texel, intervals of the parameters, the noise 
 residual: for structure, for heteroscedastic noise, for spectral lines.
 """
 
-__all__ = [
-    "heteroscedastic_noise",
-    "intervals",
-    "least_squares",
-    "noise_floor",
-    "regression",
-    "repeat_noise",
-    "residual_tests",
-    "spectral_lines",
-]
+__all__ = ["intervals", "least_squares", "noise_floor", "residual_tests"]

@@ -25,7 +25,7 @@ from ...laws.friction import (
     next_deflection,
     turned_into_plane,
 )
-from ...model.effect import Effect
+from ...model.sensor import Effect
 from ...model.sensor_parameters import SensorParameters
 
 if TYPE_CHECKING:

@@ -13,13 +13,11 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from ...effects.engine import readout_chain
-from ...effects.engine.declarations import SCATTER, STEPS
 from ...effects.engine.registry import actual_placement as placed_texels
 from ...effects.engine.registry import form_of, kind_of, site_of_action
-from ...effects.engine.specification import TransducerArray
+from ...effects.engine.specification import SCATTER, STEPS, TransducerArray
 from ...geometry.texels import Texels
-from ...model.effect import Effect
-from ...model.sensor import Sensor
+from ...model.sensor import Effect, Sensor
 from ...model.sensor_parameters import FRICTION_LAW_PARAMETERS, NORMAL_LAW_PARAMETERS, SensorParameters
 from ..dataset.rig import FORCE, Rig
 from ..dataset.trial import Trial

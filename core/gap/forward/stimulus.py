@@ -17,11 +17,9 @@ from ...compiled.kernels import kernel
 from ...errors import SceneError
 from ...geometry.rotations import quaternion_product, rotation_vectors
 from ...geometry.texels import Texels
-from ...model.body import Body
-from ...model.motion import Motion
-from ...model.scenario import Scenario
+from ...model.body import Body, Motion
+from ...model.scenario import Scenario, Target
 from ...model.sensor import Sensor
-from ...model.target import Target
 from ...solver.simulation import Simulation
 from ..dataset.rig import Rig
 from ..dataset.trial import Trial

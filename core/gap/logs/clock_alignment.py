@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..dataset.shift_peak import peak_offset
+from ..dataset.second_logger import peak_offset
 
 HEIGHTS = (0.0, 0.2, 0.4, 0.6, 0.8)
 """Shares of the way of the stimulus below which it may not touch."""

@@ -15,7 +15,7 @@ from ...errors import FileError
 from ...io.csv_table import LARGEST_NUMBER
 from ...io.file_list import FileList
 from ...io.file_writing import atomic_write, writable_folder
-from ...jobs.progress import Job, Progress
+from ...jobs import Job, Progress
 from ..dataset.column_names import INVERSE, QUANTITIES, ZEROS
 from ..dataset.rig import FORMAT, read_rig
 from ..dataset.second_logger import interpolated, with_steady_signs

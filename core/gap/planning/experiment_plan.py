@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...effects.engine.declarations import FIT
 from ...effects.engine.registry import library
+from ...effects.engine.specification import FIT
 from ...errors import ParameterError
-from ...jobs.progress import Job, Progress
+from ...jobs import Job, Progress
 from ..dataset.rig import Rig
 from ..fitting.least_squares import FreeParameter, free_base_parameters
 from ..fitting.noise_floor import ChannelNoise
@@ -20,8 +20,7 @@ from ..selection.base_model import base_parameters_to_search, recording_numbers
 from ..selection.candidates import Candidate, candidates, scales_of
 from ..selection.findings import Diagnosis
 from ..selection.unfitted import unfitted
-from .limits import Limits, limits_of
-from .paths import Ground, Trajectory
+from .paths import Ground, Limits, Trajectory, limits_of
 from .separation import Separation, Signals
 
 Pair = tuple[str, str]
@@ -99,7 +98,7 @@ class Wishes:
     between : tuple of str
         Kinds that it is to separate.
     depth : float or None
-        See :class:`.limits.Limits`, as for those below.
+        See :class:`.paths.Limits`, as for those below.
     speed : float or None
     duration : float or None
     area : (float, float, float, float) or None

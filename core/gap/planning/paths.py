@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,8 +18,184 @@ from ..dataset.rig import Rig
 from ..dataset.trial import Trial
 from ..forward.predictor import Predictor
 from ..forward.stimulus import stimulus_of
-from .limits import Limits
-from .programmes import Move, Programme, programmes
+
+FASTEST = 0.99
+"""Quantile of the speeds of a recording that counts as its fastest: single samples of a noisy pose are faster."""
+LONGEST_PRESS, LONGEST_TRAVEL = 1.0, 5.0
+"""A probe that moved slowly or never is planned to need this long to the full depth, and along the whole sensor, s."""
+PLACE_MARGIN = 1e-9
+"""Metres by which a place may lie outside the area."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of a planned trajectory.
+
+    Attributes
+    ----------
+    depth : float
+        How far the probe moves beyond the first contact, m; the load where rigs know forces, N.
+    speed : float
+        m/s, sideways as well as up and down; N/s where rigs know forces.
+    duration : float, s
+    area : (float, float, float, float) or None, m
+        Least and largest x, least and largest y of the places, in the sensor's frame; None is the whole sensor.
+    """
+
+    depth: float
+    speed: float
+    duration: float
+    area: tuple[float, float, float, float] | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("depth", "speed", "duration"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise ParameterError(f"The limit of the {name} is {value:g}: give a positive number.")
+        if self.area is not None and not (self.area[0] <= self.area[1] and self.area[2] <= self.area[3]):
+            raise ParameterError("The area of the places is empty: give its least and largest x, then its least and largest y.")
+
+    def holds(self, places: np.ndarray) -> np.ndarray:
+        """Return which of some places (m, 3), in metres, lie inside the area, (m,) bool."""
+        if self.area is None:
+            return np.ones(len(places), bool)
+        x0, x1, y0, y1 = self.area
+        low, high = np.array([x0, y0]) - PLACE_MARGIN, np.array([x1, y1]) + PLACE_MARGIN
+        inside: np.ndarray = ((places[:, :2] >= low) & (places[:, :2] <= high)).all(axis=1)
+        return inside
+
+
+def limits_of(
+    predictors: Sequence[Predictor],
+    depth: float | None = None,
+    speed: float | None = None,
+    duration: float | None = None,
+    area: tuple[float, float, float, float] | None = None,
+) -> Limits:
+    """Return the limits that some recordings kept, or those that are given.
+
+    Parameters
+    ----------
+    predictors : sequence of Predictor
+    depth, speed, duration : float, optional
+    area : (float, float, float, float), optional
+
+    Raises
+    ------
+    ParameterError
+        A given limit is not positive, or the recordings never touched the sensor and no depth is given.
+    """
+    if depth is None:
+        depth = max(float(p.stimulus.load.max(initial=0.0)) for p in predictors if _is_like(p, predictors[0]))
+        if depth <= 0.0:
+            raise ParameterError("The recordings never touched the sensor: give the limit of the depth.")
+        if predictors[0].trial.stimulus == "force":
+            depth = max(float(np.max(p.trial.level)) for p in predictors if p.trial.level is not None)
+    if speed is None:
+        recorded = max(_speed(p) for p in predictors if _is_like(p, predictors[0]))
+        speed = max(recorded, depth / LONGEST_PRESS, _extent(predictors[0]) / LONGEST_TRAVEL)
+    if duration is None:
+        duration = max(float(np.ptp(p.trial.time)) for p in predictors)
+    return Limits(depth, speed, duration, area)
+
+
+def _is_like(one: Predictor, other: Predictor) -> bool:
+    return one.trial.stimulus == other.trial.stimulus
+
+
+def _extent(predictor: Predictor) -> float:
+    """Length of the sensor, m; 0 where no place is known."""
+    place = predictor.rig.texels.position
+    return float(np.ptp(place, axis=0).max()) if predictor.trial.stimulus == "pose" else 0.0
+
+
+def _speed(predictor: Predictor) -> float:
+    """Fastest motion of a recording, m/s or N/s."""
+    trial = predictor.trial
+    path = trial.position if trial.stimulus == "pose" else trial.level
+    assert path is not None
+    moved = np.diff(path.reshape(len(path), -1), axis=0)
+    speeds = np.linalg.norm(moved, axis=1) / np.diff(trial.time)
+    moving = speeds[speeds > 1e-3 * speeds.max(initial=0.0)]
+    return float(np.quantile(moving, FASTEST)) if len(moving) else 0.0
+
+
+QUICK, SLOW = 0.7, 0.05
+"""Speeds of programmes."""
+
+
+class Move(NamedTuple):
+    """A straight motion, and a rest at its end.
+
+    Attributes
+    ----------
+    depth : float or None
+        Share of the limit; None is clear of the sensor.
+    speed : float
+        Share of the limit.
+    hold : float, s
+    place : int
+        Index of the place; the probe moves there at the depth that it has.
+    """
+
+    depth: float | None
+    speed: float = QUICK
+    hold: float = 0.0
+    place: int = 0
+
+
+Press = tuple[Move, ...]
+"""Moves from a probe that is clear of the sensor until it is clear again."""
+Programme = tuple[Press, ...]
+
+
+def _press(depth: float, speed: float = QUICK, hold: float = 0.0, rest: float = 0.3, place: int = 0) -> Press:
+    return Move(depth, speed, hold, place), Move(None, speed, rest, place)
+
+
+def _through(depths: tuple[float, ...], speed: float, hold: float, place: int = 0) -> Press:
+    """A press that goes through some depths before it ends."""
+    return (*(Move(depth, speed, hold, place) for depth in depths), Move(None, QUICK, 0.5, place))
+
+
+def programmes(seconds: float, places: int, track: tuple[int, ...]) -> dict[str, Programme]:
+    """Return the programmes by name.
+
+    Parameters
+    ----------
+    seconds : float
+        Length of the recording. Shorter programmes are repeated.
+    places : int
+        Number of places at which the probe may press.
+    track : tuple of int
+        Places along which it may slide, from end to end; empty if it cannot.
+    """
+    long, step, last = 0.3 * seconds, seconds / 16.0, places - 1
+    stairs = (0.25, 0.5, 0.75, 1.0, 0.75, 0.5, 0.25)
+    found: dict[str, Programme] = {
+        "press and hold": (_press(1.0, hold=long, rest=0.6 * long), _press(0.4, hold=0.5 * long)),
+        "slow press and quick release": ((Move(1.0, SLOW), Move(None, 1.0, long)),),
+        "cycles at two speeds": (_press(1.0, 1.0), _press(1.0, SLOW), _press(1.0, 1.0), _press(1.0, 0.2)),
+        "growing cycles": tuple(_press(depth) for depth in (0.4, 0.4, 0.7, 0.7, 1.0, 1.0, 0.4)),
+        "partial unloading": (_through((1.0, 0.3, 0.9, 0.2, 0.7, 0.1, 1.0), 2.0 * SLOW, 0.0),),
+        "stairs": (_through(stairs, QUICK, step),),
+        "equal presses with rests": (_press(0.5, hold=0.5, rest=0.15 * seconds),),
+        "two loads held": (_press(1.0, hold=long), _press(0.3, hold=long)),
+    }
+    if places > 1:
+        found["two places"] = (_press(1.0, hold=1.0, place=0), _press(1.0, hold=1.0, place=last))
+        found["stairs at two places"] = (_through(stairs, QUICK, 0.5 * step), _through(stairs, QUICK, 0.5 * step, last))
+        found["every place"] = tuple(_press(1.0, hold=0.2, rest=0.2, place=place) for place in range(places))
+    if track:
+        quick, slow = (tuple(Move(0.6, speed, 0.0, place) for place in track[1:]) for speed in (1.0, 2.0 * SLOW))
+        light, heavy = (tuple(Move(depth, QUICK, 0.0, place) for place in track[1:]) for depth in (0.3, 1.0))
+        clear = Move(None, QUICK, 0.3, track[-1])
+        found["slides at two speeds"] = tuple((Move(0.6, QUICK, 0.5, track[0]), *way, clear) for way in (quick, slow))
+        found["slides under two loads"] = tuple(
+            (Move(depth, QUICK, 0.5, track[0]), *way, clear) for depth, way in ((0.3, light), (1.0, heavy))
+        )
+    return found
+
 
 Knot = tuple[float, int, float]
 """Time (s), place and depth."""

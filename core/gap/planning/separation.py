@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...model.effect import Effect
+from ...model.sensor import Effect
 from ..fitting.least_squares import FreeParameter, TrialView, derivatives, value_of
 from ..fitting.noise_floor import ChannelNoise
 from ..forward.predictor import Model, Predictor

@@ -4,4 +4,12 @@
 Nothing is fitted here.
 """
 
-__all__ = ["amended_sensor", "comparison", "experiments", "gap_table", "plan_files", "plots", "sentences", "summary"]
+__all__ = [
+    "amended_sensor",
+    "comparison",
+    "gap_table",
+    "plan_files",
+    "plots",
+    "sentences",
+    "summary",
+]

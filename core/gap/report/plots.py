@@ -14,8 +14,8 @@ from ...figures import color_maps
 from ...figures.figure_canvas import new_figure, save_figure, tidy_axes
 from ...figures.figure_style import GREY, INK, NORMAL_COLOUR, SHEAR_COLOUR, WIDTHS
 from ...figures.quantities import ERROR, error_scale
-from ...geometry.layout.grid_layout import GridLayout
-from ...jobs.progress import Job, Progress
+from ...geometry.grid_layout import GridLayout
+from ...jobs import Job, Progress
 from ..forward.contact_phases import PHASES
 from ..forward.predictor import Model, Predictor
 from ..selection.findings import Diagnosis

@@ -12,8 +12,7 @@ from ...errors import PalpateError
 from ...io.file_list import FileList
 from ...io.file_writing import atomic_write, require_space
 from ...io.sensor_toml import write_sensor
-from ...jobs.job_runner import part_of_job
-from ...jobs.progress import Job, Progress
+from ...jobs import Job, Progress, part_of_job
 from ..dataset.rig import Rig
 from ..fitting.least_squares import BASE, RECORDING
 from ..forward.predictor import Model
@@ -22,13 +21,11 @@ from ..selection.check_recordings import CheckedRecording
 from ..selection.findings import Diagnosis, Finding
 from ..selection.gap_sizes import FORCES, READINGS, friction_kinds
 from .amended_sensor import amended_sensor, with_mean_gain_moved
-from .comparison import USES, GapErrors, closed_share, error_location, gap_errors, recording_errors
-from .experiments import next_experiment
+from .comparison import USES, GapErrors, closed_share, error_location, gap_errors, recording_differences, recording_errors
 from .html_report import html_report
 from .plan_files import NEXT_TRAJECTORY, experiment_words, write_trajectory
 from .plots import FILE_TYPES, draw
-from .recording_differences import recording_differences
-from .sentences import headline, warnings
+from .sentences import headline, next_experiment, warnings
 
 FORMAT = "palpate-gap/1"
 LEAST_BYTES = 10e6

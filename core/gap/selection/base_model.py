@@ -11,8 +11,7 @@ import numpy as np
 from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
 from ..dataset.rig import FORCE, Rig
 from ..fitting.least_squares import FRICTION_LEVEL, RECORDING, Fit, FreeParameter, TrialView, fit, free_base_parameters
-from ..fitting.noise_floor import ChannelNoise, force_noise, reading_noise
-from ..fitting.repeat_noise import with_repeats
+from ..fitting.noise_floor import ChannelNoise, force_noise, reading_noise, with_repeats
 from ..forward.predictor import CONTACT_HEIGHT, Model, Predictor, number_name
 from ..forward.response_check import check_responses
 

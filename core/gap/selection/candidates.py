@@ -9,13 +9,12 @@ from functools import cache
 
 import numpy as np
 
-from ...effects.engine.declarations import SCATTER, SILENT_TEXELS, STEPS
 from ...effects.engine.registry import form_of, library, names_found_by
-from ...effects.engine.specification import Form, Kind, TransducerArray
+from ...effects.engine.specification import SCATTER, SILENT_TEXELS, STEPS, Form, Kind, TransducerArray
 from ...errors import EffectError
-from ...geometry.layout.grid_layout import GridLayout
-from ...model.effect import Effect
+from ...geometry.grid_layout import GridLayout
 from ...model.parameter import Parameter
+from ...model.sensor import Effect
 from ..dataset.sessions import COMMON
 from ..fitting.least_squares import Fit, FreeParameter, value_of
 from ..fitting.noise_floor import coverage
@@ -45,7 +44,7 @@ SIGNED_CORRELATION, LEAST_SIGNED = 0.5, 0.1
 Chosen by eye: of eFlesh's channels 12 rise and 3 fall under a normal force, and 8 and 19 in shear; the texels of each other
 set of benchmarks/_foreign.py all go one way."""
 THREES = "axes"
-"""What forms need, of :data:`.declarations.NEEDS`, that are only defined for the channels of all magnetometers."""
+"""What forms need, of :data:`.specification.NEEDS`, that are only defined for the channels of all magnetometers."""
 START_COUNT = 8
 """Number of starting points of a candidate."""
 COUPLING_PITCH, COUPLING_LOAD = 0.003, 0.05

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...effects.engine.declarations import STEPS
 from ...effects.engine.registry import form_of, kind_of, names_found_by
-from ...model.effect import Effect
+from ...effects.engine.specification import STEPS
+from ...model.sensor import Effect
 from ..fitting.least_squares import Fit
 from .candidates import DIRECTLY_ESTIMATED, is_spatial, parameters_at_bounds
 from .direct_estimates import coarsest_step

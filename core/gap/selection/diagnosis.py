@@ -13,17 +13,14 @@ from typing import TypeVar
 
 import numpy as np
 
-from ...jobs.progress import Job, Progress
+from ...jobs import Job, Progress
 from ..data_faults.data_fault import DataFault
 from ..data_faults.search import find_faults, put_right
 from ..dataset.rig import Rig
-from ..fitting.heteroscedastic_noise import proportional_noise
 from ..fitting.intervals import parameter_intervals
 from ..fitting.least_squares import BASE, Fit, fit, free_base_parameters, held_out_squares
-from ..fitting.noise_floor import SHORTEST_STRETCH, ChannelNoise, coverage
-from ..fitting.repeat_noise import is_scatter_of_repeats
-from ..fitting.residual_tests import LEAST_STRUCTURE, ResidualStructure, residual_structure
-from ..fitting.spectral_lines import strongest_line
+from ..fitting.noise_floor import SHORTEST_STRETCH, ChannelNoise, coverage, is_scatter_of_repeats
+from ..fitting.residual_tests import LEAST_STRUCTURE, ResidualStructure, proportional_noise, residual_structure, strongest_line
 from ..forward.predictor import Model, Predictor, number_name, predictors_of
 from .base_model import base_fit, identified_base_parameters, prepared
 from .between_recordings import (

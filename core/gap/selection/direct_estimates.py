@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...model.effect import Effect
+from ...model.sensor import Effect
 from ..fitting.least_squares import TrialView
 from ..forward.contact_phases import relative_load
 from ..forward.predictor import Model

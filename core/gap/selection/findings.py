@@ -12,8 +12,7 @@ from ..dataset.rig import Rig
 from ..fitting.intervals import ParameterInterval
 from ..fitting.least_squares import Fit
 from ..fitting.noise_floor import ChannelNoise, Coverage
-from ..fitting.residual_tests import ResidualStructure
-from ..fitting.spectral_lines import SpectralLine
+from ..fitting.residual_tests import ResidualStructure, SpectralLine
 from ..forward.predictor import Model, Predictor
 from .between_recordings import LOAD_HISTORY, RecordingDifferences
 from .candidates import Scales

@@ -15,8 +15,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...effects.engine.declarations import SILENT_TEXELS, STEPS
 from ...effects.engine.registry import form_of
+from ...effects.engine.specification import SILENT_TEXELS, STEPS
 from ..fitting.least_squares import Fit, FreeParameter, fit, held_out_squares
 from ..fitting.noise_floor import Coverage
 from ..fitting.residual_tests import LEAST_STRUCTURE, ResidualStructure

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...effects.engine.registry import library, site_of_action
-from ...model.effect import Effect
+from ...model.sensor import Effect
 
 READINGS, FORCES = 0, 1
 """Columns of arrays that hold a value for readings and one for net forces."""

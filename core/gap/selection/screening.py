@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...effects.engine.declarations import SILENT_TEXELS, STEPS
-from ...model.effect import Effect
+from ...effects.engine.specification import SILENT_TEXELS, STEPS
+from ...model.sensor import Effect
 from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
 from ..fitting.least_squares import Fit, FreeParameter, TrialView, fit, held_out_squares
 from ..forward.predictor import Model

@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...effects.engine.declarations import SILENT_TEXELS
 from ...effects.engine.registry import kind_of, library
-from ...model.effect import Effect
-from ..fitting.repeat_noise import MEASURED_REPEATS, is_scatter_of_repeats
+from ...effects.engine.specification import SILENT_TEXELS
+from ...model.sensor import Effect
+from ..fitting.noise_floor import MEASURED_REPEATS, is_scatter_of_repeats
 from ..fitting.residual_tests import LEAST_STRUCTURE, ResidualStructure
 from .candidates import NOT_FITTED, candidates
 from .check_recordings import CheckedRecording

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The formats of sensors: each module defines one ``FORMAT`` (:class:`..sensor_format.SensorFormat`).
 
-The registry finds the modules by itself. None needs the simulator whose files it writes.
+That module finds the formats by itself. None needs the simulator whose files it writes.
 """
 
 __all__ = []

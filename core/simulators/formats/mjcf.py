@@ -8,20 +8,252 @@ depth. What carries the body is MuJoCo's own contact, between convex shapes.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 
-from ...geometry.mesh import TriangleMesh
+from ...errors import FileError
+from ...geometry.mesh import TriangleMesh, checked_mesh, vertex_normals
+from ...geometry.point_surface import triangles_between
+from ...geometry.rotations import rotation_matrices
 from ...io.bake_folder import folder_names
-from ..contact_translation import MujocoContact, mujoco_contact
-from ..mjcf_reading import is_mjcf, read_mjcf
-from ..mujoco_load import REFERENCE_MASS
-from ..sensor_format import SensorFormat, Written
+from ...io.input_files import read_xml
+from ...io.sensor_toml import MOST_TEXELS
+from ..contact_translation import REFERENCE_MASS, MujocoContact, mujoco_contact
+from ..sensor_format import FoundSensor, SensorFormat, Written, add, comment, numbers, optional_package, write_xml
 from ..sensor_on_mesh import SensorOnMesh, unmodelled
-from ..xml_writing import add, comment, numbers, write_xml
+
+# Sensors of MJCF files, as MuJoCo compiles them: ``tactile``, ``touch`` on sites, and the plugin ``touch_grid``.
+#
+# MuJoCo resolves defaults, classes, includes and frames. A tactile's texels are the vertices of its mesh; the touch sites of
+# a body are the texels of one sensor; a touch_grid has directions, which become texels on a sphere.
+
+PLUGIN = "mujoco.sensor.touch_grid"
+SETTINGS = ("nchannel", "size", "fov", "gamma")
+"""Of the plugin, in the order in which it declares them and compiled models keep them."""
+DEEPEST = 250
+"""Elements inside each other; MuJoCo reads them by recursion."""
+SINGLE = 2e-7
+"""Relative precision of MuJoCo's vertices; the file's own numbers are taken where they are the same in this precision."""
+PROBE = 1e-5
+"""Radius (m) of the ball at a touch site by which MuJoCo finds the nearest surface of the site's body."""
+
+
+def is_mjcf(path: str | os.PathLike) -> bool:
+    """Return True if a file is XML with <mujoco> or a part of one; raises FileError if it cannot be read."""
+    if Path(path).suffix.lower() not in (".xml", ".mjcf"):
+        return False
+    root = read_xml(path, "a model")
+    return root.find("mujoco") is not None or root.find("mujocoinclude") is not None
+
+
+def read_mjcf(path: str | os.PathLike) -> list[FoundSensor]:
+    """Return the tactile sensors of a file.
+
+    Raises
+    ------
+    FileError
+        The package mujoco is missing, MuJoCo refuses the file, or it has no tactile sensor.
+    """
+    mujoco = optional_package("mujoco", f"'{path}' is an MJCF file")
+    root = read_xml(path, "a model")
+    if root.find("mujoco") is None:
+        raise FileError(f"'{path}' is a part of a model (<mujocoinclude>): give the file that includes it.")
+    if _depth(root) > DEEPEST:
+        raise FileError(f"'{path}' nests more than {DEEPEST} elements: a robot has fewer.")
+    mujoco.set_mju_user_warning(lambda message: None)  # else it writes a log into the current folder
+    try:
+        spec = mujoco.MjSpec.from_file(os.fspath(path))
+        model = spec.compile()
+    except Exception as error:  # MuJoCo raises ValueError, and others for meshes and plugins
+        words = " ".join(str(error).split())
+        hint = ": if it is a part of a model, give the file that includes it" if "unrecognized name" in words else ""
+        raise FileError(f"MuJoCo cannot compile '{path}' ({words:.160}){hint or ': correct it'}.") from error
+    finally:
+        mujoco.set_mju_user_warning(None)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    kinds, found, touch = mujoco.mjtSensor, [], []
+    instances = {plugin.name: plugin.plugin_name for plugin in spec.plugins}
+    for number, item in enumerate(spec.sensors):
+        kind = int(model.sensor_type[number])
+        if kind == kinds.mjSENS_TACTILE:
+            found.append(_tactile(path, root, model, data, number, item.name or f"tactile {number + 1}"))
+        elif kind == kinds.mjSENS_PLUGIN and (item.plugin.plugin_name or instances.get(item.plugin.name)) == PLUGIN:
+            found.append(_touch_grid(path, model, data, number, item.name or f"touch grid {number + 1}"))
+        elif kind == kinds.mjSENS_TOUCH:
+            touch.append(int(model.sensor_objid[number]))
+    notes = ["MuJoCo's geoms, contact and joints were not imported; parameters have their defaults."]
+    found += _touch_sensors(mujoco, spec, model, data, touch, notes)
+    if not found:
+        few = f"; it has <touch> on {len(touch)} sites, and three on one body make a sensor" if touch else ""
+        raise FileError(
+            f"'{path}' has no <tactile>, no <touch> and no {PLUGIN} in its <sensor>{few}: give a file that has one."
+        )
+    for one in found:
+        one.notes.extend(notes)
+    return found
+
+
+def _depth(root: ElementTree.Element) -> int:
+    """Return how many elements are inside each other."""
+    depth, level = 0, [root]
+    while level:
+        depth, level = depth + 1, [child for element in level for child in element]
+    return depth
+
+
+def _tactile(path: str | os.PathLike, root: ElementTree.Element, model: Any, data: Any, number: int, name: str) -> FoundSensor:
+    """Return the sensor of a <tactile>: MuJoCo keeps meshes in their inertial frame, and puts that into the geom's."""
+    mesh, geom = int(model.sensor_objid[number]), int(model.sensor_refid[number])
+    first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+    _require_count(path, name, count)
+    turn, shift = rotation_matrices(model.mesh_quat[mesh][None])[0], model.mesh_pos[mesh]
+    position = model.mesh_vert[first : first + count].astype(float) @ turn.T + shift
+    position = _in_full_precision(root, model.mesh(mesh).name, model.mesh_scale[mesh], position)
+    start, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+    shape = checked_mesh(position, model.mesh_face[start : start + faces], name)[0]
+    start, normals = int(model.mesh_normaladr[mesh]), int(model.mesh_normalnum[mesh])
+    stated = model.mesh_normal[start : start + normals].astype(float) @ turn.T
+    tangent = None
+    if normals == 3 * count:  # the second and third of each vertex span the plane in which MuJoCo measures sliding
+        frames = _in_full_precision(root, model.mesh(mesh).name, np.ones(3), stated, "normal").reshape(count, 3, 3)
+        frames = frames / np.linalg.norm(frames, axis=2, keepdims=True)
+        normal, tangent = frames[:, 0], frames[:, 1]
+    else:
+        normal = stated if normals == count else vertex_normals(shape)
+    world = rotation_matrices(_quaternion(data.geom_xmat[geom])[None])[0] @ turn.T
+    return FoundSensor(
+        name,
+        position,
+        normal / np.linalg.norm(normal, axis=1, keepdims=True),
+        shape.triangles,
+        tangent=tangent,
+        frame_position=data.geom_xpos[geom] - world @ shift,
+        frame_quaternion=_quaternion(world),
+    )
+
+
+def _in_full_precision(
+    root: ElementTree.Element, mesh: str, scale: np.ndarray, single: np.ndarray, key: str = "vertex"
+) -> np.ndarray:
+    """Return what the file writes of a mesh where MuJoCo has the same numbers in single precision, else what MuJoCo has."""
+    for element in root.iterfind("mujoco/asset/mesh"):
+        words = (element.get(key) or "").split()
+        if element.get("name") == mesh and len(words) == single.size:
+            written = np.array(words, float).reshape(-1, 3) * scale
+            if np.abs(written - single).max() <= SINGLE * max(float(np.abs(single).max()), 1e-3):
+                return written
+    return single
+
+
+def _touch_sensors(mujoco: Any, spec: Any, model: Any, data: Any, sites: list[int], notes: list[str]) -> list[FoundSensor]:
+    """Return for each body with three touch sites a sensor whose texels these are.
+
+    A touch site states no direction: its normal is that of the nearest surface of its own body, which MuJoCo computes.
+    """
+    groups: dict[int, list[int]] = {}
+    for site in sites:
+        groups.setdefault(int(model.site_bodyid[site]), []).append(site)
+    chosen = {body: own for body, own in groups.items() if len(own) >= 3}
+    alone = len(sites) - sum(map(len, chosen.values()))
+    if chosen and alone:
+        notes.append(f"{alone} <touch> on bodies with fewer than three of them were not imported.")
+    return [
+        _touch_sensor(model, data, body, own, _site_normals(mujoco, spec, model, data, own)) for body, own in chosen.items()
+    ]
+
+
+def _touch_sensor(model: Any, data: Any, body: int, sites: list[int], normals: np.ndarray) -> FoundSensor:
+    turn, place = rotation_matrices(data.xquat[body][None])[0], data.xpos[body].copy()
+    position, normal = (data.site_xpos[sites] - place) @ turn, normals @ turn
+    name = model.body(body).name or "touch"
+    note = f"'{name}': its {len(sites)} texels are <touch> sites, with the normals of the nearest surface of their body."
+    faces = triangles_between(position, normal)
+    return FoundSensor(
+        name, position, normal, faces, frame_position=place, frame_quaternion=data.xquat[body].copy(), notes=[note]
+    )
+
+
+def _site_normals(mujoco: Any, spec: Any, model: Any, data: Any, sites: list[int]) -> np.ndarray:
+    """Return directions out of the nearest surface of the body of each site, (n, 3) in the world."""
+    probed = spec.copy()
+    bodies = {body.id: body for body in probed.bodies}
+    for site in sites:
+        bodies[int(model.site_bodyid[site])].add_geom(
+            name=f"palpate probe {site}",
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            size=[PROBE, 0, 0],
+            mass=0,
+            pos=model.site_pos[site],
+        )
+    with_probes = probed.compile()
+    there = mujoco.MjData(with_probes)
+    mujoco.mj_kinematics(with_probes, there)
+    found = np.zeros((len(sites), 3))
+    for row, site in zip(found, sites, strict=True):
+        probe = with_probes.geom(f"palpate probe {site}").id
+        best, span = np.inf, np.zeros(6)
+        for geom in np.flatnonzero(with_probes.geom_bodyid == model.site_bodyid[site]):
+            if not with_probes.geom(geom).name.startswith("palpate probe"):
+                distance = mujoco.mj_geomDistance(with_probes, there, int(geom), probe, 1.0, span)
+                if distance < best:
+                    best, row[:] = distance, (span[3:] - span[:3]) * np.sign(distance)
+        if not row.any():  # a body without geoms: the site's own z axis
+            row[:] = data.site_xmat[site].reshape(3, 3)[:, 2]
+    return found / np.linalg.norm(found, axis=1, keepdims=True)
+
+
+def _touch_grid(path: str | os.PathLike, model: Any, data: Any, number: int, name: str) -> FoundSensor:
+    """Return the sensor of a touch_grid: its bins of directions, on a sphere around the site."""
+    site, first = int(model.sensor_objid[number]), int(model.plugin_attradr[model.sensor_plugin[number]])
+    words = model.plugin_attr[first:].tobytes().decode("utf-8").split("\0")
+    settings = dict(zip(SETTINGS, words, strict=False))
+    columns, rows = (int(float(word)) for word in settings["size"].split())
+    if min(columns, rows) < 2:
+        raise FileError(f"Sensor '{name}' in '{path}' has {columns} × {rows} bins: two each way are the fewest that are read.")
+    _require_count(path, name, columns * rows)
+    fov = [float(word) for word in settings["fov"].split()]
+    gamma = float(settings["gamma"] or 0.0)
+    azimuth, elevation = (_bin_middles(n, limit, gamma) for n, limit in zip((columns, rows), fov))
+    y, x = np.meshgrid(elevation, azimuth, indexing="ij")
+    direction = np.stack([np.cos(y) * np.sin(x), np.sin(y), -np.cos(y) * np.cos(x)], axis=-1).reshape(-1, 3)
+    radius = float(model.site_size[site][0])
+    row, column = (index.ravel() for index in np.indices((rows, columns)))
+    note = f"'{name}': a touch_grid has directions and no surface; its texels are on a sphere of the site's size, {radius:g} m."
+    grid = np.arange(len(row)).reshape(rows, columns)
+    corners = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=-1).reshape(-1, 4)
+    faces = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
+    place, turn = data.site_xpos[site].copy(), _quaternion(data.site_xmat[site])
+    return FoundSensor(
+        name, radius * direction, direction, faces, row, column, frame_position=place, frame_quaternion=turn, notes=[note]
+    )
+
+
+def _bin_middles(count: int, limit: float, gamma: float) -> np.ndarray:
+    """Return the middles of a touch_grid's bins, radians; `limit` is half its field of view, degrees (touch_grid.cc)."""
+    edges = np.linspace(-1.0, 1.0, count + 1)
+    share = min(max(gamma, 0.0), 1.0)
+    edges = np.radians(limit) * (share * edges**5 + (1.0 - share) * edges)
+    middles: np.ndarray = (edges[1:] + edges[:-1]) / 2.0
+    return middles
+
+
+def _require_count(path: str | os.PathLike, name: str, count: int) -> None:
+    if not 3 <= count <= MOST_TEXELS:
+        raise FileError(f"Sensor '{name}' in '{path}' has {count} texels: from 3 to {MOST_TEXELS} are read.")
+
+
+def _quaternion(matrix: np.ndarray) -> np.ndarray:
+    """Return the quaternion (w, x, y, z) of a rotation matrix, (3, 3) or (9,)."""
+    from scipy.spatial.transform import Rotation
+
+    return np.roll(Rotation.from_matrix(np.reshape(matrix, (3, 3))).as_quat(), 1)
+
 
 IMPEDANCE = 0.9
 """Constant impedance d of the contact (`solimp`), the upper end of MuJoCo's default."""

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ...geometry.layout.grid_layout import GridLayout
+from ...geometry.grid_layout import GridLayout
 from ...io.bake_folder import folder_names
-from ...io.npz import write_arrays
+from ...io.recording_npz import write_arrays
 from ..probe_list import PROBES_FORMAT, is_probe_list, read_probe_list, write_probe_list
 from ..sensor_format import FoundSensor, SensorFormat, Written
 from ..sensor_on_mesh import SensorOnMesh, texel_arrays

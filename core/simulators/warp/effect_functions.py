@@ -19,8 +19,7 @@ from ...effects.engine.specification import Form, TexelInput
 from ...errors import ParameterError
 from ...laws.contact_law import LINEAR_EXPONENT, ContactLaw
 from ...laws.normal_force import damped_force_derivatives, damping_coefficient, elastic_force, elastic_stiffness
-from ...model.effect import Effect
-from ...model.sensor import Sensor
+from ...model.sensor import Effect, Sensor
 
 
 def force_with_effects(

@@ -10,19 +10,17 @@ from typing import Any
 import numpy as np
 
 from ...effects.engine.readout_chain import transducers_of
-from ...effects.engine.sensor_effects import check_scenario, mounted_texels
+from ...effects.engine.registry import check_scenario, mounted_texels
 from ...errors import PalpateError, ParameterError
 from ...geometry.bvh import build_tree
 from ...geometry.contact_points import ContactPoints, contact_points
 from ...geometry.mesh import TriangleMesh
 from ...geometry.shapes import MESH, Shape
 from ...laws.contact_law import contact_law
-from ...model.body import Body
-from ...model.motion import Motion
-from ...model.scenario import Scenario
+from ...model.body import Body, Motion
+from ...model.scenario import Scenario, Target
 from ...model.sensor import Sensor
-from ...model.target import Target
-from ...solver.detection.deforming_surfaces import point_rows
+from ...solver.detection.deformation import point_rows
 from ..environment_parameters import Columns, sensors_of
 from ..load_balance import check_targets
 from ..load_search import LoadSearch

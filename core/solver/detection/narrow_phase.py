@@ -10,11 +10,10 @@ import numpy as np
 from ...compiled.kernels import inlined, kernel
 from ...geometry.bvh import Segment, Tree, segment_entry
 from ...geometry.shapes import MESH
-from ..contact_rows import LANES
 from ..solver_model import NO_TRIANGLE, TOO_DEEP, SolverModel, State
 from ..workspace import Workspace
 from .deformation import place_all_triangles, place_listed_triangles
-from .detection_data import DetectionData
+from .detection_data import LANES, DetectionData
 from .neighbour_lists import find_entry, rebuild_list
 from .segments import clear_slot, finish_block, segment_of, write_relative_pose, write_row
 from .shape_contacts import find_shape_contacts

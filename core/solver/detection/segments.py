@@ -8,9 +8,9 @@ import numpy as np
 from ...compiled.kernels import inlined, kernel
 from ...geometry.bvh import Segment
 from ...geometry.shapes import Vector
-from ..contact_rows import BRISTLE, DEPTH, LANES, NORMAL, POINT, ROW, write_vector
 from ..solver_model import SolverModel, State
 from ..workspace import Workspace
+from .detection_data import BRISTLE, DEPTH, LANES, NORMAL, POINT, ROW, write_vector
 
 
 @kernel

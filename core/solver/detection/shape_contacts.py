@@ -22,10 +22,9 @@ from ...geometry.shapes import (
     shape_entry,
     shape_normal,
 )
-from ..contact_rows import BRISTLE, DEPTH, KEEP, LANES, NORMAL, POINT, read_vector, write_vector
 from ..solver_model import Pairs, SolverModel, State
 from ..workspace import ContactWork, Workspace
-from .detection_data import DetectionData
+from .detection_data import BRISTLE, DEPTH, KEEP, LANES, NORMAL, POINT, DetectionData, read_vector, write_vector
 from .segments import finish_block, in_sensor_axes, in_target_axes, place_behind, segment_at
 
 FOUND = KEEP

@@ -9,11 +9,22 @@ import numpy as np
 
 from ...compiled.kernels import kernel
 from ...laws.friction import turned_into_plane
-from ..contact_rows import BRISTLE, DEPTH, LANES, NORMAL, POINT, read_vector, write_vector
 from ..solver_model import SolverModel, State
 from ..workspace import Workspace
 from .deformation import at_moment, point_at
-from .detection_data import OTHER, PRESENT, DetectionData, SurfaceMotion
+from .detection_data import (
+    BRISTLE,
+    DEPTH,
+    LANES,
+    NORMAL,
+    OTHER,
+    POINT,
+    PRESENT,
+    DetectionData,
+    SurfaceMotion,
+    read_vector,
+    write_vector,
+)
 
 
 @kernel

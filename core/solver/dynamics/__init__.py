@@ -8,12 +8,8 @@ stand here as well.
 __all__ = [
     "actuators",
     "contact_assembly",
-    "drive_commands",
     "effect_kernels",
-    "effect_memory",
-    "free_rotation",
     "friction_state",
-    "grip_controller",
     "linear_system",
     "modes",
     "passivity",

@@ -8,9 +8,15 @@ that no gain asks for a small step.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
 import numpy as np
 
 from ...compiled.kernels import kernel
+from ...errors import ParameterError
+from ...geometry.grid_layout import GridLayout
 from ...geometry.rotations import rotate
 from ...model.scenario import Scenario
 from ..solver_model import SolverModel, State
@@ -165,3 +171,204 @@ def move_drives(dt: float, commands: np.ndarray, model: SolverModel, state: Stat
         force, _ = actuator_force(drive, speed, True, dt, commands[drive], model, state, workspace)
         state.drives[drive, TRAVEL] += dt * speed
         state.drives[drive, SPEED], state.drives[drive, FORCE] = speed, force
+
+
+# Controllers of a gripper. They use tactile data and nothing of the simulation, so that they can drive real hardware.
+#
+# A controller receives an array of values from the sensor's electronics, at its own rate, and returns a :class:`Command` to the
+# drive of the finger. In a simulation :class:`DriveCommands` calls it; on a robot, a loop of five lines does::
+#
+#     controller = GripControl(speed=0.05, max_force=40.0)
+#     while True:
+#         command = controller.update(TactileData(rows, columns, sensor.read()), target=5.0, seconds=0.001)
+#         drive.set(command.velocity, command.push)
+
+
+@dataclass(frozen=True)
+class TactileData:
+    """One reading of a tactile sensor.
+
+    Attributes
+    ----------
+    rows, columns : int
+        Size of the array; a sensor that is no grid has one column.
+    values : (rows · columns,) float, N
+        Normal force of each texel, row by row.
+    """
+
+    rows: int
+    columns: int
+    values: np.ndarray
+
+    @property
+    def total(self) -> float:
+        """Sum of the values, N."""
+        return float(np.sum(self.values))
+
+
+class Command(NamedTuple):
+    """Command to a drive; positive is the direction in which the finger closes.
+
+    Its force is ``push + damping (velocity - speed)``, and while `homing` also a spring to where it started.
+
+    Attributes
+    ----------
+    velocity : float, m/s
+    push : float, N
+    homing : bool
+        Go back to where the drive started, no faster than its speed limit.
+    """
+
+    velocity: float
+    push: float = 0.0
+    homing: bool = False
+
+
+@dataclass
+class GripControl:
+    """Velocity until first touch, then force control on the tactile sum (paper, section 5.2.2 and Fig. 12).
+
+    After the first touch the drive pushes with the wanted force and damps its own motion. An integral slowly adds what the
+    sensor's sum still lacks: a curved object presses the texels sideways as well, and a guide has friction. The stiffness of
+    object and sensor need not be known. When the touch is lost the finger approaches again; a target of zero or less opens it.
+
+    Attributes
+    ----------
+    speed : float, m/s
+        Of the approach.
+    max_force : float, N
+        The push never exceeds it.
+    settling : float, seconds
+        Time constant of the integral: longer than the time in which finger and foam come to rest.
+    touch : float, N
+        Sum from which on the finger touches.
+    push : float, N
+        Present push.
+    touching : bool
+    """
+
+    speed: float
+    max_force: float
+    settling: float = 0.1
+    touch: float = 1e-3
+    push: float = field(default=0.0, init=False)
+    touching: bool = field(default=False, init=False)
+    _wanted: float = field(default=0.0, init=False)
+
+    def __post_init__(self) -> None:
+        for name in ("speed", "max_force", "settling"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0):
+                raise ParameterError(f"{name} of a grip controller is {value:g}: give it a value above zero.")
+
+    def update(self, data: TactileData, target: float, seconds: float) -> Command:
+        """Return the command for the next period.
+
+        Parameters
+        ----------
+        data : TactileData
+        target : float, N
+            Wanted sum; zero or less opens the finger.
+        seconds : float
+            Since the last update.
+        """
+        if target <= 0.0:
+            self.touching = False
+            return Command(0.0, homing=True)
+        total = data.total
+        was_touching, self.touching = self.touching, total > min(self.touch, 0.5 * target)
+        if not self.touching:
+            return Command(self.speed)
+        self.push = target if not was_touching else self.push + target - self._wanted
+        self.push += (target - total) * seconds / self.settling
+        self.push, self._wanted = min(max(self.push, 0.0), self.max_force), target
+        return Command(0.0, self.push)
+
+
+class DriveCommands:
+    """The targets and controllers of a scenario's actuators.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    """
+
+    def __init__(self, scenario: Scenario):
+        self._scenario = scenario
+        self._drives = {
+            i: body.drive for i, body in enumerate(scenario.bodies) if body.drive is not None and body.drive.leader is None
+        }
+        self._targets = {body: drive.target for body, drive in self._drives.items()}
+        self._coupled = {body: 1 for body in self._drives}
+        for other in scenario.bodies:
+            if other.drive is not None and other.drive.leader is not None:
+                self._coupled[other.drive.leader] += 1
+        self._controllers = {
+            body: GripControl(drive.max_speed, drive.max_force, drive.settling)
+            for body, drive in self._drives.items()
+            if drive.control == "force"
+        }
+
+    @property
+    def reads_sensors(self) -> bool:
+        """Whether any actuator has a controller."""
+        return bool(self._controllers)
+
+    def extend(self, time: float, targets: Mapping[int, float]) -> None:
+        """Append the next targets of some bodies' actuators."""
+        for body, value in targets.items():
+            if body in self._targets and self._targets[body].times[-1] < time - 1e-9:
+                self._targets[body] = self._targets[body].extended(time, value)
+
+    def control_intervals(
+        self, times: np.ndarray, dt: float, read: Callable[[int], np.ndarray]
+    ) -> Iterator[tuple[int, int, np.ndarray]]:
+        """Yield the steps of a frame in intervals during which no controller is updated.
+
+        Parameters
+        ----------
+        times : (steps + 1,) float, seconds
+        dt : float, seconds
+        read : callable
+            Returns the (n,) values of a sensor, by its index, in the present state.
+
+        Yields
+        ------
+        first, last : int
+            Steps, the last one excluded.
+        commands : (steps, d, 4) float
+            Valid for these steps.
+        """
+        steps = len(times) - 1
+        commands = np.zeros((steps, len(self._drives), 4))
+        for i, (body, drive) in enumerate(self._drives.items()):
+            target = self._targets[body].at(times)
+            if drive.control == "position":
+                commands[:, i, TARGET_TRAVEL], commands[:, i, HOLD_TRAVEL] = target[1:], 1.0
+                commands[:, i, TARGET_SPEED] = np.diff(target) / dt
+            elif drive.control == "velocity":
+                commands[:, i, TARGET_SPEED] = target[1:]
+        turns = {body: range(0, steps, max(1, round(self._drives[body].period / dt))) for body in self._controllers}
+        stops = sorted({0, steps}.union(*turns.values()))
+        for first, last in zip(stops, stops[1:], strict=False):
+            for i, body in enumerate(self._drives):
+                if first in turns.get(body, ()):
+                    seconds = min(turns[body].step, steps - first) * dt
+                    wanted = float(self._targets[body].at(times[first + 1 : first + 2])[0])
+                    commands[first:, i] = self._controller_command(body, wanted, seconds, read)
+            yield first, last, commands
+
+    def _controller_command(self, body: int, target: float, seconds: float, read: Callable[[int], np.ndarray]) -> np.ndarray:
+        """Return the (4,) command of a controller for the next `seconds`."""
+        sensor = self._drives[body].sensor
+        values = read(sensor)
+        layout = self._scenario.sensors[sensor].texels.layout
+        if isinstance(layout, GridLayout):
+            rows, columns, values = layout.rows, layout.columns, layout.image(values).ravel()
+        else:
+            rows, columns = len(values), 1
+        told: Command = self._controllers[body].update(TactileData(rows, columns, values), target, seconds)
+        command = np.zeros(4)
+        command[TARGET_SPEED], command[HOLD_TRAVEL] = told.velocity, told.homing
+        command[PUSH] = told.push * self._coupled[body]
+        return command

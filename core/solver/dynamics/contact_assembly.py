@@ -13,7 +13,7 @@ from ...effects.engine.compiled_program import TexelMotion, has_effects, may_pul
 from ...laws.contact_law import LINEAR_EXPONENT, ContactLaw, read_law
 from ...laws.friction import bristle_step, deflection_scale, friction_tangent, max_bristle_deflection, next_deflection
 from ...laws.normal_force import linear_tangent, normal_tangent
-from ..contact_rows import (
+from ..detection.detection_data import (
     BRISTLE,
     DEPTH,
     EXTRA_VISCOSITY,

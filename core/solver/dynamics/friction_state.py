@@ -5,9 +5,20 @@ from __future__ import annotations
 
 from ...compiled.kernels import inlined, kernel
 from ...laws.friction import deflection_scale, next_deflection
-from ..contact_rows import BRISTLE, GAIN, KEEP, LANES, LIMIT, NORMAL, POINT, read_vector, write_vector
 from ..detection.deformation import frame_at
-from ..detection.detection_data import OTHER, SurfaceMotion
+from ..detection.detection_data import (
+    BRISTLE,
+    GAIN,
+    KEEP,
+    LANES,
+    LIMIT,
+    NORMAL,
+    OTHER,
+    POINT,
+    SurfaceMotion,
+    read_vector,
+    write_vector,
+)
 from ..solver_model import SolverModel, State
 from ..workspace import Workspace
 from .relative_kinematics import motion_values, row_of, velocity_at, write_pair_motion

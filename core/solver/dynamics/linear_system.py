@@ -7,7 +7,7 @@ import numpy as np
 
 from ...compiled.kernels import inlined, kernel
 from ...geometry.rotations import add_triple_product
-from ..contact_rows import LANES
+from ..detection.detection_data import LANES
 from ..solver_model import Pairs, SolverModel, State
 from ..workspace import LinearSystem, Workspace
 from .modes import write_map

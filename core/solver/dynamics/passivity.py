@@ -12,17 +12,49 @@ is scaled. Where animation moves one of the bodies it may bring any energy: from
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from ...compiled.kernels import inlined, kernel
 from ...laws.contact_law import ContactLaw
 from ...laws.normal_force import elastic_energy
-from ..found_contacts import contacts_of
+from ..detection.detection_data import DEPTH, LANES, NORMAL, POINT, ROW
 from ..solver_model import SolverModel, State
 from ..workspace import Workspace
 from .linear_system import is_last_part
 from .modes import add_integration_loss, is_moved_by_path, write_end
+
+
+class Contacts(NamedTuple):
+    """The n contacts of one pair.
+
+    Attributes
+    ----------
+    slots : (n,) int
+        Slot of each in :class:`.State`.
+    normal : (n, 3) float
+        The target's outward normal, in the frame of the sensor's body like the point.
+    point : (n, 3) float, metres
+        From the body's reference point.
+    depth : (n,) float, metres
+    """
+
+    slots: np.ndarray
+    normal: np.ndarray
+    point: np.ndarray
+    depth: np.ndarray
+
+
+def contacts_of(pair: int, workspace: Workspace) -> Contacts:
+    """Return the contacts of one pair, as they were found last."""
+    number, first = workspace.contacts.number[pair], workspace.contacts.first_block[pair]
+    blocks = slice(first, first - (-number // LANES))
+    rows = workspace.contacts.rows[blocks].reshape(-1, ROW // LANES, LANES).swapaxes(1, 2).reshape(-1, ROW // LANES)[:number]
+    n, p = NORMAL // LANES, POINT // LANES
+    slots = workspace.contacts.slots[blocks].ravel()[:number]
+    return Contacts(slots, rows[:, n : n + 3], rows[:, p : p + 3], rows[:, DEPTH // LANES])
+
 
 MAX_BISECTIONS = 24
 """Bisections for the factor on its forces that a pair can pay for."""

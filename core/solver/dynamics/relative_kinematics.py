@@ -7,7 +7,7 @@ import numpy as np
 
 from ...compiled.kernels import inlined, kernel
 from ...laws.contact_law import ContactLaw, scaled_law
-from ..contact_rows import LANES, NORMAL, POINT, read_vector
+from ..detection.detection_data import LANES, NORMAL, POINT, read_vector
 from ..solver_model import SolverModel, State
 from ..workspace import ContactWork, Workspace
 

@@ -9,7 +9,7 @@ from blender_scenes import ball, changes, cube, dump, grid, select
 from palpate.addon.authoring import laid_sensors
 from palpate.addon.scene import participants, scene_reader
 from palpate.addon.session import transforms
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 from palpate.core.solver.simulation import run
 
 

@@ -137,7 +137,7 @@ def test_a_material_or_face_set_becomes_the_region(source):
 
 def test_a_region_by_material_survives_its_own_heat_map(tmp_path):
     from palpate.addon.bake.bake import bake
-    from palpate.core.jobs.job_runner import run_job
+    from palpate.core.jobs import run_job
 
     scene, pad, _ = press(3)
     right = two_halves(pad)
@@ -204,7 +204,7 @@ def test_a_soft_tip_feels_less_under_the_same_ball():
         group = pad.vertex_groups.get("Soft") or pad.vertex_groups.new(name="Soft")
         group.add(range(84), 1.0, "REPLACE")
         pad.palpate.k_map, pad.palpate.k_factor = "Soft", factor
-        from palpate.core.jobs.job_runner import run_job
+        from palpate.core.jobs import run_job
         from palpate.core.solver.simulation import run
 
         forces.append(run(run_job(scene_reader.read_scene(scene)).scenario).sensors["Pad"].normal_force[-1].sum())

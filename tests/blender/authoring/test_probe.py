@@ -8,7 +8,7 @@ from blender_scenes import ball, grid
 
 from palpate.addon.authoring import probes
 from palpate.addon.scene import scene_reader
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 from palpate.core.solver.simulation import run
 
 

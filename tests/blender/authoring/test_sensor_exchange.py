@@ -15,7 +15,7 @@ from palpate.addon.authoring import laid_sensors, sensor_exchange
 from palpate.addon.scene import participants, sensor_reader
 from palpate.commands import main
 from palpate.core.errors import SceneError
-from palpate.core.simulators.registry import export_sensors, written_formats
+from palpate.core.simulators.sensor_format import export_sensors, written_formats
 
 SAMPLES = {"weighing": ("Finger", 84), "fingertip": ("Fingertip", 176), "hand": ("Index finger", 195)}
 """Scene → a sensor in it and the number of its texels: a flat grid, a fingertip without rows, and a finger of a hand."""

@@ -8,7 +8,7 @@ from blender_scenes import ball, grid, reopen, save
 
 from palpate.addon.authoring import laid_sensors, sensor_report, surface_binding
 from palpate.addon.scene import mesh_arrays, participants, scene_reader
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 
 def finger():

@@ -16,7 +16,7 @@ from palpate.core.io.bake_folder import read_manifest
 from palpate.core.io.bake_reader import read_bake
 from palpate.core.io.hidden_folder import LOCK_NAME, PRIVATE_FOLDER
 from palpate.core.io.recording_npz import load_recording
-from palpate.core.jobs.job_runner import SlicedJob, run_job
+from palpate.core.jobs import SlicedJob, run_job
 
 
 def baked(scene):

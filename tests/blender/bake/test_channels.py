@@ -14,11 +14,11 @@ from palpate import sensors_from_blend
 from palpate.addon.bake.bake import bake
 from palpate.addon.scene import scene_fingerprint, scene_reader
 from palpate.core.errors import PalpateError
-from palpate.core.export.registry import export
+from palpate.core.export.exporter import export
 from palpate.core.io.bake_folder import read_manifest
 from palpate.core.io.bake_reader import read_bake
 from palpate.core.io.tactile_exr import channel_layout
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 from palpate.core.skins import skin_presets
 from palpate.panels import sensor as panel
 

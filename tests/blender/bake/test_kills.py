@@ -11,7 +11,7 @@ from kills import Kills
 from palpate.addon.bake.bake import bake
 from palpate.core.errors import FileError
 from palpate.core.io.bake_reader import read_bake
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 COMMAND = [sys.executable, "-m", "palpate.commands", "bake"]
 MIXED = ("of different bakes", "is missing from the bake", "was interrupted")

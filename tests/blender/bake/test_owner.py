@@ -16,7 +16,7 @@ from palpate.commands import blender, export
 from palpate.core.errors import FileError, SceneError
 from palpate.core.io.bake_folder import read_manifest
 from palpate.core.io.bake_reader import read_bake
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 
 def baked(scene, **options):

@@ -13,7 +13,7 @@ from blender_scenes import ball, changes, cube, dump, press, press_and_drop, sav
 from palpate.addon.bake.bake import bake
 from palpate.addon.scene import scene_reader
 from palpate.core.errors import PalpateError, SceneError
-from palpate.core.jobs.job_runner import SlicedJob, run_job
+from palpate.core.jobs import SlicedJob, run_job
 
 
 @pytest.fixture

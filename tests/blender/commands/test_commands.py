@@ -20,7 +20,7 @@ from palpate.commands.bake import report
 from palpate.core.errors import FileError
 from palpate.core.io.recording_npz import load_recording
 from palpate.core.io.scenario_npz import load_scenario
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 from palpate.core.solver import simulation
 
 

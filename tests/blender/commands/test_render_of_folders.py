@@ -9,7 +9,7 @@ from blender_scenes import contents, press_and_drop, reopen, save
 from palpate.addon.bake import bake
 from palpate.commands import main
 from palpate.core.io.bake_reader import read_bake
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 
 @pytest.fixture

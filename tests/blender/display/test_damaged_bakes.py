@@ -18,7 +18,7 @@ from palpate.addon.session import frame_status
 from palpate.addon.timeline import baked_frames
 from palpate.core.errors import PalpateError, SceneError
 from palpate.core.io.bake_folder import IMAGE_LIST_NAME, read_manifest, write_manifest
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 DAMAGES = {
     "half a recording": lambda pad: os.truncate(pad / "recording.npz", 3000),

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from sample_bake import pictures_of, read_exr
 
-from palpate.core.geometry.layout.grid_layout import GridLayout
-from palpate.core.geometry.layout.texture_maps import uv_layout
+from palpate.core.geometry.grid_layout import GridLayout
+from palpate.core.geometry.texture_maps import uv_layout
 from palpate.core.io.bake_folder import frame_file
 from palpate.core.io.tactile_exr import CHANNELS, write_exrs
 from palpate.core.model.recording import SensorFrame

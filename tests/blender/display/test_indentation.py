@@ -13,7 +13,7 @@ from palpate.addon.scene.display_names import INDENTATION_MODIFIER
 from palpate.addon.session import frame_status
 from palpate.addon.timeline import live_cache
 from palpate.core.figures.figure_style import FigureStyle
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 
 def surface(obj):

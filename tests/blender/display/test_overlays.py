@@ -9,9 +9,9 @@ from blender_scenes import changes, cube, dump, press_and_drop, save
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import bake_display, baked_scene, markers, materials, overlays, texel_arrows
 from palpate.addon.session import transforms
+from palpate.core import response
 from palpate.core.errors import PalpateError
-from palpate.core.jobs.job_runner import run_job
-from palpate.core.response import metrics
+from palpate.core.jobs import run_job
 from palpate.sample_blends import grasp
 
 ALL = {"FORCE", "TORQUE", "CENTRE", "SLIP", "NORMALS", "SHEARS"}
@@ -71,8 +71,8 @@ def test_texel_arrows_are_the_forces_of_their_texels(baked, kind):
 def test_markers_stand_at_the_centre_of_pressure_and_show_moment_and_slip(baked):
     scene, pad, result = baked
     readings = result.recording.sensors["Pad"]
-    share = metrics.slip_share(readings, result.scenario.sensors[0].parameters)
-    moment = metrics.free_moment(readings)
+    share = response.slip_share(readings, result.scenario.sensors[0].parameters)
+    moment = response.free_moment(readings)
     radius = float(np.ptp(result.scenario.sensors[0].texels.position, axis=0).max()) * markers.RING_SHARE
     for frame in (1, 6, 8):
         scene.frame_set(frame)
@@ -104,7 +104,7 @@ def test_all_sensors_share_one_scale(baked):
         for slot in obj.material_slots
         if slot.material is not None and materials.SENSOR_KEY in slot.material
     }
-    assert list(ends) == [pytest.approx(metrics.scale_limit(metrics.peak_force(result.recording)))]
+    assert list(ends) == [pytest.approx(response.scale_limit(response.peak_force(result.recording)))]
 
 
 def test_arrows_of_fingers_that_face_each_other_do_not_cross(tmp_path):

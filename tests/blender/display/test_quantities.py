@@ -17,7 +17,7 @@ from palpate.addon.timeline import live_cache
 from palpate.core.errors import PalpateError
 from palpate.core.figures import color_maps
 from palpate.core.figures.quantities import QUANTITIES, Scale, between
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 from palpate.panels import sensor as sensor_panel
 
 EVERY = pytest.mark.parametrize("name", QUANTITIES)

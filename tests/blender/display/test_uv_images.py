@@ -13,7 +13,7 @@ from palpate.addon.scene import participants, scene_reader, sensor_reader, uv_la
 from palpate.addon.session import frame_status
 from palpate.core.errors import SensorError
 from palpate.core.io.bake_folder import frame_file
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 
 def tip(kind="uv_sphere", **settings):

@@ -13,10 +13,10 @@ from blender_scenes import cube, press_and_drop, save, scene_with_readings
 
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import materials
+from palpate.core import response
 from palpate.core.figures import color_maps
 from palpate.core.figures.quantities import QUANTITIES
-from palpate.core.jobs.job_runner import run_job
-from palpate.core.response import metrics
+from palpate.core.jobs import run_job
 
 FRAMES = (1, 7, 8)
 SCRIPT = Path(__file__).with_name("without_addon.py")
@@ -137,7 +137,7 @@ def test_every_texel_has_the_colour_of_its_force(scene_file, tmp_path):
     path, recording = scene_file
     seen = watch(path, tmp_path, "seen", False)
     force = recording.sensors["Pad"].normal_force
-    end = metrics.scale_limit(metrics.peak_force(recording))  # one scale for all
+    end = response.scale_limit(response.peak_force(recording))  # one scale for all
     for frame in FRAMES:
         shot = seen["frames"][str(frame)]
         width, height = shot["size"]

@@ -20,10 +20,10 @@ import pytest
 from small_study import write_study
 
 from palpate.commands import COMMANDS, _parser, main
-from palpate.core.export.registry import export
+from palpate.core.export.exporter import export
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.io.bake_reader import read_bake
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 ROOT = Path(__file__).resolve().parents[3]
 PAGES = [

@@ -15,7 +15,7 @@ from palpate.commands import main
 from palpate.core.errors import SceneError
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.logs.questions import OpenQuestion
-from palpate.core.jobs.job_runner import SlicedJob
+from palpate.core.jobs import SlicedJob
 from palpate.core.solver import precompile
 
 

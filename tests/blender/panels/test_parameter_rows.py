@@ -9,7 +9,7 @@ import pytest
 
 from palpate.addon.properties.scene_units import ENDING
 from palpate.addon.session import session_state
-from palpate.core.jobs.progress import Progress
+from palpate.core.jobs import Progress
 from palpate.core.model.sensor_parameters import HUNT_CROSSLEY, LINEAR, SENSOR_PARAMETERS
 from palpate.panels import bake, gap, sensor
 

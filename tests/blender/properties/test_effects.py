@@ -11,10 +11,9 @@ from palpate.addon.properties import effect_stack
 from palpate.addon.scene import scene_fingerprint, scene_reader, sensor_reader
 from palpate.addon.session import frame_status
 from palpate.addon.timeline import staleness
-from palpate.core.effects.engine.registry import effect, library
-from palpate.core.effects.engine.sensor_effects import check_scenario
+from palpate.core.effects.engine.registry import check_scenario, effect, library
 from palpate.core.errors import EffectError
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 FORMS = [(kind.name, form.name) for kind in library().values() for form in kind.forms]
 

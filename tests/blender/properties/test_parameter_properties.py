@@ -7,7 +7,7 @@ import pytest
 from palpate.addon.authoring.sensor_presets import COPIED
 from palpate.addon.properties.parameter_properties import CONSTANT, put_sensor_parameters, sensor_parameters
 from palpate.addon.scene import scene_fingerprint
-from palpate.core.model.drive import DRIVE_PARAMETERS
+from palpate.core.model.body import DRIVE_PARAMETERS
 from palpate.core.model.parameter import Parameter
 from palpate.core.model.sensor_parameters import CONTACT, FRICTION, READOUT, SENSOR_PARAMETERS, SensorParameters
 

@@ -11,8 +11,8 @@ from palpate.addon.properties.scene_units import ENDING, KINDS, name_in_units
 from palpate.addon.scene import scene_reader
 from palpate.addon.session import units
 from palpate.core.io.sensor_toml import SensorModel, read_sensor, write_sensor
-from palpate.core.jobs.job_runner import run_job
-from palpate.core.model.drive import DRIVE_PARAMETERS
+from palpate.core.jobs import run_job
+from palpate.core.model.body import DRIVE_PARAMETERS
 from palpate.core.model.sensor_parameters import SENSOR_PARAMETERS
 
 SHOWN = {"max_penetration": 1, "x0": 1, "drive_max_speed": 1, "mass": 3}

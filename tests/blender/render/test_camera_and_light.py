@@ -10,7 +10,7 @@ from palpate.addon.bake.bake import bake
 from palpate.addon.render import camera_direction, figure_export, loaded_texels, render, render_setup, studio
 from palpate.addon.render.figure_request import FigureRequest
 from palpate.core.figures import color_maps
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 SIZE = (96, 72)
 

@@ -12,7 +12,7 @@ from palpate.addon.render import figure_export, figure_request
 from palpate.commands import render
 from palpate.core.errors import ParameterError
 from palpate.core.io.file_list import LIST_NAME
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ from palpate.core.errors import SensorError
 from palpate.core.figures import color_maps, gel_image
 from palpate.core.io.file_list import LIST_NAME
 from palpate.core.io.recording_npz import load_recording
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 SIDE, ANGLE = 0.05, 50.0
 """Of the gel, m; of the lamps, degrees."""

@@ -22,7 +22,7 @@ from palpate.core.figures.figure_style import FigureStyle
 from palpate.core.io import file_writing
 from palpate.core.io.file_list import LIST_NAME
 from palpate.core.io.file_writing import atomic_write
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 
 @pytest.fixture

@@ -10,10 +10,10 @@ import pytest
 from palpate.addon.bake.bake import bake
 from palpate.addon.render import render
 from palpate.commands import main
+from palpate.core import response
 from palpate.core.errors import SceneError
 from palpate.core.io.recording_npz import load_recording
-from palpate.core.jobs.job_runner import run_job
-from palpate.core.response import metrics
+from palpate.core.jobs import run_job
 from palpate.sample_blends import build_samples, demo, scene_builder
 
 
@@ -258,7 +258,7 @@ def test_samples_open_and_bake(name, repository, tmp_path):
     scene.palpate.folder = str(tmp_path / "bake")
     baked = run_job(bake(scene))
     assert baked.recording.warnings == ()
-    assert metrics.peak_force(baked.recording) > 0.01
+    assert response.peak_force(baked.recording) > 0.01
     for sensor in baked.recording.sensors.values():
         assert sensor.contact.any()
         assert np.isfinite(sensor.normal_force).all()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from palpate.addon.scene import scene_reader
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 from palpate.core.solver import time_step_adviser
 from palpate.core.solver.simulation import run
 from palpate.sample_blends import hand

@@ -9,7 +9,7 @@ from blender_scenes import ball, cube, grid
 from palpate.addon.bake import bake
 from palpate.addon.scene import participants, scene_reader
 from palpate.core.errors import SceneError
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 from palpate.core.solver.simulation import run
 
 

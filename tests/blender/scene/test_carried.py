@@ -9,7 +9,7 @@ from mathutils import Matrix
 
 from palpate.addon.scene import participants, scene_reader
 from palpate.core.errors import SceneError
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 from palpate.core.solver.simulation import run
 
 FRAMES = 7

@@ -13,7 +13,7 @@ from palpate.addon.scene import mesh_fingerprint, participants, scene_reader
 from palpate.addon.session import frame_status, transforms
 from palpate.addon.timeline import playback
 from palpate.core.errors import SceneError
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 
 def sampled(scene):

@@ -10,7 +10,7 @@ from palpate.addon.bake import bake
 from palpate.addon.scene import scene_reader
 from palpate.addon.session import frame_status
 from palpate.core.errors import SceneError
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 FRICTION = {"k": 1000.0, "cn": 10.0, "sigma0": 2000.0, "sigma1": 20.0, "mus": 0.8, "mud": 0.7}
 

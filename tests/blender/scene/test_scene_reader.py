@@ -13,7 +13,7 @@ from palpate.addon.scene import scene_reader
 from palpate.addon.session import transforms, units
 from palpate.core.errors import SceneError
 from palpate.core.geometry.mesh import face_normals
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 from palpate.core.solver.simulation import run
 
 

@@ -18,7 +18,7 @@ from palpate.addon.bake import bake as baking
 from palpate.addon.session import first_use, frame_status
 from palpate.addon.timeline import live_cache, playback
 from palpate.core.compiled import kernels
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 from palpate.core.solver import precompile, precompile_process
 from palpate.core.solver.simulation import Simulation
 

@@ -14,7 +14,7 @@ from palpate.addon.session import identity, transforms
 from palpate.commands import main
 from palpate.core.errors import PalpateError
 from palpate.core.io.recording_npz import load_recording
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 from palpate.core.solver.simulation import run
 
 

@@ -13,7 +13,7 @@ from blender_scenes import press, save
 from palpate.addon.scene import scene_reader
 from palpate.core.errors import PalpateError
 from palpate.core.io.recording_npz import load_recording
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 from palpate.core.solver.simulation import run
 from palpate.core.study.variation import varied_scenario
 from palpate.sweep.scene_evaluation import read_blend

@@ -10,7 +10,7 @@ from blender_scenes import press, save
 from palpate.addon.session import session_state
 from palpate.addon.study import property_path, study_process, study_settings
 from palpate.core.errors import PalpateError
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 from palpate.core.study.progress import counted_runs
 
 LONGEST = 300

@@ -8,7 +8,7 @@ from blender_scenes import cube, press_and_drop, save
 from palpate.addon.scene import scene_reader
 from palpate.addon.study import property_path, study_settings
 from palpate.core.errors import PalpateError
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 from palpate.core.study.presses import PRESS_PARAMETERS
 from palpate.core.study.study_file import plan_for, read_study
 

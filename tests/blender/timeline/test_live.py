@@ -13,7 +13,7 @@ from palpate.addon.display import materials
 from palpate.addon.events import handlers as handlers_of_palpate
 from palpate.addon.session import frame_status, session_state
 from palpate.addon.timeline import live_cache, playback
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 from palpate.core.model.recording import SENSOR_FIELDS
 from palpate.operators import bake as bake_operators
 

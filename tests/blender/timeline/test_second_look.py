@@ -13,7 +13,7 @@ from palpate.addon.timeline import baked_frames, live_cache, playback, second_lo
 from palpate.core.figures import color_maps
 from palpate.core.figures.figure_style import FigureStyle
 from palpate.core.io.bake_reader import read_sensors
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 
 @pytest.fixture(autouse=True)

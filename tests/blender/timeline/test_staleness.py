@@ -9,7 +9,7 @@ from blender_scenes import ball, press, press_and_drop, reopen, save
 from palpate.addon.bake.bake import bake
 from palpate.addon.session import frame_status
 from palpate.addon.timeline import live_cache
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 FRESH, STALE = "Frame {} of the bake.", "The scene has changed since this bake. Bake again."
 

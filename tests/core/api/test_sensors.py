@@ -150,7 +150,7 @@ def test_islands_that_get_no_texel_are_named():
 
 def test_every_format_that_is_offered_is_written(tmp_path, repository):
     """The list of the docstring, the table of docs/simulators.md and the choices of the command are the same, and all work."""
-    from palpate.core.simulators.registry import written_formats
+    from palpate.core.simulators.sensor_format import written_formats
 
     offered = set(re.findall(r'"(\w+)"', pp.export_sensor.__doc__.partition("(docs/simulators.md)")[0]))
     page = (repository / "docs" / "simulators.md").read_text(encoding="utf-8")

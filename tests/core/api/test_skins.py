@@ -10,7 +10,7 @@ from sample_bake import read_image
 from scipy.spatial.transform import Rotation
 
 import palpate as pp
-from palpate.core.skins.layer import texel_displacements
+from palpate.core.skins.magnetic_skin import texel_displacements
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ import zlib
 
 import pytest
 
-from palpate.core.compiled import kernels, machine_code, numba_internals, processors
+from palpate.core.compiled import kernels, machine_code, numba_internals
 from palpate.core.geometry import rotations
 
 if importlib.util.find_spec("numba") is None or os.environ.get("PALPATE_NUMBA") == "0":
@@ -57,7 +57,7 @@ def run(script, repository, cache, package, packed, **environment):
 def made(repository, tmp_path_factory):
     """Return a file with the machine code of one kernel for the common processor, and what the kernel computed there."""
     folder = tmp_path_factory.mktemp("made")
-    name, features = processors.target()
+    name, features = machine_code.target()
     wanted = {"NUMBA_CPU_NAME": name, "NUMBA_CPU_FEATURES": ",".join(f"+{feature}" for feature in features)}
     return folder / "code.bin", run(MAKE, repository, folder / "cache", "palpate", folder / "code.bin", **wanted)
 

@@ -21,14 +21,14 @@ COLUMN = "a column of recordings"
 ALLOWED = {
     # words that are names of effects and of something else
     "commands/fit.py": ({"offset"}, "the constant of a straight line, as the title of a column"),
-    "core/effects/engine/declarations.py": ({"temperature"}, "what recordings must hold"),
+    "core/effects/engine/specification.py": ({"temperature"}, "what recordings must hold"),
     "core/gap/dataset/column_names.py": ({"temperature"}, COLUMN),
     "core/gap/dataset/rig.py": ({"temperature"}, COLUMN),
     "core/gap/logs/column_meaning.py": ({"temperature"}, COLUMN),
     "core/gap/logs/proposal.py": ({"temperature"}, COLUMN),
     "core/gap/selection/candidates.py": ({"temperature"}, "what recordings must hold"),
     "core/gap/selection/plausibility.py": ({"offset"}, "the parameter that the signature of an offset is about"),
-    "core/simulators/urdf_reading.py": ({"offset"}, "an attribute of arrays in a URDF"),
+    "core/simulators/formats/urdf.py": ({"offset"}, "an attribute of arrays in a URDF"),
 }
 """Files outside the library that may name effects, which (all, if none is listed), and why. Tests may: they are examples."""
 
@@ -89,7 +89,7 @@ USES = """
 from types import SimpleNamespace
 import gap_cases as cases
 from palpate.core.gap.forward.predictor import Model, predictors_of
-from palpate.core.gap.report.experiments import next_experiment
+from palpate.core.gap.report.sentences import next_experiment
 from palpate.core.gap.selection.candidates import candidates
 from palpate.core.gap.selection.identifiability import NONLINEAR
 

@@ -16,15 +16,15 @@ import pytest
 from sample_bake import grid_texels, recording_of, round_texels, write_bake, write_sensor
 
 from palpate.core.errors import FileError, PalpateError
-from palpate.core.export import formats, registry
+from palpate.core.export import exporter, formats
+from palpate.core.export.exporter import export, exporters
 from palpate.core.export.formats import hdf5
-from palpate.core.export.registry import export, exporters
 from palpate.core.figures import color_maps
 from palpate.core.figures.figure_style import FigureStyle
 from palpate.core.io.bake_reader import frame_index, read_bake
 from palpate.core.io.file_list import LIST_FORMAT, LIST_NAME
-from palpate.core.io.sensor_npz import load_sensor, save_sensor
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.io.recording_npz import load_sensor, save_sensor
+from palpate.core.jobs import run_job
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
 
 
@@ -173,8 +173,8 @@ def test_every_format_is_registered_once():
     """A module of the package is a format; its position is its bit in a scene's choice, so positions have no gaps."""
     found = exporters()
     assert list(found) == ["csv", "npz", "hdf5", "png", "mcap"]
-    assert [exporter.position for exporter in found.values()] == list(range(len(found)))
-    modules = {path.stem for path in Path(registry.__file__).parent.glob("formats/*.py")} - {"__init__"}
+    assert [one.position for one in found.values()] == list(range(len(found)))
+    modules = {path.stem for path in Path(exporter.__file__).parent.glob("formats/*.py")} - {"__init__"}
     assert len(modules) == len(found)
 
 
@@ -249,9 +249,9 @@ FULL_DISK = """
 import resource, signal
 from palpate.core.errors import FileError
 from palpate.core.io.file_list import LIST_FORMAT, LIST_NAME
-from palpate.core.export.registry import export, exporters
+from palpate.core.export.exporter import export, exporters
 from palpate.core.io.bake_reader import read_bake
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 import matplotlib.image
 bake = read_bake({bake!r})
 exporters()
@@ -262,7 +262,7 @@ try:
 except FileError as error:
     print(error)
 """
-PATH = {"PYTHONPATH": str(Path(registry.__file__).parents[3])}
+PATH = {"PYTHONPATH": str(Path(exporter.__file__).parents[3])}
 
 
 def test_hdf5_of_large_arrays_is_written_by_blocks(tmp_path, monkeypatch):

@@ -13,13 +13,12 @@ import pytest
 from kills import stopped_at
 
 from palpate.core.errors import FileError
-from palpate.core.export import registry
-from palpate.core.export.exporter import Exporter
-from palpate.core.export.registry import export
+from palpate.core.export import exporter
+from palpate.core.export.exporter import Exporter, export
 from palpate.core.io import file_list
 from palpate.core.io.file_list import LIST_FORMAT, LIST_NAME
 from palpate.core.io.file_writing import atomic_write, writable_folder
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 OLD = {"bodies.csv": "old", "pad/force.csv": "old", "pad/gone.csv": "old"}
 NEW = {"bodies.csv": "new", "pad/force.csv": "new", "tip/force.csv": "new"}
@@ -42,7 +41,7 @@ def write(files, folder, _style):
 def formats(monkeypatch):
     """A format of plain text; a "bake" is a dictionary of files."""
     known = {name: Exporter(name, name, "", i, write, lambda _: 0.0) for i, name in enumerate(("text", "other"))}
-    monkeypatch.setattr(registry, "exporters", lambda: known)
+    monkeypatch.setattr(exporter, "exporters", lambda: known)
 
 
 @pytest.fixture
@@ -185,7 +184,7 @@ def test_an_error_names_the_place_of_the_file(out):
         raise FileError(f"'{folder / 'pad.csv'}' could not be written (no space left on device): free some space.")
         yield
 
-    registry.exporters()["text"] = replace(registry.exporters()["text"], write=fail)
+    exporter.exporters()["text"] = replace(exporter.exporters()["text"], write=fail)
     with pytest.raises(FileError) as caught:
         run_job(export(NEW, "text", out))
     assert str(caught.value).startswith(f"'{out / 'pad.csv'}' could not be written")

@@ -12,10 +12,10 @@ import pytest
 from sample_bake import grid_texels, recording_of, round_texels, write_sensor
 
 from palpate.core.errors import PalpateError
+from palpate.core.export.exporter import export
 from palpate.core.export.formats.mcap_messages import topic_names
-from palpate.core.export.registry import export
 from palpate.core.io.bake_reader import read_bake
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 from palpate.core.model.sensor_parameters import SensorParameters
 
 mcap_reader = pytest.importorskip("mcap.reader")

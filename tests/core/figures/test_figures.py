@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from sample_bake import COLUMNS, PITCH, ROWS, grid_texels, recording_of, round_texels
 
+from palpate.core import response
 from palpate.core.errors import FileError, ParameterError, SensorError
 from palpate.core.figures import figure_canvas, figure_style, tactile_image
 from palpate.core.figures.figure_style import FigureStyle
@@ -19,7 +20,6 @@ from palpate.core.figures.time_curves import force_curves, time_curves
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.texels import texels_from_region
 from palpate.core.model.sensor_parameters import SensorParameters
-from palpate.core.response import metrics
 
 
 def test_net_shear_of_a_flat_pad_is_the_plain_sum():
@@ -27,13 +27,13 @@ def test_net_shear_of_a_flat_pad_is_the_plain_sum():
     sensor = recording_of(texels).sensors["pad"]
     expected = np.zeros((10, 3))
     expected[:, 1] = sensor.shear[:, :, 1].sum(axis=1)  # rows run along +y
-    np.testing.assert_allclose(metrics.net_shear(sensor, texels), expected, atol=1e-15)
+    np.testing.assert_allclose(response.net_shear(sensor, texels), expected, atol=1e-15)
 
 
 def test_mobilised_friction_is_shear_over_limit_and_zero_without_contact():
     texels = grid_texels()
     sensor = recording_of(texels).sensors["pad"]
-    ratio = metrics.mobilised_friction(sensor, texels, mus=0.4)
+    ratio = response.mobilised_friction(sensor, texels, mus=0.4)
     touching = sensor.normal_force.any(axis=1)
     np.testing.assert_allclose(ratio[touching], 0.5)
     assert (ratio[~touching] == 0).all()
@@ -41,23 +41,23 @@ def test_mobilised_friction_is_shear_over_limit_and_zero_without_contact():
 
 @pytest.mark.parametrize(("value", "limit"), [(0.11, 0.15), (1.0, 1.0), (0.026, 0.03), (9.9, 10.0), (3e-7, 3e-7)])
 def test_scales_end_at_round_numbers(value, limit):
-    assert metrics.rounded_limit(value) == pytest.approx(limit)
+    assert response.rounded_limit(value) == pytest.approx(limit)
 
 
 def test_frames_are_spread_over_what_happens():
     recording = recording_of(grid_texels())
-    chosen = metrics.choose_frames(recording, 4)
+    chosen = response.choose_frames(recording, 4)
     assert len(chosen) == 4
     assert (np.diff(chosen) > 0).all()
     assert chosen.max() <= 8  # the last three frames are alike
-    assert set(metrics.choose_frames(recording, 100)) <= set(recording.frames)
+    assert set(response.choose_frames(recording, 100)) <= set(recording.frames)
 
 
 def test_frames_of_a_still_recording_are_spread_over_all_of_it():
     recording = recording_of(grid_texels())
     recording.sensors["pad"].normal_force[:] = 0.3
     recording.sensors["pad"].shear[:] = 0
-    assert list(metrics.choose_frames(recording, 2)) == [3, 8]
+    assert list(response.choose_frames(recording, 2)) == [3, 8]
 
 
 @pytest.mark.parametrize("texels", [grid_texels(), round_texels()], ids=["grid", "uv"])
@@ -191,9 +191,9 @@ def test_no_arrow_is_longer_than_arrows_are_apart(texels, inches):
 
 def test_rounding_is_no_shear():
     recording = recording_of(grid_texels())
-    assert metrics.peak_shear(recording) > 0.0
+    assert response.peak_shear(recording) > 0.0
     recording.sensors["pad"].shear[:] *= 1e-14
-    assert metrics.peak_shear(recording) == 0.0
+    assert response.peak_shear(recording) == 0.0
 
 
 def test_a_colour_bar_in_kilopascals_is_force_over_area(tmp_path, monkeypatch):
@@ -238,12 +238,12 @@ def test_slip_is_the_share_of_the_load_on_texels_at_their_limit():
     texels = grid_texels()
     felt = recording_of(texels).sensors["pad"]
     parameters = SensorParameters(mus=0.2, mud=0.2)  # shear is 0.2 of the normal force
-    assert (metrics.slip_share(felt, parameters) == 0.0).all()  # nothing moves
+    assert (response.slip_share(felt, parameters) == 0.0).all()  # nothing moves
     felt.slip[:, :5] = 0.01
-    share = metrics.slip_share(felt, parameters)
+    share = response.slip_share(felt, parameters)
     expected = felt.normal_force[:, :5].sum(axis=1)[3] / felt.normal_force.sum(axis=1)[3]
     assert share[3] == pytest.approx(expected) and share[-1] == 0.0
-    assert (metrics.slip_share(felt, SensorParameters(mus=0.5, mud=0.5)) == 0.0).all()
+    assert (response.slip_share(felt, SensorParameters(mus=0.5, mud=0.5)) == 0.0).all()
 
 
 def test_the_free_moment_does_not_depend_on_the_origin():
@@ -252,7 +252,7 @@ def test_the_free_moment_does_not_depend_on_the_origin():
     place, force, couple = np.array([0.1, -0.2, 0.03]), np.array([1.0, 2.0, -5.0]), np.array([0.0, 0.0, 0.4])
     felt.centre_of_pressure, felt.net_force = np.tile(place, (10, 1)), np.tile(force, (10, 1))
     felt.net_torque = np.tile(np.cross(place, force) + couple, (10, 1))
-    np.testing.assert_allclose(metrics.free_moment(felt), np.tile(couple, (10, 1)), atol=1e-15)
+    np.testing.assert_allclose(response.free_moment(felt), np.tile(couple, (10, 1)), atol=1e-15)
 
 
 @pytest.mark.parametrize("wrong", [{"colour_map": "JET"}, {"quantity": "torque"}, {"width": "huge"}])

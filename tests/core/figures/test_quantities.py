@@ -9,7 +9,7 @@ from sample_bake import grid_texels, recording_of
 
 from palpate.commands import figure_options
 from palpate.core.errors import ParameterError
-from palpate.core.export.registry import export
+from palpate.core.export.exporter import export
 from palpate.core.figures import color_maps, figure_canvas, quantities
 from palpate.core.figures.figure_style import FigureStyle
 from palpate.core.figures.picture_labels import label_picture
@@ -18,9 +18,9 @@ from palpate.core.figures.side_by_side import side_by_side
 from palpate.core.figures.tactile_strip import strip_figure
 from palpate.core.figures.texel_numbers import texel_numbers
 from palpate.core.io.bake_reader import Bake
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
+from palpate.core.model.recording import VectorReadings
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
-from palpate.core.model.vector_readings import VectorReadings
 
 EVERY = pytest.mark.parametrize("name", QUANTITIES)
 

@@ -14,7 +14,7 @@ from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.forward.stimulus import stimulus_of
 from palpate.core.gap.selection.candidates import candidates
 from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 OFF = 0.0004
 

@@ -11,7 +11,7 @@ from palpate.core.errors import FileError
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 SIZE, DEPTH, RADIUS, K = (0.030, 0.018), 0.003, 0.010, 80.0
 PLACES = [[x, y] for y in (-0.004, 0.004) for x in (-0.0105, -0.0035, 0.0035, 0.0105)]

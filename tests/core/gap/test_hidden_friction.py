@@ -12,7 +12,7 @@ from palpate.core.gap.report import sentences
 from palpate.core.gap.report.comparison import gap_errors
 from palpate.core.gap.report.summary import summary
 from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 from palpate.core.model.sensor_parameters import SensorParameters
 
 PARAMETERS = SensorParameters(k=1e4, cn=0.0, sigma0=5e4, sigma1=1.0, mus=0.6, mud=0.5, x0=0.02, ct=0.0)

@@ -14,7 +14,7 @@ from palpate.core.gap.report.comparison import gap_errors
 from palpate.core.gap.report.summary import summary
 from palpate.core.gap.selection import screening
 from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 TIME = 0.05 * np.arange(70)
 RESPONSES = ("texel_0", "texel_1")

@@ -9,7 +9,7 @@ from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.selection.confidence import SURE
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.gap_sizes import FORCES, READINGS, quantities_changed_by
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 
 def named(number, folder):

@@ -11,7 +11,7 @@ from palpate.core.gap.report import summary
 from palpate.core.io import file_writing
 from palpate.core.io.file_list import LIST_NAME
 from palpate.core.io.file_writing import atomic_write
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 TRIAL = SimpleNamespace(time=np.zeros(1000))
 PICTURES = {"old": ["gap", "map"], "new": ["gap", "loops"]}

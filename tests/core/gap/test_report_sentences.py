@@ -18,7 +18,7 @@ from palpate.core.gap.selection import screening
 from palpate.core.gap.selection.between_recordings import RecordingDifferences
 from palpate.core.gap.selection.diagnosis import diagnose, fit_base
 from palpate.core.gap.selection.silenced_texels import silenced_texels
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 
 @pytest.fixture

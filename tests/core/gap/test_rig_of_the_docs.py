@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 from palpate.core.gap.dataset.column_names import QUANTITIES
-from palpate.core.gap.dataset.fault_kinds import FAULT_KINDS
 from palpate.core.gap.dataset.rig import RIG_SENSOR_WORDS, RigWords, read_rig
-from palpate.core.gap.dataset.trial_words import TrialWords
+from palpate.core.gap.dataset.trial import FAULT_KINDS, TrialWords
 from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 PAGE = Path(__file__).parents[3] / "docs" / "rig-format.md"
 LATE, FACTORS = 40, (1.0, 1.0, 1.5, 1.5)

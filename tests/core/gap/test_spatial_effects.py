@@ -9,7 +9,7 @@ import pytest
 
 from palpate.core.gap.selection.confidence import SURE
 from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 
 def scanned(force, time):

@@ -12,7 +12,7 @@ from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.selection.between_recordings import as_one_session
 from palpate.core.gap.selection.candidates import candidates
 from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 
 def gains_by_themselves(rig):

@@ -11,7 +11,7 @@ from palpate.core.gap.dataset.rig import grid_texels, read_rig
 from palpate.core.gap.forward.predictor import predictors_of
 from palpate.core.gap.forward.stimulus import stimulus_of
 from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 K, RADIUS = 80.0, 0.008
 GAINS = np.array([1.0, 1.1, 0.6, 1.2, 0.9, 1.2])

@@ -19,15 +19,14 @@ from palpate.core.gap.fitting.residual_tests import residual_structure
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.report import summary
 from palpate.core.gap.report.comparison import nrmse
-from palpate.core.gap.report.experiments import next_experiment
-from palpate.core.gap.report.sentences import noise_sentence
+from palpate.core.gap.report.sentences import next_experiment, noise_sentence
 from palpate.core.gap.selection.candidates import Candidate, scales_of
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.findings import Diagnosis
 from palpate.core.gap.selection.rao_score import ScoreTest
 from palpate.core.gap.selection.screening import starting_points
 from palpate.core.io.sensor_toml import read_sensor
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 
 def diagnosed(rig):

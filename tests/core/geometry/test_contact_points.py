@@ -10,7 +10,7 @@ from solver_scenes import GRAVITY, about, box, cube_on_pad, grid_mesh, pad, pres
 
 from palpate.core.errors import ParameterError
 from palpate.core.geometry.contact_points import contact_points
-from palpate.core.geometry.layout.grid_layout import GridLayout
+from palpate.core.geometry.grid_layout import GridLayout
 from palpate.core.geometry.texels import texels_from_region
 from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.solver.simulation import run

@@ -8,8 +8,7 @@ import pytest
 import trimesh
 
 from palpate.core.geometry.mesh import checked_mesh
-from palpate.core.geometry.projection import projection_of
-from palpate.core.geometry.texels import texels_from_region
+from palpate.core.geometry.texels import projection_of, texels_from_region
 
 SIDE = 65  # pixels, so that one lies in the middle
 

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from palpate.core.geometry.smooth_depth import smooth_depth
+from palpate.core.geometry.grid_layout import smooth_depth
 
 
 def test_an_even_depth_stays_and_a_wide_dent_keeps_its_lowest_point():

@@ -7,10 +7,10 @@ import trimesh
 from solver_scenes import grid_mesh, pad, shape
 
 from palpate.core.errors import SensorError
-from palpate.core.geometry.layout.grid_layout import GridLayout
-from palpate.core.geometry.layout.texture_maps import UVLayout
+from palpate.core.geometry.grid_layout import GridLayout
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.texels import texels_from_region
+from palpate.core.geometry.texture_maps import UVLayout
 
 
 def test_the_paper_s_example_of_eight_rows_and_six_columns():

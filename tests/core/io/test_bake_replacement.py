@@ -7,7 +7,7 @@ from contextlib import suppress
 import pytest
 from kills import stopped_at
 
-from palpate.core.io import bake_replacement
+from palpate.core.io import bake_folder
 from palpate.core.io.hidden_folder import PRIVATE_FOLDER
 
 NAMES = ("Pad", "Tip", "New")
@@ -30,7 +30,7 @@ def folder(tmp_path):
 
 
 def complete_bake(folder):
-    new = bake_replacement.begin(folder)
+    new = bake_folder.begin_bake(folder)
     for name in NAMES:
         (new / name).mkdir()
         (new / name / "manifest.json").write_text("new")
@@ -51,16 +51,16 @@ BEFORE = {name: "earlier" for name in EARLIER}
 
 
 def test_the_new_bake_takes_the_place_of_the_earlier_one(folder):
-    bake_replacement.replace(folder, NAMES)
+    bake_folder.publish_bake(folder, NAMES)
     assert found(folder) == WHOLE and not (folder / "Pad" / "tactile_0001.exr").exists()
     check_user_files(folder)
-    assert list((folder / PRIVATE_FOLDER).iterdir()) == [] and not bake_replacement.is_interrupted(folder)
+    assert list((folder / PRIVATE_FOLDER).iterdir()) == [] and not bake_folder.is_interrupted(folder)
 
 
 def replace_stopped(folder, number, error=None):
     """Replace; the call of that number fails. Return how many calls there were."""
     with stopped_at(number, error) as calls, suppress(OSError):
-        bake_replacement.replace(folder, NAMES)
+        bake_folder.publish_bake(folder, NAMES)
     return len(calls)
 
 
@@ -73,15 +73,15 @@ def test_killed_at_any_step_the_next_bake_finds_one_of_the_two(folder, tmp_path)
             break
         left = found(copy)
         if left not in (BEFORE, WHOLE):  # readers see it by the ids or by a missing sensor
-            assert len(set(left.values())) == 2 or not set(EARLIER) <= set(left) or bake_replacement.is_interrupted(copy)
-        bake_replacement.begin(copy)
+            assert len(set(left.values())) == 2 or not set(EARLIER) <= set(left) or bake_folder.is_interrupted(copy)
+        bake_folder.begin_bake(copy)
         now = found(copy)
         now.pop("New", None)  # it had no predecessor, and its id says that it is of another bake
         assert set(now) == set(EARLIER) and len(set(now.values())) == 1
         check_user_files(copy)
         seen.append(now["Pad"])
         complete_bake(copy)
-        bake_replacement.replace(copy, NAMES)
+        bake_folder.publish_bake(copy, NAMES)
         assert found(copy) == WHOLE
         check_user_files(copy)
     assert 15 < number < 99 and seen == sorted(seen) and set(seen) == {"earlier", "new"}
@@ -96,7 +96,7 @@ def test_an_error_at_any_step_changes_nothing_or_leaves_the_new_bake(folder, tmp
             break
         results.append(found(copy))
         assert results[-1] in (BEFORE, WHOLE)
-        bake_replacement.discard(copy)
+        bake_folder.discard_bake(copy)
         assert found(copy) == results[-1]
         check_user_files(copy)
     assert BEFORE in results and WHOLE in results
@@ -107,7 +107,7 @@ def test_an_error_of_the_last_step_takes_everything_back(folder):
         raise OSError("the .blend is open elsewhere")
 
     with pytest.raises(OSError, match="elsewhere"):
-        bake_replacement.replace(folder, NAMES, fail)
+        bake_folder.publish_bake(folder, NAMES, fail)
     assert found(folder) == BEFORE
     check_user_files(folder)
 
@@ -116,7 +116,7 @@ def test_a_file_of_the_same_name_is_kept_beside_the_other(folder):
     replace_stopped(folder, 7)
     assert found(folder) == WHOLE
     (folder / "Pad" / "notes.txt").write_text("later")
-    bake_replacement.discard(folder)
+    bake_folder.discard_bake(folder)
     assert (folder / "Pad" / "notes.txt").read_text() == "later"
     assert (folder / "Pad" / "notes.txt_").read_text() == "mine"
 
@@ -125,6 +125,6 @@ def test_what_a_link_leads_to_stays(folder, tmp_path):
     elsewhere = tmp_path / "elsewhere"
     (folder / "Pad").rename(elsewhere)
     (folder / "Pad").symlink_to(elsewhere)
-    bake_replacement.replace(folder, NAMES)
+    bake_folder.publish_bake(folder, NAMES)
     assert found(folder) == WHOLE and not (folder / "Pad").is_symlink()
     assert (elsewhere / "manifest.json").read_text() == "earlier"

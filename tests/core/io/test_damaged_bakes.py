@@ -11,8 +11,7 @@ from sample_bake import write_bake
 from palpate.commands import main
 from palpate.core.errors import FileError
 from palpate.core.io.bake_reader import read_bake
-from palpate.core.io.recording_npz import load_recording
-from palpate.core.io.sensor_npz import load_sensor
+from palpate.core.io.recording_npz import load_recording, load_sensor
 
 
 @pytest.fixture

@@ -23,11 +23,11 @@ import pytest
 from sample_bake import pictures_of, read_exr
 
 from palpate.core.errors import FileError, PalpateError
-from palpate.core.geometry.layout.grid_layout import GridLayout
-from palpate.core.geometry.layout.texture_maps import uv_layout
+from palpate.core.geometry.grid_layout import GridLayout
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.texels import texels_from_region
-from palpate.core.io import exr_file, file_writing, npz
+from palpate.core.geometry.texture_maps import uv_layout
+from palpate.core.io import file_writing, recording_npz, tactile_exr
 from palpate.core.io.bake_folder import (
     OWN_DIGEST,
     Manifest,
@@ -39,11 +39,9 @@ from palpate.core.io.bake_folder import (
 from palpate.core.io.file_writing import atomic_write, writable_file, writable_folder
 from palpate.core.io.recording_npz import load_recording, save_recording
 from palpate.core.io.tactile_exr import CHANNELS, describe, write_exrs
-from palpate.core.model.effect import Effect
-from palpate.core.model.recording import Frame, Recording, SensorFrame, SensorRecording
-from palpate.core.model.sensor import Sensor
+from palpate.core.model.recording import Frame, Recording, SensorFrame, SensorRecording, VectorReadings
+from palpate.core.model.sensor import Effect, Sensor
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
-from palpate.core.model.vector_readings import VectorReadings
 
 on_linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks at Linux's /proc and /dev")
 
@@ -69,19 +67,19 @@ def test_equal_arrays_give_equal_bytes(tmp_path):
     }  # fmt: skip
     written = []
     for name in ("a.npz", "b.npz"):
-        npz.write_arrays(tmp_path / name, arrays)
+        recording_npz.write_arrays(tmp_path / name, arrays)
         written.append((tmp_path / name).read_bytes())
     assert written[0] == written[1]
     with zipfile.ZipFile(tmp_path / "a.npz") as archive:
         assert {one.date_time for one in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
-    with npz.open_arrays(tmp_path / "a.npz", "test", "try again") as members:
+    with recording_npz.open_arrays(tmp_path / "a.npz", "test", "try again") as members:
         for name, array in arrays.items():
             np.testing.assert_array_equal(members[name], array)
 
 
 def test_objects_are_not_written(tmp_path):
     with pytest.raises(ValueError, match="would run code"):
-        npz.write_arrays(tmp_path / "a.npz", {"a": np.array([object()])})
+        recording_npz.write_arrays(tmp_path / "a.npz", {"a": np.array([object()])})
     assert os.listdir(tmp_path) == []
 
 
@@ -632,7 +630,7 @@ def test_a_library_that_cannot_write_says_the_reason_of_the_system(tmp_path):
     pictures = {"R": np.random.default_rng(0).random((200, 300), np.float32)}
     for path, number in (("/dev/full", errno.ENOSPC), (tmp_path / "missing" / "a.exr", errno.ENOENT)):
         with pytest.raises(OSError) as error:
-            exr_file.write_image(path, pictures, {})
+            tactile_exr.write_image(path, pictures, {})
         assert error.value.errno == number
 
 
@@ -642,7 +640,7 @@ def test_a_name_that_is_no_text_is_written_as_far_as_it_is(tmp_path):
 
 
 def test_only_openimageio_can_write_where_the_process_is_linked_against_another_openexr(tmp_path, monkeypatch):
-    monkeypatch.setattr(exr_file, "library", lambda: "OpenImageIO")
+    monkeypatch.setattr(tactile_exr, "library", lambda: "OpenImageIO")
     if importlib.util.find_spec("OpenImageIO") is None:
         with pytest.raises(FileError, match="install it"):
             write_exr(tmp_path / "a.exr", grid_of(2, 2), tactile_frame(4), METADATA)

@@ -13,8 +13,7 @@ from palpate.core.io.bake_folder import read_manifest
 from palpate.core.io.bake_reader import read_bake
 from palpate.core.io.csv_table import read_table
 from palpate.core.io.input_files import open_regular, read_bytes
-from palpate.core.io.recording_npz import load_recording
-from palpate.core.io.sensor_npz import load_sensor
+from palpate.core.io.recording_npz import load_recording, load_sensor
 from palpate.core.io.sensor_toml import read_sensor
 from palpate.core.simulators.openrave_file import read_openrave
 

@@ -11,14 +11,10 @@ from solver_scenes import about, free_body, pad, shape
 from palpate.core.effects.engine.registry import effect
 from palpate.core.errors import FileError
 from palpate.core.io.scenario_npz import load_scenario, save_scenario
-from palpate.core.model.body import Body
-from palpate.core.model.deformation import Deformation
-from palpate.core.model.drive import Drive
-from palpate.core.model.motion import Motion, Signal
-from palpate.core.model.scenario import Scenario
-from palpate.core.model.sensor import Sensor
+from palpate.core.model.body import Body, Drive, Motion, Signal
+from palpate.core.model.scenario import Scenario, Target
+from palpate.core.model.sensor import Deformation, Sensor
 from palpate.core.model.sensor_parameters import Painted
-from palpate.core.model.target import Target
 
 
 def full_scenario() -> Scenario:

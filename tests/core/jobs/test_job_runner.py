@@ -5,9 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from palpate.core.jobs import job_runner
-from palpate.core.jobs.job_runner import SlicedJob, part_of_job, run_job
-from palpate.core.jobs.progress import Progress
+from palpate.core import jobs
+from palpate.core.jobs import Progress, SlicedJob, part_of_job, run_job
 
 
 class Work:
@@ -72,7 +71,7 @@ def test_a_slice_is_as_long_as_the_pause_before_it(pause, steps, monkeypatch):
             now += 1 / 16
             yield Progress("Counting", i + 1, 1000)
 
-    monkeypatch.setattr(job_runner.time, "monotonic", lambda: now)
+    monkeypatch.setattr(jobs.time, "monotonic", lambda: now)
     sliced = SlicedJob(job())
     sliced.work(0.0)
     now += pause

@@ -5,15 +5,10 @@ import numpy as np
 
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.texels import Texels
-from palpate.core.model.body import Body
-from palpate.core.model.deformation import Deformation
-from palpate.core.model.drive import Drive
-from palpate.core.model.effect import Effect
-from palpate.core.model.motion import Motion, Signal
-from palpate.core.model.scenario import Scenario
-from palpate.core.model.sensor import Sensor
+from palpate.core.model.body import Body, Drive, Motion, Signal
+from palpate.core.model.scenario import Scenario, Target
+from palpate.core.model.sensor import Deformation, Effect, Sensor
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
-from palpate.core.model.target import Target
 
 # What the first version of Palpate computed for the scenario below.
 DIGEST = "ede2bd2bc351b7a9d618617ee0a397d3557b2972a6fa745e28394d5d31d99d88"

@@ -7,8 +7,7 @@ from scipy.spatial.transform import Rotation
 from solver_scenes import about, box, pressed
 
 from palpate.core.geometry.rotations import quaternion_product, rotation_vectors
-from palpate.core.model.motion import Motion
-from palpate.core.model.pose_interpolation import poses_at
+from palpate.core.model.body import Motion, poses_at
 from palpate.core.solver.simulation import run
 
 TIMES = np.array([0.0, 0.1, 0.2, 0.35, 0.4, 0.5, 0.6])

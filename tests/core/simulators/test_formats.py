@@ -15,7 +15,7 @@ from palpate.core.errors import FileError, PalpateError
 from palpate.core.geometry.mesh import is_closed, mass_properties
 from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.simulators.formats.urdf import roll_pitch_yaw
-from palpate.core.simulators.registry import export_sensors, formats, written_formats
+from palpate.core.simulators.sensor_format import export_sensors, formats, written_formats
 from palpate.core.simulators.sensor_on_mesh import identifiers, thickened
 
 SENSORS = (pad(), pad(radius=0.02, name="Bent"), ball())

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from palpate.core.errors import FileError, PalpateError, SensorError
 from palpate.core.geometry.mesh import TriangleMesh, vertex_normals
 from palpate.core.geometry.point_surface import triangles_between
-from palpate.core.simulators.registry import export_sensors, import_sensors
+from palpate.core.simulators.sensor_format import export_sensors, import_sensors
 
 SENSORS = (pad(), pad(radius=0.02, name="Bent"), ball(painted=False))
 TACTILE = """<mujoco><compiler angle="radian"/><asset>{mesh}</asset><worldbody><body pos="1 2 3" euler="0 0 1.5707963267948966">

@@ -9,7 +9,7 @@ from exported_sensors import FLOAT32, ball, pad
 
 from palpate.core.simulators.contact_translation import mujoco_contact
 from palpate.core.simulators.formats import mjcf
-from palpate.core.simulators.registry import export_sensors
+from palpate.core.simulators.sensor_format import export_sensors
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo reads the MJCF: pip install mujoco")
 

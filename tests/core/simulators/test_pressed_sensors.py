@@ -14,11 +14,9 @@ from solver_scenes import box
 from palpate.core.compiled.kernels import COMPILED
 from palpate.core.effects.engine.registry import effect
 from palpate.core.errors import ParameterError
-from palpate.core.model.body import Body
-from palpate.core.model.motion import Motion
+from palpate.core.model.body import Body, Motion
 from palpate.core.model.recording import SENSOR_FIELDS
-from palpate.core.model.scenario import Scenario
-from palpate.core.model.target import Target
+from palpate.core.model.scenario import Scenario, Target
 from palpate.core.simulators import pressed_sensors
 from palpate.core.simulators.pressed_sensor import PressedSensor
 from palpate.core.simulators.pressed_sensors import Contacts, PressedSensors

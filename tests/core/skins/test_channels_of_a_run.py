@@ -16,8 +16,7 @@ from palpate.core.model.digest import digest_of
 from palpate.core.model.recording import Recording
 from palpate.core.model.sensor import Sensor
 from palpate.core.skins.channel_readouts import MagneticReadout, net_force_of, with_clipping_warnings
-from palpate.core.skins.layer import texel_displacements
-from palpate.core.skins.magnetic_skin import Magnetometers, Magnets, magnetic_skin
+from palpate.core.skins.magnetic_skin import Magnetometers, Magnets, magnetic_skin, texel_displacements
 from palpate.core.solver.simulation import Simulation
 
 

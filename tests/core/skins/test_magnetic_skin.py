@@ -6,9 +6,19 @@ import pytest
 
 from palpate.core.errors import ParameterError, SensorError
 from palpate.core.gap.dataset.rig import grid_texels
-from palpate.core.skins.dipoles import MU0_4PI, DipoleSum, dipole_field, dipole_gradient, moment_of_magnet
-from palpate.core.skins.layer import layer_weights, pressure_below_point_load, texel_displacements
-from palpate.core.skins.magnetic_skin import Magnetometers, Magnets, magnetic_skin
+from palpate.core.skins.magnetic_skin import (
+    MU0_4PI,
+    DipoleSum,
+    Magnetometers,
+    Magnets,
+    dipole_field,
+    dipole_gradient,
+    layer_weights,
+    magnetic_skin,
+    moment_of_magnet,
+    pressure_below_point_load,
+    texel_displacements,
+)
 
 THICKNESS = 6e-3
 

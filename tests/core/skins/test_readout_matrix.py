@@ -6,7 +6,7 @@ import pytest
 from scipy import sparse
 
 from palpate.core.errors import ParameterError
-from palpate.core.skins.readout_matrix import ReadoutMatrix
+from palpate.core.skins.channel_readouts import ReadoutMatrix
 
 
 def test_one_channel_for_each_texel_stays_as_it_is():

@@ -9,8 +9,7 @@ from solver_scenes import LEVEL, box, cube_on_pad, pressed
 
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.rotations import quaternion_product, rotation_vectors
-from palpate.core.model.body import Body
-from palpate.core.model.motion import Motion
+from palpate.core.model.body import Body, Motion
 from palpate.core.solver.fast_crossings import BodiesInFrame, _entering, _travel, path_of_moved_bodies
 from palpate.core.solver.simulation import run
 

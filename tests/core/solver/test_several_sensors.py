@@ -9,12 +9,10 @@ import trimesh
 from solver_scenes import GRAVITY, about, box, cube_on_pad, grid_mesh, pad, pressed, shape
 
 from palpate.core.geometry.texels import texels_from_region
-from palpate.core.model.body import Body
-from palpate.core.model.motion import Motion
-from palpate.core.model.scenario import Scenario
+from palpate.core.model.body import Body, Motion
+from palpate.core.model.scenario import Scenario, Target
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import SensorParameters
-from palpate.core.model.target import Target
 from palpate.core.solver.simulation import Simulation, run
 
 DEPTH = 1e-3

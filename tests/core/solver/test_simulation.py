@@ -12,13 +12,12 @@ from solver_scenes import GRAVITY, LEVEL, about, box, cube_on_pad, pad, pressed,
 
 from palpate.core.errors import PalpateError
 from palpate.core.geometry.rotations import rotation_matrices
-from palpate.core.jobs.job_runner import run_job
-from palpate.core.model.body import Body
-from palpate.core.model.motion import Motion
+from palpate.core.jobs import run_job
+from palpate.core.model.body import Body, Motion
+from palpate.core.model.scenario import Target
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.model.shared_results import SharedResults
-from palpate.core.model.target import Target
 from palpate.core.solver import simulation as simulation_module
 from palpate.core.solver.simulation import Simulation, run, solve
 

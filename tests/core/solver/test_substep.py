@@ -8,9 +8,8 @@ import pytest
 from solver_scenes import box, cube_on_pad, gripper, pad, pressed
 
 from palpate.core.effects.engine.registry import effect
-from palpate.core.jobs.job_runner import run_job
-from palpate.core.model.body import Body
-from palpate.core.model.motion import Motion
+from palpate.core.jobs import run_job
+from palpate.core.model.body import Body, Motion
 from palpate.core.model.recording import SENSOR_FIELDS
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import SensorParameters

@@ -9,8 +9,8 @@ from solver_scenes import box, gripper, smooth_path
 from study_scenes import tiny_scene
 
 from palpate.core.solver.simulation import run
-from palpate.core.study.metrics import metrics_of
 from palpate.core.study.presses import Press, place_of, with_press
+from palpate.sweep.worker import metrics_of
 
 GRAVITY = 9.81
 FPS, LIFT = 24.0, 0.02

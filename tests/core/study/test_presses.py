@@ -11,8 +11,7 @@ from study_scenes import BALL_RADIUS, tiny_scene
 
 from palpate.core.errors import PalpateError
 from palpate.core.geometry.rotations import rotation_matrices
-from palpate.core.model.motion import Motion
-from palpate.core.model.pose_interpolation import poses_at
+from palpate.core.model.body import Motion, poses_at
 from palpate.core.study import presses
 from palpate.core.study.presses import Press, place_of, with_press
 

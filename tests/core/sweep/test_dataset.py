@@ -16,7 +16,7 @@ from sweep_runs import FRICTION, failed, made_up, new_study, press, published, s
 
 from palpate.core.errors import FileError, PalpateError
 from palpate.core.model.sensor_parameters import SensorParameters
-from palpate.core.response.metrics import slipping
+from palpate.core.response import slipping
 from palpate.core.study.study_file import read_study
 from palpate.sweep import dataset, lerobot
 from palpate.sweep.dataset import publish

@@ -11,10 +11,9 @@ from trimesh.creation import icosphere
 
 from palpate.core.effects.engine.contact_forces import normal_forces
 from palpate.core.effects.engine.readout_chain import readings, transducers_of
-from palpate.core.effects.engine.registry import effect, library
-from palpate.core.effects.engine.sensor_effects import check_scenario, mounted_texels
+from palpate.core.effects.engine.registry import check_scenario, effect, library, mounted_texels
 from palpate.core.errors import EffectError
-from palpate.core.model.effect import Effect
+from palpate.core.model.sensor import Effect
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
 from palpate.core.solver.simulation import Simulation, run
 

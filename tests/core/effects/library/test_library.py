@@ -11,7 +11,7 @@ from palpate.core.effects.engine.readout_chain import ReadoutChain, readings
 from palpate.core.effects.engine.registry import actual_placement, check, effect, form_of, from_dict, kind_of, library, to_dict
 from palpate.core.effects.engine.specification import TransducerArray
 from palpate.core.errors import EffectError
-from palpate.core.model.effect import Effect
+from palpate.core.model.sensor import Effect
 from palpate.core.model.sensor_parameters import SensorParameters
 
 FORMS = [(kind.name, form.name) for kind in library().values() for form in kind.forms]

@@ -7,8 +7,14 @@ import pytest
 import palpate as pp
 from palpate.commands import main
 from palpate.core.gap.calibration.readout import _forward_check
-from palpate.core.gap.calibration.readout_data import readout_data
-from palpate.core.gap.calibration.readout_methods import ForwardInverse, GaussianProcess, Ridge, forward_curves, memory_of
+from palpate.core.gap.calibration.readout_methods import (
+    ForwardInverse,
+    GaussianProcess,
+    Ridge,
+    forward_curves,
+    memory_of,
+    readout_data,
+)
 from palpate.core.gap.dataset.rig import read_rig
 
 GAIN = np.array([1.0, -0.4, 0.7, -1.2])

@@ -15,8 +15,8 @@ from palpate.benchmarks._recordings import Recording
 from palpate.core.errors import PalpateError
 from palpate.core.gap.data_faults.clocks import refined_shifts, shift_of, with_shift
 from palpate.core.gap.data_faults.search import find_faults, put_right
-from palpate.core.gap.dataset.fault_kinds import FAULT_KINDS
 from palpate.core.gap.dataset.rig import read_rig
+from palpate.core.gap.dataset.trial import FAULT_KINDS
 from palpate.core.gap.forward.stimulus import stimulus_of
 
 

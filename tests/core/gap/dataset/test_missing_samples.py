@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 
 from palpate.core.errors import PalpateError
-from palpate.core.gap.dataset.missing_samples import MOST_ERROR, bridged, longest_gap
 from palpate.core.gap.dataset.rig import read_rig
-from palpate.core.gap.dataset.second_logger import interpolated
+from palpate.core.gap.dataset.second_logger import MOST_ERROR, bridged, interpolated, longest_gap
 
 TIME = np.arange(2000) * 0.05
 """100 s at 20 Hz."""

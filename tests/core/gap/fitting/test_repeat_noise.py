@@ -11,13 +11,12 @@ from scipy.signal import lfilter
 
 from palpate.core.errors import FileError
 from palpate.core.gap.dataset.rig import read_rig
-from palpate.core.gap.fitting.noise_floor import ChannelNoise
-from palpate.core.gap.fitting.repeat_noise import is_scatter_of_repeats, with_repeats
+from palpate.core.gap.fitting.noise_floor import ChannelNoise, is_scatter_of_repeats, with_repeats
 from palpate.core.gap.forward.predictor import predictors_of
 from palpate.core.gap.selection.base_model import base_fit, prepared
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.view_set import view_set_of
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 QUIET = ChannelNoise(0.001, 1.0, "stretches without load")
 FACTORS = (1.0, 1.06, 0.94, 1.03, 0.97)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from palpate.core.gap.fitting.least_squares import TrialView
-from palpate.core.gap.fitting.spectral_lines import strongest_line
+from palpate.core.gap.fitting.residual_tests import strongest_line
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 
 def line_in(rig, deviation):

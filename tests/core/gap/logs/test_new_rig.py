@@ -19,7 +19,7 @@ from palpate.core.gap.logs.log_file import read_log
 from palpate.core.gap.logs.new_rig import write_rig
 from palpate.core.gap.logs.preview import preview_rows
 from palpate.core.gap.logs.proposal import propose
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 RATE, COUNT = 100.0, 600
 

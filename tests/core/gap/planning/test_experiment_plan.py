@@ -19,7 +19,7 @@ from palpate.core.gap.planning.experiment_plan import Wishes, plan_experiment
 from palpate.core.gap.planning.separation import STARTS, Signals
 from palpate.core.gap.report.plan_files import planned_sentence, table_rows, write_plan
 from palpate.core.gap.selection.candidates import candidates, scales_of
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 NOISE = ChannelNoise(0.005, 1.0, "given"), ChannelNoise(0.05, 1.0, "given")
 

@@ -14,8 +14,7 @@ from palpate.core.errors import ParameterError
 from palpate.core.gap.dataset.rig import Indenter
 from palpate.core.gap.forward.predictor import predictors_of
 from palpate.core.gap.forward.stimulus import stimulus_of
-from palpate.core.gap.planning.limits import Limits, limits_of
-from palpate.core.gap.planning.paths import Ground
+from palpate.core.gap.planning.paths import Ground, Limits, limits_of
 from palpate.core.geometry.mesh import checked_mesh
 from palpate.core.model.sensor_parameters import SensorParameters
 

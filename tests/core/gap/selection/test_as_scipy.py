@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from palpate.core.gap.fitting.regression import student_quantile
+from palpate.core.gap.fitting.intervals import student_quantile
 from palpate.core.gap.selection.candidates import _halton_points
 from palpate.core.gap.selection.wear_or_drift import BENT_FROM, CHANCE, _least_ratio
 

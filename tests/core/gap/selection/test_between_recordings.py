@@ -33,7 +33,7 @@ from palpate.core.gap.selection.wear_or_drift import (
     evidence_of_courses,
     texels_can_tell,
 )
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 from palpate.core.model.sensor_parameters import SensorParameters
 
 

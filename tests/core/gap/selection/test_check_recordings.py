@@ -23,7 +23,7 @@ from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.forward_selection import SelectionState, SelectionStep
 from palpate.core.gap.selection.gap_sizes import GapSizes, Improvement
 from palpate.core.gap.selection.verdict import FAULTY, REFUTED, conclude
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 from palpate.core.model.sensor_parameters import SensorParameters
 
 GAP_SIZES = GapSizes(np.array([10.0, 0.0]), np.ones(2), np.array([900.0, 0.0]))

@@ -17,7 +17,7 @@ from palpate.core.gap.selection import verdict
 from palpate.core.gap.selection.confidence import SURE, probability
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.outlying_channels import outlying_channels, without_channels
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 TEXEL = 7
 SATURATION = effect("saturation", "rational", level=0.25)

@@ -11,7 +11,7 @@ from palpate.core.gap.forward.predictor import predictors_of
 from palpate.core.gap.selection.base_model import start_model
 from palpate.core.gap.selection.candidates import candidates
 from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.jobs.job_runner import run_job
+from palpate.core.jobs import run_job
 
 HEIGHTS = (3.0, 4.5, 6.0)
 """mm from a magnet to the magnetometers below it, at rest."""

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from palpate.core.geometry.layout import rasterization, texture_maps
-from palpate.core.geometry.layout.grid_layout import GridLayout, grid_layout
-from palpate.core.geometry.layout.texture_maps import UVLayout, uv_layout
+from palpate.core.geometry import texture_maps
+from palpate.core.geometry.grid_layout import GridLayout, grid_layout
 from palpate.core.geometry.mesh import checked_mesh
 from palpate.core.geometry.texels import texels_from_region
+from palpate.core.geometry.texture_maps import UVLayout, uv_layout
 
 DIAGONALS = ("same", "other", "alternating", "diamond", "random")
 
@@ -492,7 +492,7 @@ def test_cells_of_an_atlas_are_filled_as_if_each_were_searched(subdivisions):
     pixel, triangle, weights, inside = layout._pixels
     assert len(np.unique(pixel)) == len(pixel)
     order = np.argsort(pixel)
-    searched = rasterization.rasterise(corner_pixels(layout), *layout.shape)
+    searched = texture_maps.rasterise(corner_pixels(layout), *layout.shape)
     np.testing.assert_array_equal(searched[0], pixel[order])
     np.testing.assert_array_equal(searched[3], inside[order])
     np.testing.assert_array_equal(searched[1][searched[3]], triangle[order][searched[3]])

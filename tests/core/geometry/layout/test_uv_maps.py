@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from palpate.core.errors import SensorError
-from palpate.core.geometry.layout.texture_maps import mapped_layout
+from palpate.core.geometry.texture_maps import mapped_layout
 
 AROUND, UP = 24, 9
 RADIUS, HEIGHT = 0.02, 0.03

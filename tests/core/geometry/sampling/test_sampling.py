@@ -9,9 +9,15 @@ import trimesh
 
 from palpate.core.errors import SensorError
 from palpate.core.geometry.mesh import TriangleMesh, checked_mesh, edge_defects, triangle_areas
-from palpate.core.geometry.sampling.poisson_disk import refined, scatter
-from palpate.core.geometry.sampling.straightest_geodesics import GeodesicTracer, nearest_point
-from palpate.core.geometry.sampling.texel_arrays import filled_region, pad_array, region_middle, wrapped_array
+from palpate.core.geometry.scattered_points import refined, scatter
+from palpate.core.geometry.texel_arrays import (
+    GeodesicTracer,
+    filled_region,
+    nearest_point,
+    pad_array,
+    region_middle,
+    wrapped_array,
+)
 from palpate.core.geometry.texels import texels_from_region
 
 PITCH = (0.0034, 0.0034)

@@ -10,9 +10,8 @@ from solver_scenes import about, box, cube_on_pad, grid_mesh, pad, pressed, shap
 
 from palpate.core.errors import PalpateError
 from palpate.core.geometry.rotations import rotation_matrices
-from palpate.core.model.body import Body
-from palpate.core.model.deformation import Deformation
-from palpate.core.model.motion import Motion
+from palpate.core.model.body import Body, Motion
+from palpate.core.model.sensor import Deformation
 from palpate.core.solver.simulation import Simulation, run
 
 STIFF_FRICTION = {"k": 200.0, "cn": 2.0, "sigma0": 400.0, "sigma1": 0.5, "ct": 0.05, "x0": 0.02}

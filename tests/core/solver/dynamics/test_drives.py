@@ -9,14 +9,11 @@ from scipy.integrate import solve_ivp
 from solver_scenes import GRAVITY, about, box, gripper, pad, smooth_path
 
 from palpate.core.errors import PalpateError
-from palpate.core.model.body import Body
-from palpate.core.model.drive import Drive
-from palpate.core.model.motion import Motion, Signal
-from palpate.core.model.scenario import Scenario
+from palpate.core.model.body import Body, Drive, Motion, Signal
+from palpate.core.model.scenario import Scenario, Target
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import SensorParameters
-from palpate.core.model.target import Target
-from palpate.core.solver.dynamics.grip_controller import GripControl, TactileData
+from palpate.core.solver.dynamics.actuators import GripControl, TactileData
 from palpate.core.solver.simulation import Simulation, run
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..geometry.texels import Texels
-from ..model.recording import Recording, SensorFrame, SensorRecording
-from ..model.sensor_parameters import Painted, SensorParameters
+from .geometry.texels import Texels
+from .model.recording import Recording, SensorFrame, SensorRecording
+from .model.sensor_parameters import Painted, SensorParameters
 
 SETTLED_CHANGE, SETTLED_SPAN = 0.05, 0.1
 """Forces are settled where their sum changes by no more than this share over this share of all frames in a row. The span is
@@ -68,7 +68,7 @@ def slipping(sensor: SensorRecording | SensorFrame, parameters: SensorParameters
     -------
     (F, n) or (n,) bool
     """
-    from ..laws.friction import stribeck_force
+    from .laws.friction import stribeck_force
 
     found = np.asarray(sensor.contact, bool) & (sensor.slip > CREEPING)
     limit = stribeck_force(sensor.normal_force[found], sensor.slip[found], parameters)

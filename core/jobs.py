@@ -1,13 +1,55 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run a job to its end, a slice at a time, or as a part of another job."""
+"""Long work with progress and cancelling.
+
+Long work is a job: a generator that yields :class:`Progress` and returns its result. Closing it cancels the job, which then
+removes what it has begun. A job runs in one go, a slice at a time, or as a part of another job.
+"""
 
 from __future__ import annotations
 
+import sys
 import time
-from collections.abc import Callable
-from typing import Generic
+import warnings
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
 
-from .progress import Job, Progress, Result
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a job has come.
+
+    Attributes
+    ----------
+    stage : str
+        What the job is doing, in words for the user.
+    done, total : int
+        Steps that are done, and all steps.
+    frame : int or None
+        The frame that the job is at, where it goes through frames.
+    """
+
+    stage: str
+    done: int
+    total: int
+    frame: int | None = None
+
+    @property
+    def share(self) -> float:
+        """The part of the job that is done, from zero to one."""
+        return self.done / self.total
+
+    @property
+    def text(self) -> str:
+        """The stage, with the frame where there is one."""
+        return self.stage if self.frame is None else f"{self.stage}: frame {self.frame}"
+
+
+Result = TypeVar("Result")
+Job = Generator[Progress, None, Result]
+"""Work that yields its progress and returns its result; closing it cancels the work."""
+
 
 SLICE = 0.1
 """Seconds of work between two looks at the keyboard, where the window draws quickly."""
@@ -97,3 +139,46 @@ class SlicedJob(Generic[Result]):
         """Stop the job, which removes what it has begun."""
         self._job.close()
         self.is_done = True
+
+
+def progress_bar(label: str, total: int | None, unit: str = "frame") -> Any:
+    """Return a bar of tqdm, a count without a total: a widget in notebooks that have them, else on a terminal, else none."""
+    if "ipykernel" in sys.modules:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # without ipywidgets the bar is text, which needs no advice
+            from tqdm.auto import tqdm
+        return tqdm(total=total, desc=label, unit=unit, leave=False)
+    from tqdm import tqdm
+
+    return tqdm(total=total, desc=label, unit=unit, file=sys.stderr, leave=False, disable=None, dynamic_ncols=True)
+
+
+@contextmanager
+def shown_progress(
+    label: str,
+    unit: str = "step",
+    describe: Callable[[Progress], str] = lambda progress: progress.stage,
+    check: Callable[[], object] = lambda: None,
+) -> Iterator[Callable[[Progress], None]]:
+    """Give a function that shows the progress of a job as a bar.
+
+    Parameters
+    ----------
+    label : str
+        Before the first progress.
+    unit : str
+        What the job counts.
+    describe : callable
+        Makes the words beside the bar out of a :class:`.Progress`; the default is its stage.
+    check : callable
+        Called with each progress, and may raise to stop the job.
+    """
+    with progress_bar(label, 1, unit) as bar:
+
+        def show(progress: Progress) -> None:
+            check()
+            bar.total = progress.total
+            bar.set_description(describe(progress), refresh=False)
+            bar.update(progress.done - bar.n)
+
+        yield show
