@@ -22,7 +22,7 @@ GRAVITY = 9.80665
 """m/s²: a gram on a scale is a force."""
 LOG_UNITS: dict[str, dict[str, float]] = {
     "m": {**UNITS["m"], "nm": 1e-9, "in": 0.0254, "inch": 0.0254},
-    "s": {**UNITS["s"], "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0},
+    "s": {**UNITS["s"], "sec": 1.0, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0},
     "N": {
         **UNITS["N"],
         **{"uN": 1e-6, "g": 1e-3 * GRAVITY, "gf": 1e-3 * GRAVITY, "kg": GRAVITY, "kgf": GRAVITY, "lbf": 4.4482216152605},
@@ -113,6 +113,10 @@ above the second they are counts of a converter."""
 _BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(]\s*(?P<unit>[^\])]+?)\s*[\])]\s*$")
 
 
+_RATE = re.compile(r"/\s*(ms|s|sec|min|h)$")
+"""The end of a unit of something that is no reading: speeds, and loads over time."""
+
+
 @dataclass(frozen=True)
 class Meaning:
     """What a name says.
@@ -176,6 +180,11 @@ def meaning_of(column: str) -> Meaning:
         if set(words) & known or "_".join(words) in known:
             return Meaning(quantity, unit, 2)
     return Meaning("", unit)
+
+
+def is_rate(unit: str) -> bool:
+    """Return True if a unit is that of something per time."""
+    return _RATE.search(unit) is not None
 
 
 def _of_axis(kind: str, axis: str, unit: str, weight: int) -> Meaning:

@@ -31,15 +31,6 @@ READERS: dict[str, Callable[[Path], LogFile]] = {
     ".mat": read_mat,
 }
 """Readers by the ending of the name."""
-_BEGINNINGS: dict[bytes, Callable[[Path], LogFile]] = {
-    b"\x89MCAP0\r\n": read_mcap,
-    b"#ROSBAG V2.0": read_bag,
-    b"SQLite format 3": read_bag,
-    b"\x89HDF\r\n\x1a\n": read_hdf5,
-    b"PK\x03\x04": read_npz,
-    b"MATLAB 5.0": read_mat,
-}
-"""Readers by the first bytes, for files whose name does not tell."""
 
 
 def read_log(path: str | os.PathLike) -> LogFile:
@@ -56,15 +47,14 @@ def read_log(path: str | os.PathLike) -> LogFile:
 
 
 def _reader_of(path: Path) -> Callable[[Path], LogFile]:
-    """Return the reader of a file, by the ending of its name or by its first bytes."""
+    """Return the reader of a file, by the ending of its name."""
     size = path.stat().st_size
     if size > LARGEST_FILE:
         raise FileError(f"'{path.name}' holds {size / 1e9:.1f} GB and at most {LARGEST_FILE / 1e9:.1f} GB are read: cut it.")
     with open_regular(path) as file:
-        beginning = file.read(16)
-    if not beginning:
-        raise FileError(f"'{path.name}' is empty: copy it again.")
-    for reader in (READERS.get(path.suffix.lower()), *(r for mark, r in _BEGINNINGS.items() if beginning.startswith(mark))):
-        if reader is not None:
-            return reader
-    raise FileError(f"'{path.name}' is no log that is known: give one of {', '.join(READERS)}, or the folder of a bag.")
+        if not file.read(1):
+            raise FileError(f"'{path.name}' is empty: copy it again.")
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        raise FileError(f"'{path.name}' is no log that is known: give one of {', '.join(READERS)}, or the folder of a bag.")
+    return reader

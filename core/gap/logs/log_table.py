@@ -95,12 +95,9 @@ def with_distinct_names(logs: Sequence[LogFile]) -> list[LogFile]:
     Raises
     ------
     FileError
-        Two are still called the same, or one is shorter than a recording.
+        Two are still called the same.
     """
     logs = joined_frames(logs)
-    for log in logs:
-        if max(table.sample_count for table in log.tables) < FEWEST_ROWS and log.kind != FRAMES:
-            raise FileError(f"'{log.path.name}' has less than {FEWEST_ROWS} lines of numbers: a log needs at least 8 samples.")
     paths = [log.path for log in logs]
     names = [path.name for path in paths]
     if len(set(names)) < len(names):

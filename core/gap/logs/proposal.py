@@ -20,6 +20,7 @@ from .column_meaning import (
     Meaning,
     families,
     force_unit,
+    is_rate,
     is_since_1970,
     length_unit,
     meaning_of,
@@ -69,11 +70,16 @@ def propose(logs: Sequence[LogFile], name: str = "rig") -> Proposal:
     Raises
     ------
     FileError
-        There are no logs, two have the same name, or there are files of more than two kinds.
+        There are no logs, two have the same name, one is shorter than a recording, or there are files of more than two kinds.
     """
     if not logs:
         raise FileError("No logs are given: name at least one file.")
     logs = with_distinct_names(logs)
+    for log in logs:
+        if max(table.sample_count for table in log.tables) < FEWEST_ROWS and log.kind != FRAMES:
+            raise FileError(
+                f"'{log.path.name}' has less than {FEWEST_ROWS} samples, and a recording needs as many: leave it out."
+            )
     loggers = [_Logger(group, number) for number, group in enumerate(_groups(logs))]
     found = [one.columns() for one in loggers]
     _keep_one_sensor(loggers, found)
@@ -203,6 +209,7 @@ class _Logger:
         found = {"time": self._time()}
         taken = {name for names in self.candidates.values() for name in names} | set(column_names("time", found["time"].value))
         others = [name for name in self.names if name not in taken and name.rpartition("/")[2] not in taken]
+        others = [name for name in others if not is_rate(self.meanings[name].unit)]
         no_clocks = [name for name in others if not self._rises(name, strictly=True)]
         self.families = families(no_clocks or others, self._follows)
         for group in (POSE, TURN, FORCE):

@@ -71,8 +71,9 @@ def read_mjcf(path: str | os.PathLike) -> list[FoundSensor]:
         model = spec.compile()
     except Exception as error:  # MuJoCo raises ValueError, and others for meshes and plugins
         words = " ".join(str(error).split())
-        hint = ": if it is a part of a model, give the file that includes it" if "unrecognized name" in words else ""
-        raise FileError(f"MuJoCo cannot compile '{path}' ({words:.160}){hint or ': correct it'}.") from error
+        is_part = any(said in words for said in ("unrecognized name", "Error opening file"))
+        advice = "if it is a part of a model, give the file that includes it, with its meshes" if is_part else "correct it"
+        raise FileError(f"MuJoCo cannot compile '{path}' ({words:.160}): {advice}.") from error
     finally:
         mujoco.set_mju_user_warning(None)
     data = mujoco.MjData(model)
@@ -90,10 +91,8 @@ def read_mjcf(path: str | os.PathLike) -> list[FoundSensor]:
     notes = ["MuJoCo's geoms, contact and joints were not imported; parameters have their defaults."]
     found += _touch_sensors(mujoco, spec, model, data, touch, notes)
     if not found:
-        few = f"; it has <touch> on {len(touch)} sites, and three on one body make a sensor" if touch else ""
-        raise FileError(
-            f"'{path}' has no <tactile>, no <touch> and no {PLUGIN} in its <sensor>{few}: give a file that has one."
-        )
+        few = f"<touch> on {len(touch)} sites and never on three of one body, which make a sensor" if touch else "no <touch>"
+        raise FileError(f"'{path}' has no <tactile>, {few}, and no {PLUGIN} in its <sensor>: give a file that has one.")
     for one in found:
         one.notes.extend(notes)
     return found

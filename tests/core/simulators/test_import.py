@@ -244,7 +244,7 @@ def test_touch_sites_become_texels_out_of_the_surface_of_their_body(tmp_path):
     assert found.position == pytest.approx(np.array([[0, 0, -0.01], [0.005, 0, -0.01], [0, 0.006, -0.01]]), abs=1e-15)
     radial = found.position / np.linalg.norm(found.position, axis=1)[:, None]
     assert np.einsum("ij,ij->i", radial, found.normal) == pytest.approx(np.ones(3), abs=1e-6)
-    with pytest.raises(FileError, match="has <touch> on 2 sites, and three on one body make a sensor"):
+    with pytest.raises(FileError, match="no <tactile>, <touch> on 2 sites and never on three of one body"):
         read(tmp_path, text.replace('<touch site="0"/>', ""))
 
 

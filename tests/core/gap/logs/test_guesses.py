@@ -94,7 +94,7 @@ def test_time_series_of_several_files_without_names_are_no_frames(tmp_path):
     for path in paths:
         path.write_text("\n".join(f"{i / 10},{RNG.random()},{RNG.random()}" for i in range(40)) + "\n")
     assert len(with_distinct_names([read_log(path) for path in paths])) == 3
-    with pytest.raises(FileError, match="less than 8 lines"):
+    with pytest.raises(FileError, match="less than 8 samples"):
         (tmp_path / "short.csv").write_text("1,2\n3,4\n")
         proposal(tmp_path / "short.csv")
 
@@ -140,6 +140,20 @@ def test_a_load_that_rests_at_its_beginning_has_its_zero_there(tmp_path):
     columns |= {f"taxel{i}": 400.0 * columns["fz"] for i in range(4)}
     force = columns_of(write_csv(tmp_path / "press.csv", columns))["force"]
     assert force.value["zero"] == pytest.approx(0.4) and "is subtracted" in force.reason and force.evidence == "thin"
+
+
+def test_steps_of_a_friction_rig_with_headers_of_their_own_are_said_and_speeds_are_no_texels(tmp_path):
+    """A file of two steps, as tribometers write it: each has a preamble, names, units and a clock from zero on."""
+    step = "Run # 1\nStep No. {}\n\nRadius = 3.9\nDuration = 2.1\n\nFx,Fz,Z,V1,V2,V3,T\ng,g,mm,mm/sec,mm/sec,mm/sec,sec\n\n"
+    rows = [f"{100 + i},{-200 + i % 3},-0.6{i % 7},{0.1 * i:.1f},{i % 5},{i % 4},{0.02 * i:.2f}" for i in range(40)]
+    log = tmp_path / "run.csv"
+    log.write_text("".join(step.format(i) + "\n".join(rows) + "\n\n" for i in (1, 2)))
+    found = proposal(log)
+    assert "texel" not in found.columns() and "unit" not in [guess.word for guess in found.guesses]
+    assert found.columns()["time"].value == {"name": "T", "unit": "sec"} and found.columns()["force_z"].value["unit"] == "g"
+    assert [note for note in found.notes if "cells with text" in note] == ["'run.csv': 18 cells with text count as missing."]
+    with pytest.raises(FileError, match="The time of 'run.csv' goes backwards after sample 40 .* cut the file where the clock"):
+        new_rig(tmp_path / "rig", [log], template(tmp_path, [log]))
 
 
 def test_a_number_that_is_no_temperature_is_asked(tmp_path):

@@ -76,6 +76,16 @@ def test_the_preview_tells_the_ends_of_a_clock_that_counts_from_1970(tmp_path):
     assert rows["depth"] == ("0", "0.099")
 
 
+def test_the_preview_shows_names_and_units_of_a_file_that_is_too_short_for_a_recording(tmp_path, capsys):
+    """As a testing machine writes it, with a preamble whose numbers are no samples."""
+    rows = [f"{0.1 * i:.1f},{-0.2 * i:.2f},{-0.5 * i:.1f}" for i in range(5)]
+    (tmp_path / "a.csv").write_text("Diameter,14.0\nSpeed,6\n\nTime,Extension,Load\ns,mm,N\n" + "\n".join(rows) + "\n")
+    assert main(["rig", "new", str(tmp_path / "a.csv"), "--preview"]) == 0
+    assert re.search(r"Extension +mm +5 +-0\.8 +(-?0) *\n", capsys.readouterr().out)
+    assert main(["rig", "new", str(tmp_path / "a.csv"), "--out", str(tmp_path / "rig")]) == 1
+    assert "'a.csv' has less than 8 samples, and a recording needs as many: leave it out." in capsys.readouterr().err
+
+
 def test_a_unit_that_only_the_size_tells_is_asked(tmp_path):
     time, depth, force = press()
     logs = [write_csv(tmp_path / "a.csv", {"time": time, "indentation": depth * 1e3, "reading": force[:, 0]})]

@@ -53,7 +53,7 @@ def test_text_in_a_table_is_left_out_and_said(tmp_path):
     log = read_log(tmp_path / "log.csv")
     assert list(log.tables[0].columns) == ["t", "F", "G"]
     assert np.flatnonzero(np.isnan(log.tables[0].columns["G"])).tolist() == [3, 5]
-    assert any("'state' holds no numbers" in note for note in log.notes) and any("1 cells of 'G'" in n for n in log.notes)
+    assert any("'state' holds no numbers" in note for note in log.notes) and any("1 cell with text" in n for n in log.notes)
 
 
 # --- arrays
@@ -280,11 +280,11 @@ def test_pickles_are_not_opened(tmp_path):
     ("name", "content", "sentence"),
     [
         ("a.csv", b"", "is empty"),
-        ("a.csv", b"t,F\n1,2\n", "at least 8 samples"),
         ("a.csv", b"a,b\n" * 20, "holds no numbers"),
         ("a.csv", b"\xff\xfe\x00t" * 20, "not a text file"),
         ("a.csv", b"1" * (2 << 20), "characters: this is no table"),
         ("a.pdf", b"%PDF-1.7 and so on", "no log that is known"),
+        ("a.xlsx", b"PK\x03\x04 and so on", "no log that is known"),
         ("a.bag", b"#ROSBAG V2.0\n" + b"\xff" * 300, "damaged or cut off"),
         ("a.mcap", b"\x89MCAP0\r\n" + b"\xff" * 300, "damaged or cut off"),
         ("a.h5", b"\x89HDF\r\n\x1a\n" + b"\xff" * 300, "damaged or cut off"),
