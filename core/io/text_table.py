@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FileError, read_errors_said
-from .csv_table import UNITS
+from .csv_table import LARGEST_NUMBER, UNITS
 from .input_files import open_regular
 
 LARGEST_TEXT = 512 * 2**20
@@ -31,8 +31,6 @@ SAMPLE = 400
 """Lines within which the table has to begin, and from which its form is judged."""
 FIRST_RUN = 8
 """Lines of numbers at which a table begins, or as many as there are."""
-LARGEST_NUMBER = 1e30
-"""Numbers of a larger magnitude count as missing: nothing measured is so large."""
 MISSING = {"", "nan", "na", "n/a", "none", "null", "-", "inf", "-inf", "+inf"}
 SEPARATORS = ";\t, "
 """Of equal ones the first: a comma may be a decimal point between semicolons."""

@@ -102,14 +102,14 @@ MUCH_LESS = 0.3
 """Difference of the correlations with the load from which on one family of columns is preferred whatever its name and size."""
 SINCE_1970 = 1e9
 """Seconds: larger time stamps are times of day."""
-LARGEST_METRES = 0.3
-"""The largest motion that is taken for metres where no unit is known. Rigs for touch move by millimetres to some decimetres,
-so larger numbers are millimetres."""
-LARGEST_NEWTONS = 500.0
-"""Forces of a larger range are grams where no unit is known: probes press a skin with 0.1 to 100 N, and scales show grams."""
-COLDEST_KELVIN, HOTTEST_KELVIN = 200.0, 420.0
-"""Temperatures of a larger number are kelvins where no unit is known: nobody presses a sensor at 200 °C, or at 70 K. Of numbers
-above the second they are counts of a converter."""
+BY_SIZE: dict[str, tuple[tuple[float, str], ...]] = {
+    "m": ((0.3, "m"), (math.inf, "mm")),
+    "N": ((500.0, "N"), (math.inf, "g")),
+    "°C": ((200.0, "°C"), (420.0, "K"), (math.inf, "?")),
+}
+"""The unit where none is stated, by the reach of the values: rigs for touch move by millimetres to some decimetres, probes
+press a skin with 0.1 to 100 N while scales show grams, and nobody presses a sensor at 200 °C or at 70 K. Temperatures that are
+larger than both are counts of a converter."""
 _BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(]\s*(?P<unit>[^\])]+?)\s*[\])]\s*$")
 
 
@@ -276,38 +276,22 @@ def is_since_1970(values: np.ndarray, unit: str) -> bool:
     return len(known) > 0 and float(known.min()) * LOG_UNITS["s"][unit] > SINCE_1970
 
 
-def length_unit(span: float, stated: str) -> tuple[str, str, Evidence]:
-    """Return the unit of a length whose values span so much, why, and the evidence."""
-    if stated in LOG_UNITS["m"]:
-        return stated, "the file says so", "stated"
-    if span > LARGEST_METRES:
-        return "mm", f"it moves by {span:.4g}, too much for metres", "thin"
-    return "m", f"it moves by {span:.4g}", "thin"
+def unit_of(kind: str, stated: str, size: float) -> tuple[str, str, Evidence]:
+    """Return the unit of a length (``m``), a force (``N``) or a temperature (``°C``), why, and the evidence.
 
-
-def temperature_unit(values: np.ndarray, stated: str) -> tuple[str, str, Evidence]:
-    """Return the unit of temperatures, why, and the evidence."""
-    if stated in LOG_UNITS["°C"]:
-        return stated, "the file says so", "stated"
-    known = values[np.isfinite(values)]
-    middle = float(np.median(known)) if len(known) else 0.0
-    if middle > HOTTEST_KELVIN or middle < -COLDEST_KELVIN:
-        return (
-            "?",
-            f"it is about {middle:.4g}, which is no temperature: write unit, factor and zero, or remove the line",
-            "thin",
-        )
-    if middle > COLDEST_KELVIN:
-        return "K", f"it is about {middle:.4g}", "thin"
-    return "°C", f"it is about {middle:.4g}", "thin"
-
-
-def force_unit(stated: str, span: float = 0.0) -> tuple[str, str, Evidence]:
-    """Return the unit of a force whose values span so much, why, and the evidence."""
-    if stated in LOG_UNITS["N"] or stated in PRESSURES:
+    Parameters
+    ----------
+    kind : str
+    stated : str
+        By the file; empty if it states none.
+    size : float
+        How far the values span, or what a temperature is.
+    """
+    if stated in LOG_UNITS[kind] or kind == "N" and stated in PRESSURES:
         return stated, "the file says so", "stated"
     if stated:
-        return "?", f"it is in {stated}: write N, and the newtons per {stated} as factor", "thin"
-    if span > LARGEST_NEWTONS:
-        return "g", f"no unit is stated, and it changes by {span:.4g}, too much for newtons: grams on a scale", "thin"
-    return "N", "no unit is stated", "thin"
+        return "?", f"it is in {stated}: write {kind} as unit, and how much of it one {stated} is as factor", "thin"
+    unit = next(unit for most, unit in BY_SIZE[kind] if abs(size) <= most)
+    what = "it is about" if kind == "°C" else "it changes by"
+    advice = ": write unit, factor and zero, or remove the line" if unit == "?" else ""
+    return unit, f"no unit is stated, and {what} {size:.4g}{advice}", "thin"

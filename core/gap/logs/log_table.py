@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import FileError
+from ...io.csv_table import LARGEST_NUMBER
 
 LARGEST_FILE = 2 * 2**30
 """Bytes of a log."""
@@ -21,8 +22,6 @@ FEWEST_ROWS = 8
 """Samples of a trial, see :mod:`..dataset.rig`; shorter arrays are settings and no recordings."""
 FRAMES, MOST_FRAME_ROWS = "frames", 512
 """Kind of a log that several files are together, and rows of a matrix that may be one of them."""
-LARGEST_NUMBER = 1e30
-"""Numbers of a larger magnitude count as missing."""
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from ..dataset.rig import FORMAT, read_rig
 from ..dataset.second_logger import interpolated, with_steady_signs
 from .answers import Answers, ColumnAnswer, LoggerAnswer, RecordingAnswer
 from .clock_alignment import ClockShift, clock_shift
-from .column_behaviour import contact_of, correlation, is_unordered
+from .column_behaviour import LEAST_CONTACT, contact_of, correlation, is_unordered
 from .column_meaning import LOG_UNITS, PRESSURES, READING_UNITS, SINCE_1970
 from .guess import toml_value
 from .log_table import FEWEST_ROWS, LogFile, LogTable, with_distinct_names
@@ -33,10 +33,6 @@ LARGEST_MOTION, LARGEST_FORCE, SMALLEST_MOTION = 1.5, 1e4, 1e-7
 """Metres and newtons beyond which a unit must be wrong: rigs for touch move by less and press with less than a ton."""
 FOLLOWS = 0.5
 """Correlation of a response with the stimulus from which on there is contact, however large the noise from sample to sample."""
-LEAST_CONTACT = 6.0
-"""How many times the noise from sample to sample a response must rise above it. Of 1000 recordings of white noise of 20 to
-20,000 samples (evenly on a logarithmic scale) none reaches it after the mean over five samples that is taken here; the largest
-is at 4.2."""
 SMALLEST_INVERTED = 1e-30
 """A resistance below it counts as missing: it has no inverse."""
 DIGITS = 10
@@ -241,10 +237,8 @@ def _spread(time: np.ndarray) -> np.ndarray:
     stamps, first, counts = np.unique(time, return_index=True, return_counts=True)
     if len(stamps) < 2:
         raise FileError("All time stamps are equal: write time = { rate = … } with the samples per second.")
-    gaps = np.append(np.diff(stamps), np.median(np.diff(stamps) / counts[:-1]) * counts[-1])
-    group = np.repeat(np.arange(len(stamps)), counts)
-    found: np.ndarray = stamps[group] + gaps[group] * (np.arange(len(time)) - first[group]) / counts[group]
-    return found
+    last = float(np.median(np.diff(stamps) / counts[:-1]) * counts[-1])
+    return np.interp(np.arange(len(time)), np.append(first, len(time)), np.append(stamps, stamps[-1] + last))
 
 
 def _on_one_clock(parts: list[dict[str, np.ndarray]], log: LogFile, notes: list[str]) -> dict[str, np.ndarray]:

@@ -12,21 +12,19 @@ import numpy as np
 
 from ...errors import FileError
 from .answers import Use, column_names
-from .column_behaviour import contact_of, correlation, is_force, is_unnamed, is_unordered
+from .column_behaviour import LEAST_CONTACT, contact_of, correlation, is_force, is_unnamed, is_unordered
 from .column_meaning import (
     PRESSURES,
     READING_UNITS,
     Family,
     Meaning,
     families,
-    force_unit,
     is_rate,
     is_since_1970,
-    length_unit,
     meaning_of,
     name_and_unit,
-    temperature_unit,
     time_unit,
+    unit_of,
 )
 from .guess import UNKNOWN, Evidence, Guess, Proposal
 from .log_table import FEWEST_ROWS, FRAMES, LogFile, LogTable, with_distinct_names
@@ -42,8 +40,6 @@ ZERO_SHARE = 0.02
 SAME_COLUMNS = 0.5
 """Share of the columns of two files that both have, from which on they are of one kind: settings that were saved with them, and
 topics that were silent, differ from file to file; two loggers share no more than the name of the time."""
-ANSWERS = 6.0
-"""Texels answer if they leave their noise by so many times it."""
 ONE_TEXEL_PITCH = 0.01
 """Metres of a single texel, all of whose area shares what presses: its size has no influence."""
 FLAT = "it presses all texels alike, as a plate does: for a ball write x, y and z instead, and [indenter]"
@@ -315,13 +311,13 @@ class _Logger:
             unit, reason, evidence = "m" if is_length else "N", "ROS says so", "stated"
         elif is_length:
             group = [one for one in POSE if quantity in POSE for one in self.candidates.get(one, [])] or [name]
-            unit, reason, evidence = length_unit(max(self.span(one) for one in group), stated)
+            unit, reason, evidence = unit_of("m", stated, max(self.span(one) for one in group))
         elif quantity.startswith("q"):
             unit, reason, evidence = "", "of its name", "stated"
         elif quantity == "temperature":
-            unit, reason, evidence = temperature_unit(self.values(name, self.logs[0]), stated)
+            unit, reason, evidence = unit_of("°C", stated, float(np.nanmedian(self.values(name, self.logs[0]))))
         else:
-            unit, reason, evidence = force_unit(stated, self.span(name))
+            unit, reason, evidence = unit_of("N", stated, self.span(name))
         if self.meanings[name].weight == 1 and not set(POSE) <= set(self.candidates):
             evidence = "thin"
         value = {"name": name, **({"unit": unit} if unit else {})}
@@ -475,7 +471,7 @@ def _silent_texels(loggers: Sequence[_Logger], found: Sequence[Columns], owner: 
         return ""
     i = owner["texel"]
     names = column_names("texel", found[i]["texel"].value)
-    answered = np.array([loggers[i].answers_of(name) for name in names]) >= ANSWERS
+    answered = np.array([loggers[i].answers_of(name) for name in names]) >= LEAST_CONTACT
     count = int((~answered).sum())
     return f"{count} of {len(names)} texels" if answered.any() and count > len(names) / 2 else ""
 

@@ -11,7 +11,7 @@ from palpate.core.effects.library.temperature import REFERENCE
 from palpate.core.errors import PalpateError
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.forward.predictor import Model, predictors_of
-from palpate.core.gap.logs.column_meaning import meaning_of, temperature_unit
+from palpate.core.gap.logs.column_meaning import meaning_of, unit_of
 from palpate.core.gap.selection.candidates import candidates, scales_of
 
 IN_KELVIN = '[columns]\ntemperature = { name = "T", unit = "K" }\n\n[sensor]'
@@ -69,8 +69,8 @@ def test_a_session_puts_temperatures_on_its_clock(tmp_path):
 def test_what_a_log_calls_a_temperature():
     assert meaning_of("temperature_degC").quantity == meaning_of("Temp [K]").quantity == "temperature"
     assert meaning_of("Temp [K]").unit == "K"
-    assert temperature_unit(np.array([295.0, 296.0]), "")[0] == "K" and temperature_unit(np.array([21.0]), "")[0] == "°C"
-    assert temperature_unit(np.array([70.0]), "°F") == ("°F", "the file says so", "stated")
+    assert unit_of("°C", "", 295.0)[0] == "K" and unit_of("°C", "", 21.0)[0] == "°C"
+    assert unit_of("°C", "°F", 70.0) == ("°F", "the file says so", "stated")
 
 
 @pytest.mark.long("a whole diagnosis of warm and cold recordings")

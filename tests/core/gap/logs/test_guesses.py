@@ -159,7 +159,7 @@ def test_steps_of_a_friction_rig_with_headers_of_their_own_are_said_and_speeds_a
 def test_a_number_that_is_no_temperature_is_asked(tmp_path):
     columns = {"time": TIME, "force": LOAD, "Temp0": 757.0 + noise(400)} | {f"texel_{i}": 10.0 * LOAD for i in range(3)}
     own = columns_of(write_csv(tmp_path / "a.csv", columns))["temperature"]
-    assert own.value["unit"] == "?" and "no temperature" in own.reason
+    assert own.value["unit"] == "?" and "write unit, factor and zero" in own.reason
 
 
 def test_the_template_is_written_before_anything_is_refused(tmp_path, capsys):

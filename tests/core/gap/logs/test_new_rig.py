@@ -91,11 +91,15 @@ def test_a_unit_that_only_the_size_tells_is_asked(tmp_path):
     logs = [write_csv(tmp_path / "a.csv", {"time": time, "indentation": depth * 1e3, "reading": force[:, 0]})]
     found = propose([read_log(logs[0])])
     column = found.columns()["depth"]
-    assert column.value["unit"] == "mm" and column.evidence == "thin" and "too much for metres" in column.reason
-    with pytest.raises(FileError, match='depth of .a.csv. is .*"mm" }, because it moves by 2, too much for metres: answer it'):
+    assert (
+        column.value["unit"] == "mm" and column.evidence == "thin" and "no unit is stated, and it changes by 2" in column.reason
+    )
+    with pytest.raises(
+        FileError, match='depth of .a.csv. is .*"mm" }, because no unit is stated, and it changes by 2: answer it'
+    ):
         answers_of(found)
     run_job(write_rig([read_log(logs[0])], answers_of(found.confirmed()), tmp_path / "rig"))
-    assert "too much for metres" in (tmp_path / "rig" / "rig.toml").read_text()
+    assert "it changes by 2" in (tmp_path / "rig" / "rig.toml").read_text()
 
 
 def test_a_pose_and_a_force_turned_to_the_sensor(tmp_path):

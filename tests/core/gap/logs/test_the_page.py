@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from palpate.core.gap.logs import clock_alignment, column_meaning, log_file, new_rig
+from palpate.core.gap.logs import clock_alignment, column_behaviour, column_meaning, log_file, new_rig
 from palpate.core.gap.logs.proposal import propose
 
 
@@ -36,5 +36,5 @@ def test_units_endings_and_limits_are_those_of_the_source(page):
         for name in set(column_meaning.LOG_UNITS[unit]) - {"µs", "µm", "inch", "gf", "kgf"}:
             assert re.search(rf"[` ]{name}[` ;]", page), name
     assert f"below {clock_alignment.LEAST_CORRELATION}" in page and f"({clock_alignment.MOST_RIVAL} of" in page
-    assert f"more than {new_rig.LARGEST_MOTION} m" in page and f"more than {column_meaning.LARGEST_METRES} is" in page
-    assert "six times" in page and new_rig.LEAST_CONTACT == 6.0
+    assert f"more than {new_rig.LARGEST_MOTION} m" in page and f"more than {column_meaning.BY_SIZE['m'][0][0]} is" in page
+    assert "six times" in page and column_behaviour.LEAST_CONTACT == 6.0
