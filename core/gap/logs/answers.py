@@ -19,7 +19,7 @@ from .column_meaning import LOG_UNITS, PRESSURES
 from .guess import FORMAT, Proposal, has_unknown
 
 Use = Literal["fit", "check", "leave out"]
-_COLUMN_WORDS = {"name", "unit", "factor", "zero"}
+_COLUMN_WORDS = {"name", "unit", "factor", "zero", "missing"}
 _NAME_WORDS = {"name", "names", "first", "count"}
 _OWN_WORDS = {"time": {"rate"}, "force": {"area"}, "texel": {"names", "first", "count"}}
 
@@ -44,6 +44,8 @@ class ColumnAnswer:
         On which a pressure acts that becomes a force; 0 if it is none.
     rate : float, Hz
         Of a clock without a column; 0 if it has one.
+    missing : float or None
+        What the file has where a value is missing.
     constant : float or None
         In SI units, instead of a column.
     """
@@ -54,6 +56,7 @@ class ColumnAnswer:
     zero: Number = 0.0
     area: Positive = 0.0
     rate: Positive = 0.0
+    missing: Number | None = None
     constant: Number | None = None
 
 

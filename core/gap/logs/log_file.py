@@ -10,7 +10,6 @@ from pathlib import Path
 from ...errors import FileError, read_errors_said
 from ...io.input_files import open_regular
 from .log_table import LARGEST_FILE, LogFile
-from .missing_codes import without_missing_codes
 from .readers.array_files import read_hdf5, read_mat, read_npz
 from .readers.mcap_log import read_mcap
 from .readers.ros_bag import read_bag
@@ -43,7 +42,7 @@ def read_log(path: str | os.PathLike) -> LogFile:
     """
     path = Path(path)
     with read_errors_said(path):
-        return without_missing_codes(read_bag(path) if path.is_dir() else _reader_of(path)(path))
+        return read_bag(path) if path.is_dir() else _reader_of(path)(path)
 
 
 def _reader_of(path: Path) -> Callable[[Path], LogFile]:

@@ -3,11 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
-
-from .log_table import LogFile
 
 LEAST_SHARE, FEWEST = 0.005, 8
 """Share of the samples, and number of them, that must have the code: a single −1 is an outlier."""
@@ -47,21 +43,3 @@ def _jumps(values: np.ndarray, is_code: np.ndarray, far: float) -> int:
     jumps = border & (np.abs(np.diff(values)) > far)
     count = int(jumps.sum())
     return count if count >= LEAST_JUMPS * is_code.sum() else 0
-
-
-def without_missing_codes(log: LogFile) -> LogFile:
-    """Return a log in which codes for missing values are missing values, with a note for each column that has one."""
-    notes, tables = [], []
-    for table in log.tables:
-        columns = dict(table.columns)
-        for name, values in table.columns.items():
-            code = missing_code(values)
-            if code is not None:
-                columns[name] = np.where(values == code, np.nan, values)
-                share = float((values == code).mean())
-                notes.append(
-                    f"'{log.path.name}': {code:g} in '{table.full_name(name)}' ({share:.0%} of its samples) counts as missing, "
-                    "because the neighbouring values are far away."
-                )
-        tables.append(replace(table, columns=columns))
-    return replace(log, tables=tuple(tables), notes=(*log.notes, *notes)) if notes else log

@@ -25,6 +25,7 @@ from .column_behaviour import LEAST_CONTACT, contact_of, correlation, is_unorder
 from .column_meaning import LOG_UNITS, PRESSURES, READING_UNITS, SINCE_1970
 from .guess import toml_value
 from .log_table import FEWEST_ROWS, LogFile, LogTable, with_distinct_names
+from .missing_codes import missing_code
 
 RIG_NAME = "rig.toml"
 LONGEST_PAUSE = 10.0
@@ -140,7 +141,8 @@ def _columns_of(logs: Mapping[str, LogFile], file: str, answers: Answers, notes:
                     raise FileError(f"'{file}' has no column '{name}', which the answers name for {quantity}: check its name.")
                 table, own = found
                 column = f"texel_{i}" if quantity == "texel" else quantity
-                tables.setdefault(table.name, (table, {}))[1][column] = _in_si(quantity, answer, table.columns[own])
+                values = _known(quantity, answer, table.columns[own], f"'{own}' of '{file}'")
+                tables.setdefault(table.name, (table, {}))[1][column] = _in_si(quantity, answer, values)
     if not tables:
         raise FileError(f"The answers use no column of '{file}': name its columns, or leave the file out.")
     parts = [_on_clock(columns, _clock_of(log, table, logger, columns), log, notes) for table, columns in tables.values()]
@@ -161,6 +163,16 @@ def _table_of(tables: Sequence[LogTable], name: str) -> tuple[LogTable, str] | N
     """Return the table that has a column of a name, full or short, and its name in that table."""
     by_full = ((table, own) for table in tables for own in table.columns if table.full_name(own) == name)
     return next(by_full, None) or next(((table, name) for table in tables if name in table.columns), None)
+
+
+def _known(quantity: str, answer: ColumnAnswer, values: np.ndarray, where: str) -> np.ndarray:
+    """Return the values of a column without those that the answers call missing; refuse what seems to be such a number."""
+    if answer.missing is None and (code := missing_code(values)) is not None:
+        raise FileError(
+            f"{where} is {code:g} in {(values == code).mean():.0%} of its samples, and its neighbours are far away: write "
+            f"missing = {code} at {quantity} if no value was measured there, or missing = any other number."
+        )
+    return values if answer.missing is None else np.where(values == answer.missing, np.nan, values)
 
 
 def _in_si(quantity: str, answer: ColumnAnswer, values: np.ndarray) -> np.ndarray:

@@ -28,6 +28,7 @@ from .column_meaning import (
 )
 from .guess import UNKNOWN, Evidence, Guess, Proposal
 from .log_table import FEWEST_ROWS, FRAMES, LogFile, LogTable, with_distinct_names
+from .missing_codes import missing_code
 
 POSE, TURN, FORCE = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("force_x", "force_y", "force_z")
 BEGINNING = 0.05
@@ -155,6 +156,7 @@ class _Logger:
         self.names = [table.full_name(name) for table in self.tables for name in table.columns]
         self.units = {table.full_name(name): unit for table in self.tables for name, unit in table.units.items()}
         self.meanings = {name: self._meaning(name) for name in self.names}
+        self.missing = {name: code for name in self.names if (code := self._missing_code(name)) is not None}
         self.families: list[Family] = []
         self.candidates: dict[str, list[str]] = {}
 
@@ -173,7 +175,12 @@ class _Logger:
     def values(self, full: str, log: LogFile | None = None) -> np.ndarray:
         """Return the values of a column in one file, or in all of them."""
         parts = [values for one in ([log] if log else self.logs) if len(values := _values(one.tables, full))]
-        return np.concatenate(parts) if parts else np.zeros(0)
+        found = np.concatenate(parts) if parts else np.zeros(0)
+        return np.where(found == self.missing[full], np.nan, found) if full in self.missing else found
+
+    def _missing_code(self, full: str) -> float | None:
+        codes = (missing_code(_values(log.tables, full)) for log in self.logs)
+        return next((code for code in codes if code is not None), None)
 
     def span(self, full: str) -> float:
         """Return how far the values of a column reach, without the outermost thousandth."""
@@ -215,7 +222,15 @@ class _Logger:
                 found[quantity] = self._one(quantity, names)
         if self.families:
             found["texel"] = self._texel()
-        return found
+        return {quantity: self._with_missing(guess) for quantity, guess in found.items()}
+
+    def _with_missing(self, guess: Guess) -> Guess:
+        """Return a guess that says what its columns have where a value is missing, if they seem to have a number there."""
+        for name in column_names(guess.word, guess.value):
+            if name in self.missing:
+                code = self.missing[name]
+                return guess.but(f"{code:g} is where a value is missing, because its neighbours are far away", missing=code)
+        return guess
 
     def driver(self) -> str | None:
         """Return the column that seems to press: a force, else a depth or a height; None if no column does."""
@@ -346,8 +361,12 @@ class _Logger:
         """Return the columns for a question; how far those without a name reach is all that tells them apart."""
         if not is_unnamed(self.names):
             return listed(self.names)
-        ends = [(name, *np.nanpercentile(self.values(name), [0.1, 99.9])) for name in self.names[:MOST_NAMED]]
-        return ", ".join(f"{name}: {low:.4g} to {high:.4g}" if low < high else f"{name}: {low:.4g}" for name, low, high in ends)
+        found = []
+        for name in self.names[:MOST_NAMED]:
+            low, high = np.nanpercentile(self.values(name), [0.1, 99.9])
+            code = f", missing = {self.missing[name]}" if name in self.missing else ""
+            found.append(f"{name}: {low:.4g} to {high:.4g}{code}" if low < high else f"{name}: {low:.4g}{code}")
+        return ", ".join(found)
 
     def left_out(self, found: Columns) -> list[str]:
         """Return a sentence about the columns that nothing is made of."""

@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from log_rigs import new_rig, template, write_csv
 
 from palpate.commands import main
 from palpate.core.errors import FileError
@@ -53,13 +54,15 @@ def test_of_raw_files_what_drove_is_asked_with_how_far_each_column_reaches(tmp_p
     logs = write_files(tmp_path / "a_1", 1) + write_files(tmp_path / "b_2", 2)
     command = ["rig", "new", *map(str, logs), "--out", str(tmp_path / "rig")]
     assert main(command) == 1
-    assert "column_3: -100, column_4: 276.1 to 288, column_5: 0 to 2" in capsys.readouterr().out
+    assert "column_3: -100, column_4: 276.1 to 288, column_5: 0 to 2480, missing = -1.0)" in capsys.readouterr().out
     answers = tmp_path / "rig" / "answers.toml"
     text = answers.read_text().replace('depth = { name = "?", unit = "m" }', 'force = { name = "column_5", unit = "g" }')
     answers.write_text(text.replace('pitch = ["?", "?"]', "pitch = [0.01, 0.01]"))
+    assert main([*command, "--answers", str(answers)]) == 1
+    said = capsys.readouterr().err
+    assert "'column_5' of 'a_1/states.csv' is -1 in 50% of its samples" in said and "write missing = -1.0 at force if" in said
+    answers.write_text(answers.read_text().replace('unit = "g" }', 'unit = "g", missing = -1.0 }'))
     assert main([*command, "--answers", str(answers)]) == 0
-    said = capsys.readouterr().out
-    assert "-1 in 'column_5' (50% of its samples) counts as missing" in said
     rig = read_rig(tmp_path / "rig" / "rig.toml")
     assert [trial.use for trial in rig.trials] == ["fit", "check"] and len(rig.texels) == CHANNELS
     for seed, trial in zip((1, 2), rig.trials, strict=True):
@@ -73,6 +76,18 @@ def test_of_raw_files_what_drove_is_asked_with_how_far_each_column_reaches(tmp_p
     text = (tmp_path / "rig" / "rig.toml").read_text()
     assert "late = 0.0" in text and 'texel = { name = "column_{}", first = 2, count = 6 }  # CHECK: 6 columns' in text
     assert (tmp_path / "rig" / "recordings.png").stat().st_size > 10_000
+
+
+def test_a_code_for_missing_values_is_a_line_of_the_answers_and_can_be_taken_away(tmp_path):
+    load = np.abs(np.round(100.0 * np.sin(np.arange(2000) * 0.02), 3))
+    coded = np.where(np.arange(2000) % 3 == 0, -1.0, load)
+    log = write_csv(tmp_path / "a.csv", {"time": 0.01 * np.arange(2000), "Fz (N)": coded, "reading": 3.0 * load})
+    guess = propose([read_log(log)]).columns()["force"]
+    assert guess.value["missing"] == -1.0 and "-1 is where a value is missing" in guess.reason and "factor" not in guess.value
+    for word, count in (("missing = -1.0", 0), ("missing = 9999.0", 667)):
+        answers = template(tmp_path, [log], **{"missing = -1.0": word})
+        (trial,) = read_rig(new_rig(tmp_path / "rig", [log], answers).path).trials
+        assert (trial.level == -1.0).sum() == count
 
 
 def test_codes_for_missing_values():
