@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
+from ..dataset.column_names import QUANTITIES
 from .column_meaning import KNOWN_UNITS
 from .guess import Guess, Proposal, toml_value
 
@@ -40,11 +41,16 @@ def asked(proposal: Proposal, ask: Callable[[str], str] = input) -> Proposal:
 def _asked(guess: Guess, ask: Callable[[str], str]) -> Guess | None:
     """Return a guess after the question about it; None if the column is not to be used."""
     is_column = guess.table == "logger.columns"
-    choice = f": the column and its unit, {LEFT_OUT} for none" if is_column else ", as in the brackets"
+    choice = (
+        f": the column and its unit, force = … if it is a force, {LEFT_OUT} for none" if is_column else ", as in the brackets"
+    )
     while guess.is_open:
         typed = ask(f"{guess.what}{choice} ({guess.reason})\n  [{toml_value(guess.value)}] ").strip()
         if typed == LEFT_OUT and is_column:
             return None
+        word, is_other, rest = (part.strip() for part in typed.partition("="))
+        if is_column and is_other and word in QUANTITIES:
+            guess, typed = replace(guess, word=word, value={}), rest
         value = _typed(typed, guess) if typed else guess.value
         guess = replace(guess, value=value, evidence="stated") if value is not None else guess
     return guess

@@ -13,6 +13,7 @@ from palpate.core.gap.logs.log_file import read_log
 from palpate.core.gap.logs.log_table import with_distinct_names
 from palpate.core.gap.logs.missing_codes import missing_code
 from palpate.core.gap.logs.proposal import propose
+from palpate.core.gap.logs.questions import asked
 
 GRAM = 9.80665e-3
 CHANNELS = 6
@@ -55,6 +56,9 @@ def test_of_raw_files_what_drove_is_asked_with_how_far_each_column_reaches(tmp_p
     command = ["rig", "new", *map(str, logs), "--out", str(tmp_path / "rig")]
     assert main(command) == 1
     assert "column_3: -100, column_4: 276.1 to 288, column_5: 0 to 2480, missing = -1.0)" in capsys.readouterr().out
+    replies = {"depth": "force = column_5 g", "texel": "", "grid": "{ rows = 2, columns = 3, pitch = [0.01, 0.01] }"}
+    typed = asked(propose([read_log(log) for log in logs]), lambda question: replies[question.split(" ")[0]])
+    assert not typed.questions and typed.columns(0)["force"].value == {"name": "column_5", "unit": "g"}
     answers = tmp_path / "rig" / "answers.toml"
     text = answers.read_text().replace('depth = { name = "?", unit = "m" }', 'force = { name = "column_5", unit = "g" }')
     answers.write_text(text.replace('pitch = ["?", "?"]', "pitch = [0.01, 0.01]"))
