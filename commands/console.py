@@ -21,6 +21,7 @@ from typing import Any, NoReturn
 from ..core import jobs as bars
 from ..core.errors import PalpateError
 from ..core.jobs import Job, Progress, Result, run_job
+from ..core.jobs import progress_bar as progress_bar
 
 
 class Interrupt:
