@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
+from palpate.core.gap.dataset.column_names import GRAVITY
 from palpate.core.gap.dataset.second_logger import interpolated
-from palpate.core.gap.logs.column_meaning import GRAVITY
 
 from ._handmade import HandmadeModel, low_pass
 from ._recordings import SETS, Columns, Recording, sheet, thinned

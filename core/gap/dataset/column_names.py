@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Columns of a logger: its own names and units, which a rig translates into those of Palpate."""
+"""Columns of a logger: its own names and units, which a rig, or answers about logs, translate into those of Palpate."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ...errors import FileError
 from ...io.csv_table import UNITS
-from ...io.input_files import checked_name, is_number
-from ...io.schema import known_words
+from ...io.input_files import checked_name
+from ...io.schema import Number, Positive, known_words, read_words, wanted
 
 QUANTITIES = {
     "time": "s",
@@ -23,6 +23,22 @@ QUANTITIES = {
     **dict.fromkeys(("qw", "qx", "qy", "qz", "texel"), ""),
 }
 """Columns that a rig can name, and the SI unit of each; `texel` stands for all texels."""
+GRAVITY = 9.80665
+"""m/s²: a gram on a scale is a force."""
+LOG_UNITS: dict[str, dict[str, float]] = {
+    "m": {**UNITS["m"], "nm": 1e-9, "in": 0.0254, "inch": 0.0254},
+    "s": {**UNITS["s"], "sec": 1.0, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0},
+    "N": {
+        **UNITS["N"],
+        **{"uN": 1e-6, "g": 1e-3 * GRAVITY, "gf": 1e-3 * GRAVITY, "kg": GRAVITY, "kgf": GRAVITY, "lbf": 4.4482216152605},
+    },
+    "°C": UNITS["°C"],
+}
+"""SI unit → units that a log may be in, and the SI value of one of them."""
+PRESSURES = {**UNITS["Pa"], "hPa": 1e2, "mbar": 1e2, "bar": 1e5, "psi": 6894.757293168}
+"""Pressures: a force follows with the area on which they act."""
+READING_UNITS = LOG_UNITS["N"]
+"""Units of readings that become newtons. Readings in any other unit keep it."""
 ZEROS = {"K": -273.15, "°F": -32.0 / 1.8, "degF": -32.0 / 1.8}
 """°C at which other scales of temperature are zero, where they have another zero."""
 INVERSE = "1/x"
@@ -30,33 +46,120 @@ INVERSE = "1/x"
 NUMBER = "{}"
 """What stands for the number of a texel in the name of its column."""
 LARGEST_FACTOR = 1e12
+SMALLEST_INVERTED = 1e-30
+"""Numbers below it have no inverse."""
+_WORDS = ("name", "unit", "factor", "zero", "missing")
+_OWN_WORDS = {"time": ("rate",), "force": ("area",), "texel": ("names", "first", "count")}
 
 
 @dataclass(frozen=True)
-class ColumnRule:
-    """Where the values of a column come from.
+class Column:
+    """Where a quantity comes from: (number − zero) · factor in the unit, for ``1/x`` factor / (number − zero).
 
     Attributes
     ----------
-    source : str
-        Name of the column in the file; of texels with ``{}`` in place of the number.
-    factor : float
-    inverse : bool
-        True if one over the values is wanted, before the factor.
-    first : int
-        Number of the first texel.
-    shift : float
-        Added after the factor: zero of the kelvin scale and the like, in the SI unit.
+    names : tuple of str
+        The columns: one, or those of all texels in order.
+    unit : str
+        Empty for texels whose unit is the sensor's own.
+    factor, zero : float
+    area : float, m²
+        On which a pressure acts that becomes a force; 0 if it is none.
+    rate : float, Hz
+        Of a clock without a column; 0 if it has one.
+    missing : float or None
+        What the file has where a value is missing.
+    constant : float or None
+        In SI units, instead of a column.
     """
 
-    source: str
-    factor: float = 1.0
-    inverse: bool = False
-    first: int = 0
-    shift: float = 0.0
+    names: tuple[str, ...]
+    unit: str = ""
+    factor: Number = 1.0
+    zero: Number = 0.0
+    area: Positive = 0.0
+    rate: Positive = 0.0
+    missing: Number | None = None
+    constant: Number | None = None
+
+    def in_si(self, quantity: str, values: np.ndarray) -> np.ndarray:
+        """Return the values of a column in the unit of a quantity; NaN where one is missing or has no inverse."""
+        unit = QUANTITIES[quantity]
+        size = PRESSURES[self.unit] * self.area if self.area else LOG_UNITS.get(unit, READING_UNITS).get(self.unit, 1.0)
+        found = values if self.missing is None else np.where(values == self.missing, np.nan, values)
+        found = found - self.zero
+        if self.unit == INVERSE:
+            with np.errstate(divide="ignore"):
+                found = np.where(np.abs(found) < SMALLEST_INVERTED, np.nan, 1.0 / found)
+        shift = ZEROS.get(self.unit, 0.0) if unit == "°C" else 0.0
+        in_si: np.ndarray = found * (size * self.factor) + shift
+        return in_si
 
 
-def read_column_rules(table: Mapping[str, Any], path: Path) -> dict[str, ColumnRule]:
+@dataclass
+class _Source:
+    name: str | Annotated[tuple[str, ...], wanted("write a name, or a list of them", min_length=1)] | None = None
+    names: Annotated[tuple[str, ...], wanted('write a list of names, as ["R1", "R2"]', names=True, min_length=1)] = ()
+    first: Annotated[int, wanted("write the number of the first texel, 0 or 1", ge=0, le=65536)] = 0
+    count: Annotated[int, wanted("write a whole number above zero", ge=1, le=65536)] = 1
+
+
+def read_column(quantity: str, words: Any, where: str, without: Iterable[str] = (), texels: int | None = None) -> Column:
+    """Return what the words of a column say: its name alone, or a table.
+
+    Parameters
+    ----------
+    quantity : str
+    words : object
+        As TOML gives it.
+    where : str
+        For messages.
+    without : iterable of str
+        Words that are none here.
+    texels : int or None
+        Number of texels, where no word says it.
+
+    Raises
+    ------
+    FileError
+        A word, a name, a unit or a factor is not valid.
+    """
+    words = {"name": words} if isinstance(words, str) else words
+    if not isinstance(words, dict):
+        raise FileError(f'{where} is {words!r:.60}: write the name of the column, or {{ name = "Fz", unit = "mN" }}.')
+    known_words(words, [word for word in (*_WORDS, *_OWN_WORDS.get(quantity, ())) if word not in without], where)
+    unit, units = words.get("unit", QUANTITIES[quantity]), LOG_UNITS.get(QUANTITIES[quantity], {})
+    given = {word: words[word] for word in words if word not in ("name", "names", "first", "count")}
+    found = read_words(given, Column, where, besides=("unit",), names=(), unit=unit)
+    if not 1.0 / LARGEST_FACTOR <= abs(found.factor) <= LARGEST_FACTOR:
+        raise FileError(f"factor of {where} is {found.factor:g}: write a number other than zero.")
+    is_pressure = isinstance(unit, str) and unit in PRESSURES
+    if not isinstance(unit, str) or (units and unit not in units and not (found.area and is_pressure)):
+        hint = " (a pressure needs area = …, in m²)" if is_pressure else ""
+        choice = f"one of {', '.join(units)}{hint}" if units else "its name"
+        raise FileError(f"unit of {where} is {unit!r:.60}: write {choice}.")
+    return found if found.rate else replace(found, names=_names(quantity, words, where, texels))
+
+
+def _names(quantity: str, words: Mapping[str, Any], where: str, texels: int | None) -> tuple[str, ...]:
+    found = read_words(words, _Source, where, besides=words)
+    name = ("texel_{}" if quantity == "texel" else quantity) if found.name is None else found.name
+    if quantity == "texel" and isinstance(name, tuple):
+        raise FileError(f"name of {where} is {list(name)!r:.60}: write one name, or names = [...].")
+    names = found.names or (name if isinstance(name, tuple) else (name,))
+    for one in names:
+        checked_name(one, where)
+    if quantity == "texel" and not found.names:
+        return numbered(names[0], found.first, texels or found.count)
+    return names
+
+
+def numbered(pattern: str, first: int, count: int) -> tuple[str, ...]:
+    """Return the names of texels: those of a pattern with ``{}``, or the one that it is."""
+    return tuple(pattern.replace(NUMBER, str(first + i)) for i in range(count)) if NUMBER in pattern else (pattern,)
+
+
+def read_column_rules(table: Mapping[str, Any], path: Path, texels: int) -> dict[str, Column]:
     """Return the rules of the [columns] of a rig by the names of Palpate's columns.
 
     Raises
@@ -68,42 +171,19 @@ def read_column_rules(table: Mapping[str, Any], path: Path) -> dict[str, ColumnR
     rules = {}
     for column, words in table.items():
         where = f"{column} in [columns] of '{path.name}'"
-        words = {"name": words} if isinstance(words, str) else words
-        if not isinstance(words, dict):
-            raise FileError(f'{where} is {words!r:.60}: write the name of the column, or {{ name = "Fz", unit = "mN" }}.')
-        known_words(words, {"name", "unit", "factor", "first"} if column == "texel" else {"name", "unit", "factor"}, where)
-        source = checked_name(words.get("name", "texel_{}" if column == "texel" else column), where)
-        if column == "texel" and source.count(NUMBER) != 1:
-            raise FileError(f'The name of {where} is "{source}": write {{}} where the texel\'s number stands, as in "R{{}}".')
-        first = words.get("first", 0)
-        if not isinstance(first, int) or isinstance(first, bool) or not 0 <= first <= 1_000_000:
-            raise FileError(f"first of {where} is {first!r:.60}: write the number of the first texel, 0 or 1.")
-        scale = _scale(words, QUANTITIES[column], where)
-        shift = ZEROS.get(words.get("unit", ""), 0.0) if QUANTITIES[column] == "°C" else 0.0
-        rules[column] = ColumnRule(source, *scale, first, shift)
+        rules[column] = read_column(column, words, where, without=("rate", "names", "count"), texels=texels)
+        if column == "texel" and rules[column].unit not in ("", INVERSE):
+            raise FileError(
+                f'unit of {where} is {rules[column].unit!r:.60}: write "{INVERSE}" for one over the values; the unit of the '
+                "readings stands in [sensor]."
+            )
+        if column == "texel" and len(rules[column].names) != texels:
+            name = rules[column].names[0]
+            raise FileError(f'The name of {where} is "{name}": write {{}} where the texel\'s number stands, as in "R{{}}".')
     return rules
 
 
-def _scale(words: Mapping[str, Any], quantity: str, where: str) -> tuple[float, bool]:
-    """Factor of a column, and whether its inverse is wanted."""
-    factor, unit = words.get("factor", 1.0), words.get("unit", quantity)
-    if not is_number(factor) or not 1.0 / LARGEST_FACTOR <= abs(factor) <= LARGEST_FACTOR:
-        raise FileError(f"factor of {where} is {factor!r:.60}: write a number other than zero.")
-    if quantity == "":
-        if unit not in ("", INVERSE):
-            raise FileError(
-                f'unit of {where} is {unit!r:.60}: write "{INVERSE}" for one over the values; the unit of the readings stands '
-                "in [sensor]."
-            )
-        return float(factor), unit == INVERSE
-    if not isinstance(unit, str) or unit not in UNITS[quantity]:
-        raise FileError(f"unit of {where} is {unit!r:.60}: write one of {', '.join(UNITS[quantity])}.")
-    return float(factor) * UNITS[quantity][unit], False
-
-
-def translated(
-    names: Sequence[str], values: np.ndarray, rules: Mapping[str, ColumnRule], texels: int, file: Path
-) -> dict[str, np.ndarray]:
+def translated(names: Sequence[str], values: np.ndarray, rules: Mapping[str, Column], file: Path) -> dict[str, np.ndarray]:
     """Return the columns of a file by the names and in the units of Palpate; columns without a rule are as they are.
 
     Parameters
@@ -111,9 +191,7 @@ def translated(
     names : sequence of str
         Of the file's columns.
     values : (T, c) float
-    rules : mapping of str to ColumnRule
-    texels : int
-        Number of texels of the sensor.
+    rules : mapping of str to Column
     file : Path
         For messages.
 
@@ -123,35 +201,26 @@ def translated(
         A column is not there, is there twice, or has a value whose inverse is infinite.
     """
     columns = {name: values[:, i] for i, name in enumerate(names)}
-    wanted: dict[str, ColumnRule] = {}
+    wanted_ones: dict[str, tuple[str, Column]] = {}
     for column, rule in rules.items():
         if column != "texel":
-            wanted[column] = rule
-        elif any(rule.source.replace(NUMBER, str(rule.first + i)) in columns for i in range(texels)):
-            for i in range(texels):
-                source = rule.source.replace(NUMBER, str(rule.first + i))
-                wanted[f"texel_{i}"] = ColumnRule(source, rule.factor, rule.inverse)
+            wanted_ones[column] = rule.names[0], rule
+        elif any(name in columns for name in rule.names):
+            wanted_ones |= {f"texel_{i}": (name, rule) for i, name in enumerate(rule.names)}
+    taken = {source for source, _ in wanted_ones.values()}
     found = {}
-    for column, rule in wanted.items():
-        if rule.source not in columns:
+    for column, (source, rule) in wanted_ones.items():
+        if source not in columns:
             if column in ("force_x", "force_y", "force_z", "slide_x", "slide_y", "temperature"):
                 continue  # not every recording has them
-            raise FileError(f"'{file.name}' has no column '{rule.source}', which [columns] names for {column}.")
-        if column != rule.source and column in columns and column not in {other.source for other in wanted.values()}:
-            raise FileError(f"'{file.name}' has '{rule.source}' and '{column}' for {column}: remove one of them.")
-        found[column] = rule.factor * _inverted(columns[rule.source], rule, file) + rule.shift
-    taken = {rule.source for rule in wanted.values()}
+            raise FileError(f"'{file.name}' has no column '{source}', which [columns] names for {column}.")
+        if column != source and column in columns and column not in taken:
+            raise FileError(f"'{file.name}' has '{source}' and '{column}' for {column}: remove one of them.")
+        quantity = "texel" if column.startswith("texel_") else column
+        found[column] = rule.in_si(quantity, columns[source])
+        (lost,) = np.nonzero(np.isnan(found[column]) & ~np.isnan(columns[source]) & (columns[source] != rule.missing))
+        if len(lost):
+            raise FileError(
+                f"Line {lost[0] + 2} of '{file.name}' has zero for {source}, which has no inverse: leave the cell empty."
+            )
     return {name: column for name, column in columns.items() if name not in taken} | found
-
-
-def _inverted(values: np.ndarray, rule: ColumnRule, file: Path) -> np.ndarray:
-    """The values, or one over them."""
-    if not rule.inverse:
-        return values
-    (zero,) = np.nonzero(np.abs(values) < 1e-30)
-    if len(zero):
-        raise FileError(
-            f"Line {zero[0] + 2} of '{file.name}' has zero for {rule.source}, which has no inverse: leave the cell empty."
-        )
-    inverse: np.ndarray = 1.0 / values
-    return inverse

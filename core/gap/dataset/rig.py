@@ -21,7 +21,7 @@ from ...io.input_files import LONGEST_NAME, checked_name, read_toml, require_reg
 from ...io.schema import Name, known_words, read_words, wanted
 from ...io.sensor_toml import SHAPE_WORDS, checked_grid, checked_lengths, stated_parameters
 from ...model.sensor_parameters import DEPTH_PER_THICKNESS, SENSOR_PARAMETERS, SensorParameters, with_dependent_defaults
-from .column_names import ColumnRule, read_column_rules, translated
+from .column_names import Column, read_column_rules, translated
 from .cover import COVER_WORDS, Cover, read_cover
 from .second_logger import SecondLogger, bridged, joined
 from .sessions import TrialHistory, on_common_clocks, read_history
@@ -169,7 +169,7 @@ def read_rig(path: str | Path) -> Rig:
         folder=folder,
         texels=len(texels),
         has_indenter=found.indenter is not None,
-        rules=read_column_rules(found.columns or {}, path),
+        rules=read_column_rules(found.columns or {}, path, len(texels)),
         probes=frozenset(probes),
         height=SHARED_HEIGHT if height == FREE else height,
     )
@@ -403,7 +403,7 @@ class _TrialReader:
     folder: Path
     texels: int
     has_indenter: bool
-    rules: Mapping[str, ColumnRule]
+    rules: Mapping[str, Column]
     probes: frozenset[str]
     height: str | float
 
@@ -434,14 +434,14 @@ class _TrialReader:
         """The columns of a trial, from its CSV file or from those of two loggers."""
         if second is None:
             table = read_table(file)
-            return translated(table.names, table.values, self.rules, self.texels, file)
+            return translated(table.names, table.values, self.rules, file)
         other = _inside(second.file, self.folder, f"{where}'s readings", self.path)
         files = (file, other)
         parts = []
         for one in files:
             table = read_table(one)  # a rule of [columns] holds in the file that has its column
-            rules = {name: rule for name, rule in self.rules.items() if name == "texel" or rule.source in table.names}
-            parts.append(translated(table.names, table.values, rules, self.texels, one))
+            rules = {name: rule for name, rule in self.rules.items() if name == "texel" or rule.names[0] in table.names}
+            parts.append(translated(table.names, table.values, rules, one))
             _clock(parts[-1], one)
         return joined(parts[0], parts[1], second.late, files)
 

@@ -6,63 +6,27 @@ a :class:`~.guess.Proposal` that leaves no question open, by the same words.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from ...errors import FileError
 from ...io.input_files import checked_name, read_toml
-from ...io.schema import WORD, Name, Number, Positive, Seconds, known_words, read_words, wanted
-from ..dataset.column_names import QUANTITIES
-from .column_meaning import LOG_UNITS, PRESSURES
+from ...io.schema import WORD, Name, Seconds, known_words, read_words, wanted
+from ..dataset.column_names import QUANTITIES, Column, read_column
 from .guess import FORMAT, Proposal, has_unknown
 
 Use = Literal["fit", "check", "leave out"]
-_COLUMN_WORDS = {"name", "unit", "factor", "zero", "missing"}
-_NAME_WORDS = {"name", "names", "first", "count"}
-_OWN_WORDS = {"time": {"rate"}, "force": {"area"}, "texel": {"names", "first", "count"}}
-
 
 _Files = Annotated[tuple[str, ...], wanted('write a list of names, as ["press_1.csv"]', names=True, min_length=1)]
 
 
 @dataclass(frozen=True)
-class ColumnAnswer:
-    """Where a quantity comes from.
-
-    Attributes
-    ----------
-    names : tuple of str
-        The columns: one, or those of all texels in order. Those of a table of several are ``TABLE/COLUMN``; without the
-        table, a name means the column of every table that has it.
-    unit : str
-        Empty for texels whose unit is the sensor's own.
-    factor, zero : float
-        The value is (number − zero) · factor, in the unit.
-    area : float, m²
-        On which a pressure acts that becomes a force; 0 if it is none.
-    rate : float, Hz
-        Of a clock without a column; 0 if it has one.
-    missing : float or None
-        What the file has where a value is missing.
-    constant : float or None
-        In SI units, instead of a column.
-    """
-
-    names: tuple[str, ...]
-    unit: str = ""
-    factor: Number = 1.0
-    zero: Number = 0.0
-    area: Positive = 0.0
-    rate: Positive = 0.0
-    missing: Number | None = None
-    constant: Number | None = None
-
-
-@dataclass(frozen=True)
 class LoggerAnswer:
-    """One kind of files: `files` are their names, `columns` where each quantity comes from."""
+    """One kind of files: `files` are their names, `columns` where each quantity comes from.
+
+    Columns of a table of several are ``TABLE/COLUMN``; without the table, a name means the column of every table that has it.
+    """
 
     files: _Files
     columns: Annotated[dict[str, Any], wanted("say in [logger.columns] what each column is")]
@@ -174,48 +138,12 @@ def _logger(entry: dict[str, Any], where: str) -> LoggerAnswer:
     return replace(found, columns={name: _column(name, one, f"{name} in {where}") for name, one in found.columns.items()})
 
 
-def _column(quantity: str, words: Any, where: str) -> ColumnAnswer:
+def _column(quantity: str, words: Any, where: str) -> Column:
     if isinstance(words, int | float) and not isinstance(words, bool) and quantity not in ("time", "texel"):
-        return read_words({"constant": words}, ColumnAnswer, where, names=(), unit="")
-    words = {"name": words} if isinstance(words, str) else words
-    if not isinstance(words, dict):
-        raise FileError(f'{where} is {words!r:.60}: write the name of the column, or {{ name = "Fz", unit = "mN" }}.')
+        return read_words({"constant": words}, Column, where, names=(), unit="")
     if has_unknown(words):
         raise FileError(f'{where} is still "?": fill it in, or remove the line if nothing was recorded.')
-    known_words(words, _COLUMN_WORDS | _OWN_WORDS.get(quantity, set()), where)
-    unit, units = words.get("unit", QUANTITIES[quantity]), LOG_UNITS.get(QUANTITIES[quantity], {})
-    given = {word: words[word] for word in words if word not in _NAME_WORDS}
-    found = read_words(given, ColumnAnswer, where, besides=("unit",), names=(), unit=unit)
-    if found.factor == 0.0:
-        raise FileError(f"factor of {where} is 0: write a number other than zero.")
-    is_pressure = isinstance(unit, str) and unit in PRESSURES
-    if not isinstance(unit, str) or (units and unit not in units and not (found.area and is_pressure)):
-        hint = " (a pressure needs area = …, in m²)" if is_pressure else ""
-        choice = f"one of {', '.join(units)}{hint}" if units else "its name"
-        raise FileError(f"unit of {where} is {unit!r:.60}: write {choice}.")
-    return found if found.rate else replace(found, names=column_names(quantity, words, where))
-
-
-@dataclass
-class _ColumnNames:
-    name: str | Annotated[tuple[str, ...], wanted("write a name, or a list of them", min_length=1)] | None = None
-    names: Annotated[tuple[str, ...], wanted('write a list of names, as ["R1", "R2"]', names=True, min_length=1)] = ()
-    first: Annotated[int, wanted("write a whole number", ge=0, le=65536)] = 0
-    count: Annotated[int, wanted("write a whole number above zero", ge=1, le=65536)] = 1
-
-
-def column_names(quantity: str, words: Mapping[str, Any], where: str = "") -> tuple[str, ...]:
-    """Return the columns that the words of a quantity name."""
-    found = read_words(words, _ColumnNames, where, besides=words)
-    name = ("" if quantity == "texel" else quantity) if found.name is None else found.name
-    if quantity == "texel" and isinstance(name, tuple):
-        raise FileError(f"name of {where} is {list(name)!r:.60}: write one name, or names = [...].")
-    names = found.names or (name if isinstance(name, tuple) else (name,))
-    for name in names:
-        checked_name(name, where)
-    if quantity == "texel" and not found.names and "{}" in names[0]:
-        return tuple(names[0].replace("{}", str(found.first + i)) for i in range(found.count))
-    return names
+    return read_column(quantity, words, where)
 
 
 def _recording(entry: dict[str, Any], where: str) -> RecordingAnswer:

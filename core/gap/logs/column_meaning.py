@@ -14,27 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...io.csv_table import UNITS
-from ..dataset.column_names import QUANTITIES
+from ..dataset.column_names import LOG_UNITS, PRESSURES, QUANTITIES
 from .guess import Evidence
 
-GRAVITY = 9.80665
-"""m/s²: a gram on a scale is a force."""
-LOG_UNITS: dict[str, dict[str, float]] = {
-    "m": {**UNITS["m"], "nm": 1e-9, "in": 0.0254, "inch": 0.0254},
-    "s": {**UNITS["s"], "sec": 1.0, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0},
-    "N": {
-        **UNITS["N"],
-        **{"uN": 1e-6, "g": 1e-3 * GRAVITY, "gf": 1e-3 * GRAVITY, "kg": GRAVITY, "kgf": GRAVITY, "lbf": 4.4482216152605},
-    },
-    "°C": UNITS["°C"],
-    "": {},
-}
-"""SI unit → units that a log may be in, and the SI value of one of them. Those of a reading are in :data:`READING_UNITS`."""
-PRESSURES = {**UNITS["Pa"], "hPa": 1e2, "mbar": 1e2, "bar": 1e5, "psi": 6894.757293168}
-"""Pressures: a force follows with the area on which they act."""
-READING_UNITS = {**LOG_UNITS["N"]}
-"""Units of readings that become newtons. Readings in any other unit keep it."""
 KNOWN_UNITS = {unit for units in LOG_UNITS.values() for unit in units} | set(PRESSURES)
 KNOWN_UNITS |= set(
     ["counts", "count", "V", "mV", "ohm", "kohm", "Ohm", "kOhm", "Ω", "kΩ", "F", "pF", "raw", "LSB", "ADC", "deg", "rad", "%"]

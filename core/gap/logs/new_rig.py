@@ -16,13 +16,13 @@ from ...io.csv_table import LARGEST_NUMBER
 from ...io.file_list import FileList
 from ...io.file_writing import atomic_write, writable_folder
 from ...jobs import Job, Progress
-from ..dataset.column_names import INVERSE, QUANTITIES, ZEROS
+from ..dataset.column_names import Column
 from ..dataset.rig import FORMAT, read_rig
 from ..dataset.second_logger import interpolated, with_steady_signs
-from .answers import Answers, ColumnAnswer, LoggerAnswer, RecordingAnswer
+from .answers import Answers, LoggerAnswer, RecordingAnswer
 from .clock_alignment import ClockShift, clock_shift
 from .column_behaviour import LEAST_CONTACT, contact_of, correlation, is_unordered
-from .column_meaning import LOG_UNITS, PRESSURES, READING_UNITS, SINCE_1970
+from .column_meaning import SINCE_1970
 from .guess import toml_value
 from .log_table import FEWEST_ROWS, LogFile, LogTable, with_distinct_names
 from .missing_codes import missing_code
@@ -34,8 +34,6 @@ LARGEST_MOTION, LARGEST_FORCE, SMALLEST_MOTION = 1.5, 1e4, 1e-7
 """Metres and newtons beyond which a unit must be wrong: rigs for touch move by less and press with less than a ton."""
 FOLLOWS = 0.5
 """Correlation of a response with the stimulus from which on there is contact, however large the noise from sample to sample."""
-SMALLEST_INVERTED = 1e-30
-"""A resistance below it counts as missing: it has no inverse."""
 DIGITS = 10
 """Significant digits of the numbers in the CSV files."""
 
@@ -141,8 +139,8 @@ def _columns_of(logs: Mapping[str, LogFile], file: str, answers: Answers, notes:
                     raise FileError(f"'{file}' has no column '{name}', which the answers name for {quantity}: check its name.")
                 table, own = found
                 column = f"texel_{i}" if quantity == "texel" else quantity
-                values = _known(quantity, answer, table.columns[own], f"'{own}' of '{file}'")
-                tables.setdefault(table.name, (table, {}))[1][column] = _in_si(quantity, answer, values)
+                values = _in_si(quantity, answer, table.columns[own], f"'{own}' of '{file}'")
+                tables.setdefault(table.name, (table, {}))[1][column] = values
     if not tables:
         raise FileError(f"The answers use no column of '{file}': name its columns, or leave the file out.")
     parts = [_on_clock(columns, _clock_of(log, table, logger, columns), log, notes) for table, columns in tables.values()]
@@ -165,29 +163,14 @@ def _table_of(tables: Sequence[LogTable], name: str) -> tuple[LogTable, str] | N
     return next(by_full, None) or next(((table, name) for table in tables if name in table.columns), None)
 
 
-def _known(quantity: str, answer: ColumnAnswer, values: np.ndarray, where: str) -> np.ndarray:
-    """Return the values of a column without those that the answers call missing; refuse what seems to be such a number."""
+def _in_si(quantity: str, answer: Column, values: np.ndarray, where: str) -> np.ndarray:
+    """Return the values of a column; refuse a number that seems to stand for missing values, where the answers name none."""
     if answer.missing is None and (code := missing_code(values)) is not None:
         raise FileError(
             f"{where} is {code:g} in {(values == code).mean():.0%} of its samples, and its neighbours are far away: write "
             f"missing = {code} at {quantity} if no value was measured there, or missing = any other number."
         )
-    return values if answer.missing is None else np.where(values == answer.missing, np.nan, values)
-
-
-def _in_si(quantity: str, answer: ColumnAnswer, values: np.ndarray) -> np.ndarray:
-    unit = QUANTITIES[quantity]
-    factor = LOG_UNITS.get(unit, {}).get(answer.unit, 1.0)
-    if answer.unit in PRESSURES and quantity == "force":
-        factor = PRESSURES[answer.unit] * answer.area
-    if quantity == "texel":
-        factor = READING_UNITS.get(answer.unit, 1.0)
-    shift = ZEROS.get(answer.unit, 0.0) if unit == "°C" else 0.0
-    found: np.ndarray = (values - answer.zero) * (factor * answer.factor) + shift
-    if quantity == "texel" and answer.unit == INVERSE:
-        with np.errstate(divide="ignore"):
-            found = np.where(np.abs(found) < SMALLEST_INVERTED, np.nan, 1.0 / found)
-    return found
+    return answer.in_si(quantity, values)
 
 
 def _clock_of(log: LogFile, table: LogTable, logger: LoggerAnswer, columns: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -207,7 +190,7 @@ def _clock_of(log: LogFile, table: LogTable, logger: LoggerAnswer, columns: Mapp
                 f"'{name}' of '{log.name}' has {len(values)} stamps for {table.sample_count} samples of "
                 f"'{next(iter(columns))}': name the clock of these samples."
             )
-        return _in_si("time", answer, values)
+        return answer.in_si("time", values)
     raise FileError(f"'{log.name}' has no column '{answer.names[0]}', which the answers name for time: check its name.")
 
 

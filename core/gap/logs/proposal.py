@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 
 from ...errors import FileError
-from .answers import Use, column_names
+from ..dataset.column_names import PRESSURES, READING_UNITS, numbered
+from .answers import Use
 from .column_behaviour import LEAST_CONTACT, contact_of, correlation, is_force, is_unnamed, is_unordered
 from .column_meaning import (
-    PRESSURES,
-    READING_UNITS,
     Family,
     Meaning,
     families,
@@ -210,7 +209,7 @@ class _Logger:
             if meaning.quantity and (self.span(name) > 0.0 or meaning.quantity in (*POSE, *TURN, *FORCE)):
                 self.candidates.setdefault(meaning.quantity, []).append(name)
         found = {"time": self._time()}
-        taken = {name for names in self.candidates.values() for name in names} | set(column_names("time", found["time"].value))
+        taken = {name for names in self.candidates.values() for name in names} | set(_columns_of(found["time"]))
         others = [name for name in self.names if name not in taken and name.rpartition("/")[2] not in taken]
         others = [name for name in others if not is_rate(self.meanings[name].unit)]
         no_clocks = [name for name in others if not self._rises(name, strictly=True)]
@@ -226,7 +225,7 @@ class _Logger:
 
     def _with_missing(self, guess: Guess) -> Guess:
         """Return a guess that says what its columns have where a value is missing, if they seem to have a number there."""
-        for name in column_names(guess.word, guess.value):
+        for name in _columns_of(guess):
             if name in self.missing:
                 code = self.missing[name]
                 return guess.but(f"{code:g} is where a value is missing, because its neighbours are far away", missing=code)
@@ -370,9 +369,17 @@ class _Logger:
 
     def left_out(self, found: Columns) -> list[str]:
         """Return a sentence about the columns that nothing is made of."""
-        used = {name for word, one in found.items() if isinstance(one.value, dict) for name in column_names(word, one.value)}
+        used = {name for one in found.values() for name in _columns_of(one)}
         rest = [name for name in self.names if name not in used and name.rpartition("/")[2] not in used]
         return [f"'{self.logs[0].name}': not used: {listed(rest)}."] if rest else []
+
+
+def _columns_of(guess: Guess) -> tuple[str, ...]:
+    """Return the columns that a guess names."""
+    words = guess.value if isinstance(guess.value, dict) else {}
+    if "name" not in words:
+        return tuple(words.get("names", ()))
+    return numbered(words["name"], words.get("first", 0), words.get("count", 1))
 
 
 def _values(tables: Sequence[LogTable], full: str) -> np.ndarray:
@@ -489,7 +496,7 @@ def _silent_texels(loggers: Sequence[_Logger], found: Sequence[Columns], owner: 
     if "texel" not in owner:
         return ""
     i = owner["texel"]
-    names = column_names("texel", found[i]["texel"].value)
+    names = _columns_of(found[i]["texel"])
     answered = np.array([loggers[i].answers_of(name) for name in names]) >= LEAST_CONTACT
     count = int((~answered).sum())
     return f"{count} of {len(names)} texels" if answered.any() and count > len(names) / 2 else ""
@@ -532,7 +539,7 @@ def _sensor(loggers: Sequence[_Logger], found: Sequence[Columns]) -> list[Guess]
     """Return the guesses about [sensor] and [indenter]."""
     texels = next((own["texel"] for own in found if "texel" in own), None)
     is_pose = any(set(POSE) <= set(own) for own in found)
-    count = len(column_names("texel", texels.value)) if texels else 1
+    count = len(_columns_of(texels)) if texels else 1
     grid, reason, evidence = _grid_of(count, loggers)
     is_free = not is_pose and count == 1
     grid["pitch"] = [ONE_TEXEL_PITCH if is_free else UNKNOWN] * 2

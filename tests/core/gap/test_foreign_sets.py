@@ -9,7 +9,7 @@ import pytest
 from palpate.benchmarks._foreign import FOREIGN, _eflesh
 from palpate.benchmarks._handmade import predict_by_hand
 from palpate.benchmarks._recordings import Recording
-from palpate.core.gap.logs.column_meaning import GRAVITY
+from palpate.core.gap.dataset.column_names import GRAVITY
 
 TIME = np.linspace(0.0, 40.0, 500)
 STIMULI = {"force": (0.0, 2000.0), "depth": (0.0, 1e-3), "slide_x": (-5e-3, 5e-3)}

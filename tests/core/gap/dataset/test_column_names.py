@@ -6,6 +6,7 @@ import pytest
 from rig_files import RIG, TEXELS, table, write
 
 from palpate.core.errors import PalpateError
+from palpate.core.gap.dataset.column_names import read_column
 from palpate.core.gap.dataset.rig import read_rig
 
 COLUMNS = """
@@ -45,6 +46,26 @@ def test_names_and_units_are_translated(tmp_path):
     np.testing.assert_allclose(found.position, plain.position, atol=1e-9)
     np.testing.assert_allclose(found.reading, 1.0 + plain.reading, rtol=1e-9)
     assert found.force is None and not rig.warnings  # a force that no file has is no mistake
+
+
+def test_zero_and_missing_are_words_of_a_rig_as_of_answers_about_logs(tmp_path):
+    plain = read_rig(write(tmp_path)).trials[0].reading
+    header, *rows = logged()
+    texel = [name.startswith("R") for name in header]
+    rows = [[f"{float(cell) + 2.0:.12g}" if is_texel else cell for cell, is_texel in zip(row, texel)] for row in rows]
+    rows[4][header.index("R3")] = "-1"
+    words = COLUMNS.replace("factor = 1000", "factor = 1000, zero = 2, missing = -1")
+    found = read_rig(write(tmp_path, with_columns(words), press=[header, *rows], again=[header, *rows])).trials[0].reading
+    assert np.argwhere(np.isnan(found)).tolist() == [[4, 2]]
+    np.testing.assert_allclose(np.nan_to_num(found - 1.0 - plain), 0.0, atol=1e-8)
+    answered = read_column(
+        "texel", {"name": "R{}", "count": 2, "unit": "1/x", "factor": 1e3, "zero": 2, "missing": -1}, "texel"
+    )
+    assert answered.names == ("R0", "R1") and answered.in_si("texel", np.array([3.0, 2.0, -1.0, 4.0]))[[0, 3]].tolist() == [
+        1e3,
+        5e2,
+    ]
+    assert np.isnan(answered.in_si("texel", np.array([2.0, -1.0]))).all()
 
 
 def test_a_column_of_the_net_force(tmp_path):

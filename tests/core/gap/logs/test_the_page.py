@@ -8,6 +8,7 @@ import re
 import numpy as np
 import pytest
 
+from palpate.core.gap.dataset import column_names
 from palpate.core.gap.logs import clock_alignment, column_behaviour, column_meaning, log_file, new_rig
 from palpate.core.gap.logs.proposal import propose
 
@@ -33,7 +34,7 @@ def test_units_endings_and_limits_are_those_of_the_source(page):
     for ending in log_file.READERS:
         assert ending in page
     for unit in ("s", "m", "N"):
-        for name in set(column_meaning.LOG_UNITS[unit]) - {"µs", "µm", "inch", "gf", "kgf"}:
+        for name in set(column_names.LOG_UNITS[unit]) - {"µs", "µm", "inch", "gf", "kgf"}:
             assert re.search(rf"[` ]{name}[` ;]", page), name
     assert f"below {clock_alignment.LEAST_CORRELATION}" in page and f"({clock_alignment.MOST_RIVAL} of" in page
     assert f"more than {new_rig.LARGEST_MOTION} m" in page and f"more than {column_meaning.BY_SIZE['m'][0][0]} is" in page
