@@ -9,8 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..dataset.rig import Rig, Trial
+from ..forward.response_check import centred
 from ..forward.stimulus import Stimulus
-from .data_fault import Correction, DataFault, centred
+from .data_fault import Correction, DataFault
 
 MOST_CHANNELS = 1024
 """Number of texels above which the table of all pairs is not computed."""

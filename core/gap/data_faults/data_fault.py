@@ -6,8 +6,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from ..dataset.trial import FAULT_KINDS, Trial
 
 Correction = Callable[[Trial], Trial]
@@ -45,11 +43,3 @@ class DataFault:
         if self.put_right:
             return f"{what}; this was put right."
         return f'{what}; correct = ["{self.kind}"] in [data] of the rig puts it right.'
-
-
-def centred(load: np.ndarray, response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return load and response less the mean of their columns over the samples that were measured; zero elsewhere."""
-    good = np.isfinite(response)
-    count = np.maximum(good.sum(axis=0), 1)
-    x, y = np.where(good, load, 0.0), np.where(good, response, 0.0)
-    return np.where(good, x - x.sum(axis=0) / count, 0.0), np.where(good, y - y.sum(axis=0) / count, 0.0)

@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..dataset.rig import Rig, Trial
-from ..forward.response_check import OPPOSITE, correlation
+from ..forward.response_check import OPPOSITE, centred, correlation
 from ..forward.stimulus import Stimulus
-from .data_fault import Correction, DataFault, centred
+from .data_fault import Correction, DataFault
 
 FACTORS = (10.0, 9.81, 100.0, 1000.0)
 """Factors by which units are mistaken: prefixes, and kilograms for newtons."""

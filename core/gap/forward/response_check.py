@@ -80,6 +80,14 @@ def _check_force_sign(rig: Rig, touching: Sequence[Stimulus]) -> None:
         )
 
 
+def centred(load: np.ndarray, response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return load and response less the mean of their columns over the samples that were measured; zero elsewhere."""
+    good = np.isfinite(response)
+    count = np.maximum(good.sum(axis=0), 1)
+    x, y = np.where(good, load, 0.0), np.where(good, response, 0.0)
+    return np.where(good, x - x.sum(axis=0) / count, 0.0), np.where(good, y - y.sum(axis=0) / count, 0.0)
+
+
 def correlation(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> float:
     """Return the correlation of loads with responses, both less the mean of their channel; zero when nothing changes.
 
@@ -90,11 +98,7 @@ def correlation(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> float:
     """
     product = load_square = response_square = 0.0
     for load, response in pairs:
-        good = np.isfinite(response)
-        count = np.maximum(good.sum(axis=0), 1)
-        x, y = np.where(good, load, 0.0), np.where(good, response, 0.0)
-        x = np.where(good, x - x.sum(axis=0) / count, 0.0)
-        y = np.where(good, y - y.sum(axis=0) / count, 0.0)
+        x, y = centred(load, response)
         product += float((x * y).sum())
         load_square += float((x * x).sum())
         response_square += float((y * y).sum())
