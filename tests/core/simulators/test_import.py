@@ -115,7 +115,10 @@ BROKEN = {
     "a wrong face": (TACTILE.format(mesh=MESH.replace("0 3 2", "0 3 9")), "does not exist"),
     "half a face": (TACTILE.format(mesh=MESH.replace("0 3 2", "0 3")), "must be a multiple of 3"),
     "included": ("<mujocoinclude/>", "give the file that includes it"),
-    "no file": (TACTILE.format(mesh='<mesh name="m" file="gone.stl"/>'), "Error opening file 'gone.stl'"),
+    "no file": (
+        TACTILE.format(mesh='<mesh name="m" file="gone.stl"/>'),
+        "Error opening file 'gone.stl'.*give the file that includes it, with its meshes",
+    ),
     "no quaternion": (TACTILE.format(mesh=MESH).replace("1 0 0 0", "0 0 0 0"), "zero quaternion"),
     "deep": ("<mujoco><worldbody>" + "<body>" * 300 + "</body>" * 300 + "</worldbody></mujoco>", "nests more than"),
     "no site": (
