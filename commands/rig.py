@@ -45,10 +45,11 @@ def run(arguments: argparse.Namespace) -> int:
     from ..core.gap.logs.template import ANSWERS_NAME, PLOT_NAME, answers_or_template
 
     with console.Interrupt.raised_at_once():
-        logs = with_distinct_names([read_log(path) for path in arguments.logs])
-        print(console.text_table(preview_rows(logs), "<<<>>>"))
+        logs = [read_log(path) for path in arguments.logs]
+        shown = with_distinct_names(logs)
+        print(console.text_table(preview_rows(shown), "<<<>>>"))
         if arguments.preview:
-            for note in dict.fromkeys(note for log in logs for note in log.notes):
+            for note in dict.fromkeys(note for log in shown for note in log.notes):
                 print(f"note: {note}")
             return 0
         if not arguments.out:

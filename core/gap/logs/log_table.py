@@ -88,15 +88,22 @@ class LogFile:
         return self.name.removesuffix(self.path.suffix).replace("/", "_")
 
 
-def with_distinct_names(logs: Sequence[LogFile]) -> list[LogFile]:
+def with_distinct_names(logs: Sequence[LogFile], named: Sequence[str] = ()) -> list[LogFile]:
     """Return logs of which those in several folders with the same name are called ``FOLDER/NAME``; frames are one log.
+
+    Parameters
+    ----------
+    logs : sequence of LogFile
+    named : sequence of str
+        What answers name; frames stay files of their own if it is one of these.
 
     Raises
     ------
     FileError
         Two are still called the same.
     """
-    logs = joined_frames(logs)
+    if not {log.path.name for log in logs} & set(named):
+        logs = joined_frames(logs)
     paths = [log.path for log in logs]
     names = [path.name for path in paths]
     if len(set(names)) < len(names):

@@ -77,7 +77,7 @@ def write_rig(logs: Sequence[LogFile], answers: Answers, folder: str | os.PathLi
         The answers and the logs do not fit together, a unit must be wrong, a recording shows no contact, time stamps cannot be
         used, or a file cannot be written. An earlier rig is then as it was.
     """
-    logs = with_distinct_names(logs)
+    logs = with_distinct_names(logs, [file for one in answers.recordings for file in one.files])
     folder = writable_folder(folder, create=True)
     recordings = [one for one in answers.recordings if one.use != "leave out"]
     if not recordings:

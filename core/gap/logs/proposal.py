@@ -263,7 +263,9 @@ class _Logger:
         driver = self.driver()
         reason = ""
         if self.logs[0].kind == FRAMES:
-            reason = "each file is a frame without a time, in the order of the load"
+            reason = (
+                "each file is a frame without a time, in the order of the load; where rows are samples, name the files instead"
+            )
         elif driver is not None and all(map(self._counts_rows, rising)) and self._is_unordered(driver):
             reason = "the load jumps from row to row and no column is a clock: these are points, which are sorted by the load"
         if reason:

@@ -89,6 +89,24 @@ def test_matrices_in_files_are_frames_with_the_load_of_their_names(tmp_path):
     np.testing.assert_array_equal(trial.reading, np.array([frame.ravel() for frame in frames.values()]))
 
 
+def test_frames_are_recordings_where_the_answers_name_their_files(tmp_path):
+    """Of matrices without a clock nobody knows whether a file is a frame: the guess is taken back in the answers."""
+    paths = []
+    for i in range(3):
+        paths.append(tmp_path / f"run_{i}.csv")
+        rows = np.column_stack([LOAD[:60:1] * (1 + i) + noise(60, level=1e-3), 50.0 * LOAD[:60] + noise(60, level=0.1)])
+        paths[-1].write_text("\n".join(",".join(f"{value:.5f}" for value in row) for row in rows) + "\n")
+    found = proposal(*paths)
+    assert found.of("logger", "files").value == ["3 frames"] and "name the files instead" in found.columns()["time"].reason
+    (tmp_path / "answers.toml").write_text(
+        'format = "palpate-log-answers/1"\n[sensor]\ngrid = { rows = 1, columns = 1, pitch = 0.01 }\nunit = "counts"\n'
+        '[[logger]]\nfiles = ["run_*.csv"]\n[logger.columns]\ntime = { rate = 50.0 }\nforce = { name = "column_1" }\n'
+        'texel = { name = "column_2" }\n' + "".join(f'[[recording]]\nfiles = ["run_{i}.csv"]\n' for i in range(3))
+    )
+    trials = read_rig(new_rig(tmp_path / "rig", paths, tmp_path / "answers.toml").path).trials
+    assert [trial.name for trial in trials] == ["run_0", "run_1", "run_2"] and all(len(trial.time) == 60 for trial in trials)
+
+
 def test_time_series_of_several_files_without_names_are_no_frames(tmp_path):
     paths = [tmp_path / f"run_{i}.csv" for i in range(3)]
     for path in paths:
