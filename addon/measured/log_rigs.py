@@ -59,9 +59,9 @@ def _with_grid_of(context, obj, proposal: Proposal) -> Proposal:
     except PalpateError:
         return proposal  # it has no texels
     grid = proposal.of("sensor", "grid")
-    is_same = known is not None and all(known[word] == grid.value[word] for word in ("rows", "columns"))
-    if known is None or known["rows"] * known["columns"] != grid.value["rows"] * grid.value["columns"]:
+    counts = [len(one.columns) for one in proposal.guesses if one.word == "texel"]
+    if known is None or not counts or known["rows"] * known["columns"] != counts[0]:
         return proposal
-    if grid.evidence != "thin" and not is_same:
+    if any(grid.value[word] not in ("?", known[word]) for word in ("rows", "columns")):
         return proposal
     return proposal.with_guess(replace(grid, value=known, reason=f"that of '{obj.name}' in the scene", evidence="stated"))

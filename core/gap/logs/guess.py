@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
+from ..dataset.column_names import numbered
+
 FORMAT = "palpate-log-answers/1"
 UNKNOWN = "?"
 """What nobody can know from the logs."""
@@ -54,6 +56,14 @@ class Guess:
     def is_open(self) -> bool:
         """True if a person has to fill it in, or to confirm it."""
         return self.is_unknown or self.evidence == "thin"
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The columns that it names, if it is about a quantity."""
+        words = self.value if isinstance(self.value, dict) else {}
+        if "name" not in words:
+            return tuple(words.get("names", ()))
+        return numbered(words["name"], words.get("first", 0), words.get("count", 1))
 
     @property
     def what(self) -> str:

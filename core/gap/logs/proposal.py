@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import FileError
-from ..dataset.column_names import PRESSURES, READING_UNITS, numbered
+from ..dataset.column_names import PRESSURES, READING_UNITS
 from .answers import Use
 from .column_behaviour import LEAST_CONTACT, contact_of, correlation, is_force, is_unnamed, is_unordered
 from .column_meaning import (
@@ -209,7 +209,7 @@ class _Logger:
             if meaning.quantity and (self.span(name) > 0.0 or meaning.quantity in (*POSE, *TURN, *FORCE)):
                 self.candidates.setdefault(meaning.quantity, []).append(name)
         found = {"time": self._time()}
-        taken = {name for names in self.candidates.values() for name in names} | set(_columns_of(found["time"]))
+        taken = {name for names in self.candidates.values() for name in names} | set(found["time"].columns)
         others = [name for name in self.names if name not in taken and name.rpartition("/")[2] not in taken]
         others = [name for name in others if not is_rate(self.meanings[name].unit)]
         no_clocks = [name for name in others if not self._rises(name, strictly=True)]
@@ -225,7 +225,7 @@ class _Logger:
 
     def _with_missing(self, guess: Guess) -> Guess:
         """Return a guess that says what its columns have where a value is missing, if they seem to have a number there."""
-        for name in _columns_of(guess):
+        for name in guess.columns:
             if name in self.missing:
                 code = self.missing[name]
                 return guess.but(f"{code:g} is where a value is missing, because its neighbours are far away", missing=code)
@@ -371,17 +371,9 @@ class _Logger:
 
     def left_out(self, found: Columns) -> list[str]:
         """Return a sentence about the columns that nothing is made of."""
-        used = {name for one in found.values() for name in _columns_of(one)}
+        used = {name for one in found.values() for name in one.columns}
         rest = [name for name in self.names if name not in used and name.rpartition("/")[2] not in used]
         return [f"'{self.logs[0].name}': not used: {listed(rest)}."] if rest else []
-
-
-def _columns_of(guess: Guess) -> tuple[str, ...]:
-    """Return the columns that a guess names."""
-    words = guess.value if isinstance(guess.value, dict) else {}
-    if "name" not in words:
-        return tuple(words.get("names", ()))
-    return numbered(words["name"], words.get("first", 0), words.get("count", 1))
 
 
 def _values(tables: Sequence[LogTable], full: str) -> np.ndarray:
@@ -478,7 +470,9 @@ def _load(logger: _Logger, own: Guess) -> Guess:
     """Return a known force with its sign and, where the log shows it without load, its zero."""
     values = logger.values(own.value["name"])
     if own.value["unit"] in PRESSURES:
-        own = own.but("the area on which the pressure acts, in m², is not known", area=UNKNOWN)
+        own = replace(
+            own.but(area=UNKNOWN), reason="the unit is that of the file; fill in the area on which the pressure acts, in m²"
+        )
     if own.value["unit"] == UNKNOWN or is_force(values):  # a recording may begin under load
         return own
     zero, way, rests = logger.beginning(own.value["name"])
@@ -498,7 +492,7 @@ def _silent_texels(loggers: Sequence[_Logger], found: Sequence[Columns], owner: 
     if "texel" not in owner:
         return ""
     i = owner["texel"]
-    names = _columns_of(found[i]["texel"])
+    names = found[i]["texel"].columns
     answered = np.array([loggers[i].answers_of(name) for name in names]) >= LEAST_CONTACT
     count = int((~answered).sum())
     return f"{count} of {len(names)} texels" if answered.any() and count > len(names) / 2 else ""
@@ -541,11 +535,11 @@ def _sensor(loggers: Sequence[_Logger], found: Sequence[Columns]) -> list[Guess]
     """Return the guesses about [sensor] and [indenter]."""
     texels = next((own["texel"] for own in found if "texel" in own), None)
     is_pose = any(set(POSE) <= set(own) for own in found)
-    count = len(_columns_of(texels)) if texels else 1
+    count = len(texels.columns) if texels else 1
     grid, reason, evidence = _grid_of(count, loggers)
     is_free = not is_pose and count == 1
     grid["pitch"] = [ONE_TEXEL_PITCH if is_free else UNKNOWN] * 2
-    reason += "; its size has no influence here" if is_free else "; pitch along x and y in metres"
+    reason += "; its size has no influence here" if is_free else ", and the pitch along x and y in metres"
     guesses = [Guess("sensor", "grid", grid, reason, evidence)]
     if texels is not None:
         unit = texels.value.get("unit", "")
@@ -569,8 +563,7 @@ def _grid_of(count: int, loggers: Sequence[_Logger]) -> tuple[dict[str, Any], st
                     return {"rows": rows, "columns": across}, why, "stated"
     if count == 1:
         return {"rows": 1, "columns": 1}, "one texel", "shown"
-    across = max(i for i in range(1, int(count**0.5) + 1) if count % i == 0)
-    return {"rows": count // across, "columns": across}, f"{count} texels; the number of rows is a guess", "thin"
+    return {"rows": UNKNOWN, "columns": UNKNOWN}, f"{count} texels; their rows and columns", "shown"
 
 
 def listed(names: Sequence[str]) -> str:

@@ -188,7 +188,7 @@ def test_logs_become_a_rig_with_the_answers_beside_it(scene, tmp_path):
     assert not other.palpate.measured
     paths = [tmp_path / name for name in names]
     made = partial(log_rigs.make, bpy.context, other, paths, tmp_path / "asked", False)  # as the dialog asks, one by one
-    with pytest.raises(OpenQuestion, match="grid of .sensor., as in the brackets .4 texels; the number of rows is a guess"):
+    with pytest.raises(OpenQuestion, match="grid of .sensor., as in the brackets .4 texels; their rows and columns"):
         made([])
     with pytest.raises(OpenQuestion, match="as in the brackets"):
         made(["2 by 2"])
@@ -196,7 +196,7 @@ def test_logs_become_a_rig_with_the_answers_beside_it(scene, tmp_path):
     assert len(read_rig(written.path).texels) == 4
     bpy.context.view_layer.objects.active = obj
     answers = tmp_path / "rig" / "answers.toml"
-    answers.write_text(answers.read_text().replace('["?", "?"]', "[0.005, 0.005]"))
+    answers.write_text(answers.read_text().replace('"?", columns = "?", pitch = ["?", "?"]', "2, columns = 2, pitch = 0.005"))
     assert bpy.ops.palpate.measured_logs(**chosen) == {"FINISHED"}
     assert obj.palpate.measured == str(tmp_path / "rig" / "rig.toml")
     assert bpy.data.images["Palpate Recordings"].size[0] > 500

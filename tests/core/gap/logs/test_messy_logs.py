@@ -61,7 +61,9 @@ def test_of_raw_files_what_drove_is_asked_with_how_far_each_column_reaches(tmp_p
     assert not typed.questions and typed.columns(0)["force"].value == {"name": "column_5", "unit": "g"}
     answers = tmp_path / "rig" / "answers.toml"
     text = answers.read_text().replace('depth = { name = "?", unit = "m" }', 'force = { name = "column_5", unit = "g" }')
-    answers.write_text(text.replace('pitch = ["?", "?"]', "pitch = [0.01, 0.01]"))
+    answers.write_text(
+        text.replace('rows = "?", columns = "?", pitch = ["?", "?"]', "rows = 2, columns = 3, pitch = [0.01, 0.01]")
+    )
     assert main([*command, "--answers", str(answers)]) == 1
     said = capsys.readouterr().err
     assert "'column_5' of 'a_1/states.csv' is -1 in 50% of its samples" in said and "write missing = -1.0 at force if" in said

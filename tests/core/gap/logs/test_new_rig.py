@@ -317,7 +317,7 @@ def test_without_answers_a_template_is_written_and_the_same_command_goes_on_with
     answers = out / "answers.toml"
     assert main(["rig", "new", *logs, "--out", str(out), "--answers", str(answers)]) == 1
     assert 'still "?"' in capsys.readouterr().err
-    answers.write_text(answers.read_text().replace('["?", "?"]', "[0.005, 0.005]"))
+    answers.write_text(answers.read_text().replace('"?", columns = "?", pitch = ["?", "?"]', "2, columns = 2, pitch = 0.005"))
     assert main(["rig", "new", *logs, "--out", str(out), "--answers", str(answers)]) == 0
     said = capsys.readouterr().out
     assert "2 recordings, 1 to fit and 1 to check; 4 texels" in said
