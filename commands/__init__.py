@@ -18,7 +18,7 @@ from typing import NoReturn
 
 from ..core.errors import Cancelled, PalpateError, os_error_reason
 from ..core.version import VERSION
-from . import console, limits
+from . import console
 
 COMMANDS = {
     "demo": "build, bake and render the demo scene, and print the forces on the pads",
@@ -80,7 +80,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                 prefix = f"palpate {arguments.command}:"
                 stopped = getattr(arguments, "stopped", stopped)
                 console.Interrupt.check()
-                with limits.kept(arguments) if arguments.command in limits.COMMANDS else nullcontext():
+                with console.kept(arguments) if arguments.command in console.COMMANDS else nullcontext():
                     status = arguments.run(arguments)
             except SystemExit as stop:  # argparse has printed its help or an error
                 status = int(stop.code or 0)
@@ -151,7 +151,7 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
             continue
         module = importlib.import_module(f".{name.replace('-', '_')}", __package__)
         module.add_arguments(sub)
-        if name in limits.COMMANDS:
-            limits.add_arguments(sub)
+        if name in console.COMMANDS:
+            console.add_arguments(sub)
         sub.set_defaults(run=module.run)
     return parser

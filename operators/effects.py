@@ -5,7 +5,7 @@ import bpy
 from bpy.props import EnumProperty, IntProperty
 
 from ..addon.properties import effect_stack
-from ..addon.session import units
+from ..addon.session import transforms
 from ..core.effects.engine import registry
 from . import support
 
@@ -29,7 +29,7 @@ class PALPATE_OT_effect_add(support.ErrorReporting, bpy.types.Operator):
 
     def run(self, context):
         obj = context.object
-        gain = units.as_typed(obj.palpate.gain)
+        gain = transforms.as_typed(obj.palpate.gain)
         effect_stack.add(obj, registry.effect(self.effect, gain=gain))
         self.report({"INFO"}, f"'{obj.name}' has {registry.kind_of(self.effect).title.lower()}")
 

@@ -6,7 +6,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 from bpy_extras.object_utils import AddObjectHelper, object_data_add
 
 from ..addon.authoring import laid_sensors, sensors
-from ..addon.properties import laid_sensor_properties
+from ..addon.properties import object_properties
 from . import support
 
 
@@ -82,7 +82,7 @@ class PALPATE_OT_skin_add(support.ErrorReporting, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
     method: EnumProperty(
-        name="Pattern", description="How texels are laid", items=laid_sensor_properties.SKIN_METHODS[1:], default="NOISE"
+        name="Pattern", description="How texels are laid", items=object_properties.SKIN_METHODS[1:], default="NOISE"
     )
     spacing: FloatProperty(
         name="Spacing (m)",
@@ -142,7 +142,7 @@ class PALPATE_OT_skin_add(support.ErrorReporting, bpy.types.Operator):
         layout.prop(self, "source")
         layout.prop(self, "method")
         column = layout.column()
-        for name in laid_sensor_properties.FIELDS[self.method]:
+        for name in object_properties.FIELDS[self.method]:
             column.prop(self, name)
 
 

@@ -8,7 +8,7 @@ from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
 from bpy.props import StringProperty
 
-from ..addon.authoring import exchange, sensor_presets
+from ..addon.authoring import exchange, laid_sensors
 from ..core.errors import FileError, counted
 from . import support
 
@@ -79,7 +79,7 @@ class PALPATE_OT_preset_add(AddPresetBase, bpy.types.Operator):
     bl_label = "Add Sensor Preset"
     preset_menu = "PALPATE_MT_presets"
     preset_defines = ["settings = bpy.context.object.palpate"]
-    preset_values = [f"settings.{name}" for name in sensor_presets.COPIED]
+    preset_values = [f"settings.{name}" for name in laid_sensors.COPIED]
     preset_subdir = SUBDIR
 
     @classmethod
@@ -89,7 +89,7 @@ class PALPATE_OT_preset_add(AddPresetBase, bpy.types.Operator):
     def execute(self, context):
         if self.remove_name or self.remove_active:
             found = bpy.utils.preset_find(self.name, self.preset_subdir, display_name=True)
-            if found and sensor_presets.FOLDER in Path(found).parents:  # Blender takes an extension's files for the user's own
+            if found and laid_sensors.FOLDER in Path(found).parents:  # Blender takes an extension's files for the user's own
                 self.report({"WARNING"}, f"'{self.name}' is part of Palpate and cannot be removed")
                 return {"CANCELLED"}
         return super().execute(context)
@@ -115,7 +115,7 @@ class PALPATE_OT_parameters_copy(support.ErrorReporting, bpy.types.Operator):
         support.leave_edit_mode(context)
         others = _others(context)
         for obj in others:
-            sensor_presets.copy_parameters(context.object, obj)
+            laid_sensors.copy_parameters(context.object, obj)
         self.report({"INFO"}, f"Copied the parameters of '{context.object.name}' to {counted(len(others), 'other')}")
 
 
@@ -137,8 +137,8 @@ CLASSES = (
 
 
 def register():
-    bpy.utils.register_preset_path(str(sensor_presets.FOLDER.parent))
+    bpy.utils.register_preset_path(str(laid_sensors.FOLDER.parent))
 
 
 def unregister():
-    bpy.utils.unregister_preset_path(str(sensor_presets.FOLDER.parent))
+    bpy.utils.unregister_preset_path(str(laid_sensors.FOLDER.parent))

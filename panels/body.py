@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Panel of an object's body: what moves it."""
 
-from ..addon.properties import start_transforms
+from ..addon.properties import object_properties
 from ..addon.properties.scene_units import name_in_units
 from ..addon.scene import drives
 from .subpanels import Subpanel, draw_named, draw_sentences
@@ -14,7 +14,7 @@ class Body(Subpanel):
 
     def draw_part(self, layout, settings, context):
         layout.prop(settings, "body", text="")
-        if settings.body in start_transforms.MOVED_BY_FORCES:
+        if settings.body in object_properties.MOVED_BY_FORCES:
             layout.prop(settings, name_in_units(settings, "mass", context.scene))
         if settings.role in {"SENSOR", "PAD"}:
             layout.prop(settings, "presses")

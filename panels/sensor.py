@@ -5,9 +5,9 @@ import bpy
 
 from ..addon.authoring import laid_sensors, sensor_report
 from ..addon.display import bake_display
-from ..addon.properties import laid_sensor_properties
+from ..addon.properties import object_properties
 from ..addon.properties.scene_units import name_in_units
-from ..addon.scene import attached_objects
+from ..addon.scene import moved_bodies
 from ..addon.session import first_use, frame_status, session_state
 from ..core.figures.quantities import QUANTITIES, Extent
 from ..core.model.sensor_parameters import CONTACT, FRICTION, HUNT_CROSSLEY, LINEAR, READOUT, SENSOR_PARAMETERS
@@ -76,7 +76,7 @@ class Skins(Subpanel):
             row.label(text=f"Lies on '{obj.parent.name}'" if obj.parent else "Lies on nothing", icon="MOD_SHRINKWRAP")
             if obj.parent:
                 row.operator("palpate.object_activate", text="", icon="RESTRICT_SELECT_OFF").name = obj.parent.name
-            for name in laid_sensor_properties.FIELDS[own.method]:
+            for name in object_properties.FIELDS[own.method]:
                 box.prop(own, name_in_units(own, name, context.scene))
             layout.operator("palpate.skin_update", icon="FILE_REFRESH")
             return
@@ -92,7 +92,7 @@ def _draw_lay_texels(layout, context) -> None:
     column = layout.column(align=True)
     column.operator("palpate.skin_add", icon="MOD_SHRINKWRAP")
     pattern = context.window_manager.operator_properties_last("palpate.skin_add")
-    draw_operator_fields(column, context, "palpate.skin_add", "method", *laid_sensor_properties.FIELDS[pattern.method])
+    draw_operator_fields(column, context, "palpate.skin_add", "method", *object_properties.FIELDS[pattern.method])
 
 
 class Region(Subpanel):
@@ -247,7 +247,7 @@ def _summary(channels) -> str:
 
 def _sentence_of_net(scene, obj) -> str:
     """Return what Net is, and in which axes."""
-    body = attached_objects.body_object(obj, attached_objects.objects_with_role(scene))
+    body = moved_bodies.body_object(obj, moved_bodies.objects_with_role(scene))
     mirrored = ", x reversed because its scale mirrors it" if body.matrix_world.is_negative else ""
     return (
         f"Net is the vector sum of normals and shear, along the local axes of '{body.name}'{mirrored}: "

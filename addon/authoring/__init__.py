@@ -13,7 +13,6 @@ __all__ = [
     "problems",
     "sensor_exchange",
     "sensor_import",
-    "sensor_presets",
     "sensor_report",
     "sensors",
     "surface_binding",

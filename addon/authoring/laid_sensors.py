@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -18,9 +19,27 @@ from ...core.errors import SensorError
 from ...core.geometry.mesh import TriangleMesh, checked_mesh, vertex_normals
 from ...core.geometry.scattered_points import scatter
 from ...core.geometry.texel_arrays import TexelMesh, filled_region, pad_array, region_middle, shifted_pose, wrapped_array
+from ...core.model.sensor_parameters import SENSOR_PARAMETERS
+from ..properties import effect_stack
 from ..scene import mesh_arrays, participants, sensor_regions
-from ..session import identity, transforms, units
-from . import sensor_presets, sensors, surface_binding
+from ..session import identity, transforms
+from . import sensors, surface_binding
+
+FOLDER = Path(__file__).parents[1] / "presets"
+"""Folder of the presets that come with Palpate."""
+COPIED = (*SENSOR_PARAMETERS, "k_factor", "friction_factor", "gain_factor")
+"""Names of the properties that presets hold and that are copied: all that do not depend on the mesh of one sensor."""
+
+
+def copy_parameters(source, target) -> None:
+    """Give a sensor the parameters and effects of another one.
+
+    Its region and its name stay. Effects that are switched off are not copied.
+    """
+    for name in COPIED:
+        setattr(target.palpate, name, getattr(source.palpate, name))
+    effect_stack.put_stack(target, effect_stack.stack(source))
+
 
 PATTERN_PROPERTIES = (
     "method",
@@ -50,7 +69,7 @@ def pad_mesh(context, rows: int, columns: int, pitch: tuple[float, float], radiu
     radius : float, metres
         The pad is bent to it; 0: flat, below 0: inwards.
     """
-    return _mesh_of(pad_array(rows, columns, pitch, radius), "Tactile Pad", 1.0 / units.metres_per_unit(context.scene))
+    return _mesh_of(pad_array(rows, columns, pitch, radius), "Tactile Pad", 1.0 / transforms.metres_per_unit(context.scene))
 
 
 def lay_texels(context, carrier, source: str, pattern: dict):
@@ -87,7 +106,7 @@ def lay_texels(context, carrier, source: str, pattern: dict):
     obj.parent = carrier
     _store_pattern(obj, carrier, region, pattern)
     if carrier.palpate.role in {"SENSOR", "PAD"}:
-        sensor_presets.copy_parameters(carrier, obj)
+        copy_parameters(carrier, obj)
     context.view_layer.update()
     surface_binding.bind(context, obj, carrier)
     obj.palpate.body = "PARENT"
@@ -140,7 +159,7 @@ def update_texels(context, obj) -> int:
 def pattern_of(obj) -> dict:
     """Return the pattern with which the texels of a laid sensor were made: values of :data:`PATTERN_PROPERTIES`."""
     own = obj.palpate.skin
-    return {key: units.as_typed(v) if isinstance(v := getattr(own, key), float) else v for key in PATTERN_PROPERTIES}
+    return {key: transforms.as_typed(v) if isinstance(v := getattr(own, key), float) else v for key in PATTERN_PROPERTIES}
 
 
 def is_laid(obj) -> bool:
@@ -195,7 +214,7 @@ def _store_pattern(obj, carrier, region: dict, pattern: dict) -> None:
 def _stored_region(own) -> dict:
     """Return the region on the carrier that a laid sensor's properties hold, for :func:`.sensor_regions.vertices_of_region`."""
     name = own.region_name
-    threshold = units.as_typed(own.region_threshold)
+    threshold = transforms.as_typed(own.region_threshold)
     return {
         "region": own.region,
         "vertex_group": name,
@@ -229,7 +248,7 @@ def _texels_on(context, carrier, chosen: np.ndarray, pattern: dict) -> TexelMesh
     matrix = transforms.as_array(carrier.evaluated_get(depsgraph).matrix_world)
     if transforms.is_singular(matrix):
         raise SensorError(f"The scale of '{carrier.name}' is zero: give it a scale before texels are laid onto it.")
-    stretch = transforms.decompose(matrix)[2] * units.metres_per_unit(context.scene)
+    stretch = transforms.decompose(matrix)[2] * transforms.metres_per_unit(context.scene)
     is_mirrored = np.linalg.det(stretch) < 0
     triangles = arrays.triangles[chosen[arrays.triangles].all(axis=1)]
     if not len(triangles):
@@ -286,6 +305,6 @@ def usual_spacing(obj, scene) -> float:
     obj.data.edges.foreach_get("vertices", ends)
     lengths = np.linalg.norm(np.diff(points[ends.reshape(-1, 2)], axis=1)[:, 0], axis=1)
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
-    usual = min(float(np.median(lengths)), size / 20) * units.metres_per_unit(scene)
+    usual = min(float(np.median(lengths)), size / 20) * transforms.metres_per_unit(scene)
     digits = 1 - math.floor(math.log10(usual)) if usual > 0 else 4
     return round(usual, digits) if usual > 0 else 0.002

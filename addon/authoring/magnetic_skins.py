@@ -8,9 +8,9 @@ import numpy as np
 from mathutils import Matrix, Quaternion
 
 from ...core.skins import skin_presets
-from ..properties import magnetic_properties
-from ..scene import body_poses, participants, sensor_reader
-from ..session import units
+from ..properties import object_properties
+from ..scene import moved_bodies, participants, sensor_reader
+from ..session import transforms
 
 SHOWN = 1.5e-3
 """m: length of the arrows of an empty."""
@@ -40,7 +40,7 @@ def place_skin(context, obj, name: str):
     preset = skin_presets.preset_named(name)
     sensor, _ = sensor_reader.sensor_in_own_frame(scene, obj, depsgraph)
     skin = skin_presets.placed(preset, sensor.texels)
-    pose, metres = body_poses.body_pose(scene, obj, depsgraph), units.metres_per_unit(scene)
+    pose, metres = moved_bodies.body_pose(scene, obj, depsgraph), transforms.metres_per_unit(scene)
     body = np.array(Matrix.LocRotScale(pose[:3] / metres, Quaternion(pose[3:]), None))
     collection = bpy.data.collections.new(f"{obj.name} Magnetic Skin")
     scene.collection.children.link(collection)
@@ -62,7 +62,7 @@ def place_skin(context, obj, name: str):
     for i, (place, axes) in enumerate(zip(skin.magnetometers, skin.axes, strict=True)):
         put("MAGNETOMETER", i, place, axes, "ARROWS")
     own = obj.palpate.readout
-    own.kind, own.collection, own.thickness = magnetic_properties.PLACED, collection, preset.thickness
+    own.kind, own.collection, own.thickness = object_properties.PLACED, collection, preset.thickness
     return collection
 
 

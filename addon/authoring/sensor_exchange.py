@@ -8,8 +8,8 @@ import numpy as np
 from ...core.errors import SceneError
 from ...core.geometry.mesh import TriangleMesh, checked_mesh
 from ...core.simulators.sensor_on_mesh import SensorOnMesh
-from ..scene import body_poses, mesh_arrays, participants, sensor_reader
-from ..session import transforms, units
+from ..scene import mesh_arrays, moved_bodies, participants, sensor_reader
+from ..session import transforms
 
 
 def sensors_on_meshes(scene, names=()) -> list[SensorOnMesh]:
@@ -42,7 +42,7 @@ def sensors_on_meshes(scene, names=()) -> list[SensorOnMesh]:
 def _sensor_on_mesh(scene, obj) -> SensorOnMesh:
     depsgraph = participants.depsgraph_of(scene)
     sensor, mesh = sensor_reader.sensor_in_own_frame(scene, obj, depsgraph)
-    pose = body_poses.body_pose(scene, obj, depsgraph)
+    pose = moved_bodies.body_pose(scene, obj, depsgraph)
     return SensorOnMesh(sensor, mesh, _carrying_surface(scene, obj, depsgraph), pose[:3], pose[3:])
 
 
@@ -52,8 +52,8 @@ def _carrying_surface(scene, obj, depsgraph) -> TriangleMesh | None:
     if obj.palpate.body != "PARENT" or carrier is None or carrier.type not in participants.OBJECT_TYPES:
         return None
     arrays = mesh_arrays.target_arrays(carrier, depsgraph)
-    location, quaternion, _ = body_poses.decompose(obj, body_poses.world_matrix(obj, depsgraph))
-    matrix = np.linalg.inv(transforms.pose_matrix(location, quaternion)) @ body_poses.world_matrix(carrier, depsgraph)
-    vertices = (arrays.vertices @ matrix[:3, :3].T + matrix[:3, 3]) * units.metres_per_unit(scene)
+    location, quaternion, _ = moved_bodies.decompose(obj, moved_bodies.world_matrix(obj, depsgraph))
+    matrix = np.linalg.inv(transforms.pose_matrix(location, quaternion)) @ moved_bodies.world_matrix(carrier, depsgraph)
+    vertices = (arrays.vertices @ matrix[:3, :3].T + matrix[:3, 3]) * transforms.metres_per_unit(scene)
     triangles = arrays.triangles[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else arrays.triangles
     return checked_mesh(vertices, triangles, carrier.name)[0]

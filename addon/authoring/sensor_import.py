@@ -14,8 +14,8 @@ from ...core.geometry.mesh import TriangleMesh, vertex_normals
 from ...core.simulators.sensor_format import require_sensor_size
 from ..properties import effect_stack
 from ..scene import mesh_arrays
-from ..scene.display_names import STATED_NORMAL
-from ..session import transforms, units
+from ..scene.stored_names import STATED_NORMAL
+from ..session import transforms
 from . import exchange, sensors
 
 FLAG, POSITION, NORMAL = "is_sensor", "sensor_pos", "sensor_normal"
@@ -88,7 +88,7 @@ def _owner(context, item):
 
 def _new_sensor(context, item):
     """Return a new object whose mesh is the texels, on the surface that carries them where the file has it."""
-    scale = 1.0 / units.metres_per_unit(context.scene)
+    scale = 1.0 / transforms.metres_per_unit(context.scene)
     obj = _new_object(context, item.name, item.position * scale, item.faces)
     top = obj
     if item.surface is not None:
@@ -139,7 +139,7 @@ def _read_gentact(context, path) -> list:
                     continue
             position, normal, faces, notes = points
             place, turn, stretch = transforms.decompose(transforms.as_array(obj.evaluated_get(depsgraph).matrix_world))
-            scale = units.metres_per_unit(context.scene)
+            scale = transforms.metres_per_unit(context.scene)
             normal = normal @ np.linalg.inv(stretch)
             normal /= np.linalg.norm(normal, axis=1, keepdims=True)
             found.append(

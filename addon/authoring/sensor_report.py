@@ -16,8 +16,8 @@ from ...core.errors import PalpateError, SceneError
 from ...core.geometry.mesh import TriangleMesh
 from ...core.geometry.texels import Texels
 from ...core.solver.time_step_adviser import Advice, advise
-from ..scene import attached_objects, mesh_arrays, participants, scene_fingerprint, scene_reader, sensor_reader
-from ..session import session_state, transforms, units
+from ..scene import mesh_arrays, moved_bodies, participants, scene_fingerprint, scene_reader, sensor_reader
+from ..session import session_state, transforms
 from . import laid_sensors, problems
 
 DELAY = 0.2
@@ -134,8 +134,8 @@ def _compute(obj, scene) -> Report:
     advice, missing = _advice(scene, depsgraph)
     hidden = [problems.Problem("HIDDEN", missing)] if missing and participants.find_participants(scene)[1] else []
     missing = "" if hidden else missing  # a problem with a button
-    metres = units.metres_per_unit(scene)
-    reach = units.as_typed(obj.palpate.max_penetration)
+    metres = transforms.metres_per_unit(scene)
+    reach = transforms.as_typed(obj.palpate.max_penetration)
     notes: list[str] = []
     try:
         notes = mesh_arrays.sensor_arrays(obj, depsgraph)[1]
@@ -156,7 +156,7 @@ def _around(obj, depsgraph, metres: float) -> TriangleMesh | None:
         return None
     arrays = mesh_arrays.target_arrays(carrier, depsgraph)
     matrix = transforms.as_array(obj.evaluated_get(depsgraph).matrix_world)
-    linear, offset = attached_objects.to_body_frame(matrix, np.linalg.inv(matrix) @ transforms.as_array(carrier.matrix_world))
+    linear, offset = moved_bodies.to_body_frame(matrix, np.linalg.inv(matrix) @ transforms.as_array(carrier.matrix_world))
     triangles = arrays.triangles[:, ::-1] if np.linalg.det(linear) < 0 else arrays.triangles
     return TriangleMesh((arrays.vertices @ linear.T + offset) * metres, triangles)
 

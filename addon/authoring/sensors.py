@@ -8,7 +8,7 @@ import numpy as np
 from ...core.errors import SensorError
 from ..display import baked_scene
 from ..scene import sensor_regions
-from ..session import units
+from ..session import transforms
 
 GROUP_NAME = "Palpate Sensor"
 PENETRATION_SHARES = 0.05, 0.3
@@ -103,7 +103,7 @@ def follow_size(scene, obj) -> str:
         chosen = places.reshape(-1, 3)[sensor_regions.region_vertices(obj, len(obj.data.vertices))]
     except SensorError:
         return ""  # nothing is painted yet
-    scale = np.abs(obj.matrix_world.to_scale()) * units.metres_per_unit(scene)
+    scale = np.abs(obj.matrix_world.to_scale()) * transforms.metres_per_unit(scene)
     size = float((np.ptp(chosen, axis=0) * scale).max()) if len(chosen) else 0.0
     least, most = (share * size for share in PENETRATION_SHARES)
     if not size or least <= settings.max_penetration <= most:
@@ -127,7 +127,7 @@ def describe_region(obj, source: str) -> dict:
         return {
             "region": own.region,
             "vertex_group": own.vertex_group,
-            "threshold": units.as_typed(own.threshold),
+            "threshold": transforms.as_typed(own.threshold),
             "material": own.material,
             "face_set": own.face_set,
         }
@@ -141,7 +141,7 @@ def describe_region(obj, source: str) -> dict:
         if obj.vertex_groups.active is None:
             raise SensorError(f"'{obj.name}' has no vertex group: paint one, or use the whole mesh.")
         name = obj.vertex_groups.active.name
-        return {"region": "GROUP", "vertex_group": name, "threshold": units.as_typed(own.threshold)}
+        return {"region": "GROUP", "vertex_group": name, "threshold": transforms.as_typed(own.threshold)}
     if source == "MATERIAL":
         return {"region": "MATERIAL", "material": _active_material(obj)[1]}
     if source == "FACE_SET":

@@ -16,7 +16,7 @@ from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 from mathutils.interpolate import poly_3d_calc
 
-from ..properties import painted_maps
+from ..properties import parameter_properties
 from ..scene import deforming_objects, mesh_arrays, participants, sensor_regions
 from ..session import transforms
 
@@ -222,7 +222,7 @@ def painted_values(sensor) -> PaintedMesh:
         mesh_arrays.vertices(mesh),
         [list(face.vertices) for face in mesh.polygons],
         {group.name: sensor_regions.vertex_weights(mesh, group.index) for group in sensor.vertex_groups},
-        {item.name: _attribute_values(item) for item in mesh.attributes if painted_maps.is_map(item)},
+        {item.name: _attribute_values(item) for item in mesh.attributes if parameter_properties.is_map(item)},
     )
 
 

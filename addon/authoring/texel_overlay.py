@@ -9,8 +9,8 @@ import bpy
 import numpy as np
 
 from ...core.geometry.grid_layout import GridLayout
-from ..scene.display_names import GAP_COLORS
-from ..session import frame_status, transforms, view_shading
+from ..scene.stored_names import GAP_COLORS
+from ..session import frame_status, session_state, transforms
 from . import sensor_report
 
 VALID_COLOR, FAULTY_COLOR, NORMAL_COLOR, REACH_COLOR = (
@@ -111,7 +111,7 @@ def _draw() -> None:
     gpu.state.blend_set("ALPHA")
     with gpu.matrix.push_pop():
         gpu.matrix.multiply_matrix(_frame(obj))
-        gpu.state.depth_test_set("NONE" if view_shading.is_xray(bpy.context.space_data.shading) else "LESS_EQUAL")
+        gpu.state.depth_test_set("NONE" if session_state.is_xray(bpy.context.space_data.shading) else "LESS_EQUAL")
         shown = hides_dots(bpy.context.scene, obj, bpy.context.space_data.shading)
         if own.show_texels and not shown:
             _triangles(drawing, "fine", VALID_COLOR)

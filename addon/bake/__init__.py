@@ -4,4 +4,4 @@
 :func:`.bake.bake` is the whole of it, step by step. Until its last step an earlier bake stays as it is.
 """
 
-__all__ = ["bake", "bake_files", "bake_images", "scene_writer"]
+__all__ = ["bake", "bake_files", "scene_writer"]

@@ -1,25 +1,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A bake, step by step: read the scene, solve it, write the files, show the result. Operator and command line drive it."""
+"""A bake, step by step. Operator and command line drive the job :func:`bake`, which is its table of contents::
+
+open → read scene → scenario → model → step, forces, readings, images of each frame → seal → publish → report
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bpy
 
 from ...core.errors import SceneError
 from ...core.io.bake_folder import BakeOwner
-from ...core.io.bake_reader import Bake
 from ...core.jobs import Job, Progress, part_of_job
 from ...core.model.recording import Frame, Recording
 from ...core.model.scenario import Scenario
 from ...core.skins.channel_readouts import with_clipping_warnings
-from ..display import texel_arrows
 from ..scene import scene_fingerprint, scene_reader
 from ..scene.scene_reading import SceneReading
 from ..session import first_use, identity, session_state
-from . import bake_files, scene_writer
+from . import bake_files
+
+if TYPE_CHECKING:
+    from ...core.io.bake_reader import Bake
 
 
 @dataclass(frozen=True)
@@ -65,11 +70,32 @@ def bake(scene, into_scene: bool = True, images: bool = True, blend: bake_files.
     """
     if into_scene and not images:
         raise ValueError("a scene shows a bake by its images")
-    with session_state.suspended():
-        try:
-            return (yield from part_of_job(_bake(scene, into_scene, images, blend), _note_for_panel))
-        finally:
-            session_state.session.bake_progress = None
+    name, steps = scene.name, _Steps(scene)
+    with session_state.suspended(), steps:
+        folder = bake_files.writable_bake_folder(scene)
+        reading = yield from part_of_job(scene_reader.read_scene(scene), steps.reading)
+        scenario = reading.scenario
+        if into_scene:
+            _scene_writer().check_writable(scene, reading)
+        yield from part_of_job(first_use.wait(scenario), steps.shown)
+        bake_files.check_space(folder, scenario, images)
+        simulation = first_use.load_solver().Simulation(scenario)
+        owner = _owner(scene, into_scene, blend)
+        with bake_files.BakeFiles(folder, scenario, owner, images) as files:
+            for frame in simulation.frames():  # a step, its forces and readings
+                files.write(frame)
+                yield steps.solved(frame)
+                reading.objects(_scene_called(name))  # raises if the user has deleted one
+            warnings = (*reading.warnings, *simulation.warnings)
+            recording = with_clipping_warnings(files.recording(simulation.dt, warnings, simulation.step_reason))
+            files.seal(recording)
+            shown = _Shown(files.folders, files.bake_id, owner.scene_id)
+            if blend is not None:
+                _show(_scene_called(name), reading, recording, shown)
+            files.publish(blend)
+        if into_scene and blend is None:
+            _show(_scene_called(name), reading, recording, shown)
+        return BakeResult(recording, scenario, files.folders)
 
 
 def show_bake(scene, found: Bake) -> Job[None]:
@@ -88,14 +114,6 @@ def show_bake(scene, found: Bake) -> Job[None]:
     PalpateError
         The bake is not of this scene as it is now, it has no images, or the scene cannot show it.
     """
-    with session_state.suspended():
-        try:
-            yield from part_of_job(_show_existing(scene, found), _note_for_panel)
-        finally:
-            session_state.session.bake_progress = None
-
-
-def _show_existing(scene, found: Bake) -> Job[None]:
     manifest = next(iter(found.manifests.values()))
     place = next(iter(found.folders.values())).parent
     sensors = {obj.name: obj for obj in scene.objects if obj.palpate.role == "SENSOR"}
@@ -113,60 +131,50 @@ def _show_existing(scene, found: Bake) -> Job[None]:
         if name not in found.manifests:
             obj.palpate.role = "PAD"
     scene.frame_start, scene.frame_end = (int(found.recording.frames[end]) for end in (0, -1))
-    reading = yield from _read(scene)
-    if reading.scenario.digest() != manifest.digest:
-        raise SceneError(
-            f"The bake in '{place}' is not of '{scene.name}' as it is now: something that forces depend on has "
-            "changed since, or options of the bake changed it; bake again, or use a .blend that was saved with its bake."
-        )
-    scene_writer.check_writable(scene, reading)
-    _show(scene, reading, found.recording, _Shown(found.folders, manifest.bake_id, identity.scene_id(scene)))
-
-
-def _bake(scene, into_scene: bool, images: bool, blend: bake_files.BlendToSave | None) -> Job[BakeResult]:
-    """Do the steps of a bake, each in the room that owns it."""
-    name = scene.name
-    folder = bake_files.writable_bake_folder(scene)
-    reading = yield from _read(scene)
-    scenario = reading.scenario
-    if into_scene:
-        scene_writer.check_writable(scene, reading)
-    yield from first_use.wait(scenario)
-    bake_files.check_space(folder, scenario, images)
-    simulation = first_use.load_solver().Simulation(scenario)
-    owner = _owner(scene, into_scene, blend)
-    with bake_files.BakeFiles(folder, scenario, owner, images) as files:
-        for frame in simulation.frames():
-            files.write(frame)
-            yield _solved(scenario, frame)
-            reading.objects(_scene_called(name))  # raises if the user has deleted one
-        warnings = (*reading.warnings, *simulation.warnings)
-        recording = with_clipping_warnings(files.recording(simulation.dt, warnings, simulation.step_reason))
-        files.complete(recording)
-        shown = _Shown(files.folders, files.bake_id, owner.scene_id)
-        if blend is not None:
-            _show(_scene_called(name), reading, recording, shown)
-        files.publish(blend)
-    if into_scene and blend is None:
-        _show(_scene_called(name), reading, recording, shown)
-    return BakeResult(recording, scenario, files.folders)
-
-
-def _read(scene) -> Job[SceneReading]:
-    """Read the scene over its whole frame range: the first half of the work."""
-    total = _total_steps(scene.frame_start, scene.frame_end)
-    with texel_arrows.hidden_nodes(scene):
-        return (
-            yield from part_of_job(
-                scene_reader.read_scene(scene), lambda step: replace(step, stage="Reading the scene", total=total)
+    steps = _Steps(scene)
+    with session_state.suspended(), steps:
+        reading = yield from part_of_job(scene_reader.read_scene(scene), steps.reading)
+        if reading.scenario.digest() != manifest.digest:
+            raise SceneError(
+                f"The bake in '{place}' is not of '{scene.name}' as it is now: something that forces depend on has "
+                "changed since, or options of the bake changed it; bake again, or use a .blend that was saved with its bake."
             )
-        )
+        _scene_writer().check_writable(scene, reading)
+        _show(scene, reading, found.recording, _Shown(found.folders, manifest.bake_id, identity.scene_id(scene)))
 
 
-def _solved(scenario: Scenario, frame: Frame) -> Progress:
-    """Return how far a bake is when a frame is solved: the second half of the work."""
-    total = _total_steps(scenario.frame_start, scenario.frame_end)
-    return Progress("Computing forces", total // 2 + frame.frame - scenario.frame_start + 1, total, frame.frame)
+class _Steps:
+    """Progress of a bake, which reads every frame and then solves it; the panel shows the last step until the bake ends."""
+
+    def __init__(self, scene):
+        self._first, self._total = scene.frame_start, 2 * max(1, scene.frame_end - scene.frame_start + 1)
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, *_) -> None:
+        session_state.session.bake_progress = None
+
+    def shown(self, progress: Progress) -> Progress:
+        """Show progress in the panel, and return it."""
+        session_state.session.bake_progress = progress
+        return progress
+
+    def reading(self, progress: Progress) -> Progress:
+        """Return how far the bake is, from how far the reading of its scene is."""
+        return self.shown(replace(progress, stage="Reading the scene", total=self._total))
+
+    def solved(self, frame: Frame) -> Progress:
+        """Return how far the bake is when a frame is solved."""
+        done = self._total // 2 + frame.frame - self._first + 1
+        return self.shown(Progress("Computing forces", done, self._total, frame.frame))
+
+
+def _scene_writer():
+    """Return the module that puts a bake into its scene; a bake that only writes files does not load it."""
+    from . import scene_writer
+
+    return scene_writer
 
 
 def _owner(scene, into_scene: bool, blend: bake_files.BlendToSave | None) -> BakeOwner:
@@ -189,22 +197,12 @@ class _Shown:
 
 def _show(scene, reading: SceneReading, recording: Recording, shown: _Shown) -> None:
     """Put the result into the scene and evaluate the present frame again, so that the new keyframes take effect."""
-    scene_writer.write(scene, reading, recording, shown.folders)
+    _scene_writer().write(scene, reading, recording, shown.folders)
     scene.palpate.scene_id, scene.palpate.baked_id = shown.scene_id, shown.bake_id
     scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
     scene.palpate.baked_fingerprint = scene_fingerprint.fingerprint(scene)
     for show in session_state.when_baked:
         show(scene, recording, shown.folders)
-
-
-def _total_steps(frame_start: int, frame_end: int) -> int:
-    """Return the steps of a bake: each frame is read and solved."""
-    return 2 * max(1, frame_end - frame_start + 1)
-
-
-def _note_for_panel(progress: Progress) -> Progress:
-    session_state.session.bake_progress = progress
-    return progress
 
 
 def _scene_called(name: str):

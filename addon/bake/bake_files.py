@@ -8,7 +8,9 @@ import json
 import math
 import os
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,13 +20,16 @@ import bpy
 from ...core.errors import FileError, os_error_reason
 from ...core.io.bake_folder import (
     BAKE_FILE_NAMES,
+    IMAGE_LIST_NAME,
     MANIFEST_FORMAT,
     MANIFEST_NAME,
     RECORDING_NAME,
     BakeOwner,
     begin_bake,
+    checksum_line,
     discard_bake,
     folder_names,
+    frame_file,
     manifest_of,
     other_owner,
     publish_bake,
@@ -36,9 +41,80 @@ from ...core.io.hidden_folder import PRIVATE_FOLDER, FolderLock, is_private_fold
 from ...core.io.input_files import read_bytes
 from ...core.io.recording_npz import SENSOR_NAME, save_recording, save_sensor
 from ...core.io.row_tables import FrameTable
+from ...core.io.tactile_exr import describe, nearest_places, write_exrs
 from ...core.model.recording import Frame, Recording
 from ...core.model.scenario import Scenario
-from .bake_images import BakeImages
+from ...core.model.sensor import Sensor
+
+# The tactile images of a bake: a thread writes them, some frames together, while the solver computes the next ones.
+#
+# A list in each folder has their SHA-256 (:func:`.bake_folder.read_checksums`).
+
+MAX_BATCH_IMAGES, MAX_BATCH_PIXELS = 16, 16384
+"""Most images of one sensor that are written together, and most pixels in them: one call for many small images is faster."""
+MAX_WAITING_BATCHES = 8
+"""Batches that may wait. Each keeps its frames in memory, so that a slow disk has to slow the solver down."""
+
+
+class BakeImages:
+    """The images of all sensors of one bake. Its methods raise OSError and FileError where a file cannot be written.
+
+    Parameters
+    ----------
+    sensors : mapping of str to Sensor
+        By the name of the sensor.
+    folders : mapping of str to Path
+        Where the images are written, likewise.
+    digest : str
+        Of the scenario.
+    """
+
+    def __init__(self, sensors: Mapping[str, Sensor], folders: Mapping[str, Path], digest: str):
+        self._sensors, self._folders, self._digest = sensors, folders, digest
+        self._nearest = {
+            name: nearest_places(sensor.texels, sensor.channels and sensor.channels.no_frames())
+            for name, sensor in sensors.items()
+        }
+        pixels = max((math.prod(sensor.texels.layout.shape) for sensor in sensors.values()), default=1)
+        self._batch = max(1, min(MAX_BATCH_IMAGES, MAX_BATCH_PIXELS // pixels))
+        self._frames: list[Frame] = []
+        self._thread = ThreadPoolExecutor(1, "palpate-images")
+        self._waiting: deque[Future[None]] = deque()
+
+    def write(self, frame: Frame) -> None:
+        """Write the images of a frame; while :data:`MAX_WAITING_BATCHES` are waiting, block."""
+        self._frames.append(frame)
+        if len(self._frames) >= self._batch:
+            self._submit(MAX_WAITING_BATCHES)
+
+    def finish(self) -> dict[str, dict[str, str]]:
+        """Return, once all images are written, the SHA-256 of the list of each sensor by its name, by the sensor's name."""
+        self._submit(0)
+        lists = {name: folder / IMAGE_LIST_NAME for name, folder in self._folders.items()}
+        return {name: {IMAGE_LIST_NAME: file_sha256(path)} for name, path in lists.items()}
+
+    def stop(self) -> None:
+        """Drop the waiting batches and end the thread."""
+        self._thread.shutdown(cancel_futures=True)
+
+    def _submit(self, may_wait: int) -> None:
+        """Hand the frames so far to the thread, and return when no more batches wait than may."""
+        self._waiting.append(self._thread.submit(self._write, self._frames))
+        self._frames = []
+        while len(self._waiting) > may_wait:
+            self._waiting.popleft().result()
+
+    def _write(self, frames: list[Frame]) -> None:
+        """Write the images of some frames, and their checksums."""
+        names = [frame_file(frame.frame) for frame in frames]
+        for name, sensor in self._sensors.items():
+            paths = [self._folders[name] / file for file in names]
+            headers = [describe(sensor, frame, self._digest) for frame in frames]
+            if frames:
+                own = [frame.sensors[name] for frame in frames]
+                write_exrs(paths, sensor.texels.layout, own, headers, self._nearest[name])
+            with (self._folders[name] / IMAGE_LIST_NAME).open("ab") as file:
+                file.writelines(checksum_line(path.name, file_sha256(path)) for path in paths)
 
 
 def bake_folder(scene) -> Path:
@@ -196,7 +272,7 @@ class BakeFiles:
         """Return the recording of the frames that were written; see :meth:`.FrameTable.recording`."""
         return self._frames.recording(dt, self._digest, warnings, step_reason)
 
-    def complete(self, recording: Recording) -> None:
+    def seal(self, recording: Recording) -> None:
         """Write the recordings and manifests; the earlier bake stays in its place.
 
         Raises

@@ -11,8 +11,8 @@ from ...core.errors import SceneError
 from ...core.model.recording import Recording
 from ..display import bake_display, baked_scene
 from ..display.baked_sensor import BakedSensor
-from ..properties.settings_migration import VERSION
-from ..scene import baked_names, moved_bodies, participants, scene_fingerprint
+from ..properties.migrations import VERSION
+from ..scene import moved_bodies, participants, scene_fingerprint, stored_names
 from ..scene.scene_reading import SceneReading
 
 MANY_KEYFRAMES = 100_000
@@ -105,7 +105,7 @@ def write(scene, reading: SceneReading, recording: Recording, folders: dict[str,
     settings.schema_version = VERSION
     settings.baked_digest = recording.digest
     settings.baked_shapes = scene_fingerprint.pack_fingerprints(reading.mesh_fingerprints)
-    settings.baked_names = baked_names.pack_names(participants.find_participants(scene)[0])
+    settings.baked_names = stored_names.pack_names(participants.find_participants(scene)[0])
     settings.baked_start, settings.baked_end = scenario.frame_start, scenario.frame_end
 
 

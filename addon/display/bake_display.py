@@ -20,8 +20,8 @@ from ...core.figures.quantities import Extent
 from ...core.io.bake_folder import frame_file
 from ...core.io.bake_reader import Bake, read_sensors
 from ..properties import scene_properties
-from ..scene import baked_names
-from ..session import units
+from ..scene import stored_names
+from ..session import transforms
 from . import bake_identity, baked_scene, heat_map, indentation, markers, materials, texel_arrows
 from .baked_sensor import BakedSensor
 
@@ -60,14 +60,14 @@ class Scales:
         unit = baked_sensors[0].scale if baked_sensors else 1.0
         largest_force = _largest(np.linalg.norm(item.readings.net_force, axis=1) for item in baked_sensors)
         largest_moment = _largest(np.linalg.norm(response.free_moment(item.readings), axis=1) for item in baked_sensors)
-        force = units.as_typed(settings.arrow_scale) / unit
+        force = transforms.as_typed(settings.arrow_scale) / unit
         if settings.use_auto_arrow:
             force = min(size / largest_force, _max_scale_of_facing_arrows(baked_sensors)) if largest_force > 0 else 0.0
         peaks = {
             "NORMALS": _largest(item.readings.normal_force for item in baked_sensors),
             "SHEARS": _largest(np.linalg.norm(item.readings.shear, axis=2) for item in baked_sensors),
         }
-        texel = dict.fromkeys(peaks, units.as_typed(settings.texel_arrow_scale) / unit)
+        texel = dict.fromkeys(peaks, transforms.as_typed(settings.texel_arrow_scale) / unit)
         if settings.use_auto_arrow:
             texel = {kind: LONGEST_TEXEL_ARROW * size / peak if peak > 0 else 0.0 for kind, peak in peaks.items()}
         longest = {kind: texel[kind] * peak for kind, peak in peaks.items()}
@@ -166,7 +166,7 @@ def refresh(scene, places: dict) -> None:
     for obj, place in places.items():
         name = names[place]
         body_name = bake.manifests[name].body or obj.name
-        body = baked_names.objects_of_bake(scene, [body_name]).get(body_name)
+        body = stored_names.objects_of_bake(scene, [body_name]).get(body_name)
         if body is None or body_name not in recording.body_names:
             raise SceneError(f"'{body_name}', which moves sensor '{obj.name}', is not in the bake any more: bake again.")
         if len(obj.data.vertices) <= bake.texels[name].vertex.max():
@@ -181,7 +181,7 @@ def refresh(scene, places: dict) -> None:
                 readings=recording.sensors[name],
                 frames=recording.frames,
                 poses=recording.poses[:, recording.body_names.index(body_name)],
-                scale=units.metres_per_unit(scene),
+                scale=transforms.metres_per_unit(scene),
                 folder=place,
             )
         )

@@ -9,8 +9,8 @@ import numpy as np
 from ...core.figures.quantities import Scale
 from ...core.geometry.texels import Texels
 from ...core.geometry.texture_maps import UVLayout
-from ..scene import mesh_arrays
-from ..scene.display_names import HEAT_MAP_MODIFIER, OLD_MATERIAL, UV_MAP
+from ..scene import mesh_arrays, stored_names
+from ..scene.stored_names import HEAT_MAP_MODIFIER, OLD_MATERIAL, UV_MAP
 from . import materials, played_table
 from .baked_sensor import BakedSensor
 
@@ -85,7 +85,7 @@ def clear(obj, keep_image: bool = False) -> None:
         obj.modifiers.remove(modifier)
     names = _table_attributes(uid)
     if _slot_of(mesh) is None:
-        names += materials.TEXEL_UV, materials.FORCE, "palpate_area"  # the last one of Palpate 0.1.0
+        names += materials.TEXEL_UV, stored_names.FORCE, "palpate_area"  # the last one of Palpate 0.1.0
         layer = mesh.uv_layers.get(UV_MAP)
         if layer is not None:
             mesh.uv_layers.remove(layer)

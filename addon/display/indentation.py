@@ -20,7 +20,7 @@ import numpy as np
 
 from ...core.geometry.grid_layout import NEIGHBOUR_WEIGHT, SHARPENINGS
 from ..scene import mesh_arrays
-from ..scene.display_names import INDENTATION_MODIFIER, MODIFIERS, REST_POSITION
+from ..scene.stored_names import INDENTATION_MODIFIER, MODIFIERS, REST_POSITION
 from ..session import transforms
 from . import materials, played_table
 from .baked_sensor import BakedSensor

@@ -13,7 +13,7 @@ from ...core.figures.quantities import Scale
 from ...core.geometry.grid_layout import GridLayout
 from ...core.geometry.texels import Projection, Texels, projection_of
 from ...core.geometry.texture_maps import UVLayout
-from ..session import redraw
+from ..session import session_state
 
 MAX_SENSORS = 4
 """Number of sensors that are shown at most."""
@@ -142,7 +142,7 @@ def inset_content(scene, frame, texels: dict, frames: np.ndarray, loads: dict, s
 def show(scene, content: InsetContent) -> None:
     """Show this content in the 3D views of a scene."""
     _contents[scene.session_uid] = content
-    redraw.views()
+    session_state.redraw_views()
 
 
 def clear(scene=None) -> None:
@@ -151,7 +151,7 @@ def clear(scene=None) -> None:
         _contents.clear()
     else:
         _contents.pop(scene.session_uid, None)
-    redraw.views()
+    session_state.redraw_views()
 
 
 def _draw() -> None:

@@ -16,9 +16,9 @@ import bpy
 import numpy as np
 
 from ...core.figures import color_maps
-from ...core.figures.quantities import QUANTITIES, Quantity, Scale
+from ...core.figures.quantities import Quantity, Scale
 from ...core.io.input_files import require_regular
-from ..scene.display_names import UV_MAP
+from ..scene.stored_names import UV_MAP
 
 TEXEL_UV = "palpate_uv"
 TABLE = "values"
@@ -35,8 +35,6 @@ def attribute_of(quantity: Quantity) -> str:
     return f"palpate_{quantity.name}"
 
 
-FORCE = attribute_of(QUANTITIES["force"])
-"""The timeline also writes this one, while it plays."""
 MISSING_COLOR = (1.0, 0.0, 1.0)
 """Colour that Blender shows for an image that it does not find. Forces of exactly these values (N) do not occur in practice."""
 GLOW = 0.8

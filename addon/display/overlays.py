@@ -15,8 +15,8 @@ import numpy as np
 from ...core.figures.quantities import Scale
 from ...core.geometry.mesh import TriangleMesh, vertex_normals
 from ...core.io.bake_reader import frame_index
-from ..scene import baked_names, participants
-from ..session import redraw, transforms, units, view_shading
+from ..scene import participants, stored_names
+from ..session import session_state, transforms
 from . import bake_display, indentation, inset, materials
 
 LIFT = 0.004
@@ -91,7 +91,7 @@ def show(scene, run, frame) -> None:
     else:
         inset.clear(scene)
     _shown[scene.session_uid] = _settings_of(scene)
-    redraw.views()
+    session_state.redraw_views()
 
 
 def sensor_overlays(scene, run, frame) -> list[SensorOverlay]:
@@ -126,14 +126,14 @@ def show_bake(scene, bake, number: int, scale: Scale) -> None:
     """
     if scene.palpate.show_overlay:
         _overlays[scene.session_uid] = baked_overlays(scene, bake, number, scale)
-        redraw.views()
+        session_state.redraw_views()
 
 
 def baked_overlays(scene, bake, number: int, scale: Scale) -> list[SensorOverlay]:
     """Return the heat maps of one frame of a bake; see :func:`show_bake`."""
     recording, overlays = bake.recording, []
     sensors, poses = recording.at(number).sensors, recording.poses[frame_index(recording, number)]
-    objects = baked_names.objects_of_bake(scene, bake.texels)
+    objects = stored_names.objects_of_bake(scene, bake.texels)
     for name, texels in bake.texels.items():
         body = bake.manifests[name].body or name
         if body in recording.body_names:
@@ -142,7 +142,7 @@ def baked_overlays(scene, bake, number: int, scale: Scale) -> list[SensorOverlay
             if not scale.quantity.is_in(readings):
                 continue
             displacement = indentation.factor_of(obj) * readings.depth
-            overlay = _heat_map(texels, readings, displacement, pose, scale, units.metres_per_unit(scene))
+            overlay = _heat_map(texels, readings, displacement, pose, scale, transforms.metres_per_unit(scene))
             overlay.plain_only = True
             overlay.sensor = obj.session_uid if obj is not None else 0
             overlays.append(overlay)
@@ -238,7 +238,7 @@ def clear(scene=None) -> None:
         _overlays.pop(scene.session_uid, None)
         _shown.pop(scene.session_uid, None)
         inset.clear(scene)
-    redraw.views()
+    session_state.redraw_views()
 
 
 def _draw() -> None:
@@ -273,7 +273,7 @@ def _draw() -> None:
 
 def draws_through(scene, space) -> bool:
     """Return True where a 3D view draws heat maps over what covers them: as set, or in X-ray."""
-    return scene.palpate.show_through or view_shading.is_xray(space.shading)
+    return scene.palpate.show_through or session_state.is_xray(space.shading)
 
 
 def is_edited(obj) -> bool:

@@ -8,14 +8,11 @@ sensor's body.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-
 import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..scene.display_names import INDENTATION_MODIFIER
+from ..scene.stored_names import ARROWS_MODIFIER
 from ..session import transforms
 from . import marker_meshes, markers, materials
 from .baked_sensor import BakedSensor
@@ -26,7 +23,6 @@ NORMAL, X_AXIS, Y_AXIS = "palpate_normal", "palpate_x", "palpate_y"
 """Vector attributes of the points: the texel's axes."""
 MIN_ARROW_SHARE = 0.02
 """Length below which an arrow is not drawn, as a share of the longest arrow."""
-MODIFIER = "Palpate Arrows"
 
 
 def build_arrows(scene, sensor: BakedSensor, image, kinds, lengths: dict, longest: dict) -> None:
@@ -58,7 +54,7 @@ def build_arrows(scene, sensor: BakedSensor, image, kinds, lengths: dict, longes
         arrows.matrix_parent_inverse = Matrix(np.vstack([np.column_stack([np.linalg.inv(scale), np.zeros(3)]), [0, 0, 0, 1]]))
         arrows.hide_select = True
         arrows.color = (*marker_meshes.COLORS[material], 1.0)  # Workbench shows these of what nodes make
-        modifier = arrows.modifiers.new(MODIFIER, "NODES")
+        modifier = arrows.modifiers.new(ARROWS_MODIFIER, "NODES")
         modifier.node_group = _nodes(
             f"{uid}:{kind}",
             arrows.name,
@@ -69,31 +65,6 @@ def build_arrows(scene, sensor: BakedSensor, image, kinds, lengths: dict, longes
             longest[kind],
             marker_meshes.marker_material(material),
         )
-
-
-@contextmanager
-def hidden_nodes(scene) -> Iterator[None]:
-    """Hide arrows and indentations inside the ``with`` block, where their nodes would read the previous bake at every frame."""
-    shown = [
-        (obj.name, modifier.name)
-        for obj in scene.objects
-        if obj.library is None
-        for modifier in obj.modifiers
-        if modifier.name in (MODIFIER, INDENTATION_MODIFIER) and modifier.show_viewport
-    ]
-    try:
-        _show(scene, shown, False)
-        yield
-    finally:
-        with suppress(ReferenceError):  # the scene was removed meanwhile
-            _show(scene, shown, True)
-
-
-def _show(scene, modifiers, shown: bool) -> None:
-    for name, modifier_name in modifiers:
-        obj = scene.objects.get(name)  # the user may have deleted it meanwhile
-        if obj is not None and (modifier := obj.modifiers.get(modifier_name)) is not None:
-            modifier.show_viewport = shown
 
 
 def _points(sensor: BakedSensor, name: str):

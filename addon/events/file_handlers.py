@@ -9,7 +9,7 @@ from bpy.app.handlers import persistent
 from ..properties import migrations
 from ..scene import scene_fingerprint
 from ..session import first_use, identity, session_state
-from ..timeline import played_changes, staleness
+from ..timeline import staleness
 
 
 def examine_file() -> None:
@@ -20,7 +20,7 @@ def examine_file() -> None:
     identity.register_owners(bpy.data.objects)
     migrations.apply()
     for scene in bpy.data.scenes:
-        played_changes.hide(scene)  # the file may have been written without save_pre, as after a crash
+        staleness.remove_played(scene)  # the file may have been written without save_pre, as after a crash
     if any(obj.palpate.role != "NONE" for obj in bpy.data.objects):
         first_use.begin()
 
@@ -53,7 +53,7 @@ def palpate_save_pre(_path):
     identity.separate_copied_scenes()
     for scene in bpy.data.scenes:
         staleness.note_unchanged(scene)
-        played_changes.hide(scene)
+        staleness.remove_played(scene)
 
 
 LISTS = {

@@ -9,7 +9,7 @@ from bpy.app.handlers import persistent
 from ..authoring import sensor_report, texel_overlay
 from ..display import overlays
 from ..scene import participants
-from ..session import animation_time, first_use, session_state
+from ..session import fcurves, first_use, session_state
 from ..timeline import playback, second_look
 from . import file_handlers
 
@@ -55,7 +55,7 @@ def palpate_save_post(_path):
 @persistent
 def palpate_render_begins(scene, _depsgraph=None):
     session = session_state.session
-    session.rendering, session.render_note, session.rendered_from = True, "", animation_time.current_frame(scene)
+    session.rendering, session.render_note, session.rendered_from = True, "", fcurves.current_frame(scene)
 
 
 @persistent

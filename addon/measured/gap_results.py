@@ -21,7 +21,7 @@ from ...core.jobs import Progress, part_of_job
 from ..authoring import exchange
 from ..properties import effect_stack
 from ..scene import participants, sensor_reader
-from ..scene.display_names import GAP_COLORS
+from ..scene.stored_names import GAP_COLORS
 from ..session import first_use, identity
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...core.errors import SceneError
 from ...core.jobs import Progress, part_of_job
-from ..session import fcurves, first_use, identity, transforms, units
+from ..session import fcurves, first_use, identity, transforms
 from . import gap_results
 
 if TYPE_CHECKING:
@@ -96,10 +96,10 @@ def put_on_probe(context, obj, experiment: PlannedExperiment, rig):
     from ...core.gap.report.plan_files import experiment_words, planned_sentence
 
     scene, trajectory = context.scene, experiment.trajectory
-    metres = units.metres_per_unit(scene)
+    metres = transforms.metres_per_unit(scene)
     probe = _probe(context, obj, rig, metres)
     scene.frame_set(scene.frame_start)
-    frames, places, turn = keys(obj, trajectory, scene.frame_start, units.frames_per_second(scene), metres)
+    frames, places, turn = keys(obj, trajectory, scene.frame_start, transforms.frames_per_second(scene), metres)
     probe.parent = None
     probe.rotation_mode = "QUATERNION"
     probe.rotation_quaternion = turn

@@ -9,16 +9,11 @@ stand in saved files, so a property that is renamed needs a migration.
 __all__ = [
     "effect_stack",
     "figure_properties",
-    "laid_sensor_properties",
-    "magnetic_properties",
     "migrations",
     "object_properties",
-    "painted_maps",
     "parameter_properties",
     "registration",
     "scene_properties",
     "scene_units",
-    "settings_migration",
-    "start_transforms",
     "study_properties",
 ]

@@ -18,7 +18,7 @@ from ...core.effects.engine.specification import Form, Kind
 from ...core.errors import EffectError
 from ...core.model.parameter import Parameter
 from ...core.model.sensor import Effect
-from ..session import units
+from ..session import transforms
 from .parameter_properties import CONSTANT, FIXED, float_property, unit_in_words, with_unit
 
 SITE_ICONS = {"contact": "MOD_PHYSICS", "pad": "MOD_CLOTH", "readout": "DRIVER"}
@@ -138,7 +138,7 @@ def put_stack(obj, effects) -> None:
     EffectError
         An effect is not valid; the sensor keeps the effects that it has.
     """
-    gain = units.as_typed(obj.palpate.gain)
+    gain = transforms.as_typed(obj.palpate.gain)
     registry.check(effects, obj.name, gain=gain)
     obj.palpate.effects.clear()
     for effect in effects:
@@ -151,7 +151,7 @@ def add(obj, effect: Effect):
     item = obj.palpate.effects.add()
     item.name, item.kind, item.seed = kind.title, kind.name, effect.seed
     setattr(item, form_key(kind), form.name)
-    values = registry.complete_values(effect, units.as_typed(obj.palpate.gain))
+    values = registry.complete_values(effect, transforms.as_typed(obj.palpate.gain))
     for parameter in form.parameters:
         value = values[parameter.name]
         if parameter.per_texel:
@@ -166,11 +166,11 @@ def _plain(obj, item) -> Effect:
     for parameter, key in parameters(item):
         value = getattr(item, key)
         if not parameter.per_texel:
-            values[parameter.name] = units.as_typed(value)
+            values[parameter.name] = transforms.as_typed(value)
         elif value.strip():
             values[parameter.name] = _numbers(value, f"{parameter.name} of effect '{item.kind}' of sensor '{obj.name}'")
         else:
-            values[parameter.name] = parameter.scaled(units.as_typed(obj.palpate.gain)).default
+            values[parameter.name] = parameter.scaled(transforms.as_typed(obj.palpate.gain)).default
     return Effect(item.kind, form.name, values, item.seed if form.random else 0)
 
 

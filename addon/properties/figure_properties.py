@@ -16,7 +16,7 @@ from bpy.props import (
 
 from ...core.export.exporter import exporters
 from ...core.figures.gel_image import LIGHT_ANGLES, MARKERS_ALONG, GelStyle
-from . import path_options
+from . import scene_units
 from .scene_units import in_units
 
 KINDS = (
@@ -71,7 +71,7 @@ class PALPATE_PG_figures(CheckBoxes, bpy.types.PropertyGroup):
         description="Folder of the figures; // is the folder of the .blend",
         default="//figures",
         subtype="DIR_PATH",
-        options=path_options.OUTPUT,
+        options=scene_units.OUTPUT,
     )
     kinds: EnumProperty(
         name="Figures",

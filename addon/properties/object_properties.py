@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a user says about an object: `Object.palpate`."""
 
+from __future__ import annotations
+
 import bpy
+import numpy as np
 from bpy.props import (
     BoolProperty,
     CollectionProperty,
@@ -13,12 +16,234 @@ from bpy.props import (
     StringProperty,
 )
 
+from ...core.skins.skin_presets import PRESETS
 from ..session import first_use, identity, session_state
-from . import effect_stack, laid_sensor_properties, magnetic_properties, start_transforms
-from .painted_maps import PaintedProperties
-from .parameter_properties import FIXED, DriveParameterProperties, SensorParameterProperties
-from .scene_units import in_units
-from .settings_migration import VERSION
+from . import effect_stack
+from .migrations import VERSION
+from .parameter_properties import FIXED, DriveParameterProperties, PaintedProperties, SensorParameterProperties
+from .scene_units import in_units, units_of_lengths
+
+# Where a free or driven body starts: its location and rotation at the first frame.
+#
+# While playing displaces a body, or a bake moves it by keyframes, its properties keep the start, so that it can be
+# restored exactly.
+
+MOVED_BY_FORCES = ("FREE", "DRIVEN")
+"""Values of the property `body` of objects that forces move."""
+
+
+def transform_channels(obj) -> np.ndarray:
+    """Return location, Euler, quaternion and axis-angle rotation of an object, (14,) float."""
+    return np.concatenate([obj.location, obj.rotation_euler, obj.rotation_quaternion, obj.rotation_axis_angle])
+
+
+def set_transform_channels(obj, values: np.ndarray) -> None:
+    """Give an object the values of :func:`transform_channels`."""
+    obj.location, obj.rotation_euler = values[:3], values[3:6]
+    obj.rotation_quaternion, obj.rotation_axis_angle = values[6:10], values[10:14]
+
+
+def store_start(obj, matrix: np.ndarray) -> None:
+    """Store where a body starts, before it is moved for the first time; later calls change nothing.
+
+    Parameters
+    ----------
+    obj : Object
+    matrix : (4, 4) float
+        Its world matrix at the first frame.
+    """
+    settings = obj.palpate
+    if not settings.has_start:
+        settings.start_matrix = matrix.ravel()
+        settings.start_channels = transform_channels(obj)
+        settings.has_start = True
+
+
+def restore_unless_moved(obj) -> None:
+    """Move an object back to its start when neither a run nor a bake will move it, because its role or body has changed."""
+    settings = obj.palpate
+    if (settings.body not in MOVED_BY_FORCES or settings.role == "NONE") and not settings.is_baked:
+        restore_start(obj)
+
+
+def restore_start(obj) -> None:
+    """Move a body back to its start, equal to the last bit, and delete the stored start."""
+    if obj.palpate.has_start:
+        set_transform_channels(obj, np.array(obj.palpate.start_channels))
+        for name in ("has_start", "start_matrix", "start_channels"):
+            obj.palpate.property_unset(name)
+
+
+SKIN_METHODS = (
+    ("NONE", "None", "Not laid onto a surface"),
+    ("ARRAY", "Array", "Rows and columns of a given pitch, wrapped around the surface"),
+    ("GRID", "Rows at a Spacing", "Rows and columns at a spacing, as far as the region goes"),
+    ("NOISE", "Even", "Evenly spaced without rows (blue noise)"),
+    ("VERTICES", "Vertices", "One texel for each vertex of the region"),
+)
+
+FIELDS = {
+    "ARRAY": ("rows", "columns", "pitch_x", "pitch_y", "shift_x", "shift_y", "angle", "lift"),
+    "GRID": ("spacing", "angle", "lift"),
+    "NOISE": ("spacing", "seed", "lift"),
+    "VERTICES": ("lift",),
+}
+"""Settings that each pattern is made from."""
+
+
+def _length(name: str, text: str, **more):
+    """Return a property that is a length in metres."""
+    return FloatProperty(name=name, description=text, precision=5, step=0.01, options=set(), **more)
+
+
+class LengthsInUnits:
+    """The lengths of a pattern in the units of the scene."""
+
+    __annotations__ = units_of_lengths(
+        {
+            "pitch_x": ("Column Pitch", "Distance between columns"),
+            "pitch_y": ("Row Pitch", "Distance between rows"),
+            "shift_x": ("Shift Across", "Displacement of the middle of the array along its rows"),
+            "shift_y": ("Shift Along", "Displacement of the middle of the array across its rows"),
+            "spacing": ("Spacing", "Distance between texels"),
+            "lift": ("Lift", "Height of the texels above the surface"),
+        }
+    )
+
+
+class PALPATE_PG_skin(LengthsInUnits, bpy.types.PropertyGroup):
+    """How the texels of a sensor were laid onto the surface of its parent: `Object.palpate.skin`"""
+
+    method: EnumProperty(
+        name="Pattern",
+        description="How texels are laid onto the surface",
+        items=SKIN_METHODS,
+        options=set(),
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+    rows: IntProperty(name="Rows", description="Number of rows of the array", default=14, min=2, options=set())
+    columns: IntProperty(name="Columns", description="Number of columns of the array", default=6, min=2, options=set())
+    pitch_x: _length("Column Pitch (m)", "Distance between columns, m", default=0.0034, min=1e-6)
+    pitch_y: _length("Row Pitch (m)", "Distance between rows, m", default=0.0034, min=1e-6)
+    shift_x: _length("Shift Across (m)", "Displacement of the middle of the array along its rows, m")
+    shift_y: _length("Shift Along (m)", "Displacement of the middle of the array across its rows, m")
+    angle: FloatProperty(
+        name="Turn", description="Angle of the rows, anticlockwise seen from outside", subtype="ANGLE", options=set()
+    )
+    spacing: _length("Spacing (m)", "Distance between texels, m", default=0.002, min=1e-6)
+    seed: IntProperty(name="Seed", description="Seed of the random pattern", min=0, options=set())
+    lift: _length("Lift (m)", "Height of the texels above the surface, m", min=0.0)
+    region: StringProperty(options={"HIDDEN"})
+    region_name: StringProperty(options={"HIDDEN"})
+    region_number: IntProperty(options={"HIDDEN"})
+    region_threshold: FloatProperty(default=0.5, options={"HIDDEN"})  # that of sensors that were laid before it was stored
+    made_from: StringProperty(options={"HIDDEN"})
+
+
+PLACED, NET_FORCE = "PLACED", "NET_FORCE"
+KINDS = (
+    ("NONE", "None", "One reading for each texel, and nothing else", 0),
+    (PLACED, "Magnets in the Scene", "Magnetometers read the field of magnets: empties of a collection are both", 1),
+    (NET_FORCE, "Net Force", "Three channels of a load cell below the whole sensor, N", 2),
+    *(
+        (name.upper(), f"Skin {name}", f"Magnetometers read the field of magnets: {one.text}", number)
+        for number, (name, one) in enumerate(PRESETS.items(), 3)
+    ),
+)
+"""Kinds of read-outs with several channels. Their numbers are saved: a new one takes the next."""
+PARTS = (
+    ("NONE", "None", "Not part of a skin"),
+    ("MAGNET", "Magnet", "It moves with the texels above it; its moment is along its Z axis"),
+    ("MAGNETOMETER", "Magnetometer", "It measures the field along its X, Y and Z axes"),
+)
+
+
+class PALPATE_PG_readout(bpy.types.PropertyGroup):
+    """Channels of a sensor besides its texels' readings: `Object.palpate.readout`"""
+
+    kind: EnumProperty(name="Channels", description="Further channels that the sensor is read out by", items=KINDS, **FIXED)
+    collection: PointerProperty(
+        name="Magnets",
+        description="Collection with the empties that are magnets and magnetometers",
+        type=bpy.types.Collection,
+        **FIXED,
+    )
+    thickness: FloatProperty(
+        name="Layer (m)",
+        description="Thickness of the compliant layer, whose base is rigid, m",
+        default=6e-3,
+        min=1e-6,
+        max=0.999,
+        precision=5,
+        step=0.01,
+        **FIXED,
+    )
+    thickness_in_units: in_units("thickness", "m", "Layer", "Thickness of the compliant layer, whose base is rigid", step=0.1)
+    shear_stiffness: FloatProperty(
+        name="Shear Stiffness (N/m)",
+        description="Stiffness of a texel against shear, N/m: its surface moves sideways by its shear divided by it; "
+        "0 is its normal stiffness",
+        min=0.0,
+        precision=3,
+        **FIXED,
+    )
+
+
+class PALPATE_PG_magnetic(bpy.types.PropertyGroup):
+    """The part that an empty has in magnetic skins: `Object.palpate.magnetic`"""
+
+    part: EnumProperty(name="Part", description="What the empty is in a magnetic skin", items=PARTS, **FIXED)
+    moment: FloatProperty(
+        name="Moment (A·m²)",
+        description="Dipole moment of a magnet along its Z axis, A·m²; "
+        "a cylinder of N52, 1.6 mm wide and 1.7 mm high, has 0.004",
+        default=4e-3,
+        precision=5,
+        step=0.01,
+        **FIXED,
+    )
+    full_scale: FloatProperty(
+        name="Range (T)",
+        description="Largest field that an axis of a magnetometer shows, T; what is larger is clipped",
+        default=50e-3,
+        min=1e-9,
+        precision=4,
+        step=0.1,
+        **FIXED,
+    )
+    zero_field: FloatVectorProperty(
+        name="Offset (T)",
+        description="What the axes of a magnetometer show more, T: its own zero and the field of the surroundings",
+        size=3,
+        subtype="XYZ",
+        precision=6,
+        **FIXED,
+    )
+
+
+def parts(obj) -> list:
+    """Return the empties of a sensor's collection that are magnets or magnetometers, by name."""
+    own = obj.palpate.readout
+    if own.kind != PLACED or own.collection is None:
+        return []
+    found = [part for part in own.collection.all_objects if part.type == "EMPTY" and part.palpate.magnetic.part != "NONE"]
+    return sorted(found, key=lambda part: part.name)
+
+
+def settings(obj) -> tuple:
+    """Return all on which a sensor's channels depend besides its texels, in a form that can be compared; () without any."""
+    own = obj.palpate.readout
+    if own.kind == "NONE" or obj.palpate.role != "SENSOR":
+        return ()
+    return own.kind, own.thickness, own.shear_stiffness, *(_stated(part) for part in parts(obj))
+
+
+def _stated(part) -> tuple:
+    own = part.palpate.magnetic
+    place = (*part.matrix_basis, *part.matrix_parent_inverse)  # not where a sensor that moves has carried it
+    values = part.name, own.part, own.moment, own.full_scale, tuple(own.zero_field), part.parent and part.parent.name
+    return *values, *(tuple(row) for row in place)
+
 
 ROLES = (
     ("NONE", "None", "Not part of the simulation"),
@@ -39,7 +264,7 @@ def _role_changed(settings, context):
 
 
 def _body_changed(settings, _context):
-    start_transforms.restore_unless_moved(settings.id_data)
+    restore_unless_moved(settings.id_data)
     session_state.settings_changed()
 
 
@@ -170,12 +395,12 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
     )
 
     readout: PointerProperty(
-        type=magnetic_properties.PALPATE_PG_readout,
+        type=PALPATE_PG_readout,
         description="Channels of the sensor besides its texels' readings",
         override={"LIBRARY_OVERRIDABLE"},
     )
     magnetic: PointerProperty(
-        type=magnetic_properties.PALPATE_PG_magnetic,
+        type=PALPATE_PG_magnetic,
         description="What an empty is in a magnetic skin",
         override={"LIBRARY_OVERRIDABLE"},
     )
@@ -184,7 +409,7 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
 
     made_vertices: IntProperty(options={"HIDDEN"})
     skin: PointerProperty(
-        type=laid_sensor_properties.PALPATE_PG_skin,
+        type=PALPATE_PG_skin,
         description="How the texels were laid onto the surface of the parent",
         override={"LIBRARY_OVERRIDABLE"},
     )

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Properties of Blender made from the specifications of parameters in :mod:`..core.model`, and read back as plain data."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 
 from bpy.props import EnumProperty, FloatProperty, StringProperty
@@ -8,7 +10,7 @@ from bpy.props import EnumProperty, FloatProperty, StringProperty
 from ...core.model.body import DRIVE_PARAMETERS
 from ...core.model.parameter import ChoiceParameter, Parameter, Specification
 from ...core.model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters
-from ..session import session_state, units
+from ..session import session_state, transforms
 from .scene_units import ENDING, KINDS, in_units
 
 FIXED: dict = {"options": set(), "override": {"LIBRARY_OVERRIDABLE"}, "update": session_state.settings_changed}
@@ -110,7 +112,7 @@ def sensor_parameters(settings) -> SensorParameters:
     values = {}
     for name, specification in SENSOR_PARAMETERS.items():
         value = getattr(settings, name)
-        values[name] = units.as_typed(value) if isinstance(value, float) else type(specification.default)(value)
+        values[name] = transforms.as_typed(value) if isinstance(value, float) else type(specification.default)(value)
     return SensorParameters(**values)
 
 
@@ -123,4 +125,57 @@ def put_sensor_parameters(settings, parameters: SensorParameters) -> None:
 
 def drive_parameters(settings) -> dict[str, float]:
     """Return the values by name of those parameters of a drive that the settings of an object hold."""
-    return {name: units.as_typed(getattr(settings, key)) for key, name in DRIVE_PARAMETER_PROPERTIES.items()}
+    return {name: transforms.as_typed(getattr(settings, key)) for key, name in DRIVE_PARAMETER_PROPERTIES.items()}
+
+
+PAINTED_PARAMETERS = ("k", "friction", "gain")
+"""Each of them has two properties: ``<name>_map`` names a vertex group or attribute, ``<name>_factor`` is its factor."""
+
+
+def is_map(attribute) -> bool:
+    """True for an attribute of a mesh that holds a number for each vertex and that a user may mean."""
+    return attribute.domain == "POINT" and attribute.data_type == "FLOAT" and not attribute.name.startswith((".", "palpate_"))
+
+
+def _names_of_maps(settings, context, typed):
+    """Return the names of vertex groups and attributes that contain what was typed."""
+    obj = settings.id_data
+    names = [group.name for group in obj.vertex_groups]
+    if obj.type == "MESH":
+        names += [item.name for item in obj.data.attributes if is_map(item)]
+    return [name for name in names if typed.lower() in name.lower()]
+
+
+def _map(what: str, effect: str):
+    """Return the property that holds the name of a map."""
+    return StringProperty(
+        name=what,
+        description=f"Vertex group or attribute that gives each texel a factor of {effect}. "
+        "A weight of 1 means the factor below, 0 leaves the texel as it is; an attribute holds the factors themselves",
+        search=_names_of_maps,
+        **FIXED,
+    )
+
+
+def _factor(what: str):
+    """Return the property that says what a weight of 1 means."""
+    return FloatProperty(
+        name="At Full Weight (×)",
+        description=f"Factor of {what} where the weight is 1, no unit; 1 changes nothing",
+        default=0.5,
+        min=0.0,
+        soft_max=4.0,
+        precision=3,
+        **FIXED,
+    )
+
+
+class PaintedProperties:
+    """The painted maps of a sensor, one for each field of :class:`.Painted`."""
+
+    k_map: _map("Painted Stiffness", "stiffness and damping")
+    k_factor: _factor("stiffness and damping")
+    friction_map: _map("Painted Friction", "static and dynamic friction")
+    friction_factor: _factor("friction")
+    gain_map: _map("Painted Gain", "the gain")
+    gain_factor: _factor("the gain")

@@ -4,22 +4,14 @@
 import bpy
 from bpy.props import PointerProperty
 
-from . import (
-    effect_stack,
-    figure_properties,
-    laid_sensor_properties,
-    magnetic_properties,
-    object_properties,
-    scene_properties,
-    study_properties,
-)
+from . import effect_stack, figure_properties, object_properties, scene_properties, study_properties
 
 CLASSES = (
     effect_stack.PALPATE_PG_effect,
     figure_properties.PALPATE_PG_figures,
-    laid_sensor_properties.PALPATE_PG_skin,
-    magnetic_properties.PALPATE_PG_readout,
-    magnetic_properties.PALPATE_PG_magnetic,
+    object_properties.PALPATE_PG_skin,
+    object_properties.PALPATE_PG_readout,
+    object_properties.PALPATE_PG_magnetic,
     study_properties.PALPATE_AP_preferences,
     study_properties.PALPATE_PG_study_variable,
     study_properties.PALPATE_PG_study,

@@ -6,8 +6,8 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, Po
 
 from ...core.figures import color_maps
 from ...core.figures.quantities import QUANTITIES, between
-from ..session import session_state, units
-from . import figure_properties, path_options, study_properties
+from ..session import session_state, transforms
+from . import figure_properties, scene_units, study_properties
 
 SETTING: dict = {"options": set(), "update": session_state.settings_changed}
 """A setting of a scene has no keyframes; what is shown follows it."""
@@ -42,7 +42,7 @@ RANGE_NAMES = {"force": "range_max"}
 
 def color_range(settings) -> tuple[float | None, float | None]:
     """Return the ends of the colours as set; the lower one is None where it follows from the other, both if they are none."""
-    *lower, upper = (units.as_typed(getattr(settings, name)) for name in range_names(settings))
+    *lower, upper = (transforms.as_typed(getattr(settings, name)) for name in range_names(settings))
     if lower and lower[0] >= upper:
         return None, None
     return (lower[0] if lower else None), upper
@@ -86,7 +86,7 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
         description="Tactile images and recordings go here, in one folder per sensor; // is the folder of the .blend",
         default=FOLDER,
         subtype="DIR_PATH",
-        **{**SETTING, "options": path_options.OUTPUT},
+        **{**SETTING, "options": scene_units.OUTPUT},
     )
     use_auto_dt: BoolProperty(
         name="Auto Time Step",

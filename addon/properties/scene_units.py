@@ -13,7 +13,16 @@ from collections.abc import Mapping
 import bpy
 from bpy.props import FloatProperty, FloatVectorProperty
 
-from ..session import units
+from ..session import transforms
+
+# Options of properties that are paths of files and folders which Palpate writes.
+#
+# Newer Blenders draw such a field red, as an error, unless the property says that // may begin its path and that it is an
+# output.
+
+_NAMES = {"PATH_SUPPORTS_BLEND_RELATIVE": "is_path_supports_blend_relative", "OUTPUT_PATH": "is_path_output"}
+OUTPUT: set = {option for option, flag in _NAMES.items() if flag in bpy.types.Property.bl_rna.properties}
+
 
 ENDING = "_in_units"
 """What the name of such a property adds to the name of the one that it shows."""
@@ -43,7 +52,7 @@ def in_units(name: str, unit: str, label: str, text: str, is_vector: bool = Fals
     kind, power = KINDS[unit]
 
     def unit_size() -> float:
-        return units.metres_per_unit(bpy.context.scene) ** power
+        return transforms.metres_per_unit(bpy.context.scene) ** power
 
     def in_si(shown: float) -> float:
         size = unit_size()

@@ -11,7 +11,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from . import path_options
+from . import scene_units
 
 NUMBER, WORDS = "NUMBER", "WORDS"
 """Kinds of what varies: numbers have every distribution, switches, words and whole numbers only a choice."""
@@ -71,7 +71,7 @@ class PALPATE_PG_study(bpy.types.PropertyGroup):
         "// is the folder of the .blend",
         default="//study.toml",
         subtype="FILE_PATH",
-        options=path_options.OUTPUT,
+        options=scene_units.OUTPUT,
     )
     design: EnumProperty(name="Design", description="How the values of the runs are chosen", items=DESIGNS, options=set())
     samples: IntProperty(

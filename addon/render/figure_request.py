@@ -14,7 +14,7 @@ from ...core.figures.figure_style import FigureStyle
 from ...core.figures.gel_image import GelStyle
 from ..display import bake_display
 from ..properties import figure_properties
-from ..session import units
+from ..session import transforms
 from .render_setup import RenderOptions
 
 KINDS = ("scene", "strip", "curves", "numbers", "video", "gel")
@@ -132,9 +132,9 @@ def requested_figures(scene, active=None) -> FigureRequest:
         see_through=own.see_through,
         size=tuple(own.size),
         samples=own.samples or None,
-        light_angle=units.as_typed(own.light_angle),
+        light_angle=transforms.as_typed(own.light_angle),
         markers=own.markers,
-        marker_pitch=units.as_typed(own.marker_pitch) or None,
+        marker_pitch=transforms.as_typed(own.marker_pitch) or None,
     )
 
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from ...core.io.bake_reader import Bake, frame_index
 from ..display import indentation
-from ..scene import baked_names
-from ..session import transforms, units
+from ..scene import stored_names
+from ..session import transforms
 
 LOADED_SHARE = 0.05
 """A texel is loaded from this share of the largest normal force of any texel at the frame: what one sees in a colour map."""
@@ -44,10 +44,10 @@ class LoadedTexels:
 
 def loaded_texels(scene, bake: Bake, frame: int) -> LoadedTexels:
     """Return the loaded texels of all sensors of a bake at a frame, which the bake must have."""
-    recording, metres = bake.recording, units.metres_per_unit(scene)
+    recording, metres = bake.recording, transforms.metres_per_unit(scene)
     sensors, poses = recording.at(frame).sensors, recording.poses[frame_index(recording, frame)]
     largest = max((float(sensors[name].normal_force.max(initial=0.0)) for name in bake.texels), default=0.0)
-    objects = baked_names.objects_of_bake(scene, bake.texels)
+    objects = stored_names.objects_of_bake(scene, bake.texels)
     parts = [(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0, dtype=int))]
     for number, (name, texels) in enumerate(bake.texels.items()):
         body, readings = bake.manifests[name].body or name, sensors[name]

@@ -7,23 +7,16 @@ and :meth:`.SceneReading.sample` one more frame at a time. Fingerprints tell whe
 """
 
 __all__ = [
-    "animation_fingerprint",
-    "attached_objects",
-    "baked_names",
-    "body_poses",
-    "channel_reader",
     "deforming_objects",
-    "display_names",
     "drives",
     "mesh_arrays",
-    "mesh_fingerprint",
     "moved_bodies",
     "participants",
-    "rounding_warnings",
     "scene_fingerprint",
     "scene_reader",
     "scene_reading",
     "sensor_reader",
     "sensor_regions",
+    "stored_names",
     "uv_layouts",
 ]

@@ -18,15 +18,15 @@ from ...core.io.row_tables import RowTable, motion_table
 from ...core.model.scenario import Scenario, Target
 from ...core.model.sensor import Deformation, Sensor
 from ..session import fcurves, identity
-from . import display_names, mesh_arrays
-from .mesh_snapshot import MeshSnapshot
+from . import mesh_arrays, stored_names
+from .mesh_arrays import MeshSnapshot
 
 SCALE_PROPERTIES = {"scale", "delta_scale"}
 
 
 def may_deform(obj) -> bool:
     """Return True when anything could change the shape of an object over time."""
-    if any(modifier.show_viewport and modifier.name not in display_names.MODIFIERS for modifier in obj.modifiers):
+    if any(modifier.show_viewport and modifier.name not in stored_names.MODIFIERS for modifier in obj.modifiers):
         return True
     if obj.parent_type in {"ARMATURE", "LATTICE"}:
         return True

@@ -12,7 +12,7 @@ import numpy as np
 from ...core.errors import SceneError
 from ...core.model.body import Drive, Signal
 from ..properties.parameter_properties import DRIVE_PARAMETER_PROPERTIES, drive_parameters
-from ..session import transforms, units
+from ..session import transforms
 
 TARGET_PROPERTIES = {"POSITION": "drive_position", "VELOCITY": "drive_speed", "FORCE": "drive_force"}
 """Property that holds the target, by kind of control."""
@@ -23,7 +23,7 @@ DRIVE_PROPERTIES = (*DRIVE_PARAMETER_PROPERTIES, "drive_control", "drive_axis", 
 def drive_target(obj, depsgraph) -> float:
     """Return the target of an object's drive at the present frame."""
     settings = obj.evaluated_get(depsgraph).palpate
-    return units.as_typed(getattr(settings, TARGET_PROPERTIES[settings.drive_control]))
+    return transforms.as_typed(getattr(settings, TARGET_PROPERTIES[settings.drive_control]))
 
 
 def target_path(obj) -> str | None:

@@ -3,13 +3,17 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
+import hashlib
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from ...core.errors import MeshError, SensorError
-from .display_names import MODIFIERS, REST_POSITION
+from ..properties import parameter_properties
+from . import sensor_regions
+from .stored_names import MODIFIERS, REST_POSITION
 
 
 @dataclass(frozen=True)
@@ -133,3 +137,113 @@ def sensor_arrays(obj, depsgraph) -> tuple[MeshArrays, list[str]]:
         f"A modifier ({names}) changes the number of vertices of sensor '{obj.name}': texels stand on the vertices without "
         "modifiers, apply it to have them on the new ones."
     ]
+
+
+def evaluated_fingerprint(obj, depsgraph) -> str:
+    """Return a hash of an object's evaluated geometry, of everything in it that forces depend on."""
+    with evaluated_mesh(obj, depsgraph) as mesh:
+        return _fingerprint(obj, mesh)
+
+
+def own_fingerprint(obj) -> str:
+    """Return the hash of an object's own mesh, without modifiers and animation; empty for curves, text and metaballs."""
+    return _fingerprint(obj, obj.data) if obj.type == "MESH" else ""
+
+
+def _fingerprint(obj, mesh) -> str:
+    """Return the hash of a mesh of an object."""
+    return arrays_fingerprint(positions(mesh), corner_vertices(mesh), region_bytes(obj))
+
+
+def arrays_fingerprint(positions: np.ndarray, corners: np.ndarray, region: bytes) -> str:
+    """Return the hash of positions and corners of a mesh (:mod:`.mesh_arrays`) and of :func:`region_bytes`."""
+    digest = hashlib.blake2b(digest_size=16)
+    for part in (positions, corners, region):
+        digest.update(part)
+    return digest.hexdigest()
+
+
+def region_bytes(obj) -> bytes:
+    """Return what the mesh of a sensor or pad says besides its shape: region, painted values, and UV maps of its images."""
+    if obj.type != "MESH" or obj.palpate.role not in ("SENSOR", "PAD"):
+        return b""
+    parts = []
+    with suppress(SensorError):  # reading the scene reports it
+        parts.append(np.packbits(sensor_regions.region_vertices(obj, len(obj.data.vertices))).tobytes())
+        for key in parameter_properties.PAINTED_PARAMETERS:
+            values = sensor_regions.painted_multipliers(obj, key)
+            parts.append(b"" if values is None else values.tobytes())
+    if obj.palpate.image_layout == "UV":
+        for layer in obj.data.uv_layers:
+            uv = np.empty(2 * len(layer.uv), dtype=np.float32)
+            layer.uv.foreach_get("vector", uv)
+            parts.append(layer.name.encode("utf-8", "surrogatepass") + uv.tobytes())
+    return b"".join(parts)
+
+
+# Evaluated meshes as they were read last.
+#
+# Most meshes are the same at the next frame. Comparing two meshes takes less time than to compute a fingerprint and positions
+# in the body's frame again.
+
+
+@dataclass
+class MeshSnapshot:
+    """An evaluated mesh as it was read.
+
+    Attributes
+    ----------
+    positions : (3 · nv,) float32, Blender units, in the object's frame
+    corners : (nc,) int32
+        Vertex of each corner of the faces.
+    """
+
+    positions: np.ndarray
+    corners: np.ndarray
+
+    @cached_property
+    def vertices(self) -> np.ndarray:
+        """Positions of the vertices, (nv, 3) float."""
+        return self.positions.astype(float).reshape(-1, 3)
+
+
+class MeshSnapshots:
+    """Snapshots of the objects of a run. Each mesh is read once per frame."""
+
+    def __init__(self):
+        self._snapshots: dict[int, MeshSnapshot] = {}
+        self._fingerprints: dict[int, tuple[MeshSnapshot, str]] = {}
+        self._regions: dict[int, bytes] = {}
+        self._read: set[int] = set()
+
+    def begin_frame(self) -> None:
+        """Note that the scene stands at another frame, so that every mesh has to be read again."""
+        self._read.clear()
+
+    def snapshot(self, obj, depsgraph) -> MeshSnapshot:
+        """Return the snapshot of an object; the identical one while positions and number of corners stay the same."""
+        key = obj.session_uid
+        if key not in self._read:
+            with evaluated_mesh(obj, depsgraph) as mesh:
+                now, before = positions(mesh), self._snapshots.get(key)
+                if before is None or len(mesh.loops) != len(before.corners) or not _same_bits(now, before.positions):
+                    self._snapshots[key] = MeshSnapshot(now, corner_vertices(mesh))
+            self._read.add(key)
+        return self._snapshots[key]
+
+    def fingerprint(self, obj, depsgraph) -> str:
+        """Return an object's :func:`evaluated_fingerprint`, with its region as at the first call."""
+        key, snapshot = obj.session_uid, self.snapshot(obj, depsgraph)
+        if key not in self._regions:
+            self._regions[key] = region_bytes(obj)
+        if key not in self._fingerprints or self._fingerprints[key][0] is not snapshot:
+            self._fingerprints[key] = (
+                snapshot,
+                arrays_fingerprint(snapshot.positions, snapshot.corners, self._regions[key]),
+            )
+        return self._fingerprints[key][1]
+
+
+def _same_bits(one: np.ndarray, other: np.ndarray) -> bool:
+    """Return True when two arrays of 32-bit values have the same bits."""
+    return len(one) == len(other) and np.array_equal(one.view(np.int32), other.view(np.int32))

@@ -10,8 +10,112 @@ import numpy as np
 from mathutils import Euler, Matrix, Quaternion
 
 from ...core.errors import SceneError
-from ..properties import start_transforms
-from ..session import fcurves, transforms
+from ..properties import object_properties
+from ..session import fcurves, identity, transforms
+
+
+def world_matrix(obj, depsgraph) -> np.ndarray:
+    """Return the evaluated world matrix of an object, (4, 4) float."""
+    return transforms.as_array(obj.evaluated_get(depsgraph).matrix_world)
+
+
+def decompose(obj, matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return location, quaternion and stretch of an object's world matrix (:func:`.transforms.decompose`).
+
+    Raises
+    ------
+    SceneError
+        The matrix is singular or not finite.
+    """
+    if not np.isfinite(matrix).all():
+        raise SceneError(f"'{obj.name}' has a NaN or infinite location, rotation or scale: check its drivers and constraints.")
+    if transforms.is_singular(matrix):
+        raise SceneError(f"The scale of '{obj.name}' is zero in at least one direction: give it a scale, it has no volume.")
+    return transforms.decompose(matrix)
+
+
+def body_pose(scene, obj, depsgraph) -> np.ndarray:
+    """Return position (m) and quaternion of an object's body frame at the present frame, (7,) float."""
+    position, quaternion, _ = decompose(obj, world_matrix(obj, depsgraph))
+    return np.concatenate([position * transforms.metres_per_unit(scene), quaternion])
+
+
+# Objects that are part of their parent's body: one or more sensors on a finger, or a handle on a box.
+#
+# An attached object has its own role, mesh and parameters, but no motion. It stays where it was put on its parent, and forces
+# on it move the parent's body. It has no mass.
+
+SAME_MATRIX = 1e-4
+"""Largest relative change over time of an attached object's matrix that is put down to rounding."""
+
+
+def body_objects(objects) -> dict:
+    """Return, for each of the participating objects, the object whose body it belongs to.
+
+    An attached object whose parent is not simulated is a body of its own, which its parents move like any other object.
+    """
+    return {obj: body_object(obj, set(objects)) for obj in objects}
+
+
+def body_object(obj, objects):
+    """Return the object whose body an object belongs to; `objects` are those of the simulation."""
+    while obj.palpate.body == "PARENT" and obj.parent in objects:
+        obj = obj.parent
+    return obj
+
+
+def objects_with_role(scene) -> set:
+    """Return the objects of a scene that have a role, also those that are hidden."""
+    return {obj for obj in scene.objects if obj.palpate.role != "NONE"}
+
+
+def check_parents(objects, body_objects: dict) -> None:
+    """Raise SceneError when the parent of an object is a free or driven body of which the object is no part."""
+    moved = {obj: obj.palpate.body.lower() for obj in objects if obj.palpate.body in object_properties.MOVED_BY_FORCES}
+    for obj in objects:
+        above = obj.parent
+        while above is not None:
+            if above in moved and body_objects[obj] != above:
+                raise SceneError(
+                    f"'{obj.name}' is a child of {moved[above]} body '{above.name}': "
+                    "set its body to Part of Parent, or clear its parent, so that it is a body of its own."
+                )
+            above = above.parent
+
+
+def matrix_on_body(obj, body_object, depsgraph) -> np.ndarray:
+    """Return the matrix from an attached object's coordinates to those of the object whose body it belongs to, (4, 4) float."""
+    above, below = (transforms.as_array(item.evaluated_get(depsgraph).matrix_world) for item in (body_object, obj))
+    if transforms.is_singular(above) or transforms.is_singular(below):
+        raise SceneError(f"The scale of '{body_object.name}' or its part '{obj.name}' is zero: give it a scale.")
+    return np.linalg.inv(above) @ below
+
+
+def to_body_frame(matrix: np.ndarray, attachment: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return (3, 3) and (3,) float, which take an attached object's vertices to the body's frame, in Blender units.
+
+    Parameters
+    ----------
+    matrix : (4, 4) float
+        World matrix of the object whose body it is.
+    attachment : (4, 4) float
+        From :func:`matrix_on_body`.
+    """
+    position, quaternion, _ = transforms.decompose(matrix)
+    whole = np.linalg.inv(transforms.pose_matrix(position, quaternion)) @ matrix @ attachment
+    return whole[:3, :3], whole[:3, 3]
+
+
+def check_attachments(scene, depsgraph, attachments: dict[str, np.ndarray]) -> None:
+    """Raise SceneError when an object has moved on its body; `attachments` are the matrices at the first frame, by key."""
+    for key, obj in identity.find_objects(scene, attachments).items():
+        now = matrix_on_body(obj, body_object(obj, objects_with_role(scene)), depsgraph)
+        if np.abs(now - attachments[key]).max() > SAME_MATRIX * np.abs(attachments[key]).max():
+            raise SceneError(
+                f"'{obj.name}' moves on its parent (frame {scene.frame_current}), but is part of that body: "
+                "remove its keyframes, or set its body to Keyframed."
+            )
+
 
 TRANSFORM_PATHS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle")
 
@@ -71,7 +175,7 @@ class BodyPlacement:
     def of(cls, obj, matrix: np.ndarray, parent: np.ndarray, metres_per_unit: float) -> BodyPlacement:
         """Return the placement of a body that starts at a world matrix; a stored start counts while it is displaced."""
         settings = obj.palpate
-        start = np.array(settings.start_channels) if settings.has_start else start_transforms.transform_channels(obj)
+        start = np.array(settings.start_channels) if settings.has_start else object_properties.transform_channels(obj)
         return cls(start.astype(float), matrix, parent, metres_per_unit)
 
     def channels_at(self, obj, pose: np.ndarray, parent: np.ndarray, previous: np.ndarray | None = None) -> np.ndarray:
@@ -136,8 +240,8 @@ class BodyPlacement:
 
     def move(self, obj, channels: np.ndarray) -> None:
         """Give the object its channels, (14,) float, and store its start if it has not been moved before."""
-        start_transforms.store_start(obj, self.world)
-        start_transforms.set_transform_channels(obj, channels)
+        object_properties.store_start(obj, self.world)
+        object_properties.set_transform_channels(obj, channels)
 
 
 def keyframe_motion(obj, placement: BodyPlacement, frames: np.ndarray, poses: np.ndarray, parents: np.ndarray) -> None:
@@ -150,7 +254,7 @@ def keyframe_motion(obj, placement: BodyPlacement, frames: np.ndarray, poses: np
     parents : (f, 4, 4) float
     """
     table = placement.channels_along(obj, poses, parents)
-    start_transforms.store_start(obj, placement.world)
+    object_properties.store_start(obj, placement.world)
     found, is_new_action = fcurves.ensure(obj, f"{obj.name} Palpate")
     fcurves.remove(found, TRANSFORM_PATHS)
     fcurves.write(found, "location", frames, table[:, :3])
@@ -176,4 +280,4 @@ def remove_motion(obj) -> None:
             if not data.drivers and not data.nla_tracks:
                 obj.animation_data_clear()
     obj.palpate.made_action = obj.palpate.is_baked = False
-    start_transforms.restore_start(obj)
+    object_properties.restore_start(obj)

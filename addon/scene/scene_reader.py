@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A scene becomes a :class:`.Scenario`: the only way by which meshes and poses leave Blender.
 
-Each participant is a body, unless it is part of its parent's body (:mod:`.attached_objects`). A body's frame has the
+Each participant is a body, unless it is part of its parent's body (:mod:`.moved_bodies`). A body's frame has the
 location and rotation of its object; scale and shear are applied to the vertices. Keyframed bodies, and surfaces that deform,
 are sampled at every frame.
 """
@@ -12,6 +12,7 @@ from collections.abc import Generator
 from contextlib import suppress
 from dataclasses import replace
 
+import bpy
 import numpy as np
 
 from ...core.effects.engine.registry import check_scenario
@@ -20,29 +21,97 @@ from ...core.geometry.mesh import TriangleMesh, mass_properties
 from ...core.io.row_tables import motion_table
 from ...core.jobs import Progress
 from ...core.model.body import Body, Motion, Signal
+from ...core.model.recording import row_blocks
 from ...core.model.scenario import Scenario, Target
 from ...core.model.sensor import Sensor
-from ..properties import start_transforms
-from ..session import animation_time, identity, session_state, units
-from . import (
-    attached_objects,
-    body_poses,
-    channel_reader,
-    deforming_objects,
-    drives,
-    moved_bodies,
-    participants,
-    rounding_warnings,
-    sensor_reader,
-    uv_layouts,
-)
+from ..properties import object_properties
+from ..session import fcurves, identity, session_state, transforms
+from . import deforming_objects, drives, moved_bodies, participants, scene_fingerprint, sensor_reader, stored_names, uv_layouts
+from .drives import TARGET_PROPERTIES
 from .scene_reading import FrameSample, SceneReading
+
+FLOAT32_ROUNDING = 2.0**-24
+"""Largest relative rounding of Blender's numbers."""
+FLAT = 2.0**-23
+"""Blender units. Where both keyframes of a Bézier curve and their handles differ by less, Blender takes the curve for constant
+(FLT_EPSILON in its `fcurve_eval_keyframes_interpolate`) and jumps at the second keyframe."""
+ROUNDING_SHARE = 0.001
+"""Share of the thinnest skin's depth by which positions may be off without a warning. A ball that presses 2 mm deep into a skin
+of 12 mm has this share 200 m from the origin; from 100 m to 1 km the largest error of its force grows from 0.6 % to 8 %."""
+_LENGTHS = ("location", "delta_location", f"palpate.{TARGET_PROPERTIES['POSITION']}")
+"""Properties in Blender units or metres."""
+
+
+def distance_warnings(scenario: Scenario) -> tuple[str, ...]:
+    """Return a warning for the body that is so far from the origin that rounding changes forces."""
+    skin = _thinnest_skin(scenario)
+    distances = {body.name: _largest_distance(body.motion.positions) for body in scenario.bodies}
+    for target in scenario.targets:
+        name = scenario.bodies[target.body].name
+        distances[name] += float(np.linalg.norm(target.mesh.vertices, axis=1).max())
+    name = max(distances, key=lambda body: distances[body])
+    rounding = distances[name] * FLOAT32_ROUNDING
+    if rounding < ROUNDING_SHARE * skin:
+        return ()
+    return (
+        f"'{name}' is {distances[name] * 1e-3:.3g} km from the origin, where Blender rounds positions to "
+        f"{rounding * 1e3:.2g} mm and a skin is {skin * 1e3:.3g} mm deep: move the scene to the origin, "
+        "or its forces are inexact.",
+    )
+
+
+def keyframe_warnings(objects, scenario: Scenario, metres_per_unit: float) -> tuple[str, ...]:
+    """Return a warning for each object that Blender holds still between keyframes that are too near to each other.
+
+    Parameters
+    ----------
+    objects : iterable of Object
+        The participants; what they depend on is looked at too.
+    scenario : Scenario
+    metres_per_unit : float
+    """
+    least = ROUNDING_SHARE * _thinnest_skin(scenario)
+    if FLAT * max(metres_per_unit, 1.0) < least:
+        return ()
+    found = []
+    for block in scene_fingerprint.related_data_blocks(objects):
+        if isinstance(block, bpy.types.Object) and block.animation_data is not None:
+            for curve in fcurves.of_object(block) or ():
+                metres = 1.0 if curve.data_path.startswith("palpate.") else metres_per_unit
+                if curve.data_path in _LENGTHS and _largest_flat_difference(curve) * metres >= least:
+                    found.append(block.name)
+                    break
+    return tuple(
+        f"Blender holds '{name}' still between keyframes that differ by less than {FLAT:.2g} units, and then it jumps: "
+        "set a smaller Unit Scale and enlarge the scene in units, or make these keyframes linear."
+        for name in found
+    )
+
+
+def _largest_flat_difference(curve) -> float:
+    """Return by how many units an F-curve jumps at most where Blender takes it for constant between two keyframes."""
+    points, largest = curve.keyframe_points, 0.0
+    for k in range(len(points) - 1):
+        before, after = points[k], points[k + 1]
+        values = before.co[1], before.handle_right[1], after.handle_left[1], after.co[1]
+        if before.interpolation == "BEZIER" and max(values) - min(values) < FLAT:
+            largest = max(largest, abs(after.co[1] - before.co[1]))
+    return largest
+
+
+def _thinnest_skin(scenario: Scenario) -> float:
+    """Return the smallest maximum penetration of a scenario's sensors, metres."""
+    return min(sensor.parameters.max_penetration for sensor in scenario.sensors)
+
+
+def _largest_distance(positions: np.ndarray) -> float:
+    return max(float(np.linalg.norm(positions[rows], axis=1).max()) for rows in row_blocks(positions))
 
 
 def read_scene(scene) -> Generator[Progress, None, SceneReading]:
     """Read a scene over its whole frame range, frame by frame, and return it to the frame where it stood.
 
-    The timeline does not simulate meanwhile.
+    The timeline does not simulate meanwhile, and what a bake shows in the scene is hidden.
 
     Raises
     ------
@@ -50,12 +119,13 @@ def read_scene(scene) -> Generator[Progress, None, SceneReading]:
         Something in the scene makes no run; the message names it.
     """
     before = scene.frame_current, scene.frame_subframe
-    try:
-        with session_state.suspended(), animation_time.without_time_stretching(scene):
-            return (yield from _read_frames(scene))
-    finally:
-        with suppress(ReferenceError):  # the scene was deleted while its frames were read
-            scene.frame_set(before[0], subframe=before[1])
+    with session_state.suspended(), stored_names.hidden_display(scene):
+        try:
+            with fcurves.without_time_stretching(scene):
+                return (yield from _read_frames(scene))
+        finally:
+            with suppress(ReferenceError):  # the scene was deleted while its frames were read
+                scene.frame_set(before[0], subframe=before[1])
 
 
 def read_start(scene, depsgraph) -> SceneReading:
@@ -79,12 +149,12 @@ class _StartReader:
 
     def __init__(self, scene, depsgraph):
         self.scene, self.depsgraph = scene, depsgraph
-        self.metres_per_unit = units.metres_per_unit(scene)
+        self.metres_per_unit = transforms.metres_per_unit(scene)
         self.objects, self.warnings = participants.find_participants(scene)
         for obj in self.objects:
             identity.ensure_uid(obj)
-        self.body_objects = attached_objects.body_objects(self.objects)
-        attached_objects.check_parents(self.objects, self.body_objects)
+        self.body_objects = moved_bodies.body_objects(self.objects)
+        moved_bodies.check_parents(self.objects, self.body_objects)
         self.owners = [obj for obj in self.objects if self.body_objects[obj] == obj]
         # By body index: body, mesh in the body's frame, world matrix and stretch of the object.
         self.bodies: list[Body] = []
@@ -126,15 +196,15 @@ class _StartReader:
 
     def _read_body(self, index: int, obj) -> None:
         """Read the pose and mesh of an object that is a body; mass and start of one that forces move."""
-        is_moved = obj.palpate.body in start_transforms.MOVED_BY_FORCES
+        is_moved = obj.palpate.body in object_properties.MOVED_BY_FORCES
         if is_moved:
             moved_bodies.check_movable(obj)
             matrix = self.start_matrices[index] = moved_bodies.start_matrix(obj, self.depsgraph)
         elif obj.palpate.has_start:
             raise SceneError(f"'{obj.name}' is Keyframed, but its keyframes are those of a bake: use Clear Bake first.")
         else:
-            matrix = body_poses.world_matrix(obj, self.depsgraph)
-        position, quaternion, stretch = body_poses.decompose(obj, matrix)
+            matrix = moved_bodies.world_matrix(obj, self.depsgraph)
+        position, quaternion, stretch = moved_bodies.decompose(obj, matrix)
         mesh = self._mesh(obj, stretch * self.metres_per_unit)
         body = Body(obj.name, Motion.at_rest(position * self.metres_per_unit, quaternion))
         if is_moved:
@@ -156,9 +226,9 @@ class _StartReader:
         index = self.owners.index(body_object)
         mesh, linear, offset = self.meshes[index], self.stretches[index], np.zeros(3)
         if body_object != obj:
-            attachment = attached_objects.matrix_on_body(obj, body_object, self.depsgraph)
+            attachment = moved_bodies.matrix_on_body(obj, body_object, self.depsgraph)
             self.attachments[identity.key(obj)] = attachment
-            linear, offset = attached_objects.to_body_frame(self.matrices[index], attachment)
+            linear, offset = moved_bodies.to_body_frame(self.matrices[index], attachment)
             mesh = self._mesh(obj, linear * self.metres_per_unit, offset * self.metres_per_unit)
         to_body = linear * self.metres_per_unit, offset * self.metres_per_unit
         is_smooth = obj.palpate.contact_normals == "SMOOTH"
@@ -166,7 +236,7 @@ class _StartReader:
             self._add(self.targets, Target(obj.name, index, mesh, smooth=is_smooth), obj, mesh, to_body)
             return
         sensor = sensor_reader.read_sensor(obj, index, mesh, linear)
-        sensor = channel_reader.with_channels(obj, sensor, to_body, self.depsgraph)
+        sensor = sensor_reader.with_channels(obj, sensor, to_body, self.depsgraph)
         self.warnings += uv_layouts.layout_warnings(obj, sensor.texels)
         self.sensor_objects.append(obj)
         self._add(self.sensors, sensor, obj, mesh, to_body)
@@ -198,9 +268,9 @@ class _StartReader:
             targets=tuple(self.targets),
             frame_start=scene.frame_start,
             frame_end=scene.frame_end,
-            fps=units.frames_per_second(scene),
-            gravity=units.gravity(scene),
-            dt=None if settings.use_auto_dt else units.as_typed(settings.dt),
+            fps=transforms.frames_per_second(scene),
+            gravity=transforms.gravity(scene),
+            dt=None if settings.use_auto_dt else transforms.as_typed(settings.dt),
             name=scene.name,
             interpolation=settings.interpolation.lower(),
         )
@@ -216,7 +286,7 @@ class _StartReader:
 def _with_mass(obj, body: Body, mesh: TriangleMesh) -> tuple[Body, list[str]]:
     """Return a body with its mass properties, and warnings; a free body also gets its initial velocity."""
     settings = obj.palpate
-    mass = units.as_typed(settings.mass)
+    mass = transforms.as_typed(settings.mass)
     center, inertia, warnings = mass_properties(mesh, mass, obj.name)
     body = replace(body, mass=mass, center_of_mass=center, inertia=inertia)
     if settings.body == "DRIVEN":
@@ -224,8 +294,8 @@ def _with_mass(obj, body: Body, mesh: TriangleMesh) -> tuple[Body, list[str]]:
     return replace(
         body,
         free=True,
-        velocity=np.array([units.as_typed(value) for value in settings.velocity]),
-        angular_velocity=np.array([units.as_typed(value) for value in settings.angular_velocity]),
+        velocity=np.array([transforms.as_typed(value) for value in settings.velocity]),
+        angular_velocity=np.array([transforms.as_typed(value) for value in settings.angular_velocity]),
     ), warnings
 
 
@@ -292,8 +362,8 @@ def _read_frames(scene) -> Generator[Progress, None, SceneReading]:
     samples = (len(frames) - 1) * samples_per_frame + 1
     times = np.arange(samples) / (reading.scenario.fps * samples_per_frame)
     scenario = history.applied_to(reading.scenario, times)
-    warnings = _mass_warnings(scenario) + rounding_warnings.distance_warnings(scenario)
-    warnings += rounding_warnings.keyframe_warnings(participants.find_participants(scene)[0], scenario, reading.metres_per_unit)
+    warnings = _mass_warnings(scenario) + distance_warnings(scenario)
+    warnings += keyframe_warnings(participants.find_participants(scene)[0], scenario, reading.metres_per_unit)
     return replace(reading, scenario=scenario, warnings=reading.warnings + warnings)
 
 

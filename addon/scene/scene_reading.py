@@ -10,9 +10,9 @@ import numpy as np
 from ...core.errors import SceneError
 from ...core.model.scenario import Scenario
 from ..session import identity, transforms
-from . import attached_objects, body_poses, drives, moved_bodies
+from . import drives, moved_bodies
 from .deforming_objects import DeformingSurface, has_animated_scale
-from .mesh_snapshot import MeshSnapshots
+from .mesh_arrays import MeshSnapshots
 
 SAME_STRETCH = 1e-4
 """Largest relative change of an object's scale over time that is put down to rounding."""
@@ -139,10 +139,10 @@ class SceneReading:
                 targets[index] = drives.drive_target(obj, depsgraph)
                 matrix = drives.matrix_without_drive(matrices[index], self.parent_matrices[index][0], parents[index])
             else:
-                matrix = matrices[index] = body_poses.world_matrix(obj, depsgraph)
+                matrix = matrices[index] = moved_bodies.world_matrix(obj, depsgraph)
             poses[index] = self._pose(scene, index, obj, matrix)
         if self.attachments:
-            attached_objects.check_attachments(scene, depsgraph, self.attachments)
+            moved_bodies.check_attachments(scene, depsgraph, self.attachments)
         return FrameSample(poses, parents, targets, *self._shapes(scene, depsgraph, matrices))
 
     def record_fingerprints(self, objects, depsgraph) -> None:
@@ -155,7 +155,7 @@ class SceneReading:
         before = self._last_poses.get(index)
         if before is not None and before[0] == matrix.tobytes():
             return before[1]
-        position, quaternion, stretch = body_poses.decompose(obj, matrix)
+        position, quaternion, stretch = moved_bodies.decompose(obj, matrix)
         expected = self.stretches[index]
         may_deform = any(surface.body == index for surface in self.surfaces)
         if not (may_deform and has_animated_scale(obj)) and (
@@ -192,7 +192,7 @@ class SceneReading:
         if attachment is None:
             linear, offset = transforms.decompose(matrix)[2], np.zeros(3)
         else:
-            linear, offset = attached_objects.to_body_frame(matrix, attachment)
+            linear, offset = moved_bodies.to_body_frame(matrix, attachment)
         return linear * self.metres_per_unit, offset * self.metres_per_unit
 
 

@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.errors import PaintedError, RegionError
-from ..properties import painted_maps
-from ..session import units
-from . import display_names
+from ..properties import parameter_properties
+from ..session import transforms
+from . import stored_names
 
 
 def region_vertices(obj, count: int) -> np.ndarray:
@@ -63,7 +63,7 @@ def _faces_of_material(obj, name: str) -> np.ndarray:
         raise RegionError(f"Sensor '{obj.name}' has no material '{name}': choose one in its Region panel (was it renamed?).")
     index = np.empty(len(obj.data.polygons), dtype=np.int32)
     obj.data.polygons.foreach_get("material_index", index)
-    covered = obj.data.attributes.get(display_names.OLD_MATERIAL)
+    covered = obj.data.attributes.get(stored_names.OLD_MATERIAL)
     if covered is not None and len(covered.data) == len(index):
         before = np.empty(len(index), dtype=np.int32)
         covered.data.foreach_get("value", before)
@@ -123,9 +123,9 @@ def painted_multipliers(obj, key: str) -> np.ndarray | None:
         return None
     group = obj.vertex_groups.get(name)
     if group is not None:
-        return 1.0 + (units.as_typed(factor) - 1.0) * vertex_weights(obj.data, group.index).astype(float)
+        return 1.0 + (transforms.as_typed(factor) - 1.0) * vertex_weights(obj.data, group.index).astype(float)
     attribute = obj.data.attributes.get(name)
-    if attribute is None or not painted_maps.is_map(attribute):
+    if attribute is None or not parameter_properties.is_map(attribute):
         what = obj.palpate.bl_rna.properties[f"{key}_map"].name
         raise PaintedError(
             f"Sensor '{obj.name}' has no vertex group or attribute '{name}' any more, which its {what} names: "

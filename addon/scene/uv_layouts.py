@@ -10,7 +10,7 @@ import numpy as np
 from ...core.errors import ImageError
 from ...core.geometry.texels import Texels
 from ...core.geometry.texture_maps import UVLayout, mapped_layout
-from . import display_names, mesh_arrays
+from . import mesh_arrays, stored_names
 
 IMAGE_PROPERTIES = ("image_layout", "image_map", "image_size", "image_filter")
 """Properties of :class:`.properties.PALPATE_PG_object` that choose the layout."""
@@ -53,7 +53,7 @@ def uv_layer(obj):
     ImageError
         There is no such map, or the mesh is being edited.
     """
-    layers = [layer for layer in obj.data.uv_layers if layer.name != display_names.UV_MAP]
+    layers = [layer for layer in obj.data.uv_layers if layer.name != stored_names.UV_MAP]
     wanted = obj.palpate.image_map
     if not layers:
         raise ImageError(

@@ -6,15 +6,11 @@ are installed, and the solver's first compilation.
 """
 
 __all__ = [
-    "animation_time",
     "dependencies",
     "fcurves",
     "first_use",
     "frame_status",
     "identity",
-    "redraw",
     "session_state",
     "transforms",
-    "units",
-    "view_shading",
 ]

@@ -25,7 +25,7 @@ import bpy
 
 from ...core.jobs import Progress
 from ...core.solver import precompile, precompile_process
-from . import dependencies, redraw
+from . import dependencies, session_state
 
 if TYPE_CHECKING:
     from ...core.model.scenario import Scenario
@@ -191,7 +191,7 @@ def _poll() -> float | None:
     if _compilation is None:
         return None
     _show(now and f"{now.stage} …")
-    redraw.panels()
+    session_state.redraw_panels()
     if now is not None:
         return POLL_INTERVAL
     _change_over()

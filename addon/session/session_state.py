@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
+import bpy
+
 
 @dataclass
 class Session:
@@ -84,3 +86,32 @@ def suspended() -> Iterator[None]:
 def reset() -> None:
     """Reset everything, because another file is open or the add-on is being disabled."""
     session.__init__()
+
+
+def redraw_panels() -> None:
+    """Redraw panels, but no 3D view, because that may take long."""
+    for manager in bpy.data.window_managers:
+        for window in manager.windows:
+            for area in window.screen.areas:
+                if area.type == "PROPERTIES":
+                    area.tag_redraw()
+                for region in area.regions:
+                    if region.type == "UI" and area.type == "VIEW_3D":
+                        region.tag_redraw()
+
+
+def redraw_views() -> None:
+    """Redraw 3D views and panels."""
+    if bpy.app.background:
+        return
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type in {"VIEW_3D", "PROPERTIES"}:
+                area.tag_redraw()
+
+
+def is_xray(shading) -> bool:
+    """Return True where a 3D view draws objects see-through: Solid and Wireframe have a switch each."""
+    if shading.type == "WIREFRAME":
+        return shading.show_xray_wireframe
+    return shading.type == "SOLID" and shading.show_xray

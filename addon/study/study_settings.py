@@ -22,11 +22,11 @@ from ...core.study import study_file
 from ...core.study.scene_property import WholeNumber
 from ...core.study.variation import AXES
 from ..properties import effect_stack
+from ..properties.object_properties import MOVED_BY_FORCES
 from ..properties.parameter_properties import DRIVE_PARAMETER_PROPERTIES
-from ..properties.start_transforms import MOVED_BY_FORCES
 from ..properties.study_properties import NUMBER, WORDS
 from ..scene.drives import TARGET_PROPERTIES
-from ..session import units
+from ..session import transforms
 from . import scene_overrides
 from .scene_overrides import Found
 
@@ -92,7 +92,7 @@ def _known_to_solver(found: Found) -> Entry | None:
 
 def _object_entry(found: Found, obj) -> Entry | None:
     settings, key, value = obj.palpate, found.key, found.get()
-    number = units.as_typed(value) if isinstance(value, float) else value
+    number = transforms.as_typed(value) if isinstance(value, float) else value
     if key in SENSOR_PARAMETERS and settings.role in SENSORS:
         specification = SENSOR_PARAMETERS[key]
         if isinstance(specification, ChoiceParameter):
@@ -134,8 +134,8 @@ def _effect_entry(found: Found, obj) -> Entry | None:
         return Entry(f"{start}.form", ChoiceParameter("form", kind.forms[0].name, forms, ""), found.get())
     for parameter, key in effect_stack.parameters(item):
         if key == found.key and not parameter.per_texel:
-            specification = parameter.scaled(units.as_typed(obj.palpate.gain))
-            return Entry(f"{start}.{parameter.name}", specification, units.as_typed(found.get()))
+            specification = parameter.scaled(transforms.as_typed(obj.palpate.gain))
+            return Entry(f"{start}.{parameter.name}", specification, transforms.as_typed(found.get()))
     return None
 
 
@@ -196,9 +196,9 @@ def study_tables(scene) -> dict[str, Any]:
     if own.images:
         tables["images"] = True
     if own.use_limit:
-        tables["run_limit"] = units.as_typed(own.run_limit)
+        tables["run_limit"] = transforms.as_typed(own.run_limit)
     if own.use_memory_limit:
-        tables["run_memory"] = units.as_typed(own.run_memory)
+        tables["run_memory"] = transforms.as_typed(own.run_memory)
     tables["vary"] = {item.name: _distribution(item, own.design) for item in own.variables if item.use}
     if own.use_press:
         tables["press"] = _press(own)
@@ -211,7 +211,7 @@ def _distribution(item, design: str) -> Mapping[str, Any]:
     word = item.distribution.lower().replace("_", "-")
     pair = (item.mean, item.deviation) if item.distribution == "NORMAL" else (item.low, item.high)
     levels = {"levels": item.levels} if design == "GRID" else {}
-    return {word: [units.as_typed(value) for value in pair], **levels}
+    return {word: [transforms.as_typed(value) for value in pair], **levels}
 
 
 def _word(text: str) -> Any:
@@ -238,7 +238,7 @@ def _press(own) -> dict[str, Any]:
 
 def _range(low: float, high: float) -> Any:
     """Return a uniform distribution, or the number where there is only one."""
-    first, second = units.as_typed(low), units.as_typed(high)
+    first, second = transforms.as_typed(low), transforms.as_typed(high)
     return first if first == second else {"uniform": [first, second]}
 
 

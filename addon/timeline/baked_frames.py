@@ -13,7 +13,7 @@ from ...core.figures.quantities import Extent, Scale
 from ...core.io.bake_reader import Bake, read_sensors
 from ...core.model.recording import Frame, Recording
 from ..display import bake_display, bake_identity, baked_scene, inset, overlays
-from ..session import animation_time, frame_status, identity
+from ..session import fcurves, frame_status, identity
 from . import staleness
 
 _new: dict[Path, Recording] = {}
@@ -44,7 +44,7 @@ def remember(recording: Recording, folders: dict[str, Path]) -> None:
 
 def show(scene, depsgraph) -> None:
     """Show the numbers of a bake's present frame in the panel, and its images and curves in the 3D view."""
-    number, _ = animation_time.current_frame(scene)
+    number, _ = fcurves.current_frame(scene)
     try:
         recording = _recording(scene)
     except PalpateError as error:

@@ -18,9 +18,9 @@ from ...core.errors import PalpateError
 from ...core.figures.quantities import Extent, Quantity
 from ...core.model.recording import Frame
 from ...core.model.scenario import Scenario
-from ..properties import start_transforms
-from ..scene import mesh_fingerprint, moved_bodies, participants, scene_fingerprint, scene_reader, scene_reading
-from ..session import animation_time, first_use, session_state
+from ..properties import object_properties
+from ..scene import mesh_arrays, moved_bodies, participants, scene_fingerprint, scene_reader, scene_reading
+from ..session import fcurves, first_use, session_state
 
 
 @dataclass
@@ -130,7 +130,7 @@ def start(scene, depsgraph) -> LiveRun | None:
         simulation=first_use.load_solver().Simulation(reading.scenario),
         placements=placements,
         settings=scene_fingerprint.settings_of(scene, everyone),
-        mesh_fingerprints={obj.name: mesh_fingerprint.evaluated_fingerprint(obj, depsgraph) for obj in everyone},
+        mesh_fingerprints={obj.name: mesh_arrays.evaluated_fingerprint(obj, depsgraph) for obj in everyone},
     )
     first = reading.scenario.frame_start
     run.frames[first] = run.simulation.observe()
@@ -143,7 +143,7 @@ def start(scene, depsgraph) -> LiveRun | None:
 
 def advance(scene, depsgraph, run: LiveRun) -> LiveRun:
     """Compute the frame at which the scene stands, which must be the frame after the last computed one."""
-    frame, _ = animation_time.current_frame(scene)
+    frame, _ = fcurves.current_frame(scene)
     sample = run.samples[frame] = run.reading.sample(scene, depsgraph)
     if scene.palpate.subframes > 1:
         _sample_between_frames(scene, run, frame)
@@ -173,7 +173,7 @@ def at_other_frames(scene) -> Iterator[None]:
     before = scene.frame_current, scene.frame_subframe
     with session_state.suspended():
         try:
-            with animation_time.without_time_stretching(scene):
+            with fcurves.without_time_stretching(scene):
                 yield
         finally:
             scene.frame_set(before[0], subframe=before[1])
@@ -198,27 +198,27 @@ def is_stale(scene, depsgraph, run: LiveRun) -> bool:
     session_state.session.changed_geometry -= touched
     deforming = {surface.name for surface in run.reading.surfaces}
     if any(
-        mesh_fingerprint.evaluated_fingerprint(everyone[name], depsgraph) != run.mesh_fingerprints[name]
+        mesh_arrays.evaluated_fingerprint(everyone[name], depsgraph) != run.mesh_fingerprints[name]
         for name in touched - deforming
     ):
         return True
     # What deforms has another shape at every frame: it is compared with its shape at this frame, if that is known.
     if not touched & deforming:
         return False
-    return animation_time.current_frame(scene)[0] not in run.samples or has_moved(scene, depsgraph, run)
+    return fcurves.current_frame(scene)[0] not in run.samples or has_moved(scene, depsgraph, run)
 
 
 def _has_new_start(scene, run: LiveRun, objects: list) -> bool:
     """Return True when the user has moved a free or driven body while it stood at the first frame."""
     placed = run.placed_channels
-    is_moved = any(not np.array_equal(start_transforms.transform_channels(objects[i]), put) for i, put in placed.items())
+    is_moved = any(not np.array_equal(object_properties.transform_channels(objects[i]), put) for i, put in placed.items())
     stand_at_start = all(not objects[index].palpate.has_start for index in placed)
     return is_moved and stand_at_start and scene.frame_start in run.frames
 
 
 def has_moved(scene, depsgraph, run: LiveRun) -> bool:
     """Return True when animation gives other poses, shapes or drive targets now than when the present frame was computed."""
-    before = run.samples[animation_time.current_frame(scene)[0]]
+    before = run.samples[fcurves.current_frame(scene)[0]]
     try:
         now = run.reading.sample(scene, depsgraph)
     except PalpateError:

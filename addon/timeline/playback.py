@@ -12,11 +12,11 @@ import numpy as np
 
 from ...core.errors import PalpateError
 from ...core.jobs import Progress
-from ..display import baked_scene, materials, overlays
-from ..properties import start_transforms
-from ..scene import participants, scene_fingerprint
-from ..session import animation_time, first_use, frame_status, session_state
-from . import baked_frames, live_cache, played_changes
+from ..display import baked_scene, overlays
+from ..properties import object_properties
+from ..scene import participants, scene_fingerprint, stored_names
+from ..session import fcurves, first_use, frame_status, session_state
+from . import baked_frames, live_cache, staleness
 
 _errors: dict[int, str] = {}
 """By scene: why the last attempt to compute failed."""
@@ -63,7 +63,7 @@ def on_frame(scene, depsgraph) -> None:
     if not _is_on(scene) or _waits_for_solver(scene):
         return
     run = live_cache.get(scene)
-    frame, part = animation_time.current_frame(scene)
+    frame, part = fcurves.current_frame(scene)
     if not session_state.session.rendering and not part:
         run = _updated_run(scene, depsgraph, run, frame)
     if run is not None and frame in run.frames:
@@ -78,7 +78,7 @@ def on_frame(scene, depsgraph) -> None:
 
 def _note_missing(scene) -> None:
     """Note once in a render that it shows neither forces nor the motion of free bodies, as nothing is computed meanwhile."""
-    session, run, here = session_state.session, live_cache.get(scene), animation_time.current_frame(scene)
+    session, run, here = session_state.session, live_cache.get(scene), fcurves.current_frame(scene)
     is_shown = run is not None and here[0] in run.frames and not _renders_beside_window(scene)
     if session.render_note or here == session.rendered_from or is_shown or baked_scene.baked_objects(scene):
         return
@@ -129,7 +129,7 @@ def solver_is_ready() -> None:
 
 def _not_computed(scene, run) -> str:
     """Return why the present frame cannot be shown, and what to do."""
-    frame, _ = animation_time.current_frame(scene)
+    frame, _ = fcurves.current_frame(scene)
     if run is not None:
         return f"Frame {frame} is not computed: play from frame {run.simulation.frame}, or use Compute to Here."
     reason = _errors.get(scene.session_uid)
@@ -140,7 +140,7 @@ def missing_frames(scene) -> range:
     """Return the frames that have to be computed to show the present one; empty when they cannot be computed."""
     if not _is_on(scene) or scene.session_uid in _errors:
         return range(0)
-    (frame, part), run = animation_time.current_frame(scene), live_cache.get(scene)
+    (frame, part), run = fcurves.current_frame(scene), live_cache.get(scene)
     first = scene.frame_start if run is None else run.simulation.frame + 1
     return range(first, min(frame + bool(part), scene.frame_end) + 1)
 
@@ -157,7 +157,7 @@ def compute_to_present_frame(scene) -> Generator[Progress, None, None]:
     wanted, frames = (scene.frame_current, scene.frame_subframe), missing_frames(scene)
     session_state.session.catching_up = True
     try:
-        with animation_time.without_time_stretching(scene):
+        with fcurves.without_time_stretching(scene):
             for done, number in enumerate(frames, 1):
                 scene.frame_set(number)
                 if scene.session_uid in _waiting:
@@ -212,7 +212,7 @@ def _renders_beside_window(scene) -> bool:
 
 def _has_moved(scene, depsgraph, run) -> bool:
     """Return True when animation differs from that with which the present frame was computed."""
-    return animation_time.current_frame(scene)[0] in run.frames and live_cache.has_moved(scene, depsgraph, run)
+    return fcurves.current_frame(scene)[0] in run.frames and live_cache.has_moved(scene, depsgraph, run)
 
 
 def _start(scene, depsgraph):
@@ -236,15 +236,15 @@ def _attempt(scene, work):
 
 def show(scene, run) -> None:
     """Show bodies and heat maps as a run has computed them at the present frame."""
-    number, part = animation_time.current_frame(scene)
+    number, part = fcurves.current_frame(scene)
     frame = run.frames[number]
     objects = run.reading.objects(scene)
     for index, placement in run.placements.items():
         if number == run.scenario.frame_start and not part:
-            start_transforms.restore_start(objects[index])
+            object_properties.restore_start(objects[index])
         else:
             _place(run, objects[index], placement, index, number, part)
-        run.placed_channels[index] = start_transforms.transform_channels(objects[index])
+        run.placed_channels[index] = object_properties.transform_channels(objects[index])
     for sensor, obj in zip(run.scenario.sensors, run.reading.sensor_objects(scene), strict=True):
         if sensor.readout and obj is not None:
             _write_force(obj, sensor.texels.vertex, frame.sensors[sensor.name].normal_force)
@@ -271,7 +271,7 @@ def _write_force(obj, vertex: np.ndarray, force: np.ndarray) -> None:
     mesh = obj.data
     if obj.mode == "EDIT" or not mesh.is_editable:
         return
-    attribute = mesh.attributes.get(materials.FORCE) or mesh.attributes.new(materials.FORCE, "FLOAT", "POINT")
+    attribute = mesh.attributes.get(stored_names.FORCE) or mesh.attributes.new(stored_names.FORCE, "FLOAT", "POINT")
     values = np.zeros(len(mesh.vertices), dtype=np.float32)
     values[vertex] = force
     attribute.data.foreach_set("value", values)
@@ -295,15 +295,15 @@ def show_new_bake(scene, recording, folders) -> None:
 
 
 def unhide(scene) -> None:
-    """Show the present frame again after :func:`.played_changes.hide`."""
+    """Show the present frame again after :func:`.staleness.remove_played`."""
     run = live_cache.get(scene)
-    if run is not None and animation_time.current_frame(scene)[0] in run.frames:
+    if run is not None and fcurves.current_frame(scene)[0] in run.frames:
         _attempt(scene, lambda: show(scene, run))
 
 
 def reset(scene) -> None:
     """Move bodies back to their start and forget what was computed."""
-    played_changes.hide(scene)
+    staleness.remove_played(scene)
     live_cache.drop(scene)
     overlays.clear(scene)
     frame_status.forget(scene)

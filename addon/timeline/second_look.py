@@ -12,8 +12,8 @@ from contextlib import suppress
 import bpy
 
 from ..display import baked_scene, markers, overlays
-from ..scene import animation_fingerprint, participants
-from ..session import animation_time, fcurves, frame_status, redraw, session_state
+from ..scene import participants, scene_fingerprint
+from ..session import fcurves, frame_status, session_state
 from . import baked_frames, live_cache, playback
 
 DELAY = 0.1
@@ -121,10 +121,10 @@ def look_again(scene) -> None:
         baked_scene.clear_copies(scene)
         markers.follow_names(scene, baked)
         baked_frames.show(scene, depsgraph)
-        redraw.views()
+        session_state.redraw_views()
         return
     run = live_cache.get(scene)
-    frame, part = animation_time.current_frame(scene)
+    frame, part = fcurves.current_frame(scene)
     is_shown = run is not None and frame in run.frames
     if part or not is_shown and scene.session_uid not in _dropped:
         return  # no numbers were taken away
@@ -140,12 +140,12 @@ def look_again(scene) -> None:
     frame_status.set_status(scene, "Out of date, something has changed: use Compute to Here, or play from the first frame.")
     _dropped.add(scene.session_uid)
     playback.forget_error(scene)
-    blocks = animation_fingerprint.related_data_blocks(participants.find_participants(scene)[0])
+    blocks = scene_fingerprint.related_data_blocks(participants.find_participants(scene)[0])
     if not any(fcurves.has_other_values(block, frame) for block in blocks):  # what is not keyframed would be put back
         _compute_again(scene)
         if playback.missing_frames(scene):
             compute_later()
-    redraw.views()
+    session_state.redraw_views()
 
 
 def _compute_again(scene) -> None:

@@ -12,9 +12,9 @@ import numpy as np
 from ...core.errors import PalpateError
 from ...core.io.bake_folder import UNCHANGED_NOTE
 from ...core.model.recording import Recording
-from ..properties import start_transforms
-from ..scene import baked_names, body_poses, mesh_fingerprint, participants, scene_fingerprint
-from ..session import animation_time, units
+from ..properties import object_properties
+from ..scene import mesh_arrays, moved_bodies, participants, scene_fingerprint, stored_names
+from ..session import fcurves, transforms
 
 SAME_POSE = 1e-6
 """Share of the largest length in a pose, and components of a quaternion, by which a recorded pose may differ: an evaluated
@@ -48,18 +48,18 @@ def note_unchanged(scene) -> None:
 
 def _has_deformed(scene, depsgraph) -> bool:
     """Return True when a mesh that may deform differs from the mesh that was baked at this frame."""
-    number, part = animation_time.current_frame(scene)
+    number, part = fcurves.current_frame(scene)
     index = number - scene.palpate.baked_start
     if part or not 0 <= index <= scene.palpate.baked_end - scene.palpate.baked_start:
         return False
     fingerprints = scene_fingerprint.fingerprints_at(scene.palpate.baked_shapes, index)
-    objects = baked_names.objects_of_bake(scene, fingerprints)
+    objects = stored_names.objects_of_bake(scene, fingerprints)
     for name, baked in fingerprints.items():
         obj = objects.get(name)
         if obj is None or obj.type not in participants.OBJECT_TYPES:
             return True
         try:
-            if mesh_fingerprint.evaluated_fingerprint(obj, depsgraph) != baked:
+            if mesh_arrays.evaluated_fingerprint(obj, depsgraph) != baked:
                 return True
         except PalpateError:
             return True
@@ -68,25 +68,42 @@ def _has_deformed(scene, depsgraph) -> bool:
 
 def _has_moved(scene, depsgraph, recording: Recording) -> bool:
     """Return True when a keyframed body is not where the recording has it at this frame."""
-    number, part = animation_time.current_frame(scene)
+    number, part = fcurves.current_frame(scene)
     if number not in recording.frames or part:
         return False
     poses = recording.poses[int(np.searchsorted(recording.frames, number))]
     extent = float(np.abs(poses[:, :3]).max(initial=0.0))
-    objects = baked_names.objects_of_bake(scene, recording.body_names)
+    objects = stored_names.objects_of_bake(scene, recording.body_names)
     for name, pose in zip(recording.body_names, poses, strict=True):
         obj = objects.get(name)
         if obj is None:
             return True
-        if obj.palpate.body in start_transforms.MOVED_BY_FORCES:
+        if obj.palpate.body in object_properties.MOVED_BY_FORCES:
             continue
         try:
-            now = body_poses.body_pose(scene, obj, depsgraph)
+            now = moved_bodies.body_pose(scene, obj, depsgraph)
         except PalpateError:
             return True
-        size = max(extent, units.metres_per_unit(scene) * max(obj.dimensions))
+        size = max(extent, transforms.metres_per_unit(scene) * max(obj.dimensions))
         if np.abs(now[:3] - pose[:3]).max() > SAME_POSE * size:
             return True
         if min(np.abs(now[3:] - sign * pose[3:]).max() for sign in (1.0, -1.0)) > SAME_POSE:
             return True
     return False
+
+
+def remove_played(scene) -> None:
+    """Undo what playing has changed in the scene; what was computed is kept.
+
+    Also for files that were written without this, as after a crash, and for changes by a run that has been dropped.
+    """
+    for obj in scene.objects:
+        settings = obj.palpate
+        if settings.is_baked or not settings.uid:
+            continue
+        if settings.has_start and obj.is_editable:
+            object_properties.restore_start(obj)
+        if obj.type == "MESH" and obj.data.is_editable:
+            attribute = obj.data.attributes.get(stored_names.FORCE)
+            if attribute is not None:
+                obj.data.attributes.remove(attribute)

@@ -15,8 +15,7 @@ from ..workspace import Workspace
 from .deformation import place_all_triangles, place_listed_triangles
 from .detection_data import LANES, DetectionData
 from .neighbour_lists import find_entry, rebuild_list
-from .segments import clear_slot, finish_block, segment_of, write_relative_pose, write_row
-from .shape_contacts import find_shape_contacts
+from .shape_contacts import clear_slot, find_shape_contacts, finish_block, segment_of, write_relative_pose, write_row
 
 NEARLY_TOO_DEEP = 0.9
 """Share of the maximum penetration. If a point was deeper than this a step ago and its segment meets nothing now, it may be

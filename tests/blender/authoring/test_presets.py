@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 from blender_scenes import ball, grid, press
 
-from palpate.addon.authoring import sensor_presets
+from palpate.addon.authoring import laid_sensors
 from palpate.addon.properties.parameter_properties import sensor_parameters
-from palpate.addon.scene import mesh_fingerprint, participants, scene_reader, sensor_regions
+from palpate.addon.scene import mesh_arrays, participants, scene_reader, sensor_regions
 from palpate.addon.timeline import live_cache
 from palpate.core.errors import SensorError
 from palpate.core.model.sensor_parameters import SensorParameters
 
-PRESETS = sorted((sensor_presets.FOLDER / "palpate" / "sensor").glob("*.py"))
+PRESETS = sorted((laid_sensors.FOLDER / "palpate" / "sensor").glob("*.py"))
 
 
 def test_blender_finds_the_presets():
     found = {Path(path) for path in bpy.utils.preset_paths("palpate/sensor")}
-    assert sensor_presets.FOLDER / "palpate" / "sensor" in found
+    assert laid_sensors.FOLDER / "palpate" / "sensor" in found
 
 
 @pytest.mark.parametrize("path", PRESETS, ids=lambda path: path.stem)
@@ -155,14 +155,14 @@ def test_a_changed_region_or_painted_map_is_noticed():
     depsgraph = participants.depsgraph_of(scene)
     run = live_cache.start(scene, depsgraph)
     assert not live_cache.is_stale(scene, depsgraph, run)
-    first = mesh_fingerprint.evaluated_fingerprint(pad, depsgraph)
+    first = mesh_arrays.evaluated_fingerprint(pad, depsgraph)
     pad.data.polygons.foreach_set("material_index", np.ones(len(pad.data.polygons), dtype=np.int32))
-    assert mesh_fingerprint.evaluated_fingerprint(pad, depsgraph) != first
-    second = mesh_fingerprint.evaluated_fingerprint(pad, depsgraph)
+    assert mesh_arrays.evaluated_fingerprint(pad, depsgraph) != first
+    second = mesh_arrays.evaluated_fingerprint(pad, depsgraph)
     group = pad.vertex_groups.new(name="Soft")
     pad.palpate.k_map = "Soft"
     group.add([0], 1.0, "REPLACE")
-    assert mesh_fingerprint.evaluated_fingerprint(pad, depsgraph) != second
+    assert mesh_arrays.evaluated_fingerprint(pad, depsgraph) != second
     assert live_cache.is_stale(scene, depsgraph, run)
 
 

@@ -9,7 +9,7 @@ from sample_bake import read_exr
 
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import heat_map, marker_meshes, materials
-from palpate.addon.scene import display_names, scene_reader
+from palpate.addon.scene import scene_reader, stored_names
 from palpate.addon.session import fcurves, session_state, transforms
 from palpate.core.errors import FileError
 from palpate.core.io.bake_folder import read_manifest
@@ -341,7 +341,7 @@ def test_a_sensor_all_around_has_a_heat_map_on_its_vertices(tmp_path):
         scene.frame_set(i + 1)
         mesh = tip.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
         values = np.zeros(8, dtype=np.float32)
-        mesh.attributes[materials.FORCE].data.foreach_get("value", values)
+        mesh.attributes[stored_names.FORCE].data.foreach_get("value", values)
         assert values == pytest.approx(readings.normal_force[i], abs=1e-7)
     scenario = run_job(scene_reader.read_scene(scene)).scenario  # its own nodes do not change what is sampled
     assert scenario.digest() == run_job(bake(scene)).recording.digest
@@ -435,7 +435,7 @@ def test_the_buttons_leave_the_mode_in_which_a_mesh_is_changed(tmp_path, mode):
         bpy.ops.object.mode_set(mode="EDIT")  # which would bring back what the mesh was before
         bpy.ops.object.mode_set(mode="OBJECT")
         assert pad.palpate.is_baked == is_baked
-        assert (display_names.UV_MAP in pad.data.uv_layers) == is_baked
+        assert (stored_names.UV_MAP in pad.data.uv_layers) == is_baked
         assert {face.material_index for face in pad.data.polygons} == {int(is_baked)}
 
 

@@ -8,8 +8,8 @@ from blender_scenes import ball, changes, dump, grid, press, press_and_drop, reo
 
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import indentation, materials, overlays, played_table
-from palpate.addon.scene import mesh_arrays, mesh_fingerprint
-from palpate.addon.scene.display_names import INDENTATION_MODIFIER
+from palpate.addon.scene import mesh_arrays, stored_names
+from palpate.addon.scene.stored_names import INDENTATION_MODIFIER
 from palpate.addon.session import frame_status
 from palpate.addon.timeline import live_cache
 from palpate.core.figures.figure_style import FigureStyle
@@ -93,10 +93,10 @@ def test_a_sensor_that_deforms_is_not_stale(tmp_path):
     key.keyframe_insert("value", frame=8)
     scene.frame_set(1)
     save(tmp_path)
-    plain = mesh_fingerprint.evaluated_fingerprint(pad, bpy.context.evaluated_depsgraph_get())
+    plain = mesh_arrays.evaluated_fingerprint(pad, bpy.context.evaluated_depsgraph_get())
     result = run_job(bake(scene))
     assert result.scenario.sensors[0].deformation is not None
-    assert mesh_fingerprint.evaluated_fingerprint(pad, bpy.context.evaluated_depsgraph_get()) == plain
+    assert mesh_arrays.evaluated_fingerprint(pad, bpy.context.evaluated_depsgraph_get()) == plain
     scene.frame_set(8)
     assert frame_status.status_of(scene).text == "Frame 8 of the bake."
     depth = result.recording.at(8).sensors["Pad"].depth.max()
@@ -239,7 +239,7 @@ def test_factor_undo_and_reopening_of_a_played_scene(tmp_path):
     save(tmp_path)
     scene = reopen(tmp_path / "scene.blend")
     pad = scene.objects["Pad"]
-    assert not pad.modifiers and not pad.data.attributes.get(materials.FORCE) and len(surface(pad)) == len(pad.data.vertices)
+    assert not pad.modifiers and not pad.data.attributes.get(stored_names.FORCE) and len(surface(pad)) == len(pad.data.vertices)
     assert not [item.name for item in pad.data.attributes if item.name.startswith("palpate")]
     again, _ = playing(scene, 8)
     assert (again.at_rest[:, 2] - again.corners[:, 2]).max() == pytest.approx(3.0 * deepest, rel=1e-4)

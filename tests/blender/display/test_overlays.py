@@ -8,6 +8,7 @@ from blender_scenes import changes, cube, dump, press_and_drop, save
 
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import bake_display, baked_scene, markers, materials, overlays, texel_arrows
+from palpate.addon.scene.stored_names import ARROWS_MODIFIER
 from palpate.addon.session import transforms
 from palpate.core import response
 from palpate.core.errors import PalpateError
@@ -183,10 +184,7 @@ def test_arrows_of_a_lost_image_do_not_show(baked, tmp_path):
 @pytest.mark.parametrize("end", ["read", "stopped"])
 def test_arrows_rest_while_a_bake_reads_the_scene(baked, end):
     scene, pad, _ = baked
-    own = [
-        markers.find_marker(scene.objects, pad.palpate.uid, kind).modifiers[texel_arrows.MODIFIER]
-        for kind in texel_arrows.KINDS
-    ]
+    own = [markers.find_marker(scene.objects, pad.palpate.uid, kind).modifiers[ARROWS_MODIFIER] for kind in texel_arrows.KINDS]
     own[1].show_viewport = False  # as the user left it
     work = bake(scene)
     for _ in range(3):

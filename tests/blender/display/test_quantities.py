@@ -12,7 +12,7 @@ from palpate.addon.display import bake_display, baked_scene, heat_map, materials
 from palpate.addon.properties import scene_properties
 from palpate.addon.render import figure_export, workbench_colors
 from palpate.addon.scene import mesh_arrays
-from palpate.addon.scene.display_names import GAP_COLORS
+from palpate.addon.scene.stored_names import GAP_COLORS
 from palpate.addon.timeline import live_cache
 from palpate.core.errors import PalpateError
 from palpate.core.figures import color_maps

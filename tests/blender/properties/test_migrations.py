@@ -6,7 +6,7 @@ import pytest
 from blender_scenes import press, reopen, save
 
 from palpate.addon.properties import migrations
-from palpate.addon.properties.settings_migration import VERSION
+from palpate.addon.properties.migrations import VERSION
 from palpate.addon.session import session_state
 from palpate.core.io.hidden_folder import FolderLock
 

@@ -4,7 +4,7 @@
 import bpy
 import pytest
 
-from palpate.addon.authoring.sensor_presets import COPIED
+from palpate.addon.authoring.laid_sensors import COPIED
 from palpate.addon.properties.parameter_properties import CONSTANT, put_sensor_parameters, sensor_parameters
 from palpate.addon.scene import scene_fingerprint
 from palpate.core.model.body import DRIVE_PARAMETERS

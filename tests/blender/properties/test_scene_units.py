@@ -9,7 +9,7 @@ from blender_scenes import press, reopen, save
 from palpate.addon.properties.parameter_properties import sensor_parameters
 from palpate.addon.properties.scene_units import ENDING, KINDS, name_in_units
 from palpate.addon.scene import scene_reader
-from palpate.addon.session import units
+from palpate.addon.session import transforms
 from palpate.core.io.sensor_toml import SensorModel, read_sensor, write_sensor
 from palpate.core.jobs import run_job
 from palpate.core.model.body import DRIVE_PARAMETERS
@@ -30,11 +30,11 @@ def test_what_is_typed_in_units_of_the_scene_is_stored_in_si(name, scale):
     """Blender divides what is typed, as 12 mm, by the scale; what is stored is the number that was meant, bit for bit."""
     scene, pad, _ = press()
     set_units(scale=scale)
-    own, size = pad.palpate, units.metres_per_unit(scene) ** SHOWN[name]
+    own, size = pad.palpate, transforms.metres_per_unit(scene) ** SHOWN[name]
     for meant in np.random.default_rng(3).integers(1, 99999, 200) * 1e-6:
         meant = float(f"{meant:.6g}")
         setattr(own, name + ENDING, meant / size)
-        assert units.as_typed(getattr(own, name)) == meant
+        assert transforms.as_typed(getattr(own, name)) == meant
         assert getattr(own, name + ENDING) == pytest.approx(meant / size, rel=2e-7)
     assert name + ENDING not in own  # the file has the SI value alone
 
@@ -43,12 +43,12 @@ def test_a_velocity_and_the_lengths_of_a_pattern():
     scene, pad, _ = press()
     set_units(scale=0.001)
     pad.palpate.velocity_in_units = (20.0, -5.5, 0.0)
-    assert [units.as_typed(value) for value in pad.palpate.velocity] == [0.02, -0.0055, 0.0]
+    assert [transforms.as_typed(value) for value in pad.palpate.velocity] == [0.02, -0.0055, 0.0]
     for name in ("pitch_x", "pitch_y", "shift_x", "shift_y", "spacing", "lift"):
         setattr(pad.palpate.skin, name + ENDING, 3.4)
-        assert units.as_typed(getattr(pad.palpate.skin, name)) == 0.0034
+        assert transforms.as_typed(getattr(pad.palpate.skin, name)) == 0.0034
     scene.palpate.figures.marker_pitch_in_units = 1.5
-    assert units.as_typed(scene.palpate.figures.marker_pitch) == 0.0015
+    assert transforms.as_typed(scene.palpate.figures.marker_pitch) == 0.0015
 
 
 def test_bounds_are_those_of_the_value_in_si():

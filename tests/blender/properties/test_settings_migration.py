@@ -3,7 +3,7 @@
 
 import pytest
 
-from palpate.addon.properties.settings_migration import STEPS, VERSION, migrate
+from palpate.addon.properties.migrations import STEPS, VERSION, migrate
 from palpate.core.errors import FileError
 
 

@@ -9,7 +9,7 @@ import pytest
 from blender_scenes import press, press_and_drop
 
 from palpate.addon.bake.bake import bake
-from palpate.addon.scene import mesh_fingerprint, participants, scene_reader
+from palpate.addon.scene import mesh_arrays, participants, scene_reader
 from palpate.addon.session import frame_status, transforms
 from palpate.addon.timeline import playback
 from palpate.core.errors import SceneError
@@ -100,7 +100,7 @@ def test_looks_are_the_fingerprints_of_every_frame(how):
     for frame in range(1, 7):
         scene.frame_set(frame)
         for name, found in expected.items():
-            found.append(mesh_fingerprint.evaluated_fingerprint(scene.objects[name], participants.depsgraph_of(scene)))
+            found.append(mesh_arrays.evaluated_fingerprint(scene.objects[name], participants.depsgraph_of(scene)))
     assert reading.mesh_fingerprints == expected
     assert len(set(expected["Ball"][:4])) > 2 and len(set(expected["Pad"])) == 1
 

@@ -10,7 +10,7 @@ from blender_scenes import ball, cube, grid, press
 from mathutils import Matrix, Quaternion
 
 from palpate.addon.scene import scene_reader
-from palpate.addon.session import transforms, units
+from palpate.addon.session import transforms
 from palpate.core.errors import SceneError
 from palpate.core.geometry.mesh import face_normals
 from palpate.core.jobs import run_job
@@ -78,7 +78,7 @@ def test_unit_scale_makes_metres():
     assert there.sensors[0].texels.position == pytest.approx(here.sensors[0].texels.position, abs=1e-8)
     assert there.gravity.tolist() == here.gravity.tolist()
     scene.unit_settings.system = "NONE"
-    assert units.metres_per_unit(scene) == 1.0
+    assert transforms.metres_per_unit(scene) == 1.0
 
 
 def _curves(obj):

@@ -9,8 +9,8 @@ import pytest
 from blender_scenes import changes, dump, press, press_and_drop, reopen, save
 
 from palpate.addon.bake.bake import bake
-from palpate.addon.display import materials
 from palpate.addon.events import handlers as handlers_of_palpate
+from palpate.addon.scene import stored_names
 from palpate.addon.session import frame_status, session_state
 from palpate.addon.timeline import live_cache, playback
 from palpate.core.jobs import run_job
@@ -24,7 +24,7 @@ def play(scene, *frames):
 
 
 def shown_force(obj):
-    attribute = obj.data.attributes.get(materials.FORCE)
+    attribute = obj.data.attributes.get(stored_names.FORCE)
     if attribute is None:
         return None
     values = np.zeros(len(obj.data.vertices), dtype=np.float32)
@@ -354,7 +354,7 @@ def test_a_file_saved_in_edit_mode_while_playing_holds_none_of_it(tmp_path):
     bpy.context.view_layer.objects.active = pad
     bpy.ops.object.mode_set(mode="EDIT")
     path = save(tmp_path)
-    assert materials.FORCE not in stored_mesh(path, pad).attributes
+    assert stored_names.FORCE not in stored_mesh(path, pad).attributes
     bpy.ops.object.mode_set(mode="OBJECT")
     play(scene, *range(1, 5))
     assert shown_force(pad).max() > 0.0  # it goes on
@@ -366,7 +366,7 @@ def test_a_file_saved_when_what_was_played_is_stale_holds_none_of_it(tmp_path):
     pad.palpate.k *= 2.0
     play(scene, 4)
     assert live_cache.get(scene) is None
-    assert materials.FORCE not in stored_mesh(save(tmp_path), pad).attributes
+    assert stored_names.FORCE not in stored_mesh(save(tmp_path), pad).attributes
 
 
 @pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
@@ -380,9 +380,9 @@ def test_a_file_written_by_a_crash_is_cleaned_when_opened(tmp_path, mode):
     bpy.app.handlers.save_pre.clear()
     path = save(tmp_path)
     bpy.app.handlers.save_pre.extend(hidden)
-    assert materials.FORCE in stored_mesh(path, pad).attributes
+    assert stored_names.FORCE in stored_mesh(path, pad).attributes
     scene = reopen(path)
-    assert materials.FORCE not in scene.objects["Pad"].data.attributes
+    assert stored_names.FORCE not in scene.objects["Pad"].data.attributes
     assert tuple(scene.objects["Cube"].location) == start
 
 

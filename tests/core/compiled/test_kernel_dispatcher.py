@@ -11,7 +11,7 @@ from numba.core.caching import NullCache
 from oracles import interpreted
 from solver_scenes import cube_on_pad
 
-from palpate.core.compiled import kernel_dispatcher, kernels
+from palpate.core.compiled import kernels
 from palpate.core.compiled.kernels import inlined, kernel
 from palpate.core.solver.simulation import Simulation
 from palpate.core.solver.substep import advance_frames
@@ -87,8 +87,8 @@ def test_a_compiler_that_fails_is_said_once_and_the_numbers_are_the_same(monkeyp
         raise RuntimeError("LLVM has no such target")
 
     with monkeypatch.context() as patch:
-        patch.setattr(kernel_dispatcher.CPUDispatcher, "compile", fail)
-        patch.setattr(kernel_dispatcher, "_failed", False)
+        patch.setattr(kernels.CPUDispatcher, "compile", fail)
+        patch.setattr(kernels, "_failed", False)
 
         @kernel
         def three_times(number):
@@ -100,7 +100,7 @@ def test_a_compiler_that_fails_is_said_once_and_the_numbers_are_the_same(monkeyp
             kernels.compile_kernels()
             assert kernels.are_interpreted(), "it would only fail again"
         finally:
-            patch.setattr(kernel_dispatcher, "_failed", False)
+            patch.setattr(kernels, "_failed", False)
             kernels.compile_kernels()
     assert capfd.readouterr().err.splitlines() == [
         "Palpate's solver cannot be compiled here and computes slowly, with the same numbers: LLVM has no such target"
