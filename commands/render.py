@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ..core.figures.figure_canvas import FILE_TYPES as FORMATS
-from ..core.io.file_list import remove_own_files
 from ..core.io.file_writing import writable_folder
+from ..core.io.hidden_folder import remove_own_files
 from . import blender, console, figure_options
 
 FIGURES = ("scene", "strip", "curves", "numbers", "video", "gel")

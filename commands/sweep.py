@@ -89,7 +89,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.status:
         print(studies.status_of(folder))
         return 0
-    from ..core.study.progress import STUDY_NAME
+    from ..core.study.study_file import STUDY_NAME
     from ..sweep import driver, exports, study_folder
 
     driver.require_dask()

@@ -3,7 +3,7 @@
 
 from ..addon.properties import object_properties
 from ..addon.properties.scene_units import name_in_units
-from ..addon.scene import drives
+from ..addon.scene import moved_bodies
 from .subpanels import Subpanel, draw_named, draw_sentences
 
 
@@ -40,7 +40,7 @@ def _draw_drive(layout, settings, scene) -> None:
     draw_named(layout, settings, "drive_control")
     column = layout.column(align=True)
     column.use_property_decorate = True
-    column.prop(settings, drives.TARGET_PROPERTIES[settings.drive_control])
+    column.prop(settings, moved_bodies.TARGET_PROPERTIES[settings.drive_control])
     column = layout.column(align=True)
     column.prop(settings, "drive_max_force")
     column.prop(settings, name_in_units(settings, "drive_max_speed", scene))

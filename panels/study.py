@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Panel of a scene's study: what varies, over what, and the button that computes it."""
 
-from ..addon.properties.study_properties import WORDS
+from ..addon.properties.scene_properties import WORDS
 from ..addon.session import session_state
 from .subpanels import Subpanel, draw_named, draw_progress, draw_sentences
 

@@ -25,8 +25,7 @@ from ..core.io.bake_folder import folder_names
 from ..core.io.bake_reader import Bake
 from ..core.io.file_writing import atomic_write
 from ..core.io.recording_npz import load_sensor, save_sensor
-from ..core.model.digest import digest_of
-from ..core.model.recording import Recording, SensorRecording
+from ..core.model.recording import Recording, SensorRecording, digest_of
 from ..core.model.scenario import Scenario
 from ..core.model.sensor_parameters import Painted, SensorParameters
 from ..core.model.shared_results import SharedResults

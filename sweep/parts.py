@@ -20,8 +20,7 @@ import numpy as np
 
 from ..core.errors import FileError
 from ..core.io.file_writing import atomic_write
-from ..core.study.progress import LAYOUTS, PARTS, part_files, part_name
-from ..core.study.study_file import Run
+from ..core.study.study_file import LAYOUTS, PARTS, Run, part_files, part_name
 from .features import Layout, RunFrames
 
 if TYPE_CHECKING:

@@ -17,8 +17,7 @@ from typing import Any
 
 from ..core.errors import FileError, PalpateError, SceneError
 from ..core.io.file_writing import atomic_write, file_sha256, os_error_reason
-from ..core.study.progress import SCENES
-from ..core.study.study_file import Study
+from ..core.study.study_file import SCENES, Study
 from .scene_evaluation import ALLOW
 
 SUFFIX = ".py"

@@ -18,9 +18,8 @@ from ..core.errors import SceneError
 from ..core.io.hidden_folder import temporary_folder
 from ..core.io.scenario_npz import load_scenario
 from ..core.model.scenario import Scenario
-from ..core.study.progress import SCENES
 from ..core.study.scene_property import write_overrides
-from ..core.study.study_file import at_rate
+from ..core.study.study_file import SCENES, at_rate
 
 SCRIPTS = REFUSE, IGNORE, ALLOW = ("refuse", "ignore", "allow")
 """What is done about the Python in a .blend; the command line's --ignore-scripts and --allow-scripts."""

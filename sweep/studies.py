@@ -17,8 +17,7 @@ from ..core.errors import FileError, PalpateError
 from ..core.io.file_writing import writable_folder
 from ..core.io.hidden_folder import FolderLock
 from ..core.jobs import Progress
-from ..core.study.progress import STUDY_NAME
-from ..core.study.study_file import read_study
+from ..core.study.study_file import STUDY_NAME, read_study
 from . import driver, study_folder
 from .parts import Parts, remove_unfinished_parts
 from .program import require_allowed

@@ -22,10 +22,23 @@ from ..core.io.bake_folder import folder_names
 from ..core.io.file_writing import atomic_write, file_sha256, writable_folder
 from ..core.io.scenario_npz import load_scenario, save_scenario
 from ..core.model.scenario import Scenario
-from ..core.study.mesh_choices import MESHES, StudyMeshes, find_meshes, freeze_meshes
-from ..core.study.progress import LAYOUTS, PARTS, RUNS, SCENES, STUDY_NAME
+from ..core.study.design import MESHES, StudyMeshes, find_meshes, freeze_meshes
 from ..core.study.scene_property import read_properties
-from ..core.study.study_file import Plan, Runs, Study, differences, frozen_text, plan_for, plan_for_job, read_study
+from ..core.study.study_file import (
+    LAYOUTS,
+    PARTS,
+    RUNS,
+    SCENES,
+    STUDY_NAME,
+    Plan,
+    Runs,
+    Study,
+    differences,
+    frozen_text,
+    plan_for,
+    plan_for_job,
+    read_study,
+)
 from ..core.version import VERSION
 from . import program
 from .parts import FORMAT as PARTS_FORMAT

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..core.study.progress import PARTS, RUNS, SCENES, STUDY_NAME
+from ..core.study.study_file import PARTS, RUNS, SCENES, STUDY_NAME
 from .dataset import publish
 from .report import write_report
 from .scene_evaluation import REFUSE

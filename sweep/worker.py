@@ -40,9 +40,8 @@ from ..core.model.sensor import Sensor
 from ..core.model.shared_results import SharedResults
 from ..core.response import net_shear, share_on, slipping
 from ..core.study.presses import Press, place_of
-from ..core.study.progress import RUNS, STUDY_NAME
 from ..core.study.scene_property import is_scene_property, scene_values
-from ..core.study.study_file import SCENE, Run
+from ..core.study.study_file import RUNS, SCENE, STUDY_NAME, Run
 from ..core.study.variation import PRESS, varied_scenario
 from .features import FrameStyle, solved_frames
 from .parts import RunResult, write_part

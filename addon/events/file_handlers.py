@@ -7,9 +7,8 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..properties import migrations
-from ..scene import scene_fingerprint
+from ..scene import moved_bodies, scene_fingerprint
 from ..session import first_use, identity, session_state
-from ..timeline import staleness
 
 
 def examine_file() -> None:
@@ -20,7 +19,7 @@ def examine_file() -> None:
     identity.register_owners(bpy.data.objects)
     migrations.apply()
     for scene in bpy.data.scenes:
-        staleness.remove_played(scene)  # the file may have been written without save_pre, as after a crash
+        moved_bodies.remove_played(scene)  # the file may have been written without save_pre, as after a crash
     if any(obj.palpate.role != "NONE" for obj in bpy.data.objects):
         first_use.begin()
 
@@ -50,10 +49,12 @@ def palpate_depsgraph_update_post(_scene, depsgraph):
 
 @persistent
 def palpate_save_pre(_path):
+    from ..timeline import staleness  # a bake that saves no file needs none of it
+
     identity.separate_copied_scenes()
     for scene in bpy.data.scenes:
         staleness.note_unchanged(scene)
-        staleness.remove_played(scene)
+        moved_bodies.remove_played(scene)
 
 
 LISTS = {

@@ -15,5 +15,4 @@ __all__ = [
     "registration",
     "scene_properties",
     "scene_units",
-    "study_properties",
 ]

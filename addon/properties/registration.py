@@ -4,7 +4,7 @@
 import bpy
 from bpy.props import PointerProperty
 
-from . import effect_stack, figure_properties, object_properties, scene_properties, study_properties
+from . import effect_stack, figure_properties, object_properties, scene_properties
 
 CLASSES = (
     effect_stack.PALPATE_PG_effect,
@@ -12,9 +12,9 @@ CLASSES = (
     object_properties.PALPATE_PG_skin,
     object_properties.PALPATE_PG_readout,
     object_properties.PALPATE_PG_magnetic,
-    study_properties.PALPATE_AP_preferences,
-    study_properties.PALPATE_PG_study_variable,
-    study_properties.PALPATE_PG_study,
+    scene_properties.PALPATE_AP_preferences,
+    scene_properties.PALPATE_PG_study_variable,
+    scene_properties.PALPATE_PG_study,
     object_properties.PALPATE_PG_object,
     scene_properties.PALPATE_PG_scene,
 )

@@ -21,9 +21,8 @@ from ...core.figures.texel_numbers import MOST, texel_numbers
 from ...core.figures.time_curves import time_curves
 from ...core.io.bake_folder import file_stems
 from ...core.io.bake_reader import Bake, frame_index, read_sensors
-from ...core.io.file_list import FileList
 from ...core.io.file_writing import require_space, writable_folder
-from ...core.io.hidden_folder import temporary_folder
+from ...core.io.hidden_folder import FileList, temporary_folder
 from ...core.jobs import Job, Progress, part_of_job
 from ..display import bake_identity, baked_scene
 from . import figure_size, gel_figures, loaded_texels, render, render_setup, see_through, video, workbench_colors
@@ -56,7 +55,7 @@ def make_figures(scene, folder, request: FigureRequest) -> Job[list[Path]]:
     """Make the figures of a baked scene.
 
     All figures are written before the first of them is put in its place. Earlier ones of the same kinds stay if they were made
-    from the same bake and have other names; those of another bake are removed (:mod:`....core.io.file_list`).
+    from the same bake and have other names; those of another bake are removed (:mod:`....core.io.hidden_folder`).
 
     Parameters
     ----------

@@ -8,7 +8,6 @@ and :meth:`.SceneReading.sample` one more frame at a time. Fingerprints tell whe
 
 __all__ = [
     "deforming_objects",
-    "drives",
     "mesh_arrays",
     "moved_bodies",
     "participants",

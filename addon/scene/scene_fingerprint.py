@@ -15,7 +15,7 @@ import numpy as np
 from ...core.model.sensor_parameters import SENSOR_PARAMETERS
 from ..properties import effect_stack, object_properties, parameter_properties
 from ..session import fcurves, session_state, transforms
-from . import deforming_objects, drives, mesh_arrays, participants, stored_names, uv_layouts
+from . import deforming_objects, mesh_arrays, moved_bodies, participants, stored_names, uv_layouts
 
 # Hash of everything that moves and deforms objects, directly or through other data-blocks.
 #
@@ -47,7 +47,7 @@ def fingerprint_of_animation(objects) -> str:
             digest.update(repr(_driver(driver.driver)).encode("utf-8", "surrogatepass"))
         target = None
         if isinstance(block, bpy.types.Object) and block.palpate.body in object_properties.MOVED_BY_FORCES:
-            target = drives.target_path(block)
+            target = moved_bodies.target_path(block)
             if target is None:
                 continue
         for curve in fcurves.of_animation_data(data) or ():
@@ -199,7 +199,7 @@ OBJECT_PROPERTIES = (
     *SENSOR_PARAMETERS,
     *(f"{key}_{part}" for key in parameter_properties.PAINTED_PARAMETERS for part in ("map", "factor")),
     *("region", "vertex_group", "threshold", "material", "face_set"),
-    *drives.DRIVE_PROPERTIES,
+    *moved_bodies.DRIVE_PROPERTIES,
     *uv_layouts.IMAGE_PROPERTIES,
     "role",
     "body",
@@ -275,7 +275,7 @@ def _constant_scales(obj) -> str:
 
 def _constant_drive_target(obj) -> str:
     """Return the target of an object's drive as text; empty without a drive, and where the target is animated."""
-    path = drives.target_path(obj)
+    path = moved_bodies.target_path(obj)
     return "" if path is None or path in animated_paths(obj) else repr((path, obj.path_resolve(path)))
 
 

@@ -26,8 +26,8 @@ from ...core.model.scenario import Scenario, Target
 from ...core.model.sensor import Sensor
 from ..properties import object_properties
 from ..session import fcurves, identity, session_state, transforms
-from . import deforming_objects, drives, moved_bodies, participants, scene_fingerprint, sensor_reader, stored_names, uv_layouts
-from .drives import TARGET_PROPERTIES
+from . import deforming_objects, moved_bodies, participants, scene_fingerprint, sensor_reader, stored_names, uv_layouts
+from .moved_bodies import TARGET_PROPERTIES
 from .scene_reading import FrameSample, SceneReading
 
 FLOAT32_ROUNDING = 2.0**-24
@@ -254,10 +254,10 @@ class _StartReader:
     def _read_drive(self, index: int) -> None:
         """Give a driven body its drive."""
         obj = self.owners[index]
-        drive = drives.drive_of(obj, self.matrices[index], self.depsgraph)
-        leader = drives.leader_index(obj, self.owners)
+        drive = moved_bodies.drive_of(obj, self.matrices[index], self.depsgraph)
+        leader = moved_bodies.leader_index(obj, self.owners)
         if leader is None and drive.control == "force":
-            drive = replace(drive, sensor=drives.controlled_sensor(obj, self.sensor_objects))
+            drive = replace(drive, sensor=moved_bodies.controlled_sensor(obj, self.sensor_objects))
         self.bodies[index] = replace(self.bodies[index], drive=replace(drive, leader=leader))
 
     def _scenario(self) -> Scenario:

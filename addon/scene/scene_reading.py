@@ -10,7 +10,7 @@ import numpy as np
 from ...core.errors import SceneError
 from ...core.model.scenario import Scenario
 from ..session import identity, transforms
-from . import drives, moved_bodies
+from . import moved_bodies
 from .deforming_objects import DeformingSurface, has_animated_scale
 from .mesh_arrays import MeshSnapshots
 
@@ -136,8 +136,8 @@ class SceneReading:
                 parents[index] = moved_bodies.parent_matrix(obj, depsgraph)
                 if index not in self.driven_bodies:
                     continue
-                targets[index] = drives.drive_target(obj, depsgraph)
-                matrix = drives.matrix_without_drive(matrices[index], self.parent_matrices[index][0], parents[index])
+                targets[index] = moved_bodies.drive_target(obj, depsgraph)
+                matrix = moved_bodies.matrix_without_drive(matrices[index], self.parent_matrices[index][0], parents[index])
             else:
                 matrix = matrices[index] = moved_bodies.world_matrix(obj, depsgraph)
             poses[index] = self._pose(scene, index, obj, matrix)

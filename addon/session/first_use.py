@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 import bpy
 
 from ...core.jobs import Progress
-from ...core.solver import precompile, precompile_process
+from ...core.solver import precompile
 from . import dependencies, session_state
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ def begin() -> None:
         return
     log = Path(tempfile.mkstemp(prefix="palpate-compiling-", suffix=".log", dir=bpy.app.tempdir or None)[1])
     package = dependencies.root_package()
-    command = [sys.executable, "-I", precompile_process.__file__, package, json.dumps(sys.path)]
+    command = [sys.executable, "-I", str(precompile.PROCESS), package, json.dumps(sys.path)]
     try:
         with log.open("wb") as out:
             process = subprocess.Popen(

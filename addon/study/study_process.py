@@ -19,9 +19,8 @@ import bpy
 from ...core.errors import FileError, PalpateError, SceneError
 from ...core.io.input_files import read_toml
 from ...core.jobs import Job, Progress
-from ...core.study.progress import STUDY_NAME, counted_runs
-from ...core.study.study_file import FROZEN
-from ..properties.study_properties import command_in_preferences
+from ...core.study.study_file import FROZEN, STUDY_NAME, counted_runs
+from ..properties.scene_properties import command_in_preferences
 from ..session import session_state
 
 LOOK = 0.5

@@ -24,8 +24,8 @@ from ...core.study.variation import AXES
 from ..properties import effect_stack
 from ..properties.object_properties import MOVED_BY_FORCES
 from ..properties.parameter_properties import DRIVE_PARAMETER_PROPERTIES
-from ..properties.study_properties import NUMBER, WORDS
-from ..scene.drives import TARGET_PROPERTIES
+from ..properties.scene_properties import NUMBER, WORDS
+from ..scene.moved_bodies import TARGET_PROPERTIES
 from ..session import transforms
 from . import scene_overrides
 from .scene_overrides import Found

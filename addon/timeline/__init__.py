@@ -3,7 +3,7 @@
 
 :mod:`.playback` decides what happens at a frame; :mod:`.live_cache` holds the run; :mod:`.baked_frames` and :mod:`.staleness`
 show the numbers of a bake and check whether it is out of date. :mod:`.second_look` does so when something else than the frame
-changes. :mod:`.staleness` keeps what is played out of saved files.
+changes.
 """
 
 __all__ = ["baked_frames", "live_cache", "playback", "second_look", "staleness"]

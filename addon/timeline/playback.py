@@ -14,7 +14,7 @@ from ...core.errors import PalpateError
 from ...core.jobs import Progress
 from ..display import baked_scene, overlays
 from ..properties import object_properties
-from ..scene import participants, scene_fingerprint, stored_names
+from ..scene import moved_bodies, participants, scene_fingerprint, stored_names
 from ..session import fcurves, first_use, frame_status, session_state
 from . import baked_frames, live_cache, staleness
 
@@ -295,7 +295,7 @@ def show_new_bake(scene, recording, folders) -> None:
 
 
 def unhide(scene) -> None:
-    """Show the present frame again after :func:`.staleness.remove_played`."""
+    """Show the present frame again after :func:`.moved_bodies.remove_played`."""
     run = live_cache.get(scene)
     if run is not None and fcurves.current_frame(scene)[0] in run.frames:
         _attempt(scene, lambda: show(scene, run))
@@ -303,7 +303,7 @@ def unhide(scene) -> None:
 
 def reset(scene) -> None:
     """Move bodies back to their start and forget what was computed."""
-    staleness.remove_played(scene)
+    moved_bodies.remove_played(scene)
     live_cache.drop(scene)
     overlays.clear(scene)
     frame_status.forget(scene)

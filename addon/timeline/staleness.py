@@ -90,20 +90,3 @@ def _has_moved(scene, depsgraph, recording: Recording) -> bool:
         if min(np.abs(now[3:] - sign * pose[3:]).max() for sign in (1.0, -1.0)) > SAME_POSE:
             return True
     return False
-
-
-def remove_played(scene) -> None:
-    """Undo what playing has changed in the scene; what was computed is kept.
-
-    Also for files that were written without this, as after a crash, and for changes by a run that has been dropped.
-    """
-    for obj in scene.objects:
-        settings = obj.palpate
-        if settings.is_baked or not settings.uid:
-            continue
-        if settings.has_start and obj.is_editable:
-            object_properties.restore_start(obj)
-        if obj.type == "MESH" and obj.data.is_editable:
-            attribute = obj.data.attributes.get(stored_names.FORCE)
-            if attribute is not None:
-                obj.data.attributes.remove(attribute)

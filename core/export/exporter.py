@@ -18,8 +18,8 @@ from ..errors import PalpateError
 from ..figures.figure_style import FigureStyle
 from ..geometry.grid_layout import GridLayout
 from ..io.bake_reader import Bake
-from ..io.file_list import FileList
 from ..io.file_writing import CHANNEL_BYTES, recording_bytes, require_space, writable_folder
+from ..io.hidden_folder import FileList
 from ..jobs import Job, Progress
 from ..model.recording import SENSOR_FIELDS, VectorReadings
 

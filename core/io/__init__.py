@@ -10,7 +10,6 @@ __all__ = [
     "bake_folder",
     "bake_reader",
     "csv_table",
-    "file_list",
     "file_writing",
     "hidden_folder",
     "input_files",

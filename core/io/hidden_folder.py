@@ -7,15 +7,21 @@ however it ends, so the next process finds what a killed one has left, and remov
 
 from __future__ import annotations
 
+import errno
+import json
+import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+import threading
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from pathlib import Path
-from typing import TYPE_CHECKING
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Any
 
 from ..errors import FileError, os_error_reason
 from . import file_writing
+from .file_writing import atomic_write, file_sha256, require_replaceable, writable_folder
+from .input_files import read_bytes
 
 if TYPE_CHECKING:
     from filelock import BaseFileLock
@@ -151,3 +157,191 @@ def _lock(folder: Path) -> BaseFileLock | None:
     except Timeout:
         return None
     return lock
+
+
+# The files of an export, which take the place of those of the export before.
+#
+# An export is written whole into a hidden folder. Then its files are moved to their places, and files of the earlier export
+# that have no successor are removed: an export of a hundred frames that is followed by one of ten leaves no images of the
+# earlier one. A list in the folder names the files of exports with their SHA-256, and says whether all of an export are in
+# their places. Only files that the list names, and that still have the content it was written for, are removed.
+
+LIST_NAME = ".palpate-export.json"
+LIST_FORMAT = "palpate-export/1"
+_moving = threading.Lock()
+"""Held while files are moved, so that a thread that ends the process waits for that."""
+
+
+class FileList:
+    """The list of all files that were written into a folder, by kind: a format of an export, a kind of figures, a report.
+
+    Parameters
+    ----------
+    folder : Path
+        What killed processes have left in it is removed.
+    """
+
+    def __init__(self, folder: Path):
+        self._folder = folder
+        self._kinds = _read(folder / LIST_NAME)
+        remove_abandoned(folder)
+
+    @contextmanager
+    def new_files(self, purpose: str) -> Iterator[Path]:
+        """Make a hidden folder for new files, which is removed in the end.
+
+        Parameters
+        ----------
+        purpose : str
+            Part of its name.
+
+        Raises
+        ------
+        FileError
+            It cannot be made. Errors of the body name the places that the files would get.
+        """
+        with temporary_folder(self._folder, purpose) as new:
+            try:
+                yield new
+            except FileError as error:
+                raise FileError(str(error).replace(str(new), str(self._folder))) from error
+
+    def replace(self, new: Path, written: Mapping[str, Iterable[Path]], source: str = "") -> list[Path]:
+        """Put new files in the place of the earlier ones of their kinds.
+
+        Parameters
+        ----------
+        new : Path
+            The folder from :meth:`new_files`, in which they were written.
+        written : mapping of str to iterable of Path
+            The files in it, by kind.
+        source : str
+            What they were made from. Earlier files that were made from the same stay; those made from something else are
+            removed, and without a source all of them.
+
+        Returns
+        -------
+        list of Path
+            Where the files are now.
+
+        Raises
+        ------
+        FileError
+            Something is in the place of a file that no file may replace, or a folder cannot be written to: earlier files are
+            as they were. Or a file cannot be moved: the list says that the export is incomplete.
+        """
+        names = {kind: [path.relative_to(new).as_posix() for path in paths] for kind, paths in written.items()}
+        every = [name for those in names.values() for name in those]
+        self._check_places(every)
+        removed: dict[str, str] = {}
+        for kind, those in names.items():
+            before = self._kinds.get(kind, {"files": {}, "source": ""})
+            earlier = {name: digest for name, digest in before["files"].items() if name not in every}
+            kept = {}
+            if source and source == before["source"]:
+                kept = {name: digest for name, digest in earlier.items() if self._is_own_file(name, digest)}
+            removed |= {name: digest for name, digest in earlier.items() if name not in kept}
+            files = kept | {name: file_sha256(new / name) for name in those}
+            self._kinds[kind] = {"complete": False, "files": files, "source": source}
+        with _moving:
+            self._write(removed)
+            for name in every:
+                _move(new / name, self._folder / name)
+            listed = {name for own in self._kinds.values() for name in own["files"]}
+            for name, digest in removed.items():
+                if name not in listed and self._is_own_file(name, digest):
+                    self._remove(self._folder / name)
+            for kind in names:
+                self._kinds[kind]["complete"] = True
+            self._write({})
+        return [self._folder / name for name in every]
+
+    def _check_places(self, names: Iterable[str]) -> None:
+        """Check, before an earlier file is replaced, that every new file can be put in its place."""
+        folders = set()
+        for name in names:
+            target = self._folder / name
+            require_replaceable(target)
+            if target.parent.is_file():
+                raise FileError(f"'{target.parent}' is a file where a folder is needed: rename it.")
+            folders |= {place for place in (target.parent, Path(os.path.realpath(target)).parent) if place.is_dir()}
+        for folder in sorted(folders):
+            writable_folder(folder)
+
+    def _is_own_file(self, name: str, digest: str) -> bool:
+        """Return True if a listed file is in the folder and has the content that it was listed with."""
+        path = self._folder / name
+        try:
+            inside = not path.is_symlink() and path.resolve().is_relative_to(self._folder.resolve())
+            return inside and path.is_file() and file_sha256(path) == digest
+        except (OSError, ValueError, RuntimeError, FileError):
+            return False
+
+    def _remove(self, path: Path) -> None:
+        """Remove a file, and the folders about it that are empty then."""
+        with suppress(OSError):
+            path.unlink()
+            for parent in path.parents:
+                if parent == self._folder:
+                    break
+                parent.rmdir()  # raises if it holds other files
+
+    def _write(self, removed: Mapping[str, str]) -> None:
+        """Write the list. Files that are about to be removed belong to it until that is done."""
+        kinds = {kind: {**own, "files": {**own["files"]}} for kind, own in self._kinds.items()}
+        for own in kinds.values():
+            if not own["complete"]:
+                own["files"] |= removed
+        with atomic_write(self._folder / LIST_NAME) as temporary:
+            content = {"format": LIST_FORMAT, "exports": kinds}
+            temporary.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+
+
+def remove_own_files() -> None:
+    """Remove what this process has begun, because it is about to end; files that are being moved are waited for."""
+    with _moving:
+        remove_unfinished()
+
+
+def _move(new: Path, target: Path) -> None:
+    """Put a file in its place; where that is a link to a file, into the place to which it leads."""
+    place = Path(os.path.realpath(target))
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            os.replace(new, place)
+        except OSError as error:
+            if error.errno != errno.EXDEV:
+                raise
+            with atomic_write(place) as temporary:
+                shutil.copyfile(new, temporary)
+    except OSError as error:
+        raise FileError(
+            f"'{target}' could not be replaced ({os_error_reason(error)}): close programs that show it, check the permissions "
+            f"of '{target.parent}', and do this again; some of the new files may be in their places already."
+        ) from error
+
+
+def _read(path: Path) -> dict[str, dict[str, Any]]:
+    """Return the kinds of a list; none when it is missing or damaged, so that nothing is removed by it."""
+    try:
+        content = json.loads(read_bytes(path).decode("utf-8"))
+        if content["format"] != LIST_FORMAT:
+            return {}
+        return {
+            str(kind): {
+                "complete": own.get("complete") is True,
+                "files": {name: str(digest) for name, digest in own["files"].items() if _is_safe(name)},
+                "source": str(own.get("source", "")),
+            }
+            for kind, own in content["exports"].items()
+        }
+    except (OSError, ValueError, RecursionError, KeyError, TypeError, AttributeError, FileError):
+        return {}
+
+
+def _is_safe(name: str) -> bool:
+    """Return True for a name of a file in the folder of the list, or in a folder in it."""
+    parts = PurePosixPath(name).parts
+    hidden = any(part in ("..", LIST_NAME) or "\\" in part or "\0" in part for part in parts)
+    return 0 < len(parts) <= 2 and not PurePosixPath(name).is_absolute() and not hidden

@@ -20,7 +20,7 @@ from ..geometry.mesh import TriangleMesh
 from ..geometry.texels import Texels
 from ..geometry.texture_maps import UVLayout
 from ..model.body import Body, Drive, Motion, Signal
-from ..model.digest import stated_fields
+from ..model.recording import stated_fields
 from ..model.scenario import Scenario, Target
 from ..model.sensor import Deformation, Effect, Sensor
 from ..model.sensor_parameters import Painted, SensorParameters

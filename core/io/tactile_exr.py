@@ -29,8 +29,8 @@ from ..geometry.texels import Texels
 from ..geometry.texture_maps import UVLayout
 from ..model.recording import Frame, SensorFrame, VectorReadings
 from ..model.sensor import Sensor
-from .file_list import FileList
 from .file_writing import writable_folder, write_file
+from .hidden_folder import FileList
 
 # OpenEXR images of 32-bit floats with named channels and attributes, written by a library.
 #

@@ -9,7 +9,6 @@ specifications. A :class:`.recording.Recording` holds the results.
 
 __all__ = [
     "body",
-    "digest",
     "parameter",
     "recording",
     "scenario",

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import ParameterError, SceneError
 from ..geometry.mesh import TriangleMesh
 from .body import Body
-from .digest import digest_of
+from .recording import digest_of
 from .sensor import Deformation, Sensor
 
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from ..errors import SceneError
 from ..geometry.texels import Texels
-from .digest import IF_GIVEN, digest_of
-from .recording import ChannelReadout, row_blocks
+from .recording import IF_GIVEN, ChannelReadout, digest_of, row_blocks
 from .sensor_parameters import Painted, SensorParameters
 
 Value = float | tuple[float, ...]

@@ -18,8 +18,8 @@ import numpy as np
 from ..errors import FileError, PalpateError, SensorError
 from ..geometry.mesh import TriangleMesh, checked_mesh
 from ..geometry.texels import texels_with_normals
-from ..io.file_list import FileList
 from ..io.file_writing import require_space, writable_folder, write_file
+from ..io.hidden_folder import FileList
 from ..io.input_files import require_xml_text
 from ..model.sensor import Effect, Sensor
 from ..model.sensor_parameters import SensorParameters

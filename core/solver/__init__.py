@@ -13,7 +13,6 @@ __all__ = [
     "dynamics",
     "jumps",
     "precompile",
-    "precompile_process",
     "pressed_model",
     "pressing",
     "simulation",

@@ -15,9 +15,8 @@ from ..compiled.kernels import inlined, kernel
 from ..geometry.rotations import solve_positive_definite
 from .detection.detection_data import DetectionData
 from .dynamics.actuators import SPEED, add_actuators
-from .dynamics.linear_system import add_pair_to_system, write_pair_forces
+from .dynamics.linear_system import MAX_BISECTIONS, add_pair_to_system, check_energy, reset_force_scales, write_pair_forces
 from .dynamics.modes import add_mass, write_guess, write_motion
-from .dynamics.passivity import MAX_BISECTIONS, check_energy, reset_force_scales
 from .parallel_loops import SUM_CONTACTS, run_parallel_loop
 from .solver_model import SolverModel, State
 from .workspace import Workspace

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 Report = Callable[[int, int], None]
 
+PROCESS = Path(__file__).with_name("precompile_process.py")
+"""The program that compiles in a process of its own."""
 INTERPRETED_POINT = 1.2e-5
 """Seconds in which interpreted kernels compute one step of one contact point, if a fifth of the points touch something.
 

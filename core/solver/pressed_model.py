@@ -20,7 +20,6 @@ from ..model.scenario import Scenario, Target
 from ..model.sensor import Sensor
 from .detection.detection_data import TargetShapes
 from .detection.shape_contacts import blocks_of_points
-from .model_builder import step_program
 from .parallel_loops import help_with_loops, prepare_pair_loops
 from .pressing import (
     Environment,
@@ -33,7 +32,7 @@ from .pressing import (
     make_environments,
 )
 from .simulation import Simulation
-from .structures import workspace_for
+from .structures import step_program, workspace_for
 from .workspace import Workspace
 
 

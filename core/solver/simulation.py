@@ -28,13 +28,12 @@ from .detection.deformation import refit_boxes, set_moment
 from .detection.detection_data import DetectionData
 from .detection.narrow_phase import count_too_deep
 from .dynamics.actuators import DriveCommands
+from .dynamics.linear_system import contacts_of, credit_initial_contacts
 from .dynamics.modes import driven_bodies
-from .dynamics.passivity import contacts_of, credit_initial_contacts
 from .fast_crossings import FastCrossings, path_of_moved_bodies
-from .model_builder import texel_starts
 from .parallel_loops import find_all_contacts, help_with_loops, prepare_pair_loops
 from .solver_model import SolverModel, State
-from .structures import structures_for
+from .structures import structures_for, texel_starts
 from .substep import FRAME, NOTHING, TEXELS, FramePath, ObservedFrames, Surroundings, advance_frames
 from .time_step_adviser import plan
 from .workspace import Workspace

@@ -27,7 +27,7 @@ from .detection.detection_data import (
     write_vector,
 )
 from .dynamics.effect_kernels import NOW, apply_effects, force_and_friction_law, lane_range, press_texel
-from .dynamics.relative_kinematics import motion_values, point_law, row_of, row_velocity, velocity_at, write_pair_motion
+from .dynamics.friction_state import motion_values, point_law, row_of, row_velocity, velocity_at, write_pair_motion
 from .solver_model import SolverModel, State
 from .workspace import Workspace
 

@@ -15,7 +15,6 @@ from ...geometry.grid_layout import GridLayout
 from ...geometry.texels import Texels
 from ...io.bake_folder import folder_names
 from ...io.bake_reader import Bake
-from ...io.csv_table import harmless_cell
 from ...io.file_writing import atomic_write, writable_folder
 from ...jobs import Job
 from ...model.recording import Recording, SensorRecording
@@ -117,6 +116,8 @@ def _texel_table(texels: Texels) -> tuple[list[str], np.ndarray]:
 
 def _write_table(path: Path, header: Sequence[str], tables: Iterable[np.ndarray]) -> None:
     """Write tables below one another."""
+    from ...io.csv_table import harmless_cell
+
     with atomic_write(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow([harmless_cell(name) for name in header])

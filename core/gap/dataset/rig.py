@@ -24,8 +24,18 @@ from ...model.sensor_parameters import DEPTH_PER_THICKNESS, SENSOR_PARAMETERS, S
 from .column_names import Column, read_column_rules, translated
 from .cover import COVER_WORDS, Cover, read_cover
 from .second_logger import SecondLogger, bridged, joined
-from .sessions import TrialHistory, on_common_clocks, read_history
-from .trial import FAULT_KINDS, FREE, SHARED_HEIGHT, SensorHeight, Trial, TrialWords, check_free_heights
+from .trial import (
+    FAULT_KINDS,
+    FREE,
+    SHARED_HEIGHT,
+    SensorHeight,
+    Trial,
+    TrialHistory,
+    TrialWords,
+    check_free_heights,
+    on_common_clocks,
+    read_history,
+)
 
 FORMAT = "palpate-rig/1"
 LOWEST_TEMPERATURE, HIGHEST_TEMPERATURE = -273.15, 2000.0

@@ -13,8 +13,8 @@ import numpy as np
 
 from ...errors import FileError
 from ...io.csv_table import LARGEST_NUMBER
-from ...io.file_list import FileList
 from ...io.file_writing import atomic_write, writable_folder
+from ...io.hidden_folder import FileList
 from ...jobs import Job, Progress
 from ..dataset.column_names import Column
 from ..dataset.rig import FORMAT, read_rig

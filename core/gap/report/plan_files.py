@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ...io.file_list import FileList
 from ...io.file_writing import atomic_write
+from ...io.hidden_folder import FileList
 from ..planning.experiment_plan import ExperimentPlan, PlannedExperiment
 from ..planning.paths import Trajectory
 from ..planning.separation import LEAST_SHARE, Separation

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import PalpateError
-from ...io.file_list import FileList
 from ...io.file_writing import atomic_write, require_space
+from ...io.hidden_folder import FileList
 from ...io.sensor_toml import write_sensor
 from ...jobs import Job, Progress, part_of_job
 from ..dataset.rig import Rig

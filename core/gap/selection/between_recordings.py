@@ -17,8 +17,7 @@ import numpy as np
 
 from ...effects.engine.registry import only_name_where
 from ..dataset.rig import Rig
-from ..dataset.sessions import COMMON, TrialHistory, on_common_clocks
-from ..dataset.trial import Trial
+from ..dataset.trial import COMMON, Trial, TrialHistory, on_common_clocks
 from ..forward.predictor import Model, Predictor, number_name
 from .identifiability import LOSING
 from .wear_or_drift import CLOCK, NOTHING, TEXELS, USE, changed_from, evidence_of_recordings, texels_can_tell

@@ -15,7 +15,7 @@ from ...errors import EffectError
 from ...geometry.grid_layout import GridLayout
 from ...model.parameter import Parameter
 from ...model.sensor import Effect
-from ..dataset.sessions import COMMON
+from ..dataset.trial import COMMON
 from ..fitting.least_squares import Fit, FreeParameter, value_of
 from ..fitting.noise_floor import coverage
 from ..forward.predictor import Model, Predictor

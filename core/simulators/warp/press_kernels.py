@@ -35,7 +35,7 @@ from ...laws.normal_force import normal_force, normal_tangent
 from ...solver.detection.narrow_phase import NEARLY_TOO_DEEP
 from ...solver.dynamics.contact_assembly import LinearContact, Tangent, linearise_contact
 from ...solver.dynamics.effect_kernels import NOW, STEP
-from ...solver.dynamics.relative_kinematics import relative_motion, velocity_at
+from ...solver.dynamics.friction_state import relative_motion, velocity_at
 from ...solver.jumps import crosses_texel, meets_sphere
 from .block import block_sum, wait_for_block
 from .effect_functions import force_with_effects, friction_with_effects, reading_with_effects

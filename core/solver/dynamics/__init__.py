@@ -5,13 +5,4 @@ Passivity, the modes of bodies, actuators with their commands and grip control, 
 stand here as well.
 """
 
-__all__ = [
-    "actuators",
-    "contact_assembly",
-    "effect_kernels",
-    "friction_state",
-    "linear_system",
-    "modes",
-    "passivity",
-    "relative_kinematics",
-]
+__all__ = ["actuators", "contact_assembly", "effect_kernels", "friction_state", "linear_system", "modes"]

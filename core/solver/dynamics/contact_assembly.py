@@ -31,7 +31,7 @@ from ..detection.detection_data import (
 from ..solver_model import SolverModel, State
 from ..workspace import SUMS, Workspace
 from .effect_kernels import STEP, apply_effects, lane_range, press_texel, write_tangent
-from .relative_kinematics import motion_values, point_law, relative_motion, row_of, row_velocity, velocity_at
+from .friction_state import motion_values, point_law, relative_motion, row_of, row_velocity, velocity_at
 
 
 class Tangent(NamedTuple):

@@ -25,7 +25,7 @@ from ...laws.contact_law import LINEAR_EXPONENT, ContactLaw, read_law, whole_tex
 from ..detection.detection_data import DEPTH, EXTRA_VISCOSITY, FRICTION_SCALE, LANES, NORMAL_BIAS, NORMAL_SLOPE
 from ..solver_model import SolverModel, State
 from ..workspace import EffectWork, Workspace
-from .relative_kinematics import motion_values, point_law, row_of, row_velocity, write_pair_motion
+from .friction_state import motion_values, point_law, row_of, row_velocity, write_pair_motion
 
 STEP, NOW = 0, 1
 """Lengths of time that laws are made for: a step, and none at all."""

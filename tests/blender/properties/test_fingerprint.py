@@ -9,7 +9,7 @@ import pytest
 
 from palpate.addon.properties import scene_properties
 from palpate.addon.properties.scene_units import ENDING
-from palpate.addon.scene import drives, scene_fingerprint
+from palpate.addon.scene import moved_bodies, scene_fingerprint
 
 OBJECT_WITHOUT_FORCES = {
     *("schema_version", "uid", "measured", "made_vertices", "skin", "is_baked", "made_action", "bake_folder", "tactile_images"),
@@ -18,7 +18,7 @@ OBJECT_WITHOUT_FORCES = {
 """Properties of an object that change no force: identity, file names, and what laying texels or a bake has left."""
 COMPARED_BY_COMPONENT = {"velocity", "angular_velocity", "effects", "readout", "magnetic"}
 """Read component by component in `settings_of`."""
-COMPARED_WHEN_DRIVEN = set(drives.TARGET_PROPERTIES.values())
+COMPARED_WHEN_DRIVEN = set(moved_bodies.TARGET_PROPERTIES.values())
 """Targets of drives: the one that the drive follows is compared, with its keyframes."""
 SCENE_WITHOUT_FORCES = {
     *("schema_version", "folder", "use_live", "figures", "baked_digest", "baked_fingerprint", "baked_shapes", "baked_names"),
@@ -56,7 +56,7 @@ def test_every_property_of_a_scene_is_in_the_fingerprint_or_changes_no_force():
     assert not compared & SCENE_WITHOUT_FORCES
 
 
-@pytest.mark.parametrize("control, path", drives.TARGET_PROPERTIES.items())
+@pytest.mark.parametrize("control, path", moved_bodies.TARGET_PROPERTIES.items())
 def test_the_target_of_a_drive_is_compared_where_the_drive_follows_it(settings, control, path):
     obj, scene = settings.id_data, bpy.context.scene
     settings.role, settings.body, settings.mass = "TARGET", "DRIVEN", 1.0
@@ -69,7 +69,7 @@ def test_the_target_of_a_drive_is_compared_where_the_drive_follows_it(settings, 
 
     setattr(settings, path, 0.25)
     check(True)
-    other = next(name for name in drives.TARGET_PROPERTIES.values() if name != path)
+    other = next(name for name in moved_bodies.TARGET_PROPERTIES.values() if name != path)
     setattr(settings, other, 0.5)
     check(False)
     settings.keyframe_insert(path, frame=1)

@@ -11,7 +11,7 @@ from palpate.addon.bake.bake import bake
 from palpate.addon.render import figure_export, figure_request
 from palpate.commands import render
 from palpate.core.errors import ParameterError
-from palpate.core.io.file_list import LIST_NAME
+from palpate.core.io.hidden_folder import LIST_NAME
 from palpate.core.jobs import run_job
 
 

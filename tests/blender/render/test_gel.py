@@ -17,7 +17,7 @@ from palpate.addon.scene import mesh_arrays
 from palpate.commands import main
 from palpate.core.errors import SensorError
 from palpate.core.figures import color_maps, gel_image
-from palpate.core.io.file_list import LIST_NAME
+from palpate.core.io.hidden_folder import LIST_NAME
 from palpate.core.io.recording_npz import load_recording
 from palpate.core.jobs import run_job
 

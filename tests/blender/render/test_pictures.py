@@ -20,8 +20,8 @@ from palpate.commands import main
 from palpate.core.errors import FileError, ParameterError, SceneError
 from palpate.core.figures.figure_style import FigureStyle
 from palpate.core.io import file_writing
-from palpate.core.io.file_list import LIST_NAME
 from palpate.core.io.file_writing import atomic_write
+from palpate.core.io.hidden_folder import LIST_NAME
 from palpate.core.jobs import run_job
 
 

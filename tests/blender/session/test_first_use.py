@@ -19,7 +19,7 @@ from palpate.addon.session import first_use, frame_status
 from palpate.addon.timeline import live_cache, playback
 from palpate.core.compiled import kernels
 from palpate.core.jobs import run_job
-from palpate.core.solver import precompile, precompile_process
+from palpate.core.solver import precompile
 from palpate.core.solver.simulation import Simulation
 
 
@@ -33,7 +33,7 @@ def window(monkeypatch, tmp_path):
     def compiler(source):
         script = tmp_path / "compiler.py"
         script.write_text(source)
-        monkeypatch.setattr(precompile_process, "__file__", str(script))
+        monkeypatch.setattr(precompile, "PROCESS", script)
 
     compiler("import sys; sys.stdin.read()")  # until its end
     yield compiler
@@ -209,7 +209,7 @@ def test_without_a_window_it_is_compiled_in_place_with_a_line_on_stderr(monkeypa
 def test_the_process_loads_the_package_by_its_name_in_blender_and_ends_with_blender(tmp_path):
     """Kernels that were kept under another name could not be read."""
     code = (
-        f"import sys; sys.path[:0] = [{os.path.dirname(precompile_process.__file__)!r}]; import precompile_process as c; "
+        f"import sys; sys.path[:0] = [{str(precompile.PROCESS.parent)!r}]; import precompile_process as c; "
         "c.load('bl_ext.user_default.palpate'); import bl_ext.user_default.palpate.core.solver.precompile as w; "
         "print(w.__name__, 'numba' in sys.modules, flush=True); import threading; "
         "threading.Thread(target=w._end_with_parent).start()"

@@ -11,7 +11,7 @@ from palpate.addon.session import session_state
 from palpate.addon.study import property_path, study_process, study_settings
 from palpate.core.errors import PalpateError
 from palpate.core.jobs import run_job
-from palpate.core.study.progress import counted_runs
+from palpate.core.study.study_file import counted_runs
 
 LONGEST = 300
 """Seconds until a study counts as hanging; a busy machine may have to compile the solver first."""

@@ -16,7 +16,7 @@ from solver_scenes import cube_on_pad
 from palpate.core.compiled import kernels, numba_internals
 from palpate.core.compiled.struct_reference import by_reference
 from palpate.core.laws.contact_law import read_law
-from palpate.core.solver.dynamics import contact_assembly, friction_state, relative_kinematics
+from palpate.core.solver.dynamics import contact_assembly, friction_state
 from palpate.core.solver.simulation import Simulation
 
 numba = pytest.importorskip("numba")
@@ -96,7 +96,7 @@ def test_loops_over_contacts_run_in_vector_registers(name):
     if name == "_sum_contacts":
         compiled(0, 1e-3, law, simulation._model, simulation._state.effect_memory, workspace)
     else:
-        compiled(0, relative_kinematics.motion_values(workspace.pairs.known_motion[0]), simulation._state, workspace)
+        compiled(0, friction_state.motion_values(workspace.pairs.known_motion[0]), simulation._state, workspace)
     (code,) = compiled.inspect_asm().values()
     assert re.search(r"^\s+v?sqrtpd\s", code, re.MULTILINE), "the square root is taken of one number at a time"
 

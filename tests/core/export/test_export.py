@@ -22,7 +22,7 @@ from palpate.core.export.formats import hdf5
 from palpate.core.figures import color_maps
 from palpate.core.figures.figure_style import FigureStyle
 from palpate.core.io.bake_reader import frame_index, read_bake
-from palpate.core.io.file_list import LIST_FORMAT, LIST_NAME
+from palpate.core.io.hidden_folder import LIST_FORMAT, LIST_NAME
 from palpate.core.io.recording_npz import load_sensor, save_sensor
 from palpate.core.jobs import run_job
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
@@ -248,7 +248,7 @@ def test_a_full_disk_is_one_sentence(bake, tmp_path, kind):
 FULL_DISK = """
 import resource, signal
 from palpate.core.errors import FileError
-from palpate.core.io.file_list import LIST_FORMAT, LIST_NAME
+from palpate.core.io.hidden_folder import LIST_FORMAT, LIST_NAME
 from palpate.core.export.exporter import export, exporters
 from palpate.core.io.bake_reader import read_bake
 from palpate.core.jobs import run_job

@@ -15,9 +15,9 @@ from kills import stopped_at
 from palpate.core.errors import FileError
 from palpate.core.export import exporter
 from palpate.core.export.exporter import Exporter, export
-from palpate.core.io import file_list
-from palpate.core.io.file_list import LIST_FORMAT, LIST_NAME
+from palpate.core.io import hidden_folder
 from palpate.core.io.file_writing import atomic_write, writable_folder
+from palpate.core.io.hidden_folder import LIST_FORMAT, LIST_NAME
 from palpate.core.jobs import run_job
 
 OLD = {"bodies.csv": "old", "pad/force.csv": "old", "pad/gone.csv": "old"}
@@ -128,7 +128,7 @@ def test_a_folder_that_cannot_be_written_to_is_found_before_the_old_export_is_to
         return writable_folder(folder, create)
 
     (out / "tip").mkdir()
-    monkeypatch.setattr(file_list, "writable_folder", writable)
+    monkeypatch.setattr(hidden_folder, "writable_folder", writable)
     with pytest.raises(FileError, match="read-only"):
         run_job(export(NEW, "text", out))
     assert exported(out) == OLD and hidden(out) == [LIST_NAME] and is_complete(out)
@@ -136,7 +136,7 @@ def test_a_folder_that_cannot_be_written_to_is_found_before_the_old_export_is_to
 
 def test_files_of_several_kinds_are_exchanged_together_and_those_of_one_source_are_gathered(tmp_path):
     def write_from(source, *names):
-        files = file_list.FileList(tmp_path)
+        files = hidden_folder.FileList(tmp_path)
         with files.new_files("figures") as new:
             for name in names:
                 (new / name).write_text(source)

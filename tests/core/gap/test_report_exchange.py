@@ -9,8 +9,8 @@ import pytest
 from palpate.core.errors import FileError
 from palpate.core.gap.report import summary
 from palpate.core.io import file_writing
-from palpate.core.io.file_list import LIST_NAME
 from palpate.core.io.file_writing import atomic_write
+from palpate.core.io.hidden_folder import LIST_NAME
 from palpate.core.jobs import run_job
 
 TRIAL = SimpleNamespace(time=np.zeros(1000))

@@ -12,8 +12,7 @@ from palpate.core.errors import FileError, SensorError
 from palpate.core.io.recording_npz import load_recording, save_recording
 from palpate.core.io.row_tables import FrameTable
 from palpate.core.io.scenario_npz import load_scenario, save_scenario
-from palpate.core.model.digest import digest_of
-from palpate.core.model.recording import Recording
+from palpate.core.model.recording import Recording, digest_of
 from palpate.core.model.sensor import Sensor
 from palpate.core.skins.channel_readouts import MagneticReadout, net_force_of, with_clipping_warnings
 from palpate.core.skins.magnetic_skin import Magnetometers, Magnets, magnetic_skin, texel_displacements

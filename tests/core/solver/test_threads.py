@@ -7,8 +7,8 @@ import trimesh
 from solver_scenes import about, cube_on_pad, pad, pressed, shape
 
 from palpate.core.compiled import kernels, thread_team
-from palpate.core.solver.model_builder import MAX_PAIR_POINTS
 from palpate.core.solver.simulation import Simulation
+from palpate.core.solver.structures import MAX_PAIR_POINTS
 
 compiled = pytest.mark.skipif(not kernels.COMPILED, reason="plain Python computes in one thread")
 

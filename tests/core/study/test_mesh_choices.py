@@ -9,8 +9,7 @@ from study_scenes import BALL_RADIUS, HEAD, tiny_scene
 from palpate.core.errors import PalpateError
 from palpate.core.geometry.mesh import mass_properties
 from palpate.core.io.input_files import load_mesh
-from palpate.core.study.design import points_of
-from palpate.core.study.mesh_choices import StudyMeshes, find_meshes, freeze_meshes
+from palpate.core.study.design import StudyMeshes, find_meshes, freeze_meshes, points_of
 from palpate.core.study.study_file import Runs, plan_for, read_study
 from palpate.core.study.variation import varied_scenario
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 from small_study import begun, rows_of, tree, write_study
 
-from palpate.core.study.progress import counted_runs
+from palpate.core.study.study_file import counted_runs
 from palpate.sweep.parts import Parts
 from palpate.sweep.worker import compute_batch
 

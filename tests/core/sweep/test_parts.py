@@ -14,7 +14,7 @@ from small_study import FAILING, begun, rows_of, tree, write_study
 from sweep_runs import failed, made_up, new_study
 
 from palpate.core.errors import FileError
-from palpate.core.study.progress import counted_runs, part_files
+from palpate.core.study.study_file import counted_runs, part_files
 from palpate.sweep import worker
 from palpate.sweep.dataset import publish
 from palpate.sweep.parts import Parts, remove_unfinished_parts, write_part

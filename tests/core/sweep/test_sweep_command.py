@@ -18,7 +18,7 @@ from palpate.core.io.bake_folder import IMAGE_LIST_NAME, check_sha256, frame_fil
 from palpate.core.io.bake_reader import read_bake
 from palpate.core.io.recording_npz import load_recording
 from palpate.core.io.scenario_npz import save_scenario
-from palpate.core.study.progress import part_files
+from palpate.core.study.study_file import part_files
 from palpate.sweep import driver
 from palpate.sweep.driver import dask_client
 from palpate.sweep.parts import Parts, RunResult, write_part

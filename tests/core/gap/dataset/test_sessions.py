@@ -7,7 +7,7 @@ from rig_files import RIG, table, write
 
 from palpate.core.errors import PalpateError
 from palpate.core.gap.dataset.rig import read_rig
-from palpate.core.gap.dataset.sessions import ONE_CLOCK, UNKNOWN_PAUSE
+from palpate.core.gap.dataset.trial import ONE_CLOCK, UNKNOWN_PAUSE
 
 LENGTH = 19 * 0.02
 
