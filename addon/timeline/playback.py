@@ -16,7 +16,7 @@ from ..display import baked_scene, overlays
 from ..properties import object_properties
 from ..scene import moved_bodies, participants, scene_fingerprint, stored_names
 from ..session import fcurves, first_use, frame_status, session_state
-from . import baked_frames, live_cache, staleness
+from . import baked_frames, live_cache
 
 _errors: dict[int, str] = {}
 """By scene: why the last attempt to compute failed."""

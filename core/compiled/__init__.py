@@ -6,4 +6,4 @@ cache, machine code that a zip carries, and helper threads that share the loops 
 plain Python.
 """
 
-__all__ = ["kernels", "machine_code", "struct_reference", "thread_team"]
+__all__ = ["kernel_fingerprint", "kernels", "machine_code", "struct_reference", "thread_team"]

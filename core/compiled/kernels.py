@@ -10,13 +10,11 @@ Where numba is there, kernels can still be interpreted, until compiled code is r
 
 from __future__ import annotations
 
-import hashlib
 import sys
 from collections.abc import Callable
-from functools import cache
-from pathlib import Path
 from typing import Any
 
+from .kernel_fingerprint import fingerprint
 from .numba_internals import (
     COMPILED,
     CPUDispatcher,
@@ -220,40 +218,6 @@ if COMPILED:
 else:
     KernelDispatcher: Any = None  # type: ignore[no-redef]
     _InterpretedKernel: Any = None  # type: ignore[no-redef]
-
-
-KERNEL_MARKS = (
-    b"@kernel",
-    b"@inlined",
-    b"@allocating_kernel",
-    b"@by_reference",
-    b"KIND = Kind(",
-    b"from numba",
-    b"= specified(",
-)
-"""A file that holds one of these influences the compiled code.
-
-The laws of effects are compiled as well, and the specified parameters of a sensor are the fields of the contact law. Of the
-packages laws and compiled every file counts.
-"""
-
-
-CORE = Path(__file__).resolve().parents[1]
-
-
-@cache
-def fingerprint() -> str:
-    """Return a hash of all files in core that kernels are made from.
-
-    A compiled kernel contains the machine code of the kernels that it calls, but numba looks only at a kernel's own file to
-    see whether its cached result is still good. After a change in another file, or an upgrade, old code would go on running.
-    """
-    digest = hashlib.sha256()
-    for path in sorted(CORE.rglob("*.py")):
-        source = path.read_bytes()
-        if path.parent.name in ("laws", "compiled") or any(mark in source for mark in KERNEL_MARKS):
-            digest.update(source)
-    return digest.hexdigest()[:12]
 
 
 __all__ = [

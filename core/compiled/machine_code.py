@@ -19,7 +19,7 @@ import zlib
 from pathlib import Path
 from typing import Any
 
-from .kernels import fingerprint
+from .kernel_fingerprint import fingerprint
 from .numba_internals import CAN_PACK, dumps, processor_features, rebuild_environment, reduced_overloads, save_overload
 
 X86_64_V3 = ["avx", "avx2", "bmi", "bmi2", "cmov", "cx16", "cx8", "f16c", "fma", "fxsr", "lzcnt", "mmx", "movbe", "popcnt"]

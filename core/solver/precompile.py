@@ -23,7 +23,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..compiled.kernels import fingerprint
+from ..compiled.kernel_fingerprint import fingerprint
 
 if TYPE_CHECKING:
     from ..model.scenario import Scenario

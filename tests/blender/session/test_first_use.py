@@ -5,7 +5,6 @@ The window is played here: bpy as a module has none. The whole of it in a real o
 """
 
 import json
-import os
 import subprocess
 import sys
 import time

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from solver_scenes import cube_on_pad
 
-from palpate.core.compiled import kernels, numba_internals
+from palpate.core.compiled import kernel_fingerprint, kernels, numba_internals
 from palpate.core.compiled.struct_reference import by_reference
 from palpate.core.laws.contact_law import read_law
 from palpate.core.solver.dynamics import contact_assembly, friction_state
@@ -66,7 +66,7 @@ def test_a_kernel_is_compiled_anew_when_one_that_it_calls_has_changed(tmp_path):
     package = tmp_path / "kernels"
     package.mkdir()
     (package / "__init__.py").touch()
-    for module in (kernels, numba_internals):
+    for module in (kernels, kernel_fingerprint, numba_internals):
         shutil.copy(module.__file__, package)
     (package / "caller.py").write_text(CALLER)
     answers = []
