@@ -60,7 +60,7 @@ class Scenario:
     name : str
         Of the scene, for messages.
     interpolation : str
-        How motions are interpolated between their samples: ``linear`` or ``smooth`` (:mod:`.body`).
+        How motions are interpolated between their samples: ``linear`` or ``smooth`` (:func:`.simulation.poses_at`).
     """
 
     bodies: tuple[Body, ...]

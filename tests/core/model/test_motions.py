@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 from solver_scenes import about, box, pressed
 
 from palpate.core.geometry.rotations import quaternion_product, rotation_vectors
-from palpate.core.model.body import Motion, poses_at
-from palpate.core.solver.simulation import run
+from palpate.core.model.body import Motion
+from palpate.core.solver.simulation import poses_at, run
 
 TIMES = np.array([0.0, 0.1, 0.2, 0.35, 0.4, 0.5, 0.6])
 

@@ -11,10 +11,10 @@ from solver_scenes import cube_on_pad, pressed
 from palpate.core.effects.engine.registry import check_scenario
 from palpate.core.errors import EffectError, PalpateError, ParameterError
 from palpate.core.geometry.rotations import quaternions_from_vectors, rotation_matrices, rotation_vectors
-from palpate.core.model.body import Motion, poses_at
+from palpate.core.model.body import Motion
 from palpate.core.model.sensor import Effect
 from palpate.core.model.sensor_parameters import SensorParameters
-from palpate.core.solver.simulation import run
+from palpate.core.solver.simulation import poses_at, run
 from palpate.core.solver.time_step_adviser import LONGEST, SHARE_OF_LIMIT, advise, plan, stability_limit
 
 NUMBERS = [item.name for item in fields(SensorParameters) if item.type == "float"]

@@ -11,7 +11,8 @@ from study_scenes import BALL_RADIUS, tiny_scene
 
 from palpate.core.errors import PalpateError
 from palpate.core.geometry.rotations import rotation_matrices
-from palpate.core.model.body import Motion, poses_at
+from palpate.core.model.body import Motion
+from palpate.core.solver.simulation import poses_at
 from palpate.core.study import presses
 from palpate.core.study.presses import Press, place_of, with_press
 
