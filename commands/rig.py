@@ -36,13 +36,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from ..core.gap.logs.answers import read_answers
+    from ..core.gap.logs.answers import ANSWERS_NAME, PLOT_NAME, answers_or_template, read_answers
     from ..core.gap.logs.log_file import read_log
     from ..core.gap.logs.log_table import with_distinct_names
     from ..core.gap.logs.preview import preview_rows
     from ..core.gap.logs.proposal import propose
     from ..core.gap.logs.questions import asked
-    from ..core.gap.logs.template import ANSWERS_NAME, PLOT_NAME, answers_or_template
 
     with console.Interrupt.raised_at_once():
         logs = [read_log(path) for path in arguments.logs]
@@ -72,9 +71,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _write(logs: list[LogFile], answers: Answers, out: str) -> None:
     from ..core.gap.dataset.rig import read_rig
+    from ..core.gap.logs.answers import PLOT_NAME
     from ..core.gap.logs.new_rig import write_rig
     from ..core.gap.logs.preview import plot_rig
-    from ..core.gap.logs.template import PLOT_NAME
 
     written = console.run_with_progress_bar("rig new", write_rig(logs, answers, out), unit="recording")
     rig = read_rig(written.path)

@@ -29,13 +29,12 @@ def make(context, obj, paths, folder: Path, accept: bool, replies: Sequence[str]
         A log cannot be used, or questions are open: then `answers.toml` in the folder asks them.
     """
     from ...core.gap.dataset.rig import read_rig
-    from ...core.gap.logs.answers import read_answers
+    from ...core.gap.logs.answers import ANSWERS_NAME, PLOT_NAME, answers_or_template, read_answers
     from ...core.gap.logs.log_file import read_log
     from ...core.gap.logs.new_rig import write_rig
     from ...core.gap.logs.preview import plot_rig
     from ...core.gap.logs.proposal import propose
     from ...core.gap.logs.questions import answered
-    from ...core.gap.logs.template import ANSWERS_NAME, PLOT_NAME, answers_or_template
     from ...core.jobs import run_job
 
     logs = [read_log(path) for path in paths]

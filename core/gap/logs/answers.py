@@ -5,18 +5,22 @@ a :class:`~.guess.Proposal` that leaves no question open, by the same words.
 
 from __future__ import annotations
 
+import os
 import tomllib
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from ...errors import FileError
+from ...errors import FileError, counted
+from ...io.file_writing import atomic_write, writable_folder
 from ...io.input_files import checked_name, read_toml
 from ...io.schema import WORD, Name, Seconds, known_words, read_words, wanted
 from ..dataset.column_names import QUANTITIES, Column, read_column
 from .guess import FORMAT, Proposal, has_unknown
 
 Use = Literal["fit", "check", "leave out"]
+ANSWERS_NAME, PLOT_NAME = "answers.toml", "recordings.png"
+"""Files beside the rig: the answers, and a picture of what was read."""
 
 _Files = Annotated[tuple[str, ...], wanted('write a list of names, as ["press_1.csv"]', names=True, min_length=1)]
 
@@ -102,6 +106,34 @@ def answers_of(proposal: Proposal) -> Answers:
     for question in proposal.questions:
         raise FileError(f"{question[:-1]}: answer it before the rig is written.")
     return _answers(tomllib.loads(proposal.text), "the proposal", proposal.text)
+
+
+def answers_or_template(proposal: Proposal, folder: str | os.PathLike, advice: str) -> Answers:
+    """Write what is proposed and what is asked, so that whatever is refused can be corrected there, and return the answers.
+
+    Parameters
+    ----------
+    proposal : Proposal
+    folder : path
+    advice : str
+        What to do with the file where questions are open.
+
+    Raises
+    ------
+    FileError
+        A question is open, or the file is there already and would be lost, or it cannot be written.
+    """
+    path = Path(folder) / ANSWERS_NAME
+    questions = proposal.questions
+    if path.exists() and questions:
+        raise FileError(f"'{path}' has answers already: give it with --answers, or remove it for a new template.")
+    if not path.exists():
+        with atomic_write(writable_folder(folder, create=True) / ANSWERS_NAME) as temporary:
+            temporary.write_text(proposal.text, encoding="utf-8", newline="\n")
+    if questions:
+        how_many = counted(len(questions), "question")
+        raise FileError(f"The logs leave {how_many} open, the first: {questions[0][:-1]}; answer in '{path}', {advice}.")
+    return answers_of(proposal)
 
 
 def _answers(words: dict[str, Any], source: str, text: str) -> Answers:

@@ -7,13 +7,32 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from ...errors import FileError, read_errors_said
+import numpy as np
+
+from ...errors import FileError, counted, read_errors_said
 from ...io.input_files import open_regular
-from .log_table import LARGEST_FILE, LogFile
+from ...io.text_table import MISSING, read_text_table
+from .log_table import LARGEST_FILE, MOST_VALUES, LogFile, LogTable, require_size
 from .readers.array_files import read_hdf5, read_mat, read_npz
-from .readers.mcap_log import read_mcap
-from .readers.ros_bag import read_bag
-from .readers.text_table import read_text
+from .readers.bags import read_bag, read_mcap
+
+
+def read_text(path: Path) -> LogFile:
+    """Read a table of text; raise FileError if it is none."""
+    found = read_text_table(path, MOST_VALUES)
+    rows, columns = found.values.shape
+    require_size(rows * columns, columns, path)
+    notes, kept, text = list(found.notes), {}, 0
+    for name, values in zip(found.names, found.values.T, strict=True):
+        if np.isnan(values).all():
+            notes.append(f"'{path.name}': the column '{name}' holds no numbers and was left out.")
+            continue
+        text += sum(cell.lower() not in MISSING for _, cell in found.wrong.get(name, []))
+        kept[name] = np.ascontiguousarray(values)
+    notes += [f"'{path.name}': {counted(text, 'cell')} with text count as missing."] if text else []
+    units = {name: unit for name, unit in found.units.items() if name in kept}
+    return LogFile(path, "table of text", (LogTable("", kept, units),), tuple(notes))
+
 
 READERS: dict[str, Callable[[Path], LogFile]] = {
     ".csv": read_text,

@@ -21,11 +21,10 @@ from ..dataset.rig import FORMAT, read_rig
 from ..dataset.second_logger import interpolated, with_steady_signs
 from .answers import Answers, LoggerAnswer, RecordingAnswer
 from .clock_alignment import ClockShift, clock_shift
-from .column_behaviour import LEAST_CONTACT, contact_of, correlation, is_unordered
+from .column_behaviour import LEAST_CONTACT, contact_of, correlation, is_unordered, missing_code
 from .column_meaning import SINCE_1970
 from .guess import toml_value
 from .log_table import FEWEST_ROWS, LogFile, LogTable, with_distinct_names
-from .missing_codes import missing_code
 
 RIG_NAME = "rig.toml"
 LONGEST_PAUSE = 10.0

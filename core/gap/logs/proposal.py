@@ -13,7 +13,7 @@ import numpy as np
 from ...errors import FileError
 from ..dataset.column_names import PRESSURES, READING_UNITS
 from .answers import Use
-from .column_behaviour import LEAST_CONTACT, contact_of, correlation, is_force, is_unnamed, is_unordered
+from .column_behaviour import LEAST_CONTACT, contact_of, correlation, is_force, is_unnamed, is_unordered, missing_code
 from .column_meaning import (
     Family,
     Meaning,
@@ -27,7 +27,6 @@ from .column_meaning import (
 )
 from .guess import UNKNOWN, Evidence, Guess, Proposal
 from .log_table import FEWEST_ROWS, FRAMES, LogFile, LogTable, with_distinct_names
-from .missing_codes import missing_code
 
 POSE, TURN, FORCE = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("force_x", "force_y", "force_z")
 BEGINNING = 0.05

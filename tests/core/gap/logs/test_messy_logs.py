@@ -8,10 +8,9 @@ from log_rigs import new_rig, template, write_csv
 from palpate.commands import main
 from palpate.core.errors import FileError
 from palpate.core.gap.dataset.rig import read_rig
-from palpate.core.gap.logs.column_behaviour import is_force
+from palpate.core.gap.logs.column_behaviour import is_force, missing_code
 from palpate.core.gap.logs.log_file import read_log
 from palpate.core.gap.logs.log_table import with_distinct_names
-from palpate.core.gap.logs.missing_codes import missing_code
 from palpate.core.gap.logs.proposal import propose
 from palpate.core.gap.logs.questions import asked
 
