@@ -43,15 +43,15 @@ class StepwiseNormalForces:
         self._points = PointRange(0, 0, points, np.arange(points), 0, 0)
 
     def step(
-        self, length: int, depth: np.ndarray, rate: np.ndarray, slide: np.ndarray | None = None, commit: bool = True
+        self, step_length: int, depth: np.ndarray, rate: np.ndarray, slide_step: np.ndarray | None = None, commit: bool = True
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return forces and tangents at the end of a step.
 
         Parameters
         ----------
-        length : int
+        step_length : int
             Index of the length of the step.
-        depth, rate, slide : (n,) float, m, m/s, m
+        depth, rate, slide_step : (n,) float, m, m/s, m
             Depth at the end of the step, its rate during the step, and the distance slid in the step.
         commit : bool
             Update the memory of the effects. If false, the step is only evaluated.
@@ -63,9 +63,9 @@ class StepwiseNormalForces:
             Derivatives of the force.
         """
         law, contacts = contact_law(self.parameters), self._contacts
-        slide = np.zeros(len(depth)) if slide is None else slide
+        slide_step = np.zeros(len(depth)) if slide_step is None else slide_step
         for i in range(len(depth)):
-            write_base_law(contacts, 0, i, TexelMotion(depth[i], rate[i], slide[i], 0.0), law)
+            write_base_law(contacts, 0, i, TexelMotion(depth[i], rate[i], slide_step[i], 0.0), law)
         linear = law.exponent == LINEAR_EXPONENT
-        apply_force_laws(0, length, contacts, self._points, linear, self.program, self.memory, commit)
+        apply_force_laws(0, step_length, contacts, self._points, linear, self.program, self.memory, commit)
         return contacts.force[0].copy(), contacts.by_depth[0].copy(), contacts.by_rate[0].copy()

@@ -71,7 +71,7 @@ def build_model(
 
 def step_program(sensors: Sequence[Sensor], dt: float) -> EffectProgram:
     """Return the laws that act on the forces of sensors, for steps of `dt` seconds."""
-    return compile_program([sensor.effects for sensor in sensors], [dt, 0.0])  # STEP and NOW of effect_kernels
+    return compile_program([sensor.effects for sensor in sensors], [dt, 0.0])  # FULL_STEP and NO_TIME of effect_kernels
 
 
 def texel_starts(scenario: Scenario) -> np.ndarray:

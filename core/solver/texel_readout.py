@@ -26,7 +26,7 @@ from .detection.detection_data import (
     read_vector,
     write_vector,
 )
-from .dynamics.effect_kernels import NOW, apply_effects, force_and_friction_law, lane_range, press_texel
+from .dynamics.effect_kernels import NO_TIME, apply_effects, force_and_friction_law, lane_range, press_texel
 from .dynamics.friction_state import motion_values, point_law, row_of, row_velocity, velocity_at, write_pair_motion
 from .solver_model import SolverModel, State
 from .workspace import Workspace
@@ -171,7 +171,7 @@ def _write_forces_one_by_one(pair: int, law: ContactLaw, model: SolverModel, sta
             texels = workspace.effects.contacts
             press_texel(texels, b, lane, pair, TexelMotion(depth, rate, 0.0, speed), p, model)
             points = lane_range(pair, b, lane, 1, model, workspace)
-            apply_effects(pair, NOW, points, p, model, state.effect_memory, workspace)
+            apply_effects(pair, NO_TIME, points, p, model, state.effect_memory, workspace)
             fn, p = force_and_friction_law(pair, b, lane, p, model, texels)
         fx, fy, fz = _friction(bristle, (vx, vy, vz), normal, rate, fn, p)
         write_vector(rows, b, FRICTION, lane, fx, fy, fz)

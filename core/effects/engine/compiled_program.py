@@ -3,8 +3,8 @@
 
 Every texel is one spring with one history, whatever presses on it. Each contact point of a sensor has one row of memory, zero
 at the start. During a step the solver may call :func:`apply_force_laws` any number of times with ``commit=False``. At the end
-of the step it calls it once with ``commit=True`` for *every* point of the sensor, with depth, rate and slide zero where nothing
-touches, because what was pressed recovers. If several targets press on one point, the deepest is remembered.
+of the step it calls it once with ``commit=True`` for *every* point of the sensor, with depth, rate and sliding step zero where
+nothing touches, because what was pressed recovers. If several targets press on one point, the deepest is remembered.
 
 Which laws a sensor has is known only at run time, but the solver's kernels are compiled once and for all. So each law is
 compiled into a loop over points with a fixed signature of its own, and the solver calls it by the address of its machine code.
@@ -55,7 +55,7 @@ def kernel_template(function: Callable[..., Any]) -> Callable[..., Any]:
 def _law_over_time(
     force: np.ndarray,
     depth: np.ndarray,
-    slide: np.ndarray,
+    slide_step: np.ndarray,
     step: np.ndarray,
     constants: np.ndarray,
     memory: np.ndarray,
@@ -64,7 +64,7 @@ def _law_over_time(
     for i in range(force.shape[0]):
         row = constants[step[i]]
         for point in range(force.shape[1]):
-            texel = TexelInput(force[i, point], 1.0, depth[i, point], slide[i, point])
+            texel = TexelInput(force[i, point], 1.0, depth[i, point], slide_step[i, point])
             result[i, point], _ = LAW(texel, row, memory[point], True)
 
 
@@ -72,9 +72,9 @@ def _law_over_time(
 def _law_over_points(
     columns: Columns, constants: np.ndarray, memory: np.ndarray, rows: np.ndarray, offset: int, commit: bool
 ) -> None:
-    force, slope, depth, slide = columns
+    force, slope, depth, slide_step = columns
     for i in range(len(rows)):
-        texel = TexelInput(force[i], slope[i], depth[i], slide[i])
+        texel = TexelInput(force[i], slope[i], depth[i], slide_step[i])
         force[i], slope[i] = LAW(texel, constants, memory[offset + rows[i]], commit)
 
 
@@ -235,7 +235,7 @@ def law_over_time(
     constants: np.ndarray,
     memory: np.ndarray,
     depth: np.ndarray | None = None,
-    slide: np.ndarray | None = None,
+    slide_step: np.ndarray | None = None,
 ) -> np.ndarray:
     """Run one law over t samples of n points; return (t, n) float. The numbers are those of the same run step by step.
 
@@ -243,7 +243,7 @@ def law_over_time(
     ----------
     form : Form
         With a law.
-    force, depth, slide : (t, n) float
+    force, depth, slide_step : (t, n) float
         Inputs of the law, see :class:`.TexelInput`.
     step : (t,) int
         The row of `constants` that belongs to each sample.
@@ -256,10 +256,10 @@ def law_over_time(
     # Contiguous arrays of one type, so that the law is compiled only once.
     force = np.ascontiguousarray(force, dtype=float)
     depth = _zeros(force.shape) if depth is None else np.ascontiguousarray(depth, dtype=float)
-    slide = _zeros(force.shape) if slide is None else np.ascontiguousarray(slide, dtype=float)
+    slide_step = _zeros(force.shape) if slide_step is None else np.ascontiguousarray(slide_step, dtype=float)
     constants = np.ascontiguousarray(constants, dtype=float)
     result = np.empty_like(force)
-    _over_time(form.law)(force, depth, slide, step, constants, memory, result)
+    _over_time(form.law)(force, depth, slide_step, step, constants, memory, result)
     return result
 
 
@@ -341,7 +341,7 @@ def compile_program(stacks: Sequence[Sequence[Effect]], dt: ArrayLike) -> Effect
     stacks : sequence of sequences of Effect
         The effects of each sensor; effects on readings are ignored.
     dt : (m,) float, s
-        Lengths of step that will occur. The argument `length` of :func:`apply_force_laws` is an index of these.
+        Lengths of step that will occur. The argument `step_length` of :func:`apply_force_laws` is an index of these.
     """
     lengths = np.atleast_1d(np.asarray(dt, dtype=float))
     tables = _Tables()
@@ -394,7 +394,7 @@ class TexelMotion(NamedTuple):
         At the end of the step, zero or less where nothing touches.
     rate : float, m/s
         Of the depth, during the step.
-    slide : float, m
+    slide_step : float, m
         Distance slid in the step.
     speed : float, m/s
         Of sliding.
@@ -402,7 +402,7 @@ class TexelMotion(NamedTuple):
 
     depth: float
     rate: float
-    slide: float
+    slide_step: float
     speed: float
 
 
@@ -412,7 +412,7 @@ class TexelContacts(NamedTuple):
 
     Attributes
     ----------
-    depth, rate, slide, speed : (blocks, n) float
+    depth, rate, slide_step, speed : (blocks, n) float
         See :class:`TexelMotion`; the depth is never negative.
     force : (blocks, n) float, N
         Normal force.
@@ -427,7 +427,7 @@ class TexelContacts(NamedTuple):
 
     depth: np.ndarray
     rate: np.ndarray
-    slide: np.ndarray
+    slide_step: np.ndarray
     speed: np.ndarray
     force: np.ndarray
     by_depth: np.ndarray
@@ -476,7 +476,7 @@ def write_base_law(contacts: TexelContacts, block: int, point: int, motion: Texe
         force = elastic_force(depth, law)
         by_depth = elastic_stiffness(depth, force, law)
     contacts.depth[block, point], contacts.rate[block, point] = max(depth, 0.0), motion.rate
-    contacts.slide[block, point], contacts.speed[block, point] = motion.slide, motion.speed
+    contacts.slide_step[block, point], contacts.speed[block, point] = motion.slide_step, motion.speed
     contacts.force[block, point], contacts.by_depth[block, point] = force, by_depth
     contacts.by_rate[block, point] = damping_coefficient(law)
 
@@ -484,7 +484,7 @@ def write_base_law(contacts: TexelContacts, block: int, point: int, motion: Texe
 @kernel
 def apply_force_laws(
     sensor: int,
-    length: int,
+    step_length: int,
     contacts: TexelContacts,
     points: PointRange,
     linear: bool,
@@ -497,7 +497,7 @@ def apply_force_laws(
     Parameters
     ----------
     sensor : int
-    length : int
+    step_length : int
         Index of the length of the step, see :func:`compile_program`.
     contacts : TexelContacts
     points : PointRange
@@ -508,9 +508,9 @@ def apply_force_laws(
     commit : bool
         Update the memory: once per step and point, at the end of the step.
     """
-    columns, block = (contacts.force, contacts.by_depth, contacts.depth, contacts.slide), points.block
+    columns, block = (contacts.force, contacts.by_depth, contacts.depth, contacts.slide_step), points.block
     for i in range(program.first_law[sensor], program.first_unclipped[sensor]):
-        row = program.row[i] + length
+        row = program.row[i] + step_length
         call_law(program.law[i], columns, points, program, row, memory, program.state[i], commit)
     for i in range(points.first, points.first + points.number):
         force, by_depth, by_rate = damped_force_derivatives(
@@ -520,7 +520,7 @@ def apply_force_laws(
             force = by_depth = by_rate = 0.0
         contacts.force[block, i], contacts.by_depth[block, i], contacts.by_rate[block, i] = force, by_depth, by_rate
     for i in range(program.first_unclipped[sensor], program.first_law[sensor + 1]):
-        row = program.row[i] + length
+        row = program.row[i] + step_length
         call_law(program.law[i], columns, points, program, row, memory, program.state[i], commit)
 
 

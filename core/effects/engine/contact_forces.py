@@ -32,7 +32,7 @@ def normal_forces(
     parameters: SensorParameters,
     time: np.ndarray,
     depth: np.ndarray,
-    slide: np.ndarray | None = None,
+    slide_step: np.ndarray | None = None,
     rate: np.ndarray | None = None,
 ) -> np.ndarray:
     """Return the normal forces on the texels of a sensor along a known motion, (t, n) float, N.
@@ -46,7 +46,7 @@ def normal_forces(
         Nothing has touched the sensor before the first sample.
     depth : (t, n) float, m
         Zero or less where nothing touches.
-    slide : (t, n) float, m, optional
+    slide_step : (t, n) float, m, optional
         Distance slid since the sample before; zero by default.
     rate : (t, n) float, m/s, optional
         Rate of the depth; by default the difference quotient since the sample before.
@@ -67,7 +67,7 @@ def normal_forces(
             force, clipped = _damped_and_clipped(force, inside, rate, law), True
         memory = np.zeros((depth.shape[1], form.state_size))
         constants = constants_of(form, complete_values(item), lengths)
-        force = law_over_time(form, force, step, constants, memory, inside, slide)
+        force = law_over_time(form, force, step, constants, memory, inside, slide_step)
     return force if clipped else _damped_and_clipped(force, inside, rate, law)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an effect is: plain data on a sensor, a kind in the library, and the mechanism by which a form of it acts.
+"""Kinds of effects and their forms: plain data on a sensor, a kind in the library, and the mechanism by which a form acts.
 
 Each module of the library defines one ``KIND``. A kind has several forms: different formulas
 for the same phenomenon, because publications differ. A form acts by exactly one mechanism:
@@ -13,11 +13,17 @@ for the same phenomenon, because publications differ. A form acts by exactly one
 ``placement``     where the texels really are: ``placement(position, normal, tangent, values) → the same three``
 ================  ===========================================================================================================
 
+The contract of a law: its answer depends on its arguments alone, ``commit=False`` leaves the memory as it is, and **a second
+call with a step of length zero gives the first call's answer**. The solver asks with ``commit=False`` while it iterates, with
+``commit=True`` at the end of the step, and the readout asks once more with the constants of length zero, when the memory
+already holds that step. So a law may remember (also one at the site `contact`), but it must not take a rate from the memory
+that a step of length zero would make zero or infinite: keep the rate in the memory instead, and update it only where time
+passes.
+
 Laws and friction laws are compiled, so they use only numbers, arrays and :mod:`math`. This module and those of the library
 import nothing heavy, because Blender's panels list them.
 
-Nothing outside the library names an effect. What others need to know of it is stated in its ``KIND``, in the words of
-:mod:`.specification`.
+Nothing outside the library names an effect. Its ``KIND`` states what others need to know of it, in the words of this module.
 """
 
 from __future__ import annotations
@@ -128,12 +134,12 @@ class Drawing:
 
 
 SITES_OF_ACTION = ("contact", "pad", "readout")
-"""Where an effect acts, in the order in which a load passes: `contact` changes the contact law itself and has no memory, `pad`
-has a memory in each texel; both act on the bodies. `readout` changes only what the sensor reports."""
+"""Where an effect acts, in the order in which a load passes: `contact` acts before `pad`, as a part of the contact law itself;
+both act on the bodies, and both may have a memory in each texel. `readout` changes only what the sensor reports."""
 
 
 class TexelInput(NamedTuple):
-    """What a law is told about one texel and one step.
+    """Inputs of a law: one texel and one step.
 
     Attributes
     ----------
@@ -143,14 +149,14 @@ class TexelInput(NamedTuple):
         Derivative of `force` with respect to the depth at the end of the step.
     depth : float, m
         Penetration at the end of the step, zero without contact. Zero for a readout law.
-    slide : float, m
+    slide_step : float, m
         Distance slid during the step. Zero for a readout law.
     """
 
     force: float
     slope: float
     depth: float
-    slide: float
+    slide_step: float
 
 
 Law = Callable[[TexelInput, np.ndarray, np.ndarray, bool], tuple[float, float]]

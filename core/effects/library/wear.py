@@ -49,7 +49,7 @@ def archard(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit:
     """``f · max(1 − δ/d, 0)``, as if the surface lay δ lower; δ grows with load times distance slid. State: δ. Constants: κ."""
     worn = state[0]
     if commit:
-        state[0] += constants[0] * max(texel.force, 0.0) * texel.slide
+        state[0] += constants[0] * max(texel.force, 0.0) * texel.slide_step
     if texel.depth <= worn:
         return 0.0, 0.0
     if worn == 0.0:
@@ -65,7 +65,7 @@ def work(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bo
     """
     factor = math.exp(-state[0] / constants[0])
     if commit:
-        state[0] += max(texel.force, 0.0) * math.hypot(texel.slide, max(texel.depth, 0.0) - state[1])
+        state[0] += max(texel.force, 0.0) * math.hypot(texel.slide_step, max(texel.depth, 0.0) - state[1])
         state[1] = max(texel.depth, 0.0)
     return texel.force * factor, texel.slope * factor
 

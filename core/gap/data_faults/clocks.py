@@ -172,7 +172,7 @@ def _busiest_part(rig: Rig, trial: Trial) -> slice:
 
 def _part_of(trial: Trial, part: slice) -> Trial:
     """A stretch of a trial."""
-    parts = {name: getattr(trial, name) for name in ("time", "position", "quaternion", "level", "slide", "reading", "force")}
+    parts = {name: getattr(trial, name) for name in ("time", "position", "quaternion", "level", "travel", "reading", "force")}
     kept: dict[str, Any] = {name: None if one is None else one[part] for name, one in parts.items()}
     return replace(trial, **kept)
 
@@ -284,5 +284,5 @@ def with_shift(trial: Trial, late: float) -> Trial:
         position=None if trial.position is None else at_source(trial.position),
         quaternion=quaternion,
         level=None if trial.level is None else at_source(trial.level[:, None])[:, 0],
-        slide=at_source(trial.slide),
+        travel=at_source(trial.travel),
     )

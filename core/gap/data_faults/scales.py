@@ -66,7 +66,7 @@ def _friction_signs(stimuli: Sequence[Stimulus]) -> list[DataFault]:
 def _work_share(trial: Trial) -> float:
     """Work of the net force along the stated travel over what it would be if it always pointed along it; 0 without travel."""
     assert trial.force is not None
-    step = np.diff(trial.slide, axis=0)
+    step = np.diff(trial.travel, axis=0)
     known = np.nan_to_num(trial.force[:, :2])
     force = 0.5 * (known[1:] + known[:-1])
     most = float(np.linalg.norm(force, axis=1) @ np.linalg.norm(step, axis=1))

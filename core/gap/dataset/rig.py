@@ -468,7 +468,7 @@ class _TrialReader:
                 if has_columns
                 else f"'{file.name}' has no response: it needs texel_0 … texel_{self.texels - 1}, or force_x force_y force_z."
             )
-        slide = _vector(columns, SLIDE, partial=False)
+        travel = _vector(columns, SLIDE, partial=False)
         position = quaternion = level = None
         if kind == "pose":
             position, quaternion = _vector(columns, POSE, partial=False), _turns(columns, file)
@@ -477,7 +477,7 @@ class _TrialReader:
             if kind == "force" and "x" in columns:  # a known weight at a known place, wherever its z is
                 place = [columns["x"], columns["y"], np.zeros(len(time))]
                 position, quaternion = np.stack(place, axis=1), _turns(columns, file)
-        stimuli = [(POSE, position), (TURN, quaternion), ((kind,), level), (SLIDE, slide)]
+        stimuli = [(POSE, position), (TURN, quaternion), ((kind,), level), (SLIDE, travel)]
         unknown, said = _gaps_filled(stimuli, time, file)
         reading, force = (_known_responses(part, unknown) for part in (reading, force))
         if reading is None and force is None:
@@ -489,9 +489,9 @@ class _TrialReader:
         strangers = [name for name in columns if not _meaning(name)]
         if strangers:
             said.append(f"'{file.name}': {', '.join(map(repr, strangers))} mean nothing here and were left out.")
-        slide = np.zeros((len(time), 2)) if slide is None else slide
+        travel = np.zeros((len(time), 2)) if travel is None else travel
         temperature = _temperatures(columns, time, file)
-        found = Trial(file.stem, use, time, kind, position, quaternion, level, slide, reading, force, temperature=temperature)
+        found = Trial(file.stem, use, time, kind, position, quaternion, level, travel, reading, force, temperature=temperature)
         return found, said
 
 

@@ -46,7 +46,7 @@ class Trial:
         Of the indenter in the sensor's frame. With a known force they say where it acts; z has no meaning then.
     level : (T,) float or None
         Depth of all texels (m), or force that all texels share (N).
-    slide : (T, 2) float, metres
+    travel : (T, 2) float, metres
         Travel of the surface along the sensor's x and y; zero if none was recorded.
     reading : (T, n) float or None, the sensor's unit
         NaN if a value is missing.
@@ -81,7 +81,7 @@ class Trial:
     position: np.ndarray | None
     quaternion: np.ndarray | None
     level: np.ndarray | None
-    slide: np.ndarray
+    travel: np.ndarray
     reading: np.ndarray | None
     force: np.ndarray | None
     session: str = ""

@@ -257,7 +257,7 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
         rest = max(rest, float(np.ptp(idle)) / float(np.ptp(s.time)) if len(idle) else 0.0)
         where = predictor.trial.session or id(predictor)  # the sensor remembers the cycles of a whole session
         cycles[where] = cycles.get(where, 0) + _cycle_count(total, max(UNLOADED_SHARE * full, band))
-        slides |= bool(s.slide.max(initial=0.0) > LEAST_SLIDING_SPEED)
+        slides |= bool(s.slide_speed.max(initial=0.0) > LEAST_SLIDING_SPEED)
     quick = np.concatenate(speeds) if speeds else np.zeros(0)
     spread = float(np.quantile(quick, 0.9) / np.quantile(quick, 0.1)) if len(quick) > 4 else 1.0
     return Coverage(

@@ -51,7 +51,7 @@ def phase_indices(stimulus: Stimulus) -> np.ndarray:
     found[touching] = PHASES.index("hold")
     found[touching & (rate > still)] = PHASES.index("loading")
     found[touching & (rate < -still)] = PHASES.index("unloading")
-    found[touching & (np.abs(rate) <= 5 * still) & (stimulus.slide > SLIDING_SPEED)] = PHASES.index("sliding")
+    found[touching & (np.abs(rate) <= 5 * still) & (stimulus.slide_speed > SLIDING_SPEED)] = PHASES.index("sliding")
     return found
 
 

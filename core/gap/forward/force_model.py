@@ -114,7 +114,7 @@ class ContactHistory:
         normal = -rig.surface.normal[None] if stimulus.normal is None else stimulus.normal
         normal = np.ascontiguousarray(np.broadcast_to(normal, (*load.shape, 3)), dtype=float)
         slip = np.zeros_like(normal) if stimulus.slip is None else np.ascontiguousarray(stimulus.slip)
-        arrays = [load, stimulus.rate, stimulus.slide, *np.moveaxis(normal, 2, 0), *np.moveaxis(slip, 2, 0)]
+        arrays = [load, stimulus.rate, stimulus.slide_speed, *np.moveaxis(normal, 2, 0), *np.moveaxis(slip, 2, 0)]
         first, group = _equal_columns(arrays, touched_texels)
         one = touched_texels[first]
         share = None if rig.cover is None else rig.cover.share[touched_texels]
@@ -123,7 +123,7 @@ class ContactHistory:
         pressed = np.ascontiguousarray(load[:, one] > 0)
         samples = ContactSamples.of_size(int(pressed.sum()))
         write_samples(pressed, one, count, normal, slip, step, samples)
-        depth, rate, slide = (values[:, one].copy() for values in (stimulus.depth, stimulus.rate, stimulus.slide))
+        depth, rate, slide = (values[:, one].copy() for values in (stimulus.depth, stimulus.rate, stimulus.slide_speed))
         return cls(stimulus.time, len(chosen), touched, group, depth, slide * step[:, None], rate, samples)
 
     def force(self, p: SensorParameters, force_effects: Sequence[Effect]) -> np.ndarray:

@@ -51,7 +51,7 @@ class Stimulus:
     normal : (T, n, 3) float or None
         Direction of the normal force on the sensor: the indenter's outward normal in the sensor's frame. None: straight into
         each texel.
-    slide : (T, n) float, m/s
+    slide_speed : (T, n) float, m/s
         Speed of sliding over the sensor in contact.
     slip : (T, n, 3) float, m/s, or None
         The same as a vector in the sensor's frame; None if no net force was measured.
@@ -64,7 +64,7 @@ class Stimulus:
     rate: np.ndarray
     force_share: np.ndarray | None
     normal: np.ndarray | None
-    slide: np.ndarray
+    slide_speed: np.ndarray
     slip: np.ndarray | None
     overpressed: int = 0
 
@@ -120,7 +120,7 @@ def of_texels(stimulus: Stimulus, rig: Rig) -> Stimulus:
         rate=stimulus.rate @ to_texels,
         force_share=None if stimulus.force_share is None else total,
         normal=normal,
-        slide=mean(stimulus.slide),
+        slide_speed=mean(stimulus.slide_speed),
         slip=None if stimulus.slip is None else mean_vector(stimulus.slip),
     )
 
@@ -159,9 +159,9 @@ def _stimulus(trial: Trial, rig: Rig, texels: Texels) -> Stimulus:
     """The stimulus of the texels, at the poses and depths of a trial."""
     n = len(texels)
     along = None
-    if np.ptp(trial.slide, axis=0).any():
-        travel = np.gradient(trial.slide, trial.time, axis=0)
-        along = travel[:, None, :1] * texels.tangent + travel[:, None, 1:] * texels.bitangent
+    if np.ptp(trial.travel, axis=0).any():
+        velocity = np.gradient(trial.travel, trial.time, axis=0)
+        along = velocity[:, None, :1] * texels.tangent + velocity[:, None, 1:] * texels.bitangent
     if trial.stimulus == "pose":
         return _posed(trial, rig, texels, along)
     if trial.stimulus == "force" and trial.position is not None and rig.indenter_of(trial) is not None:
@@ -217,7 +217,7 @@ def joined_stimuli(stimuli: Sequence[Stimulus], texels: Texels) -> tuple[Stimulu
         rate=np.concatenate([part.rate for part in parts]),
         force_share=None if first.force_share is None else np.concatenate([_shares(part) for part in parts]),
         normal=None if no_normal else vectors("normal", -texels.normal),
-        slide=np.concatenate([part.slide for part in parts]),
+        slide_speed=np.concatenate([part.slide_speed for part in parts]),
         slip=None if no_slip else vectors("slip", np.zeros((len(texels), 3))),
         overpressed=max(one.overpressed for one in stimuli),
     )
@@ -251,10 +251,10 @@ def _posed(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) -> 
             f"The indenter of '{trial.name}.csv' goes right through the sensor (by more than {0.5e3 * reach:.3g} mm): "
             "check the pose's unit, its origin (the shape's centre) and the sign of z."
         )
-    travel, spin = np.gradient(trial.position, trial.time, axis=0), _spin(trial.quaternion, trial.time)
+    velocity, spin = np.gradient(trial.position, trial.time, axis=0), _spin(trial.quaternion, trial.time)
     rate, slide = np.zeros_like(depth), np.zeros_like(depth)
     slip = None if trial.force is None else np.zeros_like(normal)
-    motion = tuple(np.ascontiguousarray(one, dtype=float) for one in (travel, spin, trial.position))
+    motion = tuple(np.ascontiguousarray(one, dtype=float) for one in (velocity, spin, trial.position))
     nothing = np.zeros((0, 0, 3))
     surface, kept = (nothing if one is None else np.ascontiguousarray(one) for one in (along, slip))
     split_velocities(motion, surface, depth, normal, point, (rate, slide, kept))
@@ -277,7 +277,7 @@ def split_velocities(motion, along, depth, normal, point, split):  # type: ignor
     split : tuple of (T, n), (T, n) and (T, n, 3) or (0, 0, 3) float
         Rate of the depth, speed of sliding, and sliding velocity if it is wanted; written to, zero before.
     """
-    travel, spin, centre = motion
+    velocity, spin, centre = motion
     rate, slide, slip = split
     moves = along.shape[0] > 0
     for i in range(depth.shape[0]):
@@ -286,9 +286,9 @@ def split_velocities(motion, along, depth, normal, point, split):  # type: ignor
             if depth[i, j] <= 0.0:
                 continue
             x, y, z = point[i, j, 0] - centre[i, 0], point[i, j, 1] - centre[i, 1], point[i, j, 2] - centre[i, 2]
-            vx = travel[i, 0] + (wy * z - wz * y)
-            vy = travel[i, 1] + (wz * x - wx * z)
-            vz = travel[i, 2] + (wx * y - wy * x)
+            vx = velocity[i, 0] + (wy * z - wz * y)
+            vy = velocity[i, 1] + (wz * x - wx * z)
+            vz = velocity[i, 2] + (wx * y - wy * x)
             if moves:
                 vx, vy, vz = vx + along[i, j, 0], vy + along[i, j, 1], vz + along[i, j, 2]
             nx, ny, nz = normal[i, j, 0], normal[i, j, 1], normal[i, j, 2]

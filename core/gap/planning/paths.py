@@ -270,7 +270,7 @@ class Trajectory:
             position=positions,
             quaternion=turns,
             level=self.levels(),
-            slide=np.zeros((len(time), 2)),
+            travel=np.zeros((len(time), 2)),
             reading=None if like.reading is None else np.zeros((len(time), like.reading.shape[1])),
             force=None if like.force is None else np.zeros((len(time), 3)),
             session="",
@@ -427,7 +427,7 @@ class Ground:
         assert self.quaternion is not None
         trial = replace(
             self.like, time=np.arange(float(count)), position=position, quaternion=np.tile(self.quaternion, (count, 1)),
-            slide=nothing, reading=None, force=None,
+            travel=nothing, reading=None, force=None,
         )  # fmt: skip
         touched: np.ndarray = (stimulus_of(trial, self.rig).load > 0.0).any(axis=1)
         return touched

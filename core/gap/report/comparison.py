@@ -119,7 +119,7 @@ def frictionless_nrmse(result: Diagnosis) -> dict[str, float | None] | None:
 
     The base model has friction of its own. It is part of every reported error and is no missing effect.
     """
-    if not any(p.trial.force is not None and p.stimulus.slide.any() for p in result.predictors):
+    if not any(p.trial.force is not None and p.stimulus.slide_speed.any() for p in result.predictors):
         return None
     return {use: nrmse(result.of(use), frictionless(result.base.model), result.full) for use in USES}
 
@@ -269,7 +269,7 @@ def recording_summary(predictor: Predictor, model: Model, full: tuple[float, flo
         float(trial.time[-1] - trial.time[0]),
         int(np.count_nonzero(half[1:] & ~half[:-1])),
         load.sum(axis=0),
-        bool(predictor.stimulus.slide.any()),
+        bool(predictor.stimulus.slide_speed.any()),
     )
 
 

@@ -278,8 +278,8 @@ def loops(result: Diagnosis) -> Figure:
         texel = int(name.split()[1])
         x = s.force_share[:, texel] if s.force_share is not None else 1e3 * s.depth[:, texel]
         label = "load (N)" if s.force_share is not None else "depth (mm)"
-    elif s.slide.any():
-        travel = trial.slide if trial.slide.any() else trial.position[:, :2] if trial.position is not None else trial.slide
+    elif s.slide_speed.any():
+        travel = trial.travel if trial.travel.any() else trial.position[:, :2] if trial.position is not None else trial.travel
         x, label = 1e3 * travel[:, int(np.argmax(np.ptp(travel, axis=0)))], "travel (mm)"
     else:
         x, label = 1e3 * s.depth.max(axis=1), "depth (mm)"

@@ -126,7 +126,7 @@ def _bristle_starts(views: Sequence[TrialView], model: Model) -> list[Model]:
     p, travels, steps, loads = model.parameters, [0.0], [], [0.0]
     for view in views:
         stimulus = view.predictor.stimulus
-        moved = stimulus.slide * np.diff(stimulus.time, prepend=stimulus.time[0])[:, None]
+        moved = stimulus.slide_speed * np.diff(stimulus.time, prepend=stimulus.time[0])[:, None]
         force = view.predictor.normal_force(model)
         travels.append(float(moved.sum(axis=0).max(initial=0.0)))
         steps.append(moved[moved > 0])
@@ -151,7 +151,7 @@ def identified_base_parameters(rig: Rig, predictors: Sequence[Predictor]) -> lis
     has_forces = any(p.trial.force is not None for p in predictors)
     depth_known = any(p.trial.stimulus != "force" for p in predictors)
     force_known = any(p.trial.stimulus == "force" for p in predictors)
-    slides = any(p.trial.force is not None and p.stimulus.slide.any() for p in predictors)
+    slides = any(p.trial.force is not None and p.stimulus.slide_speed.any() for p in predictors)
     own_unit = rig.parameters.unit != "N"
     names: list[str] = []
     if depth_known:

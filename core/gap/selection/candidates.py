@@ -63,7 +63,7 @@ class Scales:
         Distance between neighbouring texels, and extent of the sensor.
     step, seconds : float, s
         Median time between samples, and length of the longest trial or session.
-    speed, rate : float, m/s
+    sliding_speed, rate : float, m/s
         Largest speeds of sliding, and of a texel's depth.
     texels : int
     travel : float, m
@@ -79,7 +79,7 @@ class Scales:
     size: float
     step: float
     seconds: float
-    speed: float
+    sliding_speed: float
     rate: float
     texels: int
     travel: float = np.inf
@@ -102,7 +102,7 @@ def scales_of(predictors: Sequence[Predictor], model: Model) -> Scales:
         size=max(extent, pitch),
         step=float(np.median([q.trial.step for q in predictors])),
         seconds=max(float(np.ptp(q.trial.time if q.session is None else q.session.stimulus.time)) for q in predictors),
-        speed=max(max(float(q.stimulus.slide.max(initial=0.0)) for q in predictors), 1e-6),
+        sliding_speed=max(max(float(q.stimulus.slide_speed.max(initial=0.0)) for q in predictors), 1e-6),
         rate=max(max(_largest_rate(q) for q in predictors), 1e-6),
         texels=len(p),
         travel=_travel(predictors),
@@ -136,7 +136,7 @@ def _travel(predictors: Sequence[Predictor]) -> float:
 def search_range(parameter: Parameter, scales: Scales, form: Form) -> tuple[float, float]:
     """Return the range of values in which a parameter of a form would show in recordings of these scales, inside its bounds."""
     warmth = max(scales.warmth, LEAST_WARMTH)
-    speed = scales.rate if form.friction_law is None else scales.speed
+    speed = scales.rate if form.friction_law is None else scales.sliding_speed
     known = {
         "N": (SMALL * scales.force, LARGE * scales.force),
         "unit": (SMALL * scales.reading, LARGE * scales.reading),
@@ -144,12 +144,12 @@ def search_range(parameter: Parameter, scales: Scales, form: Form) -> tuple[floa
         "s": (0.5 * scales.step, 2.0 * scales.seconds),
         "m/s": (0.02 * speed, 2.0 * speed),
         "N·s": (0.1 * scales.force * scales.seconds, 50.0 * scales.force * scales.seconds),
-        "J": (0.1 * scales.force * scales.depth, 50.0 * scales.force * scales.speed * scales.seconds),
+        "J": (0.1 * scales.force * scales.depth, 50.0 * scales.force * scales.sliding_speed * scales.seconds),
         **{unit: (0.02 / scales.force**power, 2.0 / scales.force**power) for power, unit in INVERSE_FORCES.items()},
-        "s/m": (0.02 / scales.speed, 2.0 / scales.speed),
+        "s/m": (0.02 / scales.sliding_speed, 2.0 / scales.sliding_speed),
         "unit/s": (-0.5 * scales.reading / scales.seconds, 0.5 * scales.reading / scales.seconds),
         "rad": (-0.1, 0.1),
-        "N·s/m": (0.02 * scales.force / scales.speed, 2.0 * scales.force / scales.speed),
+        "N·s/m": (0.02 * scales.force / scales.sliding_speed, 2.0 * scales.force / scales.sliding_speed),
         "1/K": (-0.5 / warmth, 0.5 / warmth),
         "unit/K": (-0.5 * scales.reading / warmth, 0.5 * scales.reading / warmth),
     }
@@ -320,7 +320,7 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
     each recording begins with an untouched sensor, and such a gain is a form of drift.
     """
     posed = any(p.trial.stimulus == "pose" for p in predictors)
-    dragged = any(p.trial.force is not None and p.stimulus.slide.any() for p in predictors)
+    dragged = any(p.trial.force is not None and p.stimulus.slide_speed.any() for p in predictors)
     read = any(p.trial.reading is not None for p in predictors)
     several = len(predictors[0].rig.texels) > 1
     in_rows = isinstance(predictors[0].rig.texels.layout, GridLayout)

@@ -110,7 +110,7 @@ def _thinned_trial(trial: Trial) -> Trial:
     every = slice(None, None, SAMPLE_STRIDE if len(trial.time) >= LEAST_SAMPLES * SAMPLE_STRIDE else 1)
     parts: dict[str, Any] = {
         name: None if getattr(trial, name) is None else getattr(trial, name)[every]
-        for name in ("time", "position", "quaternion", "level", "slide", "reading", "force")
+        for name in ("time", "position", "quaternion", "level", "travel", "reading", "force")
     }
     return replace(trial, **parts)
 

@@ -23,14 +23,14 @@ from ...model.sensor import Effect, Sensor
 
 
 def force_with_effects(
-    when: int, motion: TexelMotion, law: ContactLaw, constants: np.ndarray, memory: np.ndarray, commit: bool
+    step_length: int, motion: TexelMotion, law: ContactLaw, constants: np.ndarray, memory: np.ndarray, commit: bool
 ) -> tuple[float, float, float]:
     """Return the normal force of a whole texel (N), and its derivatives by depth and rate (N/m and N·s/m).
 
     Parameters
     ----------
-    when : int
-        STEP or NOW of :mod:`.effect_kernels`.
+    step_length : int
+        FULL_STEP or NO_TIME of :mod:`.effect_kernels`.
     motion : TexelMotion
     law : ContactLaw
         Of a whole texel.
@@ -60,7 +60,7 @@ def friction_with_effects(speed: float, force: float, constants: np.ndarray) -> 
 
 
 def reading_with_effects(
-    force: float, zero: float, scale: float, when: int, constants: np.ndarray, memory: np.ndarray
+    force: float, zero: float, scale: float, step_length: int, constants: np.ndarray, memory: np.ndarray
 ) -> float:
     """Return the reading for a normal force (N), in the sensor's unit.
 
@@ -69,7 +69,7 @@ def reading_with_effects(
     force : float, N
     zero, scale : float
         ``reading = zero + scale · force``.
-    when : int
+    step_length : int
         0 at the first step, to which no time leads, else 1.
     constants : (laws, 2, c) float
     memory : (laws, c) float
@@ -169,10 +169,11 @@ def _chains(sensor: Sensor) -> tuple[Chain, Chain, Chain]:
 
 
 _FORCE_LAW = (
-    "force, {slope} = force_{i}(TexelInput(force, {slope}, depth, motion.slide), constants[{i}, when], memory[{i}], commit)"
+    "force, {slope} = force_{i}("
+    "TexelInput(force, {slope}, depth, motion.slide_step), constants[{i}, step_length], memory[{i}], commit)"
 )
 _FRICTION_LAW = "f, c = friction_{i}(speed, force, constants[{i}, 0])\nfactor, viscosity = factor * f, viscosity + c"
-_READING_LAW = "value, _ = reading_{i}(TexelInput(value, 1.0, 0.0, 0.0), constants[{i}, when], memory[{i}], True)"
+_READING_LAW = "value, _ = reading_{i}(TexelInput(value, 1.0, 0.0, 0.0), constants[{i}, step_length], memory[{i}], True)"
 
 
 def _with_laws(template: Callable[..., Any], calls: dict[str, list[str]], scope: dict[str, Any]) -> Callable[..., Any]:

@@ -34,7 +34,7 @@ from ...laws.friction import (
 from ...laws.normal_force import normal_force, normal_tangent
 from ...solver.detection.narrow_phase import NEARLY_TOO_DEEP
 from ...solver.dynamics.contact_assembly import LinearContact, Tangent, linearise_contact
-from ...solver.dynamics.effect_kernels import NOW, STEP
+from ...solver.dynamics.effect_kernels import FULL_STEP, NO_TIME
 from ...solver.dynamics.friction_state import relative_motion, velocity_at
 from ...solver.jumps import crosses_texel, meets_sphere
 from .block import block_sum, wait_for_block
@@ -278,13 +278,13 @@ def write_reading(
         n = sensor.first_point.shape[0] - 1
         row = texel if sensor.conversion.shape[0] == n else world * n + texel
         zero, scale = sensor.conversion[row, 0], sensor.conversion[row, 1]
-        when = 0 if worlds.fresh[world] else 1
+        step_length = 0 if worlds.fresh[world] else 1
         if worlds.fresh[world]:
             for i in range(slots.reading_memory.shape[2]):
                 for j in range(slots.reading_memory.shape[3]):
                     slots.reading_memory[world, texel, i, j] = 0.0
         reading = reading_with_effects(
-            force, zero, scale, when, sensor.reading_constants[world], slots.reading_memory[world, texel]
+            force, zero, scale, step_length, sensor.reading_constants[world], slots.reading_memory[world, texel]
         )  # fmt: skip
     out.readings[world, texel] = reading
 
@@ -314,7 +314,7 @@ def _advance_point(world: int, point: int, law: ContactLaw, sensor: SensorArrays
     """Bring bristles and the memory of effects from the step's beginning to its end."""
     stiff, scale = sensor.multipliers[point, 0], sensor.multipliers[point, 1]
     painted = scaled_law(law, stiff, scale)
-    deepest, deepest_rate, deepest_slide = 0.0, 0.0, 0.0
+    deepest, deepest_rate, deepest_slide_step = 0.0, 0.0, 0.0
     for target in range(slots.pressed.shape[1]):
         pressed, depth = slots.pressed[world, target, point], slots.depth[world, target, point]
         n, z = slots.normal, slots.bristle
@@ -339,10 +339,10 @@ def _advance_point(world: int, point: int, law: ContactLaw, sensor: SensorArrays
             z[world, target, 1, point] = zy
             z[world, target, 2, point] = zz
             if end > deepest:
-                deepest, deepest_rate, deepest_slide = end, moved.rate, sensor.dt * math.sqrt(square)
+                deepest, deepest_rate, deepest_slide_step = end, moved.rate, sensor.dt * math.sqrt(square)
     if HAS_EFFECTS == 1:
         force_with_effects(
-            STEP, TexelMotion(deepest, deepest_rate, deepest_slide, 0.0), whole_texel_law(painted, sensor.share, 1.0),
+            FULL_STEP, TexelMotion(deepest, deepest_rate, deepest_slide_step, 0.0), whole_texel_law(painted, sensor.share, 1.0),
             sensor.force_constants[world], slots.memory[world, point], True,
         )  # fmt: skip
 
@@ -356,7 +356,7 @@ def _tangent(
     if HAS_EFFECTS == 1:
         end = motion.depth + sensor.dt * motion.rate
         force, by_depth, by_rate = force_with_effects(
-            STEP, TexelMotion(end, motion.rate, 0.0, motion.speed), whole_texel_law(painted, sensor.share, 1.0),
+            FULL_STEP, TexelMotion(end, motion.rate, 0.0, motion.speed), whole_texel_law(painted, sensor.share, 1.0),
             sensor.force_constants[world], memory, False,
         )  # fmt: skip
         factor, viscosity = friction_with_effects(motion.speed, force, sensor.friction_constants[world])
@@ -485,7 +485,7 @@ def _contact_force(
     if HAS_EFFECTS == 1:
         speed = math.sqrt(square)
         whole, _, _ = force_with_effects(
-            NOW, TexelMotion(at.depth, v.rate, 0.0, speed), whole_texel_law(painted, sensor.share, 1.0),
+            NO_TIME, TexelMotion(at.depth, v.rate, 0.0, speed), whole_texel_law(painted, sensor.share, 1.0),
             sensor.force_constants[world], slots.memory[world, point], False,
         )  # fmt: skip
         factor, viscosity = friction_with_effects(speed, whole, sensor.friction_constants[world])

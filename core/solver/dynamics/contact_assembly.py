@@ -30,7 +30,7 @@ from ..detection.detection_data import (
 )
 from ..solver_model import SolverModel, State
 from ..workspace import SUMS, Workspace
-from .effect_kernels import STEP, apply_effects, lane_range, press_texel, write_tangent
+from .effect_kernels import FULL_STEP, apply_effects, lane_range, press_texel, write_tangent
 from .friction_state import motion_values, point_law, relative_motion, row_of, row_velocity, velocity_at
 
 
@@ -181,7 +181,7 @@ def _write_tangents(
         first, left = contacts.first_block[pair], contacts.number[pair]
         for b in range(first, first + (left + LANES - 1) // LANES):
             count = min(left, LANES)
-            apply_effects(pair, STEP, lane_range(pair, b, 0, count, model, workspace), law, model, memory, workspace)
+            apply_effects(pair, FULL_STEP, lane_range(pair, b, 0, count, model, workspace), law, model, memory, workspace)
             for lane in range(count):
                 write_tangent(pair, b, lane, dt, model, texels, rows)
             left -= LANES

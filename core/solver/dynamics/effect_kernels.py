@@ -27,7 +27,7 @@ from ..solver_model import SolverModel, State
 from ..workspace import EffectWork, Workspace
 from .friction_state import motion_values, point_law, row_of, row_velocity, write_pair_motion
 
-STEP, NOW = 0, 1
+FULL_STEP, NO_TIME = 0, 1
 """Lengths of time that laws are made for: a step, and none at all."""
 
 
@@ -51,7 +51,7 @@ def press_texel(
     """
     part = model.pairs.overlap_share[pair]
     whole = whole_texel_law(law, model.pairs.force_share[pair], part)
-    own = TexelMotion(part * motion.depth, part * motion.rate, motion.slide, motion.speed)
+    own = TexelMotion(part * motion.depth, part * motion.rate, motion.slide_step, motion.speed)
     write_base_law(contacts, block, point, own, whole)
 
 
@@ -64,15 +64,21 @@ def lane_range(pair: int, block: int, first: int, number: int, model: SolverMode
 
 @kernel
 def apply_effects(
-    pair: int, when: int, points: PointRange, law: ContactLaw, model: SolverModel, memory: np.ndarray, workspace: Workspace
+    pair: int,
+    step_length: int,
+    points: PointRange,
+    law: ContactLaw,
+    model: SolverModel,
+    memory: np.ndarray,
+    workspace: Workspace,
 ) -> None:
     """Let effects act on contacts of a pair that :func:`press_texel` wrote, as if each pressed on a whole texel.
 
     Parameters
     ----------
     pair : int
-    when : int
-        STEP where depths are those at the step's end, NOW where no time has passed since the last step.
+    step_length : int
+        FULL_STEP where depths are those at the step's end, NO_TIME where no time has passed since the last step.
     points : PointRange
         See :func:`lane_range`.
     law : ContactLaw
@@ -81,7 +87,7 @@ def apply_effects(
     workspace : Workspace
     """
     sensor, linear, contacts = model.pairs.sensor[pair], law.exponent == LINEAR_EXPONENT, workspace.effects.contacts
-    apply_force_laws(sensor, when, contacts, points, linear, model.effects, memory, False)
+    apply_force_laws(sensor, step_length, contacts, points, linear, model.effects, memory, False)
     apply_friction_laws(sensor, contacts, points, model.effects, memory)
 
 
@@ -140,9 +146,9 @@ def _record_pair(pair: int, dt: float, model: SolverModel, workspace: Workspace)
         b, lane = row_of(r, pair, contacts)
         point = model.pairs.first_point[pair] + contacts.slots[b, lane] - model.pairs.first_slot[pair]
         vx, vy, vz, rate = row_velocity(b, lane, motion, contacts.deforming[pair], contacts)
-        slide = dt * math.sqrt(max(vx * vx + vy * vy + vz * vz - rate * rate, 0.0))
+        slide_step = dt * math.sqrt(max(vx * vx + vy * vy + vz * vz - rate * rate, 0.0))
         p, end = point_law(law, model.points.multipliers, point), contacts.rows[b, DEPTH + lane] + dt * rate
-        _record_deepest(point, pair, TexelMotion(end, rate, slide, 0.0), p, model, workspace.effects.points)
+        _record_deepest(point, pair, TexelMotion(end, rate, slide_step, 0.0), p, model, workspace.effects.points)
 
 
 @kernel
@@ -159,7 +165,7 @@ def _commit_sensor(sensor: int, law: ContactLaw, model: SolverModel, work: Effec
     """Bring the memory of a sensor's points to the step's end, and clear what was recorded of them."""
     first, stop = model.sensors.first_point[sensor], model.sensors.first_point[sensor + 1]
     recorded, points = work.points, PointRange(0, first, stop - first, work.point_numbers, first, 0)
-    apply_force_laws(sensor, STEP, recorded, points, law.exponent == LINEAR_EXPONENT, model.effects, memory, True)
+    apply_force_laws(sensor, FULL_STEP, recorded, points, law.exponent == LINEAR_EXPONENT, model.effects, memory, True)
     for i in range(first, stop):
-        recorded.depth[0, i] = recorded.rate[0, i] = recorded.slide[0, i] = recorded.speed[0, i] = 0.0
+        recorded.depth[0, i] = recorded.rate[0, i] = recorded.slide_step[0, i] = recorded.speed[0, i] = 0.0
         recorded.force[0, i] = recorded.by_depth[0, i] = recorded.by_rate[0, i] = 0.0

@@ -63,7 +63,7 @@ def test_the_way_since_the_last_turn():
     assert "depth" not in found  # it is the same all the time
     bands = found["turning"][:, :, 0]
     assert ((bands != 0).sum(axis=0) <= 1).all() and len(bands) == len(TRAVEL_BANDS) - 1
-    peak = np.flatnonzero(np.isclose(predictor.trial.slide[:, 0], 0.02, atol=1e-9))[0]
+    peak = np.flatnonzero(np.isclose(predictor.trial.travel[:, 0], 0.02, atol=1e-9))[0]
     assert bands[0, peak + 2] == -1.0 and bands[-1, peak - 2] == 1.0  # just turned back; at the end of the way there
 
 

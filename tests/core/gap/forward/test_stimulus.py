@@ -23,7 +23,7 @@ def trial(position, quaternion=None, time=None, **changes):
     count = len(position)
     time = 0.02 * np.arange(count) if time is None else time
     turns = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)) if quaternion is None else quaternion
-    values = dict(position=np.asarray(position, float), quaternion=turns, level=None, slide=np.zeros((count, 2)))
+    values = dict(position=np.asarray(position, float), quaternion=turns, level=None, travel=np.zeros((count, 2)))
     values.update(reading=None, force=np.zeros((count, 3)))
     values.update(changes)
     return Trial("press", "fit", time, values.pop("stimulus", "pose"), **values)
@@ -64,7 +64,7 @@ def test_a_box_is_its_mesh(turned):
         plain, exact = (stimulus_of(one, rig(Indenter(mesh, None, "box", size), one)) for size in (None, edges))
         differ = np.abs(plain.depth - exact.depth) > 1e-12  # where a segment just meets an edge, rounding decides
         assert differ.mean() < 1e-3 and exact.depth.max() > 1e-3
-        for name in ("rate", "normal", "slide"):
+        for name in ("rate", "normal", "slide_speed"):
             np.testing.assert_allclose(getattr(plain, name)[~differ], getattr(exact, name)[~differ], atol=1e-9)
 
 
@@ -85,7 +85,7 @@ def test_depth_rate_and_slide_of_a_ball_are_those_of_geometry():
         np.testing.assert_allclose(found.rate[inner, texel], (velocity * normal).sum(axis=1)[inner], rtol=1e-9)
         tangential = velocity - (velocity * normal).sum(axis=1)[:, None] * normal
         np.testing.assert_allclose(found.slip[inner, texel], tangential[inner], atol=1e-12)
-        np.testing.assert_allclose(found.slide[inner, texel], np.linalg.norm(tangential, axis=1)[inner], rtol=1e-7)
+        np.testing.assert_allclose(found.slide_speed[inner, texel], np.linalg.norm(tangential, axis=1)[inner], rtol=1e-7)
 
 
 def test_a_turning_cylinder_rubs():
@@ -100,7 +100,7 @@ def test_a_turning_cylinder_rubs():
     inside = away < 0.0069
     np.testing.assert_allclose(found.depth[:, inside], 1e-3, rtol=1e-9)
     assert not found.depth[:, away > 0.0071].any()
-    np.testing.assert_allclose(found.slide[:, inside], np.tile(2.0 * away[inside], (26, 1)), atol=1e-9)
+    np.testing.assert_allclose(found.slide_speed[:, inside], np.tile(2.0 * away[inside], (26, 1)), atol=1e-9)
     assert np.abs(found.rate).max() < 1e-12
 
 
@@ -108,7 +108,7 @@ def test_depth_and_force_trials_load_all_texels_alike():
     time = 0.02 * np.arange(50)
     level = np.clip(np.sin(6 * time), 0, None) * 1e-3
     slide = np.column_stack([0.01 * time, 0 * time])
-    one = trial(np.zeros((50, 3)), stimulus="depth", level=level, slide=slide)
+    one = trial(np.zeros((50, 3)), stimulus="depth", level=level, travel=slide)
     found = stimulus_of(one, rig(None, one))
     np.testing.assert_array_equal(found.depth, np.tile(level[:, None], (1, 84)))
     np.testing.assert_allclose(found.slip[level > 0], np.tile([0.01, 0.0, 0.0], (np.count_nonzero(level), 84, 1)), atol=1e-15)
