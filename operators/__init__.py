@@ -47,6 +47,8 @@ def register():
     from . import presets
 
     for cls in _classes():
+        if cls.__doc__:
+            cls.bl_description = " ".join(cls.__doc__.split())  # a tooltip keeps the line breaks and the indent of its text
         bpy.utils.register_class(cls)
     presets.register()
 

@@ -217,10 +217,14 @@ def _ranges() -> dict:
     return found
 
 
-class PALPATE_PG_scene(bpy.types.PropertyGroup):
-    """`Scene.palpate`"""
+class ColorRanges:
+    """The ends of the colours of each quantity."""
 
     __annotations__ = _ranges()
+
+
+class PALPATE_PG_scene(ColorRanges, bpy.types.PropertyGroup):
+    """`Scene.palpate`"""
 
     schema_version: IntProperty(options={"HIDDEN"})
     folder: StringProperty(

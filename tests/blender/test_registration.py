@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Enabling is instant and disabling leaves nothing behind, also when a dependency is missing."""
 
+import ast
 import importlib.util
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import bpy
 import pytest
@@ -144,6 +146,16 @@ def test_a_process_that_forgets_to_disable_still_ends():
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, timeout=60).returncode == 0
 
 
+def test_no_class_mixes_made_properties_with_written_ones():
+    """From Python 3.14, which Blender 5.2 of Debian has, a class with ``__annotations__`` of its own has no others."""
+    for path in Path(palpate.__file__).parent.glob("addon/**/*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ClassDef):
+                given = [target.id for part in node.body if isinstance(part, ast.Assign) for target in part.targets]
+                written = any(isinstance(part, ast.AnnAssign) for part in node.body)
+                assert not (written and "__annotations__" in given), f"{path.name}: {node.name}"
+
+
 def test_every_operator_and_panel_has_a_name_and_a_tooltip():
     for base in (bpy.types.Operator, bpy.types.Panel, bpy.types.Menu):
         for kind in kinds_of(base):
@@ -152,6 +164,7 @@ def test_every_operator_and_panel_has_a_name_and_a_tooltip():
                 if base is bpy.types.Operator:
                     assert kind.__doc__, kind
                     room, name = kind.bl_idname.split(".")
+                    assert "\n" not in getattr(getattr(bpy.ops, room), name).get_rna_type().description, kind
                     assert kind.__name__ == f"{room.upper()}_OT_{name}"
     for group in (bpy.types.Object.bl_rna, bpy.types.Scene.bl_rna):
         for item in group.properties["palpate"].fixed_type.properties:
