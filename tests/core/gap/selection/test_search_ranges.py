@@ -24,3 +24,8 @@ def test_a_speed_is_that_of_sliding_for_friction_and_that_of_pressing_for_other_
     friction, creep = form_of("stribeck", "gaussian"), form_of("creep")
     assert search_range(parameter, scales, creep) == pytest.approx((0.02 * fastest, 2.0 * fastest))
     assert search_range(parameter, scales, friction) == pytest.approx((2e-8, 2e-6))
+    work, most = Parameter("life", "J", 0.1, 1e-12, 1e9, "Of something.", log=True), 50.0 * scales.force * scales.seconds
+    assert search_range(work, scales, form_of("wear"))[1] == pytest.approx(most * fastest)
+    assert search_range(work, scales, friction)[1] == pytest.approx(most * 1e-6)
+    drag = Parameter("drag", "N·s/m", 0.1, 1e-12, 1e9, "Of something.", log=True)
+    assert search_range(drag, scales, creep)[1] == pytest.approx(2.0 * scales.force / fastest)
