@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, field, replace
 from typing import Any, TypedDict, Unpack
 
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.geometry import shapes
-from ..core.geometry.mesh import TriangleMesh, mass_properties, outward_faces
+from ..core.geometry.mesh import TriangleMesh, mass_properties, turned_outwards
 from ..core.model import body as model
 from . import arguments
 from .arguments import ArgumentError
@@ -201,9 +200,7 @@ class Body:
         """Return a body; `argument` is what the size of its mesh follows from."""
         arguments.known(placement, sorted(Placement.__annotations__), "argument")
         name = arguments.name_from(mesh, placement.get("name"), "body")
-        surface, turned = outward_faces(arguments.mesh_of(mesh, "mesh", name), name)
-        for warning in turned:
-            warnings.warn(warning, stacklevel=4)
+        surface = turned_outwards(arguments.mesh_of(mesh, "mesh", name), name)
         arguments.size_checked(surface.vertices, arguments.LARGEST_BODY, argument, f"body '{name}'")
         path, turn = placement.get("path_of_motion"), placement.get("quaternion", LEVEL)
         if mass is not None and path is not None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,23 +71,23 @@ def checked_mesh(
     if triangles.min() < 0 or triangles.max() >= len(vertices):
         raise MeshError(f"A face of '{name}' refers to a vertex that does not exist: the mesh is damaged, repair it first.")
 
-    warnings = []
+    found = []
     mesh = TriangleMesh(vertices, triangles, quads)
     solid = have_area(mesh)
     if not solid.any():
         raise MeshError(f"All faces of '{name}' have zero area: give it a size (check its scale and shape).")
     if not solid.all():
-        warnings.append(f"{np.count_nonzero(~solid)} faces of '{name}' have zero area and were left out.")
+        found.append(f"{np.count_nonzero(~solid)} faces of '{name}' have zero area and were left out.")
         mesh = TriangleMesh(vertices, np.ascontiguousarray(triangles[solid]), quads)
     open_edges, branching, flipped = edge_defects(mesh.triangles)
     if branching:
-        warnings.append(f"{branching} edges of '{name}' join more than two faces (non-manifold): every face is used as it is.")
+        found.append(f"{branching} edges of '{name}' join more than two faces (non-manifold): every face is used as it is.")
     if flipped:
-        warnings.append(
+        found.append(
             f"{flipped} edges of '{name}' join faces that point to opposite sides: recalculate the normals, "
             "faces that point away make no contact."
         )
-    return mesh, warnings
+    return mesh, found
 
 
 def edge_defects(triangles: np.ndarray) -> tuple[int, int, int]:
@@ -129,6 +130,14 @@ def outward_faces(mesh: TriangleMesh, name: str) -> tuple[TriangleMesh, list[str
     quads = None if mesh.quads is None else mesh.quads[:, ::-1]
     warning = f"The faces of '{name}' point inwards: they are taken as turned outwards, flip its normals to have them so."
     return TriangleMesh(mesh.vertices, np.ascontiguousarray(mesh.triangles[:, ::-1]), quads), [warning]
+
+
+def turned_outwards(mesh: TriangleMesh, name: str) -> TriangleMesh:
+    """Return the mesh of :func:`outward_faces`; Python's own warning says what it says."""
+    turned, found = outward_faces(mesh, name)
+    for sentence in found:
+        warnings.warn(sentence, stacklevel=3)
+    return turned
 
 
 def _corners(mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -63,13 +63,9 @@ class LoadBalance:
 
     @property
     def pulls(self) -> np.ndarray:
-        """(E,) bool: True where no texel can push along the force of the last load, so that contact exerts nothing of it."""
+        """See :func:`pulling_loads`."""
         search = self._search
-        given = np.where(np.isfinite(search.given), search.given, 0.0)
-        force = given[:, :1] * search.direction if self._degrees == 1 else given[:, :3]
-        along = np.einsum("eji,ej->ei", self._rotation, force) @ self._normals.T
-        shear = 1e-9 * np.linalg.norm(force, axis=1, keepdims=True)  # rounding: what has no part along a normal is no pull
-        return np.asarray((along < -shear).all(axis=1))
+        return pulling_loads(search.given[:, : self._degrees], search.direction, self._rotation, self._normals)
 
     def step(self, wrench: np.ndarray) -> np.ndarray:
         """Run one step under a load, and return the part of it that the contact does not exert.
@@ -109,6 +105,43 @@ class LoadBalance:
             going = _advance_searches(out.wrench, out.texels, self._engine, out.poses, self._search)
         _write_residuals(self._residual, self._search)
         return self._residual[:, :degrees].copy()
+
+
+def pulling_loads(given: np.ndarray, direction: np.ndarray, rotation: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Return where no texel can push along the force of a load, so that contact exerts nothing of it.
+
+    Parameters
+    ----------
+    given : (E, 6), (E, 3) or (E, 1) float, N and N·m
+    direction : (E, 3) float
+        Of loads with one component, world.
+    rotation : (E, 3, 3) float
+        Of the sensors.
+    normals : (n, 3) float
+        Of the texels.
+
+    Returns
+    -------
+    (E,) bool
+    """
+    given = np.where(np.isfinite(given), given, 0.0)
+    force = given * direction if given.shape[1] == 1 else given[:, :3]
+    along = np.einsum("eji,ej->ei", rotation, force) @ normals.T
+    shear = 1e-9 * np.linalg.norm(force, axis=1, keepdims=True)  # rounding: what has no part along a normal is no pull
+    return np.asarray((along < -shear).all(axis=1))
+
+
+def reason_of_pulls(pulls: np.ndarray) -> str:
+    """Return which of the environments, (E,) bool, have a load that pulls, and why nothing balances it; else empty."""
+    if not pulls.any():
+        return ""
+    return f"In {pulls.sum()} of {len(pulls)} environments ({first_numbers(pulls)}) the load {PULL}"
+
+
+def first_numbers(which: np.ndarray) -> str:
+    """Return the first environments of a mask."""
+    found = np.flatnonzero(which)
+    return ", ".join(map(str, found[:8])) + (" …" if len(found) > 8 else "")
 
 
 PULL = (

@@ -16,7 +16,7 @@ from ..geometry.mesh import TriangleMesh
 from ..geometry.shapes import Shape
 from ..model.recording import SENSOR_FIELDS, SensorFrame
 from ..solver.jumps import JumpFinder
-from ..solver.pressed_model import PressedModel
+from ..solver.pressed_model import PressedModel, targets_of
 from ..solver.pressing import PressedTexels, StepMemory, begin_at
 from .load_balance import PULL, LoadBalance
 from .pressed_sensors import REMEDY
@@ -96,7 +96,7 @@ class PressedSensor:
         threads: int | None = None,
     ):
         self._one_target = isinstance(target, TriangleMesh | Shape)
-        targets = [target] if isinstance(target, TriangleMesh | Shape) else list(target)
+        targets = targets_of(target)
         self._unit = item.sensor.parameters.unit
         model = self._model = PressedModel(item.sensor, targets, dt, threads)
         out = self._out = PressedTexels.zero(1, model.texels, len(targets))

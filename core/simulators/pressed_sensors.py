@@ -16,10 +16,10 @@ from ..errors import ParameterError
 from ..geometry.mesh import TriangleMesh
 from ..geometry.shapes import Shape
 from ..solver.jumps import JumpFinder
-from ..solver.pressed_model import PressedModel
+from ..solver.pressed_model import PressedModel, targets_of
 from ..solver.pressing import PressedTexels, Presser, StepMemory
 from .environment_parameters import Columns, sensors_of
-from .load_balance import PULL, LoadBalance
+from .load_balance import LoadBalance, first_numbers, reason_of_pulls
 from .sensor_on_mesh import SensorOnMesh
 
 REMEDY = "take shorter steps, or reset where a target is put elsewhere."
@@ -68,7 +68,7 @@ def fault_of(valid: np.ndarray, jumped: np.ndarray) -> str:
     """Return what :meth:`Contacts.fault` says of environments (E,)."""
     sentences = []
     if not valid.all():
-        which = _numbers(~valid)
+        which = first_numbers(~valid)
         sentences.append(
             f"{np.sum(~valid)} of {len(valid)} environments have a pose that is not a position and quaternion of finite "
             f"numbers ({which}): reset them in the simulation."
@@ -76,15 +76,9 @@ def fault_of(valid: np.ndarray, jumped: np.ndarray) -> str:
     if jumped.any():
         sentences.append(
             f"In {jumped.sum()} of {len(valid)} environments a target went through the sensor within one step "
-            f"({_numbers(jumped)}): {REMEDY}"
+            f"({first_numbers(jumped)}): {REMEDY}"
         )
     return " ".join(sentences)
-
-
-def _numbers(which: np.ndarray) -> str:
-    """Return the first environments of a mask."""
-    found = np.flatnonzero(which)
-    return ", ".join(map(str, found[:8])) + (" …" if len(found) > 8 else "")
 
 
 class PressedSensors:
@@ -139,7 +133,7 @@ class PressedSensors:
         if environments < 1:
             raise ParameterError(f"There are {environments} environments: ask for one at least.")
         self._one_target = isinstance(target, TriangleMesh | Shape)
-        targets = [target] if isinstance(target, TriangleMesh | Shape) else list(target)
+        targets = targets_of(target)
         model = self._model = PressedModel(item.sensor, targets, dt, 1)
         n = model.texels
         check_memory(environments, model.bytes_of_environment() + n * BYTES_OF_TEXEL, available_memory())
@@ -169,10 +163,7 @@ class PressedSensors:
     @property
     def residual_reason(self) -> str:
         """Which environments have a load at the last step that pulls, and why no contact balances it; else empty."""
-        if not self.residual.shape[1] or self._balance is None or not self._balance.pulls.any():
-            return ""
-        pulls = self._balance.pulls
-        return f"In {np.sum(pulls)} of {len(self)} environments ({_numbers(pulls)}) the load {PULL}"
+        return reason_of_pulls(self._balance.pulls) if self.residual.shape[1] and self._balance is not None else ""
 
     @property
     def displacement(self) -> np.ndarray:

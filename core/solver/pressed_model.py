@@ -12,7 +12,7 @@ from ..compiled.thread_team import helper_threads, threads_for
 from ..effects.engine.readout_chain import ReadoutChain, transducers_of
 from ..effects.engine.registry import in_signal_order
 from ..errors import ParameterError
-from ..geometry.mesh import TriangleMesh
+from ..geometry.mesh import TriangleMesh, turned_outwards
 from ..geometry.shapes import Shape
 from ..laws.contact_law import contact_law
 from ..model.body import Body, Motion
@@ -34,6 +34,12 @@ from .pressing import (
 from .simulation import Simulation
 from .structures import step_program, workspace_for
 from .workspace import Workspace
+
+
+def targets_of(given: TriangleMesh | Shape | Sequence[TriangleMesh | Shape]) -> list[TriangleMesh | Shape]:
+    """Return a target, or several, as a list; a mesh whose faces point inwards is turned, with a warning."""
+    targets = [given] if isinstance(given, TriangleMesh | Shape) else list(given)
+    return [turned_outwards(one, "the target") if isinstance(one, TriangleMesh) else one for one in targets]
 
 
 class PressedModel:

@@ -19,7 +19,7 @@ from typing import Annotated, Any, Literal, get_args
 import numpy as np
 
 from ..errors import FileError, ParameterError, os_error_reason
-from ..geometry.mesh import TriangleMesh
+from ..geometry.mesh import TriangleMesh, outward_faces, turned_outwards
 from ..io.file_writing import atomic_write, file_sha256
 from ..io.input_files import load_mesh
 from ..io.schema import WORD, wanted
@@ -51,7 +51,7 @@ class StudyMeshes(Mapping[str, TriangleMesh]):
     def __init__(self, folder: Path, entries: Iterable[Mapping[str, str]] = ()):
         self._folder = folder
         self.digests = {entry["file"]: entry["sha256"] for entry in entries}
-        self._load = lru_cache(maxsize=MOST_MESHES_KEPT)(load_mesh)
+        self._load = lru_cache(maxsize=MOST_MESHES_KEPT)(_target_of)
 
     def __getitem__(self, name: str) -> TriangleMesh:
         return self._load(_copy_of(self._folder, name, self.digests[name]))
@@ -112,8 +112,13 @@ def find_meshes(vary: Mapping[str, Any], base: Path) -> dict[str, Path]:
             raise FileError(f"No file next to the study matches the meshes '{word}': check its name and folder.")
         files |= {Path(name).as_posix(): base / name for name in found}
     for file in files.values():
-        load_mesh(file)
+        turned_outwards(load_mesh(file), file.name)
     return files
+
+
+def _target_of(kept: Path) -> TriangleMesh:
+    """Return the mesh in a copy, of whose faces was warned by its own name."""
+    return outward_faces(load_mesh(kept), kept.name)[0]
 
 
 def freeze_meshes(files: Mapping[str, Path], folder: Path) -> list[dict[str, str]]:

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from ...errors import FileError, ParameterError, SensorError
-from ...geometry.mesh import TriangleMesh, checked_mesh
+from ...geometry.mesh import TriangleMesh, checked_mesh, turned_outwards
 from ...geometry.texels import Texels, texels_from_region
 from ...io.csv_table import read_table
 from ...io.input_files import LONGEST_NAME, checked_name, read_toml, require_regular
@@ -375,7 +375,7 @@ def _indenter(words: dict[str, Any], folder: Path, path: Path) -> Indenter:
         raise FileError(f"[indenter] of '{path.name}' needs either a shape or a mesh, and not both.")
     if "mesh" in words:
         mesh, _ = _mesh(_inside(words["mesh"], folder, "The indenter's mesh", path), "the indenter")
-        return Indenter(mesh, None, str(words["mesh"]))
+        return Indenter(turned_outwards(mesh, "the indenter"), None, str(words["mesh"]))
     shape = words["shape"]
     if not isinstance(shape, dict) or len(shape) != 1 or next(iter(shape)) not in ("sphere", "box", "cylinder"):
         raise FileError(

@@ -15,14 +15,16 @@ from ...errors import PalpateError, ParameterError
 from ...geometry.bvh import build_tree
 from ...geometry.contact_points import ContactPoints, contact_points
 from ...geometry.mesh import TriangleMesh
+from ...geometry.rotations import rotation_matrices
 from ...geometry.shapes import MESH, Shape
 from ...laws.contact_law import contact_law
 from ...model.body import Body, Motion
 from ...model.scenario import Scenario, Target
 from ...model.sensor import Sensor
 from ...solver.detection.deformation import point_rows
+from ...solver.pressed_model import targets_of
 from ..environment_parameters import Columns, sensors_of
-from ..load_balance import check_targets
+from ..load_balance import check_targets, pulling_loads, reason_of_pulls
 from ..load_search import LoadSearch
 from ..pressed_sensors import available_memory, check_memory, fault_of
 from ..sensor_on_mesh import SensorOnMesh
@@ -86,6 +88,8 @@ class WarpSensors:
         itself, and then call :meth:`step` without poses.
     residual : (E, 1), (E, 3) or (E, 6) warp.array, N and N·m
         Part of the loads given to the last step that no contact balances; None where none was given.
+    residual_reason : str
+        One sentence where some of these loads pull, with the convention of loads; else empty.
     displacement : (E, 6) warp.array, metres and rad
         Of the targets from their poses at the last step, for the loads: in the world, and rotation vector about their origin;
         None before a load was given.
@@ -102,7 +106,7 @@ class WarpSensors:
         parameters: Columns | None = None,
     ):
         warp = require_warp()
-        targets = [target] if isinstance(target, TriangleMesh | Shape) else list(target)
+        targets = targets_of(target)
         _check(item.sensor, targets, dt, environments)
         self._warp, self.device = warp, require_device(warp, device, single)
         self._on_gpu = bool(warp.get_device(self.device).is_cuda)
@@ -195,6 +199,18 @@ class WarpSensors:
             raise PalpateError(
                 f"{self.device} did not take the step and its arrays are lost, so make the sensors again: {error}"
             ) from error
+
+    @property
+    def residual_reason(self) -> str:
+        """What :attr:`.PressedSensors.residual_reason` says; the loads and poses come to the host for it."""
+        if self.residual is None:
+            return ""
+        search, degrees = self._balance[2], self.residual.shape[1]
+        quaternion = self.poses.numpy()[:, 0, 3:].astype(float)
+        length = np.linalg.norm(quaternion, axis=1, keepdims=True)
+        rotation = rotation_matrices(np.divide(quaternion, length, out=np.eye(4)[[0] * len(self)], where=length > 0.0))
+        given, direction = search.given.numpy()[:, :degrees], search.direction.numpy()
+        return reason_of_pulls(pulling_loads(given, direction, rotation, self._item.texels.normal))
 
     def fault(self) -> str:
         """Return what :meth:`.Contacts.fault` says; the arrays come to the host for it."""

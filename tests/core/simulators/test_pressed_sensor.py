@@ -52,6 +52,20 @@ def test_force_and_torque_are_those_of_springs(turn):
     assert contact.torque_on_target == pytest.approx(np.cross(arms, forces).sum(axis=0), abs=1e-10)
 
 
+@pytest.mark.parametrize("several", [False, True])
+def test_a_target_whose_faces_point_inwards_is_turned(several):
+    outside, rest = box(), np.array([1.0, 0.0, 0.0, 0.0])
+    inside = TriangleMesh(outside.vertices, outside.triangles[:, ::-1])
+    pressed = PressedSensor(pad(4, 4), outside, 0.01)
+    place = [0.0, 0.0, 0.02 - DEPTH], rest
+    expected = pressed.step((np.zeros(3), rest), place).force_on_target
+    with pytest.warns(UserWarning, match="faces of 'the target' point inwards"):
+        turned = PressedSensor(pad(4, 4), [inside] if several else inside, 0.01)
+    found = turned.step((np.zeros(3), rest), [place] if several else place).force_on_target
+    assert np.abs(expected).max() > 0.1
+    assert np.ravel(found) == pytest.approx(expected, abs=1e-12)
+
+
 def test_poses_that_are_none_are_refused():
     item = pad(4, 4)
     rest = (np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))

@@ -53,6 +53,16 @@ def test_a_free_body_gets_the_mass_properties_of_its_shape(folder):
     assert center[2] == pytest.approx(0.005, rel=1e-3)  # a cone's is at a quarter of its height
 
 
+def test_a_shape_whose_faces_point_inwards_is_turned(folder):
+    inverted = trimesh.creation.cone(0.01, 0.02)
+    inverted.invert()
+    inverted.export(folder / "cone.ply")
+    with pytest.warns(UserWarning, match="faces of 'cone.ply' point inwards"):
+        _, plan = plan_in(folder)
+    mesh = plan.meshes["cone.ply"]
+    assert trimesh.Trimesh(mesh.vertices, mesh.triangles).volume == pytest.approx(-inverted.volume, rel=1e-6)
+
+
 def test_another_content_makes_other_runs(folder):
     study, plan = plan_in(folder)
     before = [run.digest for run in Runs(study, {"tiny": plan}, {"tiny": "0"})]

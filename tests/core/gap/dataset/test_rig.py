@@ -70,6 +70,16 @@ def test_other_stimuli_meshes_and_forces(tmp_path):
     assert two.stimulus == "force" and two.reading.shape == (20, 8)
 
 
+def test_an_indenter_whose_faces_point_inwards_is_turned(tmp_path):
+    solid = trimesh.creation.box((0.02, 0.02, 0.02))
+    solid.invert()
+    solid.export(tmp_path / "probe.ply")
+    indenter = next(line for line in RIG.splitlines() if line.startswith("shape"))
+    with pytest.warns(UserWarning, match="faces of 'the indenter' point inwards"):
+        mesh = read_rig(write(tmp_path, RIG.replace(indenter, 'mesh = "probe.ply"'))).indenter.mesh
+    assert trimesh.Trimesh(mesh.vertices, mesh.triangles).volume == pytest.approx(8e-6)
+
+
 BAD = {
     "missing column time": (dict(press=without("time")), "no column `time`"),
     "missing column of the pose": (dict(press=without("y")), "no column y"),
