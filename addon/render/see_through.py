@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Pictures in which an indenter does not hide the texels below it.
 
-Where targets cover loaded texels, a second render without them is blended over the first. Opaque, metal and glass objects so
-become a faint image of themselves around the contact and stay what they are elsewhere, in every engine. No material is touched.
+Where targets cover loaded texels, or the arrow of a force, a second render without them is blended over the first. Opaque,
+metal and glass objects so become a faint image of themselves there and stay what they are elsewhere, in every engine. No
+material is touched.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from mathutils import Vector
 
 from ...core.io.file_writing import atomic_write
 from ...core.io.hidden_folder import temporary_folder
+from ..display import materials
 from ..scene import participants
 from . import camera_direction, render
 from .loaded_texels import LoadedTexels
@@ -125,7 +127,25 @@ def clear_weights(scene, loaded: LoadedTexels, size: tuple[int, int]) -> np.ndar
     full, faded = FULL_RADII * radius, max(FADED_RADII * radius, FULL_RADII * radius + LEAST_PIXELS)
     share = np.clip((faded - distance_transform_edt(free)) / (faded - full), 0.0, 1.0)
     weights = CLEARNESS * share * share * (3.0 - 2.0 * share)
-    return weights * _shows_sensors(scene, (weights > 0.0) & free)
+    weights *= _shows_sensors(scene, (weights > 0.0) & free)
+    return np.maximum(weights, CLEARNESS * _outline(scene, [obj for obj in scene.objects if materials.SENSOR_KEY in obj], size))
+
+
+def _outline(scene, objects, size: tuple[int, int]) -> np.ndarray:
+    """(height, width) float: 1 in the pixels of the objects' faces, with a soft edge; what covers them is not asked."""
+    from PIL import Image, ImageDraw
+    from scipy.ndimage import uniform_filter
+
+    image, depsgraph = Image.new("1", size), bpy.context.evaluated_depsgraph_get()
+    draw = ImageDraw.Draw(image)
+    for obj in filter(_is_rendered, objects):
+        evaluated = obj.evaluated_get(depsgraph)
+        places = [render.image_position(scene, evaluated.matrix_world @ vertex.co) for vertex in evaluated.data.vertices]
+        pixels = [(x * size[0], (1.0 - y) * size[1]) for x, y in places]
+        for face in evaluated.data.polygons:
+            draw.polygon([pixels[vertex] for vertex in face.vertices], fill=1)
+    shown = np.array(image, dtype=float)
+    return np.minimum(shown, uniform_filter(shown, 3))
 
 
 def _shows_sensors(scene, asked: np.ndarray) -> np.ndarray:

@@ -16,9 +16,9 @@ from mathutils import Vector
 from ...core.io.hidden_folder import temporary_folder
 from . import render
 
-LAMPS = (((-35.0, 50.0), 2.2, (1.0, 0.97, 0.93)), ((70.0, 30.0), 0.9, (0.9, 0.95, 1.0)), ((170.0, 45.0), 1.6, (1.0, 1.0, 1.0)))
+LAMPS = (((-35.0, 50.0), 1.15, (1.0, 0.97, 0.93)), ((70.0, 30.0), 0.5, (0.9, 0.95, 1.0)), ((170.0, 45.0), 0.8, (1.0, 1.0, 1.0)))
 """Sun lamps: azimuth relative to the camera and elevation, degrees; strength; colour. With :data:`WORLD_STRENGTH` they light a
-white surface that faces the camera with 0.9 to 1, so that colours are neither dull nor burnt out."""
+white surface with 1 at most, so that nothing dull is burnt out, and one that faces the camera with 0.7 to 0.9."""
 WORLD_COLOR, WORLD_STRENGTH = (0.95, 0.97, 1.0), 0.45
 LIGHT_BACKGROUND, DARK_BACKGROUND = 0.9, 0.035
 """Scene-linear grey of the two backgrounds: 0.95 and 0.21 of white as displayed."""

@@ -138,6 +138,18 @@ def test_a_pad_that_nothing_touches_takes_no_room(tmp_path):
         assert not np.allclose(np.array(scene.camera.matrix_world), before, atol=1e-3)
 
 
+def test_studio_light_burns_nothing_out():
+    """From whatever side it is seen, a dull white surface sends back no more light than it gets: 1 is white."""
+    normals = np.random.default_rng(0).standard_normal((2000, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    light = np.full(len(normals), studio.WORLD_STRENGTH)
+    for (azimuth, elevation), strength, _ in studio.LAMPS:
+        a, e = np.radians((azimuth, elevation))
+        way = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+        light += strength / np.pi * np.maximum(normals @ way, 0.0)
+    assert 0.9 < light.max() <= 1.0
+
+
 @pytest.mark.slow("two pictures by Cycles, at 4 samples")
 @pytest.mark.parametrize(
     ("color", "background"),

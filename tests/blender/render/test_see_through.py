@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 import pytest
 from blender_scenes import changes, dump, grid, save
+from mathutils import Vector
 
 from palpate.addon.bake.bake import bake
 from palpate.addon.render import figure_export, loaded_texels, render, render_setup, see_through
@@ -112,6 +113,20 @@ def test_one_render_where_nothing_is_covered(baked, tmp_path, monkeypatch):
     request = FigureRequest(("scene",), frames=(3,), size=(32, 24), samples=1, view=(-90.0, -40.0), own_light=True)
     run_job(figure_export.make_figures(scene, tmp_path / "out", request))
     assert len(calls) == 1
+
+
+def test_an_arrow_is_seen_through_the_target_in_one_piece(baked):
+    """Between its texels and the top of the ball, and beside it nothing changes."""
+    scene, pad, *_ = baked
+    weights = loaded_pixels(scene, pad)[3]
+    arrow = scene.objects["Net Force Pad"]
+    with render_setup.render_setup(scene, [3], FigureRequest(view=VIEW).render_options(SIZE)):
+        scene.frame_set(3)
+        matrix = arrow.matrix_world
+        spots = [render.image_position(scene, matrix @ Vector((0.0, 0.0, height))) for height in np.linspace(0.1, 0.9, 20)]
+    along = [weights[SIZE[1] - 1 - int(y * SIZE[1]), int(x * SIZE[0])] for x, y in spots]
+    assert min(along) == pytest.approx(see_through.CLEARNESS)
+    assert (weights > 0.0).mean() < 0.4
 
 
 @pytest.mark.long("a map for every pixel of a picture")
