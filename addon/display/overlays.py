@@ -23,6 +23,9 @@ LIFT = 0.004
 """Distance of the overlay from the sensor's surface, as a share of the sensor's size: at zero the two would flicker."""
 ARROW_SHARE = 1.0
 """Length of the longest arrow, as a share of the largest sensor's size, as on a bake."""
+DENT_ORDER = 0.01
+"""Share of the distance of a dent from the surface at rest by which it is drawn behind it: a dent of up to 40 % of the sensor's
+size, by :data:`LIFT`, still lies above the surface that Blender draws."""
 PAINT_MODES = {"WEIGHT_PAINT", "VERTEX_PAINT", "TEXTURE_PAINT", "SCULPT"}
 """Modes that change an object stroke by stroke."""
 SHOWING_MATERIALS = {"RENDERED"}
@@ -187,15 +190,17 @@ def _heat_map(texels, readings, displacement: np.ndarray, pose: np.ndarray, scal
     rotation = transforms.rotation(pose[3:])
     rgb = scale.colors(scale.values(readings, texels))
     triangles = texels.layout.triangles
-    corner = triangles.ravel()
+    # The lower side faces downwards, and comes first: where heat maps are drawn over all else, the upper side is drawn over it.
+    sides = (-1.0, triangles[:, ::-1].ravel()), (1.0, triangles.ravel())
+    corner = np.concatenate([corners for _, corners in sides])
 
     def on_both_sides(position: np.ndarray) -> np.ndarray:
         lifted = lift * texels.normal
-        sides = [(pose[:3] + (position + side * lifted)[corner] @ rotation.T) / metres for side in (1.0, -1.0)]
-        return np.concatenate(sides).astype(np.float32)
+        places = [(pose[:3] + (position + side * lifted)[corners] @ rotation.T) / metres for side, corners in sides]
+        return np.concatenate(places).astype(np.float32)
 
     if not (displacement > 0.0).any():
-        return SensorOverlay(on_both_sides(texels.position), np.tile(_opaque(rgb[corner]), (2, 1)), None)
+        return SensorOverlay(on_both_sides(texels.position), _opaque(rgb[corner]), None)
     position = texels.position - np.maximum(displacement, 0.0)[:, None] * texels.normal
     # The light comes from between the normal and the tangent.
     towards = vertex_normals(TriangleMesh(position, triangles))
@@ -203,10 +208,10 @@ def _heat_map(texels, readings, displacement: np.ndarray, pose: np.ndarray, scal
     shade = np.where(displacement > 0.0, materials.GLOW + (1.0 - materials.GLOW) * lit, 1.0)
     return SensorOverlay(
         on_both_sides(position),
-        np.tile(_opaque((rgb * shade[:, None])[corner]), (2, 1)),
+        _opaque((rgb * shade[:, None])[corner]),
         None,
         at_rest=on_both_sides(texels.position),
-        normals=np.tile(texels.normal[corner] @ rotation.T, (2, 1)).astype(np.float32),
+        normals=(texels.normal[corner] @ rotation.T).astype(np.float32),
     )
 
 
@@ -253,7 +258,7 @@ def _draw() -> None:
     through, edited = draws_through(scene, space), edited_objects(bpy.context)
     materials_suffice = space.shading.type in SHOWING_MATERIALS and shows_colors_as_they_are(scene) and not through
     gpu.state.depth_test_set("ALWAYS" if through else "LESS_EQUAL")
-    gpu.state.face_culling_set("BACK" if through else "NONE")  # of a closed sensor, its far side does not show
+    gpu.state.face_culling_set("BACK" if through else "NONE")  # of a closed sensor, the far side is below the near one
     gpu.state.depth_mask_set(True)
     for overlay in overlays:
         if overlay.plain_only and materials_suffice or overlay.sensor in edited:
@@ -318,6 +323,8 @@ def _batches(overlay: SensorOverlay) -> list:
 def _indentation_shader():
     """Return the shader of an indentation: a corner is as near as the surface at rest before it, or as itself if nearer.
 
+    A small part of its distance stays, so that what is nearer in the dent hides what is behind it.
+
     `place` is where the line of sight through the corner meets the plane of the surface at rest; seen edge-on it meets none.
     """
     import gpu
@@ -338,7 +345,8 @@ def _indentation_shader():
         "  float facing = dot(sight, normal);"
         "  if (abs(facing) > 0.05) {"
         "    vec4 place = ModelViewProjectionMatrix * vec4(pos + sight * dot(at_rest - pos, normal) / facing, 1.0);"
-        "    here.z = min(here.z / here.w, place.z / place.w) * here.w;"
+        "    float behind = here.z / here.w - place.z / place.w;"
+        f"    here.z -= max(behind, 0.0) * {1.0 - DENT_ORDER} * here.w;"
         "  }"
         "  gl_Position = here;"
         "  finalColor = color;"

@@ -186,7 +186,8 @@ def test_the_overlay_of_solid_view_is_indented_as_the_texels_are(tmp_path):
 def assert_indented(overlay, texels, depth):
     """The pad lies in the plane z = 0: both sides of its overlay are as deep as the texels at their corners."""
     corner = texels.layout.triangles.ravel()
-    above, below = np.split(overlay.corners.astype(float), 2)
+    below, above = np.split(overlay.corners.astype(float), 2)
+    below = below.reshape(-1, 3, 3)[:, ::-1].reshape(-1, 3)  # its faces are turned downwards
     assert np.linalg.norm(above - below, axis=1) == pytest.approx(2 * overlays.LIFT * 0.05, rel=1e-3)
     assert -0.5 * (above + below)[:, 2] == pytest.approx(np.maximum(depth, 0.0)[corner], abs=1e-7)
     assert np.abs(np.abs(overlay.at_rest[:, 2]) - overlays.LIFT * 0.05).max() < 1e-6
@@ -219,6 +220,8 @@ def flat_colors(scene, run):
     """Return the largest of red, green and blue of each corner of an overlay without indentation."""
     scene.palpate.show_indentation = False
     (plain,) = overlays.sensor_overlays(scene, run, run.frames[6])
+    up = np.cross(*np.diff(plain.corners.reshape(-1, 3, 3), axis=1).transpose(1, 0, 2))[:, 2] > 0.0
+    assert np.array_equal(up, np.arange(len(up)) >= len(up) / 2)  # seen from both sides where the backs of faces are not drawn
     assert plain.at_rest is None and np.ptp(plain.corners[:, 2]) < 1.01 * 2 * overlays.LIFT * 0.05
     scene.palpate.show_indentation = True
     return plain.colors[:, :3].max(axis=1)
