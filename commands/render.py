@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -115,10 +116,13 @@ def run(arguments: argparse.Namespace) -> int:
         )
         stopped = "palpate render: stopped; earlier figures are unchanged."
         with console.exit_on_interrupt(stopped, remove_own_files):
-            job = figure_export.make_figures(scene, folder, request)
+            notes: list[str] = []
+            job = figure_export.make_figures(scene, folder, request, notes.append)
             written = console.run_with_progress_bar("render", job, describe=lambda step: f"{step.stage}, frame {step.frame}")
     for path in written:
         print(path)
+    for note in notes:
+        print(f"warning: {note}", file=sys.stderr)
     return 0
 
 

@@ -25,14 +25,16 @@ class PALPATE_OT_figures_make(modal_job.ModalJob, bpy.types.Operator):
     def job(self, context):
         from ..addon.render import figure_export, figure_request
 
-        scene = context.scene
+        scene, self._left_out = context.scene, []
         request = figure_request.requested_figures(scene, context.object)
-        return figure_export.make_figures(scene, figure_request.figure_folder(scene), request)
+        return figure_export.make_figures(scene, figure_request.figure_folder(scene), request, self._left_out.append)
 
     def done(self, result):
         names = ", ".join(f"'{path.name}'" for path in result[:4])
         more = f" and {len(result) - 4} more" if len(result) > 4 else ""
         self.report({"INFO"}, f"Made {names}{more} in '{result[0].parent}'" if result else "There is no figure to make")
+        for reason in self._left_out:  # the status bar shows the last
+            self.report({"WARNING"}, reason)
 
 
 CLASSES = (PALPATE_OT_figures_make,)

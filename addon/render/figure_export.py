@@ -17,7 +17,7 @@ from ...core.errors import SceneError
 from ...core.export.exporter import export, exporters
 from ...core.figures.side_by_side import side_by_side
 from ...core.figures.tactile_strip import tactile_strip
-from ...core.figures.texel_numbers import MOST, texel_numbers
+from ...core.figures.texel_numbers import texel_numbers, why_unreadable
 from ...core.figures.time_curves import time_curves
 from ...core.io.bake_folder import file_stems
 from ...core.io.bake_reader import Bake, frame_index, read_sensors
@@ -51,7 +51,7 @@ def read_scene_bake(scene) -> Bake:
     return read_sensors(list(places.values()))
 
 
-def make_figures(scene, folder, request: FigureRequest) -> Job[list[Path]]:
+def make_figures(scene, folder, request: FigureRequest, warn: Callable[[str], object] = lambda text: None) -> Job[list[Path]]:
     """Make the figures of a baked scene.
 
     All figures are written before the first of them is put in its place. Earlier ones of the same kinds stay if they were made
@@ -61,6 +61,8 @@ def make_figures(scene, folder, request: FigureRequest) -> Job[list[Path]]:
     ----------
     folder : path
         It is created if it is missing, with the folders above it.
+    warn : callable, optional
+        Called with a sentence on each figure that is left out.
 
     Returns
     -------
@@ -81,6 +83,9 @@ def make_figures(scene, folder, request: FigureRequest) -> Job[list[Path]]:
     data = sum(exporters()[kind].size(bake) for kind in request.exports)
     require_space(folder, figure_size.figures_bytes(bake, request, len(frames)) + data, "The set of figures")
     folder = writable_folder(folder, create=True)
+    for reason in map(why_unreadable, bake.texels, bake.texels.values()):
+        if reason and "numbers" in request.kinds and not request.sensors:
+            warn(reason)
     files = FileList(folder)
     steps = _StepCounter(request, frames, bake)
     with files.new_files("figures") as new:
@@ -120,8 +125,8 @@ def draw_figures(
             written["curves"].append(folder / f"curves.{ending}")
         if "numbers" in request.kinds:
             for name, stem in file_stems(bake.texels).items():
-                if len(bake.texels[name]) > MOST and not request.sensors:
-                    continue  # unreadably many numbers; a sensor that the request names raises an error instead
+                if why_unreadable(name, bake.texels[name]) and not request.sensors:
+                    continue  # with a warning; a sensor that the request names raises an error instead
                 for number in frames:
                     path = folder / f"numbers_{stem}_{number:04d}.{ending}"
                     yield steps.next("Drawing numbers", number)

@@ -26,6 +26,11 @@ SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#4d
 """Colours of curves that the colour-blind can tell apart (Okabe and Ito 2008, without the yellow)."""
 
 
+def width_below(curves: int) -> float:
+    """Return the width of a curve with this many curves drawn over it: it is wider, so that equal ones do not hide it."""
+    return 1.2 + min(1.4 * curves, 4.2)
+
+
 @dataclass(frozen=True)
 class FigureStyle:
     """Style of one recording's figures, so that all of them agree.

@@ -15,7 +15,7 @@ from ..geometry.texels import Texels
 from ..io.bake_reader import frame_index
 from ..model.recording import Recording, SensorRecording
 from .figure_canvas import new_figure, save_figure, tidy_axes
-from .figure_style import FONT, INK, SERIES, SMALL, FigureStyle
+from .figure_style import FONT, INK, SERIES, SMALL, FigureStyle, width_below
 from .tactile_image import (
     SCALE_KEY_LINE,
     SMALLEST_ARROW,
@@ -161,10 +161,10 @@ def _placed(parts: list[_Part], across: float, up: float) -> list[tuple[float, f
 def _force_so_far(axes: Axes, recording: Recording, i: int, texels: Mapping[str, Texels]) -> None:
     for number, name in enumerate(texels):
         force = recording.sensors[name].normal_force.sum(axis=1)
-        below = len(texels) - 1 - number  # the first are wider, so that equal curves do not hide each other
-        axes.plot(recording.times, force, color=SERIES[number], lw=0.8 + below, alpha=0.35)
-        axes.plot(recording.times[: i + 1], force[: i + 1], color=SERIES[number], lw=1.4 + 1.2 * below)
-        axes.plot(recording.times[i], force[i], "o", color=SERIES[number], ms=3.5 + 2.0 * below, clip_on=False)
+        width = width_below(len(texels) - 1 - number)
+        axes.plot(recording.times, force, color=SERIES[number], lw=width - 0.5, alpha=0.35)
+        axes.plot(recording.times[: i + 1], force[: i + 1], color=SERIES[number], lw=width)
+        axes.plot(recording.times[i], force[i], "o", color=SERIES[number], ms=2.3 + width, clip_on=False)
     axes.margins(x=0.02, y=0.12)  # room for the marker at the peak
     axes.set_ylim(bottom=0)
     axes.set_xlabel("time (s)", labelpad=-7)

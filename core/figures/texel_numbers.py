@@ -20,13 +20,23 @@ from .tactile_image import SensorView, draw_colour_bar
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-MOST = 1024
+_MOST = 1024
 """Texels whose numbers can still be told apart on a page."""
 _LETTER = 0.62
 """Width of a digit over the size of its font."""
 ZERO = "0"
 _RIGHT, _ABOVE, _SIDE = 0.95, 0.32, 0.12
 """Inches around the image: for the colour bar, for the title, and elsewhere."""
+
+
+def why_unreadable(name: str, texels: Texels) -> str:
+    """Return why the numbers of a sensor cannot be drawn; empty if they can."""
+    if len(texels) <= _MOST:
+        return ""
+    return (
+        f"Sensor '{name}' has {len(texels):,} texels, whose numbers could not be read (at most {_MOST:,}): "
+        "export them as CSV instead."
+    )
 
 
 def texel_numbers(
@@ -57,11 +67,8 @@ def texel_numbers(
     """
     style = style or FigureStyle()
     own = texels[name]
-    if len(own) > MOST:
-        raise SensorError(
-            f"Sensor '{name}' has {len(own)} texels, whose numbers could not be read (at most {MOST}): "
-            "export them as CSV instead."
-        )
+    if reason := why_unreadable(name, own):
+        raise SensorError(reason)
     scale = style.scale(recording, texels)
     values = scale.values(recording.at(frame).sensors[name], own)
     peak = float(np.abs(values).max(initial=0.0))

@@ -16,7 +16,7 @@ from ..geometry.texels import Texels
 from ..model.recording import Recording
 from ..model.sensor_parameters import SensorParameters
 from .figure_canvas import new_figure, save_figure, tidy_axes
-from .figure_style import FONT, INK, NORMAL_COLOUR, SERIES, SHEAR_COLOUR, SMALL, FigureStyle
+from .figure_style import FONT, INK, NORMAL_COLOUR, SERIES, SHEAR_COLOUR, SMALL, FigureStyle, width_below
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -74,8 +74,7 @@ def curves_figure(
     grid = figure.subplots(len(kinds), 1, sharex=True, squeeze=False)[:, 0]
     for axes, kind in zip(grid, kinds, strict=True):
         for i, name in enumerate(names):
-            # The first curves lie below the others and are wider, so that equal curves do not hide each other.
-            pen = _Pen(SERIES[i % len(SERIES)], 1.3 + min(0.9 * (len(names) - 1 - i), 2.7))
+            pen = _Pen(SERIES[i % len(SERIES)], width_below(len(names) - 1 - i))
             _DRAW[kind](axes, recording, name, texels[name], parameters[name], pen)
         tidy_axes(axes)
         axes.margins(x=0)

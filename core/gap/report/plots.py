@@ -12,7 +12,7 @@ import numpy as np
 from ...effects.engine.registry import kind_of
 from ...figures import color_maps
 from ...figures.figure_canvas import new_figure, save_figure, tidy_axes
-from ...figures.figure_style import GREY, INK, NORMAL_COLOUR, SHEAR_COLOUR, WIDTHS
+from ...figures.figure_style import GREY, INK, NORMAL_COLOUR, SHEAR_COLOUR, WIDTHS, width_below
 from ...figures.quantities import ERROR, error_scale
 from ...geometry.grid_layout import GridLayout
 from ...jobs import Job, Progress
@@ -74,7 +74,7 @@ def curves(result: Diagnosis) -> Figure:
     for axes, predictor in zip(grid, trials, strict=True):
         name, measured, pick = _worst_channel(result, predictor)
         time = predictor.trial.time
-        axes.plot(time, measured, color=MEASURED, lw=1.5, label="measured")
+        axes.plot(time, measured, color=MEASURED, lw=width_below(1), label="measured")
         for label, model, colour in _models(result):
             axes.plot(
                 time,

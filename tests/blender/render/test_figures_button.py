@@ -11,6 +11,7 @@ from palpate.addon.bake.bake import bake
 from palpate.addon.render import figure_export, figure_request
 from palpate.commands import render
 from palpate.core.errors import ParameterError
+from palpate.core.figures import texel_numbers
 from palpate.core.io.hidden_folder import LIST_NAME
 from palpate.core.jobs import run_job
 
@@ -79,6 +80,18 @@ def test_what_cannot_be_made_is_one_sentence(baked):
         bpy.ops.palpate.figures_make()
     bpy.ops.palpate.bake_clear()
     assert not bpy.ops.palpate.figures_make.poll()
+
+
+def test_numbers_that_are_left_out_are_named(baked, monkeypatch, capsys):
+    scene, _, place = baked
+    monkeypatch.setattr(texel_numbers, "_MOST", 1)
+    request, warnings = figure_request.FigureRequest(("numbers", "curves"), formats=("png",)), []
+    made = run_job(figure_export.make_figures(scene, place / "figures", request, warnings.append))
+    assert [path.name for path in made] == ["curves.png"]
+    assert len(warnings) == 1 and "numbers could not be read (at most 1): export them as CSV" in warnings[0]
+    scene.palpate.figures.kinds = {"NUMBERS"}
+    bpy.ops.palpate.figures_make()
+    assert "export them as CSV" in capsys.readouterr().out
 
 
 def test_words_for_frames():
