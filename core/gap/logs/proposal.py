@@ -258,7 +258,8 @@ class _Logger:
         ]
         if not rising and named:
             unit = time_unit(self.values(named[0], self.logs[0]), self.meanings[named[0]].unit)[0]
-            return self.guess("time", {"name": named[0], "unit": unit}, "of its name", "stated")
+            reason = "of its name, but it falls: cut the file where the clock was reset, or name another column"
+            return self.guess("time", {"name": named[0], "unit": unit}, reason, "thin")
         driver = self.driver()
         reason = ""
         if self.logs[0].kind == FRAMES:
