@@ -43,7 +43,7 @@ def _channel(name: str, text: str) -> Any:
 
 
 class Recording:
-    """What sensors measured over time: T frames of n texels. Forces act on the sensor and are in the frame of its body.
+    """Forces and readings over time: T frames of n texels. Forces act on the sensor and are in the frame of its body.
 
     With several sensors each is ``recording["its name"]``, which is a recording of its own.
     """

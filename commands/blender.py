@@ -25,7 +25,7 @@ _COMPRESSED = (b"\x28\xb5\x2f\xfd", b"\x1f\x8b")  # Zstandard, and gzip in files
 _SEEKABLE_END = b"\xb1\xea\x92\x8f"
 """Last bytes of Zstandard's seekable format, in which Blender compresses."""
 REFUSE, IGNORE, ALLOW = "refuse", "ignore", "allow"
-"""What is done about the Python in a .blend: not run, and the file refused if a driver needs it; not run; run."""
+"""Treatment of the Python in a .blend: not run, and the file refused if a driver needs it; not run; run."""
 MOST_NAMED = 5
 """Most drivers that a message names."""
 

@@ -39,7 +39,7 @@ class Interrupt:
     reason: PalpateError | None = None
     """Another reason to stop: a limit that is reached."""
     clean_up: Callable[[], object] = staticmethod(lambda: None)
-    """What removes unfinished files of the call into Blender that runs now, before the process is ended in it."""
+    """Removes unfinished files of the call into Blender that runs now, before the process is ended in it."""
 
     @classmethod
     @contextmanager

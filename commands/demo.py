@@ -132,7 +132,7 @@ def _render_picture(scene: Any, path: Path, arguments: argparse.Namespace) -> No
 
 
 def _report_on_contacts(baked: BakeResult) -> str:
-    """Return what the pads measure: friction under the ball, and the weight of the cube."""
+    """Return the measurements of the pads as text: friction under the ball, and the weight of the cube."""
     from ..sample_blends import demo
 
     slide = _slide(baked.recording, _sensors(baked)[demo.PAD_A])

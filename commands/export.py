@@ -43,7 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _exporter(name: str) -> str | Exporter:
-    """Return what is given to :func:`export` for a format."""
+    """Return the options of :func:`export` for a format."""
     if name != LEROBOT:
         return name
     if importlib.util.find_spec(f"{__package__.rpartition('.')[0]}.sweep") is None:  # as in the extension's zip

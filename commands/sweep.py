@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 MOST_FAILURES_NAMED = 5
 FORMATS = ("hdf5", "zarr")
-"""What a finished dataset is exported to; the names of sweep.exports, which is not read before a study runs."""
+"""Formats to which a finished dataset is exported; the names of sweep.exports, which is not read before a study runs."""
 MOST_NAMED = 3
 """Most properties that a sentence names."""
 
@@ -164,7 +164,7 @@ def _workers(arguments: argparse.Namespace) -> int:
 
 
 def _slurm(arguments: argparse.Namespace) -> Callable[[], Any] | None:
-    """Return what asks SLURM for the workers; None without --slurm."""
+    """Return the request for workers to SLURM; None without --slurm."""
     from ..sweep import slurm
 
     options = slurm.options_of(arguments.slurm_option)

@@ -13,7 +13,7 @@ from . import support
 
 
 class MeasurementFit(support.ErrorReporting, support.FileChooser):
-    """What both fits share: choosing a CSV, drawing the settings, and showing the plot."""
+    """Common part of both fits: choosing a CSV, drawing the settings, and showing the plot."""
 
     filename_ext = ".csv"
     filter_glob: StringProperty(default="*.csv;*.txt", options={"HIDDEN"})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What operators share: errors are reported in one place, and polls say why a button is greyed out."""
+"""Base classes of operators: errors are reported in one place, and polls say why a button is greyed out."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the experiments share: building, sampling, baking and rendering a scene."""
+"""Common steps of the experiments: building, sampling, baking and rendering a scene."""
 
 from __future__ import annotations
 

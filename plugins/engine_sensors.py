@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the sensors of all engines have in common: an engine that is imported on demand, its shapes, and sensors on Warp."""
+"""Common part of the sensors of all engines: an engine that is imported on demand, its shapes, and sensors on Warp."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SHAPES: dict[str, Callable[[Any], Shape]] = {
 
 
 class TouchData(NamedTuple):
-    """What a sensor with n texels measures in E environments, as tensors of torch that share the sensor's memory.
+    """Forces and readings of a sensor with n texels in E environments, as tensors of torch that share the sensor's memory.
 
     Attributes
     ----------

@@ -43,7 +43,7 @@ class TouchSensor(SensorBase):
 
     @property
     def data(self) -> TouchData:
-        """What the sensor measures."""
+        """Forces and readings of the sensor."""
         return self._results
 
     def reset(self, env_ids: Any = None, env_mask: Any = None) -> None:

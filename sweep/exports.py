@@ -27,7 +27,7 @@ ZARR_FILES = re.compile(r"(.+/)?(\.z(group|attrs|array|metadata)|[0-9.]+)")
 CHUNK_BYTES = 1 << 20
 """Numbers of an array that are compressed together."""
 PACKAGES = {"hdf5": "h5py", "zarr": "zarr"}
-"""What each export needs, by the name that the command takes."""
+"""Package that each export needs, by the name that the command takes."""
 
 
 def require_packages(formats: Sequence[str]) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a dataset says of each frame: names, shapes and units, and the numbers themselves, taken from a run's recording.
+"""Features of each frame in a dataset: names, shapes and units, and the numbers themselves, taken from a run's recording.
 
 A sensor whose texels form a grid gives pictures, row 0 at the bottom and column 0 at the left as in its tactile images. Any
 other gives lists in the order of its texels, whose places are in ``meta/texels.parquet``.
@@ -94,7 +94,7 @@ class FrameStyle:
 
     @classmethod
     def of(cls, study: Study) -> FrameStyle:
-        """Return what a study asks for."""
+        """Return the style of frames that a study asks for."""
         return cls(study.points, "float16" if study.half_precision else "float32")
 
 
@@ -105,7 +105,7 @@ HALF_ERROR = "Rounded to 16 bits: a relative error of 2^-11 at most, and 3e-8 ab
 
 @dataclass(frozen=True)
 class Layout:
-    """What the frames of many runs have in common.
+    """Features that the frames of many runs share.
 
     Attributes
     ----------

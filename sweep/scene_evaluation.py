@@ -22,7 +22,7 @@ from ..core.study.scene_property import write_overrides
 from ..core.study.study_file import SCENES, at_rate
 
 SCRIPTS = REFUSE, IGNORE, ALLOW = ("refuse", "ignore", "allow")
-"""What is done about the Python in a .blend; the command line's --ignore-scripts and --allow-scripts."""
+"""Treatment of the Python in a .blend; the command line's --ignore-scripts and --allow-scripts."""
 MOST_KEPT = 4
 """Scenarios that are kept: the runs of a grid, whose last number changes fastest, share them."""
 _COMMANDS = f"{__package__.rpartition('.')[0]}.commands"

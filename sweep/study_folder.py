@@ -149,7 +149,7 @@ def forget_study(folder: Path) -> None:
 
 
 def scenarios_of(place: Path, read_blend: ReadBlend) -> dict[str, Scenario | None]:
-    """Return what may be varied, without beginning a study, whether or not the names that it varies are right.
+    """Return the names that may be varied, without beginning a study, whether or not the names that it varies are right.
 
     Parameters
     ----------
@@ -218,7 +218,7 @@ def resume_study(folder: Path) -> OpenStudy:
 
 
 def plan_of(study: Study, folder: Path, scene: str, meshes: StudyMeshes) -> Plan:
-    """Return what a study means on one of its scenes; raise PalpateError where a file is damaged or does not fit."""
+    """Return the distributions of a study on one of its scenes; raise PalpateError where a file is damaged or does not fit."""
     if study.is_job:
         return plan_for_job(study)
     start = folder / SCENES / scene
@@ -253,7 +253,7 @@ def _with(start: Path, suffix: str) -> Path:
 
 
 def _digests(plans: Mapping[str, Plan], entries: list[dict[str, Any]]) -> dict[str, str]:
-    """Return what the runs of each scene depend on: its scenario, and its file where each run is read from it."""
+    """Return the inputs of the runs of each scene: its scenario, and its file where each run is read from it."""
     digests = {}
     for entry in entries:
         name = entry["name"]

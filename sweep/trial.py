@@ -26,7 +26,7 @@ START_SECONDS = 4.0
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a study takes.
+    """Time and memory of a study.
 
     Attributes
     ----------

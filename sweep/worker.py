@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a Dask worker does: it computes a batch of runs and writes them into a part."""
+"""A Dask worker: compute a batch of runs and write them into a part."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ _handles: list = []
 
 @dataclass
 class Drawing:
-    """What is drawn of one report, in the frame of its object and Blender units."""
+    """Points and lines of one report, in the frame of its object and Blender units."""
 
     report: object
     spots: dict[str, np.ndarray]

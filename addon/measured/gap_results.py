@@ -34,7 +34,7 @@ MARK = "gap: "
 
 @dataclass
 class Result:
-    """What was found out for one sensor."""
+    """Measurements and results of one sensor."""
 
     diagnosis: Diagnosis
     errors: GapErrors
@@ -47,7 +47,7 @@ class Result:
 
 @dataclass(frozen=True)
 class Shown:
-    """What the colours of a sensor show: the error of which model, on which scale."""
+    """Model whose error the colours of a sensor show, and their scale."""
 
     amended: bool
     scale: Scale
@@ -58,7 +58,7 @@ _shown: dict[str, Shown] = {}
 
 
 def of(obj) -> Result | None:
-    """Return what is known about a sensor's measurements."""
+    """Return the measurements and results of a sensor."""
     return _results.get(identity.key(obj))
 
 

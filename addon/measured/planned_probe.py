@@ -24,7 +24,7 @@ MARK = "palpate_planned_probe"
 
 @dataclass(frozen=True)
 class _Planned:
-    """What the last plan of a sensor says: for which rig, on which probe."""
+    """Last plan of a sensor, with its rig and probe."""
 
     rig: str
     probe: str
@@ -36,7 +36,7 @@ _planned: dict[str, _Planned] = {}
 
 
 def sentence_of(obj) -> str:
-    """Return what the last plan of a sensor's rig separates; empty without a plan, and once its probe is gone."""
+    """Return the kinds that the last plan of a sensor's rig separates; empty without a plan, and once its probe is gone."""
     planned = _planned.get(identity.key(obj))
     is_shown = planned is not None and planned.rig == obj.palpate.measured and planned.probe in bpy.data.objects
     return planned.sentence if is_shown else ""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a user says about objects and scenes: the properties that Blender shows in panels and saves with the file.
+"""Settings of objects and scenes: the properties that Blender shows in panels and saves with the file.
 
 Only what has to be saved lives here, no state of a simulation. Numbers are in SI units with the unit in the name, since Blender
 has no unit for N/m; :mod:`.scene_units` shows lengths, masses and velocities in the units of the scene. Names of properties

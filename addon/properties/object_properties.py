@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a user says about an object: `Object.palpate`."""
+"""Settings of an object: `Object.palpate`."""
 
 from __future__ import annotations
 

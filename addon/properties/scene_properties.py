@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a user says about a scene: `Scene.palpate`."""
+"""Settings of a scene: `Scene.palpate`."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ OUTPUT: set = {option for option, flag in _NAMES.items() if flag in bpy.types.Pr
 
 
 ENDING = "_in_units"
-"""What the name of such a property adds to the name of the one that it shows."""
+"""Suffix of such a property's name after the name of the one that it shows."""
 KINDS = {"m": ("LENGTH", 1), "m/s": ("VELOCITY", 1), "kg": ("MASS", 3)}
 """Blender's kind of unit by the SI unit, and the power of the scene's unit scale with which Blender multiplies it."""
 DIGITS = 6

@@ -164,7 +164,7 @@ def arrays_fingerprint(positions: np.ndarray, corners: np.ndarray, region: bytes
 
 
 def region_bytes(obj) -> bytes:
-    """Return what the mesh of a sensor or pad says besides its shape: region, painted values, and UV maps of its images."""
+    """Return region, painted values and UV maps of images that the mesh of a sensor or pad holds, as bytes."""
     if obj.type != "MESH" or obj.palpate.role not in ("SENSOR", "PAD"):
         return b""
     parts = []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What was read of a scene: the :class:`.Scenario`, the objects behind it, and the way to read its later frames."""
+"""Result of reading a scene: the :class:`.Scenario`, the objects behind it, and the way to read its later frames."""
 
 from __future__ import annotations
 

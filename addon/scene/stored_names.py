@@ -42,7 +42,7 @@ def _unpacked(text: str) -> dict[str, str]:
 
 
 def name_in_bake(scene, obj) -> str:
-    """Return what an object is called in its scene's bake; its own name where it is not part of one, as for a duplicate."""
+    """Return the name of an object in its scene's bake; its own name where it is not part of one, as for a duplicate."""
     if identity.is_copy(obj):
         return obj.name
     return _unpacked(scene.palpate.baked_names).get(identity.key(obj), obj.name)

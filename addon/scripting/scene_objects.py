@@ -38,7 +38,7 @@ def sensor_of(obj: Any) -> Sensor:
 
 
 def scenario_of(scene: Any) -> Scenario:
-    """Return what a scene of Blender says to the solver over its whole frame range; ``simulate`` takes it.
+    """Return the scenario of a scene of Blender over its whole frame range; ``simulate`` takes it.
 
     Parameters
     ----------

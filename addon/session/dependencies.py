@@ -34,7 +34,7 @@ def _can_be_found(name: str) -> bool:
 
 
 def debug_info() -> str:
-    """Return what a maintainer needs to know about this installation, as plain text."""
+    """Return versions and paths of this installation for a maintainer, as plain text."""
     import bpy
 
     from ...core.io import tactile_exr

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is known about the frame at which each scene stands. The timeline writes it; panels and overlays read it."""
+"""Status of the frame at which each scene stands. The timeline writes it; panels and overlays read it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ...core.model.recording import Frame
 
 @dataclass(frozen=True)
 class FrameStatus:
-    """What the panel says about the present frame.
+    """Status of the present frame, for the panel.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ _statuses: dict[int, FrameStatus] = {}
 
 
 def status_of(scene) -> FrameStatus:
-    """Return what is known about a scene's present frame; fast enough to be called while drawing."""
+    """Return the status of a scene's present frame; fast enough to be called while drawing."""
     return _statuses.get(scene.session_uid, FrameStatus("Not computed: play from the first frame."))
 
 

@@ -33,7 +33,7 @@ class Session:
     rendered_from: tuple[int, float] = (0, 0.0)
     """The frame at which the scene stood when the render began."""
     render_note: str = ""
-    """What the present or last render lacks, in one sentence; empty where nothing is missing."""
+    """Parts that the present or last render lacks, in one sentence; empty where nothing is missing."""
     catching_up: bool = False
     """True while the frames that a jump on the timeline left out are computed."""
     bake_progress: object = None

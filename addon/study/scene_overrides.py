@@ -156,7 +156,7 @@ def _require(name: str, known: Iterable[str], where: str, path: str) -> None:
 
 
 def describe(path: str) -> SceneProperty:
-    """Return what the property at a path is.
+    """Return type, unit and bounds of the property at a path.
 
     Raises
     ------

@@ -37,7 +37,7 @@ SENSORS = {"SENSOR", "PAD"}
 
 @dataclass(frozen=True)
 class Entry:
-    """What a property is in a study.
+    """A property as a variable of a study.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class Entry:
 
 
 def entry_for(path: str) -> Entry:
-    """Return what the property at a path is in a study: a name that the solver knows where there is one, else its path.
+    """Return the property at a path as a variable of a study: a name that the solver knows where there is one, else its path.
 
     Raises
     ------
@@ -215,7 +215,7 @@ def _distribution(item, design: str) -> Mapping[str, Any]:
 
 
 def _word(text: str) -> Any:
-    """Return what a word between commas means: true, false, a number or a text."""
+    """Return the value of a word between commas: true, false, a number or a text."""
     if text.lower() in ("true", "false"):
         return text.lower() == "true"
     try:

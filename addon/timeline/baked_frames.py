@@ -97,7 +97,7 @@ def _scale(scene, bake: Bake) -> Scale:
 
 
 def _present_names(scene) -> dict[str, str]:
-    """Return what the sensors of a bake are called now, by their names in the bake: they may have been renamed since."""
+    """Return the present names of the sensors of a bake, by their names in the bake: they may have been renamed since."""
     folders = baked_scene.bake_folders(scene)
     return {_names[folder]: obj.name for obj, folder in folders.items() if folder in _names and not identity.is_copy(obj)}
 

@@ -29,7 +29,7 @@ TARGETS = {"x86_64": ("x86-64-v3", X86_64_V3), "arm64": ("apple-m1", ARM64)}
 """By architecture: LLVM's name of the processor that is compiled for, and the features that a processor must have to run the
 code. x86-64-v3 is Intel since Haswell (2013) and AMD since Excavator (2015). Code for arm64 was never tried."""
 ARCHITECTURES = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "arm64", "aarch64": "arm64"}
-"""What systems call an architecture, in small letters."""
+"""Names that systems give to an architecture, in small letters."""
 
 
 def architecture() -> str:
@@ -106,7 +106,7 @@ def _head() -> dict[str, Any] | None:
 
 
 def _made_by() -> dict[str, str]:
-    """Return what has to be the same where the file is made and where it is used."""
+    """Return the properties that the machine of a build and the machine of a user must share."""
     from importlib.metadata import version
 
     return {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Palpate uses of numba and LLVM beyond their documented interface. No other module imports such parts.
+"""Parts of numba and LLVM beyond their documented interface that Palpate uses. No other module imports such parts.
 
 A release of numba may change them. Where one of them is missing, or numba itself is, or ``PALPATE_NUMBA=0`` is set, nothing is
 compiled: all kernels then run as plain Python, with the same numbers to rounding, only slowly.
@@ -82,7 +82,7 @@ def processor_features() -> dict[str, bool]:
 
 
 def reduced_overloads(kernel: Any) -> list[tuple[Any, Any]]:
-    """Return what numba keeps of the compiled forms of a kernel: signature and content, without the paths of source files."""
+    """Return numba's saved compiled versions of a kernel: signature and content, without the paths of source files."""
     found = []
     for signature, compiled in kernel.overloads.items():
         content = list(kernel._cache._impl.reduce(compiled))

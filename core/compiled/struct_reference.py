@@ -66,7 +66,7 @@ else:
 
         @property
         def key(self) -> Any:
-            """What distinguishes one type from another."""
+            """Key that is equal for equal types."""
             return self.cls, self.fields
 
     @register_model(Reference)
@@ -151,7 +151,7 @@ else:
     """Of an array: C order, Fortran order, aligned and writeable. Together with type and dimensions, they make numba's type."""
 
     def _kind_of(field: Any) -> Any:
-        """Return what is equal for fields of one numba type, without asking numba, which takes longer than a short run."""
+        """Return a key that is equal for fields of one numba type; asking numba takes longer than a short run."""
         if type(field) is np.ndarray:
             return field.dtype, field.ndim, field.flags.num & _TYPE_FLAGS
         if isinstance(field, tuple):

@@ -326,7 +326,7 @@ def box_of(segment: Segment, part: float) -> Box:
 NOT_MET = 2.0
 """Position that stands for no intersection: beyond the segment's tip at 1."""
 MISSES = 9.0
-"""What :func:`intersect_triangle` returns for a triangle that the segment does not cross."""
+"""Result of :func:`intersect_triangle` for a triangle that the segment does not cross."""
 LEAVING_OFFSET = -3.0
 """A crossing that leaves a surface at the position t is returned as ``LEAVING_OFFSET - t``, which is negative."""
 

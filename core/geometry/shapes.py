@@ -19,7 +19,7 @@ from .mesh import TriangleMesh
 Vector = tuple[float, float, float]
 
 MESH, SPHERE, BOX, CAPSULE, PLANE = range(5)
-"""What a target is: a mesh, or one of these shapes."""
+"""Kinds of targets: a mesh, or one of these shapes."""
 NAMES = ("mesh", "sphere", "box", "capsule", "plane")
 PARALLEL = 1e-30
 """Square of the sine of an angle that counts as zero: over metres, a line at this angle goes 1e-15 m aside."""

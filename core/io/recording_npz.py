@@ -233,7 +233,7 @@ def _header(recording: Recording) -> dict[str, Any]:
 
 
 def described(channels: VectorReadings) -> dict[str, Any]:
-    """Return what readings of several channels are, besides their values, as JSON."""
+    """Return names, units and ranges of channels as JSON."""
     place = None if channels.place is None else channels.place.tolist()
     return {"unit": channels.unit, "names": list(channels.names), "place": place}
 
@@ -277,7 +277,7 @@ def _recording(path: str | os.PathLike, members: Any) -> Recording:
 
 
 Sensors = dict[str, tuple[Texels, Painted, SensorParameters]]
-"""What belongs to the recording of each sensor, by its name."""
+"""Arrays of the recording of each sensor, by its name."""
 
 
 def save_with_sensors(path: str | os.PathLike, recording: Recording, sensors: Sensors) -> None:

@@ -197,7 +197,7 @@ def _words(kind: Any) -> dict[str, tuple[str, Any, bool]]:
 
 
 def _meta(hint: Any) -> msgspec.Meta | None:
-    """Return what :func:`wanted` said of a word, also of one that may be None."""
+    """Return the metadata that :func:`wanted` gave to a word, also to one that may be None."""
     return next((meta for part in (hint, *get_args(hint)) for meta in getattr(part, "__metadata__", ())), None)
 
 

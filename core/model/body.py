@@ -139,7 +139,7 @@ DRIVE_PARAMETERS = specifications(Drive)
 
 
 class Mode(IntEnum):
-    """What moves a body: its animation; forces; or its animation together with an actuator along an axis.
+    """Motion of a body: by its animation, by forces, or by its animation and an actuator along an axis.
 
     What follows from it in the solver is in :mod:`palpate.core.solver.dynamics.modes`.
     """
@@ -181,7 +181,7 @@ class Body:
 
     @property
     def mode(self) -> Mode:
-        """What moves the body."""
+        """Animation, forces, or animation and an actuator."""
         return Mode.FREE if self.free else Mode.DRIVEN if self.drive is not None else Mode.KEYFRAMED
 
     @property

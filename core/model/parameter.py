@@ -107,7 +107,7 @@ class Parameter:
             return None
 
     wanted = "a number"
-    """What a file has to give."""
+    """Expected value in a file, in words."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ class ChoiceParameter:
 
     @property
     def wanted(self) -> str:
-        """What a file has to give."""
+        """Expected value in a file, in words."""
         return "a text" if isinstance(self.default, str) else "a whole number"
 
 
@@ -166,7 +166,7 @@ class TextParameter:
         return word if isinstance(word, str) else None
 
     wanted = "a text"
-    """What a file has to give."""
+    """Expected value in a file, in words."""
 
 
 Specification = Parameter | ChoiceParameter | TextParameter

@@ -66,7 +66,7 @@ BLOCK_BYTES = 1 << 22
 
 @dataclass
 class SensorArrays:
-    """What a sensor measures: at one frame (:class:`SensorFrame`) or at F frames (:class:`SensorRecording`).
+    """Forces and readings of a sensor: at one frame (:class:`SensorFrame`) or at F frames (:class:`SensorRecording`).
 
     Forces act **on the sensor** and are given in the frame of the sensor's body. The shapes are those of one frame; arrays of a
     recording have a leading axis of length F.

@@ -46,7 +46,7 @@ def sensors_of(sensor: Sensor, columns: Columns, environments: int) -> list[Sens
 
 
 def _names(sensor: Sensor) -> list[str]:
-    """What may differ."""
+    """Parameters that may differ between environments, by name."""
     names = [p.name for p in numbers_of(SENSOR_PARAMETERS) if p.name not in SHARED]
     for item in sensor.effects:
         form = registry.form_of(item.name, item.form)

@@ -40,7 +40,7 @@ MOST_RUNS = 3 + (1 + HALVINGS) + 7 * TRIALS + BISECTIONS
 """How often a search has a step run at the most."""
 
 DONE, FIRST, APPROACH, COLUMN, TRIAL, SETTLE, RETREAT, LAST = range(8)
-"""What the next trial is for: nothing; the place where the last search ended; to find the contact; a column of the Jacobian; a
+"""Purpose of the next trial: nothing; the place where the last search ended; to find the contact; a column of the Jacobian; a
 step of the search; the place that was found; to find where the target begins to touch; the place of one that does not."""
 PHASE, DEGREES, COUNT, STEPS, KNOWN, FRESH = range(6)
 """Entries of :attr:`LoadSearch.state`: what the trial is for; degrees of freedom; which column or halving; steps so far; the

@@ -30,7 +30,7 @@ LARGEST_SPEED = 20.0
 
 @dataclass(frozen=True)
 class Contact:
-    """What a sensor measures at one step, and the reaction.
+    """Forces and readings of a sensor at one step, and the reaction.
 
     Attributes
     ----------

@@ -29,7 +29,7 @@ CHUNK_POINTS = 16384
 
 @dataclass(frozen=True)
 class Contacts:
-    """What the sensors of E environments measure at one step, and the reactions.
+    """Forces and readings of the sensors of E environments at one step, and the reactions.
 
     The arrays are those of the :class:`PressedSensors` and are overwritten by its next step, unless `out` was given.
 
@@ -65,7 +65,7 @@ class Contacts:
 
 
 def fault_of(valid: np.ndarray, jumped: np.ndarray) -> str:
-    """Return what :meth:`Contacts.fault` says of environments (E,)."""
+    """Return :meth:`Contacts.fault` of each environment, (E,)."""
     sentences = []
     if not valid.all():
         which = first_numbers(~valid)
@@ -298,7 +298,7 @@ class PressedSensors:
 
 CONTACT_FIELDS = tuple(Contacts.__dataclass_fields__)
 BYTES_OF_TEXEL = 3 * 8 + 8 + 1
-"""What the results of a texel take in memory."""
+"""Bytes of the results of a texel."""
 
 
 def _check_room(out: Contacts, found: Contacts) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a format of sensors is."""
+"""Formats of sensors: their registry, and helpers for reading and writing them."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def write_xml(path: Path, root: ElementTree.Element) -> None:
 
 @dataclass(frozen=True)
 class Written:
-    """What was written of some sensors.
+    """Files of some sensors that were written, and notes on them.
 
     Attributes
     ----------

@@ -87,7 +87,7 @@ def thickened(mesh: TriangleMesh, thickness: float) -> TriangleMesh:
 
 
 def texel_arrays(item: SensorOnMesh) -> dict[str, np.ndarray]:
-    """Return what is known about each texel by name, in SI units and in the sensor's frame.
+    """Return the arrays of the texels by name, in SI units and in the sensor's frame.
 
     ``position`` (m), ``normal``, ``tangent``, ``area`` (m²), where the texels form a grid ``row`` and ``column``, and what is
     painted as ``factor_k``, ``factor_friction`` and ``factor_gain``.

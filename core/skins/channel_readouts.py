@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a sensor's channels are computed with: the field of magnets that its texels carry, or a linear map of its forces."""
+"""Readouts of several channels: the field of magnets that its texels carry, or a linear map of its forces."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class MagneticReadout:
         return VectorReadings(np.zeros((0, len(place), 3)), np.zeros((0, len(place), 3), bool), place=place)
 
     def channels(self, recorded: SensorArrays) -> VectorReadings:
-        """Return what the magnetometers show; a magnet that is pressed into one counts as clipped."""
+        """Return the readings of the magnetometers; a magnet that is pressed into one counts as clipped."""
         moved = texel_displacements(self.texels, recorded.depth, recorded.shear, self.shear_stiffness)
         return self.skin.readings(moved, refuses_near=False)
 

@@ -274,13 +274,13 @@ class MagneticSkin:
         return DipoleSum(self.magnetometers.place, self.magnets.moment)
 
     def field_at_rest(self) -> np.ndarray:
-        """Return what the magnetometers see while nothing moves, without their offsets, (k, 3) float, T."""
+        """Return the field at the magnetometers while nothing moves, without their offsets, (k, 3) float, T."""
         return self._seen(self.magnets.place[None])[0][0]
 
     def readings(
         self, displacement: np.ndarray, ambient: np.ndarray | None = None, refuses_near: bool = True
     ) -> VectorReadings:
-        """Return what the magnetometers show while the texels move.
+        """Return the field that the magnetometers measure while the texels move.
 
         Parameters
         ----------

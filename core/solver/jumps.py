@@ -26,7 +26,7 @@ from .pressing import PressedTexels
 
 @by_reference
 class JumpSearch(NamedTuple):
-    """What is needed to find jumps in E environments.
+    """Arrays for finding jumps in E environments.
 
     Attributes
     ----------

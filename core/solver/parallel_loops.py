@@ -80,7 +80,7 @@ PAIR_LOOPS = {
     UPDATE_FRICTION: update_friction,
     WRITE_CONTACTS: write_pair_contacts,
 }
-"""What each loop does with a pair. What it writes belongs to this pair alone."""
+"""Work of each loop on a pair. It writes only to memory of this pair."""
 
 
 def prepare_pair_loops(model: SolverModel, detection: DetectionData, state: State, workspace: Workspace) -> None:

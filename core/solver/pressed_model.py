@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What all environments of a pressed sensor have in common: the sensor, its targets and the solver's model of them."""
+"""Model that all environments of a pressed sensor share: the sensor, its targets and the solver's model of them."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ class PressedModel:
         self.reads_by_chain = bool(in_signal_order(sensor.effects, readout=True))
 
     def readout_chain(self, sensor: Sensor | None = None) -> ReadoutChain | None:
-        """Return what turns forces into readings, from its beginning; None where that is a scale and a zero.
+        """Return the chain from forces to readings, from its beginning; None where that is a scale and a zero.
 
         `sensor` is one that differs in parameters.
         """
@@ -135,7 +135,7 @@ class PressedModel:
         return min(environments, threads_for(environments * self.texels, wanted))
 
     def bytes_of_environment(self) -> int:
-        """Return what an environment takes in memory: state and neighbour lists."""
+        """Return the bytes of an environment: state and neighbour lists."""
         arrays = (*self._detection.neighbours, *self._state)
         return sum(field.nbytes for field in arrays) + BYTES_OF_TUPLES
 
@@ -148,7 +148,7 @@ class PressedModel:
     def presser(
         self, memory: StepMemory, pressed: PressedTexels, environments: list[Environment], workspace: Workspace
     ) -> Presser:
-        """Return what runs steps of these environments in one thread."""
+        """Return the stepper that runs steps of these environments in one thread."""
         model = self._model
         model = model._replace(
             pairs=model.pairs._replace(law=model.pairs.law.copy()),
@@ -173,4 +173,4 @@ class PressedModel:
 
 
 BYTES_OF_TUPLES = 8000
-"""What Python takes for the tuples of an environment and for its views of arrays."""
+"""Bytes of the tuples of an environment and of its views of arrays in Python."""

@@ -47,7 +47,7 @@ class OwnNumbers(NamedTuple):
 
 @by_reference
 class Environment(NamedTuple):
-    """What an environment carries from step to step.
+    """State of an environment from step to step.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Environment(NamedTuple):
 
 @by_reference
 class PressedTexels(NamedTuple):
-    """What E environments of a sensor with n texels and T targets are given and give.
+    """Inputs and results of E environments of a sensor with n texels and T targets.
 
     Attributes
     ----------
@@ -194,7 +194,7 @@ def make_environments(
 
 
 def stacked_states(environments: list[Environment]) -> list[np.ndarray]:
-    """Return what environments of :func:`make_environments` carry on, each array of all of them, with a leading axis of E."""
+    """Return the states of environments of :func:`make_environments`, each array with a leading axis of E."""
     stacks = [field.base for field in (*environments[0].state, environments[0].found)]
     return [stack for stack in stacks if stack is not None]
 

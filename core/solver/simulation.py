@@ -39,11 +39,11 @@ from .time_step_adviser import plan
 from .workspace import Workspace
 
 TEXEL_BYTES = 8 * 8
-"""What a frame of a texel takes in memory: forces, friction, depth, slip, contact and reading."""
+"""Bytes of a frame of a texel: forces, friction, depth, slip, contact and reading."""
 PATH_ROWS = 4096
 """Poses of bodies in steps that are computed at once: few enough to stay in a processor's cache."""
 PART_BYTES = 1 << 28
-"""What is observed at once goes into one piece of memory, up to this size; joining pieces takes as long as solving."""
+"""Bytes of the frames that are observed in one piece of memory; joining pieces takes as long as solving."""
 NO_PATH = 0, (np.zeros((0, 0, 0, 3)), np.zeros((0, 0, 0, 4)), np.zeros((0, 0, 0, 6)))
 """The first frame whose path is known, and the paths of it and of those that follow."""
 
@@ -152,19 +152,19 @@ class Simulation:
         self._drive_commands.extend(time, targets or {})
 
     def observe(self) -> Frame:
-        """Return what the sensors measure in the present state."""
+        """Return the forces and readings of the sensors in the present state."""
         seen = self._seen(1)
         self._observe_first(seen)
         return self._recorded(np.array([self.frame]), seen).at(self.frame)
 
     def advance(self) -> Frame:
-        """Bring the state one frame on and return what the sensors measure there."""
+        """Bring the state one frame on and return the frame: poses, forces and readings."""
         seen = self._seen(1)
         self._advance(seen)
         return self._recorded(np.array([self.frame]), seen).at(self.frame)
 
     def frames(self) -> Iterator[Frame]:
-        """Yield what the sensors measure at each frame that is left, the present one first; none stays in memory."""
+        """Yield the remaining frames, the present one first; none stays in memory."""
         yield self.observe()
         while self.frame < self.scenario.frame_end:
             yield self.advance()
@@ -297,7 +297,7 @@ class Simulation:
         return Recording(frames, times, sensors, names, poses, seen.velocity, self.dt)
 
     def _sensor_rows(self, i: int, times: np.ndarray, seen: ObservedFrames) -> SensorRecording:
-        """Return what one sensor measures in frames that were observed."""
+        """Return the forces and readings of one sensor in frames that were observed."""
         own = slice(self._texel_start[i], self._texel_start[i + 1])
         center, net, moment = self._center[self.scenario.sensors[i].body], seen.texels.net[:, i], seen.texels.moment[:, i]
         centre_of_pressure = np.zeros((len(times), 3))

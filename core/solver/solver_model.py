@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the kernels know of a scenario, :class:`SolverModel`, and what they bring forward step by step, :class:`State`."""
+"""Arrays of a scenario for the kernels: :class:`SolverModel`, which is constant, and :class:`State`, which steps change."""
 
 from __future__ import annotations
 
@@ -157,7 +157,7 @@ class Drives(NamedTuple):
 
 @by_reference
 class SolverModel(NamedTuple):
-    """What does not change during a run.
+    """Constants of a run.
 
     Attributes
     ----------
@@ -180,7 +180,7 @@ class SolverModel(NamedTuple):
 
 @by_reference
 class State(NamedTuple):
-    """What a run carries from step to step; copied, it is a checkpoint.
+    """State of a run between two steps; copied, it is a checkpoint.
 
     Attributes
     ----------

@@ -308,7 +308,7 @@ _ALIGNED = 64
 
 
 class Structures:
-    """What the kernels of one simulation work on, at its beginning.
+    """Arrays of one simulation for the kernels, at its beginning.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ from .workspace import Workspace
 
 
 class FramePath(NamedTuple):
-    """What is prescribed during the steps of a frame.
+    """Prescribed motion during the steps of a frame.
 
     Attributes
     ----------
@@ -48,11 +48,11 @@ class FramePath(NamedTuple):
 
 
 NOTHING, TEXELS, FRAME = range(3)
-"""What is observed after the steps: nothing; the texels alone, for controllers; or all of :class:`ObservedFrames`."""
+"""Observations after the steps: nothing; the texels alone, for controllers; or all of :class:`ObservedFrames`."""
 
 
 class ObservedFrames(NamedTuple):
-    """What is observed at the end of each of F frames.
+    """Observations at the end of each of F frames.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class ObservedFrames(NamedTuple):
 
     @classmethod
     def zero(cls, frames: int, texels: int, sensors: int, bodies: int, pairs: int) -> ObservedFrames:
-        """Return what is observed where nothing touches."""
+        """Return the observations of sensors without contact."""
         f, b = frames, bodies
         return cls(
             texels=TexelReadout.zero(texels, sensors, f),
@@ -99,7 +99,7 @@ class ObservedFrames(NamedTuple):
 
 
 class Surroundings(NamedTuple):
-    """What is asked about the bodies when a frame is observed.
+    """Observations of the bodies at a frame.
 
     Attributes
     ----------

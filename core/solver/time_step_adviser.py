@@ -120,7 +120,7 @@ class Plan:
 
 
 def benefit(dt: float, advice: Advice) -> str:
-    """Return what the recommended step would buy in place of a longer one that was set; empty where it is not longer."""
+    """Return the gain of the recommended step over a longer one that was set, as a sentence; empty where it is not longer."""
     if dt <= 1.001 * advice.dt:
         return ""
     return (

@@ -43,7 +43,7 @@ class WholeNumber(Parameter):
 
 @dataclass(frozen=True)
 class SceneProperty:
-    """What a property of a scene is.
+    """Type, unit and bounds of a property of a scene.
 
     Attributes
     ----------
@@ -125,7 +125,7 @@ def write_properties(path: str | os.PathLike, properties: Iterable[SceneProperty
 
 
 def read_properties(path: str | os.PathLike) -> dict[str, SceneProperty]:
-    """Return what :func:`write_properties` wrote, by path; nothing where there is no file.
+    """Read the properties that :func:`write_properties` wrote, by path; none where there is no file.
 
     Raises
     ------
@@ -141,6 +141,6 @@ def read_properties(path: str | os.PathLike) -> dict[str, SceneProperty]:
 
 @dataclass
 class _PropertiesFile:
-    """What :func:`write_properties` wrote."""
+    """File of :func:`write_properties`."""
 
     properties: tuple[SceneProperty, ...]

@@ -343,7 +343,7 @@ def _check_acts(found: Variable, scenario: Scenario, press: Press | None) -> Non
 
 
 def plan_for_job(study: Study) -> Plan:
-    """Return what a study means for its job, which takes any names: numbers, texts, and switches.
+    """Return the distributions of a study for its program, which takes any names: numbers, texts, and switches.
 
     Raises
     ------

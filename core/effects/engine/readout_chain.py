@@ -71,7 +71,7 @@ def transducers_of(sensor: Sensor) -> TransducerArray:
 
 
 def readings(effects: Iterable[Effect], transducers: TransducerArray, time: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Return what a sensor reports under known forces, (t, n) float, in its unit.
+    """Return the readings of a sensor under known forces, (t, n) float, in its unit.
 
     Parameters
     ----------

@@ -76,7 +76,7 @@ SIGNATURES = {
     "unloaded": "readings without load, from the beginning of the trials on",
     "end": "it comes to an end within the session",
 }
-"""What a fit of an effect must show to be reported under its name, if it may otherwise stand for something else."""
+"""Conditions that a fit of an effect must meet to be reported under its name, if it may otherwise stand for something else."""
 NEEDS = {
     "temperature": "temperatures that were recorded and vary",
     "clock": "recordings of which a session says how the time went on between them",
@@ -84,7 +84,7 @@ NEEDS = {
     "signed channels": "channels of which some rise and others fall under the same load",
     "axes": "the same, with a number of channels that is a multiple of three",
 }
-"""What recordings must hold for an effect, or a form of it, to be a candidate."""
+"""Contents of recordings without which an effect, or a form of it, is no candidate."""
 GAIN_FALLS_WITH = {"use": "what the sensor was pressed", "clock": "the time"}
 """With what the gain falls from recording to recording."""
 DRAWINGS = {
@@ -379,7 +379,7 @@ class Kind:
         return form.site or self.site
 
     def needs_of(self, form: Form) -> str:
-        """Return what recordings must hold for a form of this kind."""
+        """Return the contents that recordings need for a form of this kind, one of :data:`NEEDS`."""
         return form.needs or self.needs
 
 

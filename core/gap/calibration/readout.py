@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a skin is for: force and place from readings, with intervals, checked on whole recordings that were not fitted.
+"""Estimate force and place from readings, with intervals, checked on whole recordings that were not fitted.
 
 Numbers of each method are chosen by leaving out whole recordings, or stretches of them if there are few; check recordings
 decide nothing. The errors of what was left out also scale the intervals. Of the methods the simplest is proposed whose error on
@@ -46,7 +46,7 @@ LEVEL = 0.95
 
 @dataclass(frozen=True)
 class ContactEstimate:
-    """What drove a sensor, from its readings.
+    """Stimulus of a sensor, estimated from its readings.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ class ReadoutFit:
     best: MethodResult
 
     def estimate(self, time: np.ndarray, readings: np.ndarray, result: MethodResult | None = None) -> ContactEstimate:
-        """Return what drove the sensor.
+        """Return the stimulus of the sensor.
 
         Parameters
         ----------
@@ -145,7 +145,7 @@ class ReadoutFit:
         return _estimate(own.predictor, own.times, own.factor, self.floor, time, readings[:, self.data.channels])
 
     def estimate_of(self, recording: ReadoutRecording) -> ContactEstimate:
-        """Return what drove the sensor in one of the recordings of `data`, by the method that is proposed."""
+        """Return the stimulus in one of the recordings of `data`, by the proposed method."""
         own = self.best
         return _estimate(own.predictor, own.times, own.factor, self.floor, recording.time, recording.readings)
 

@@ -110,7 +110,7 @@ def readout_data(rig: Rig) -> ReadoutData:
 
 
 def _targets(trial: Trial) -> dict[str, np.ndarray]:
-    """What is known of what drove a recording, by name."""
+    """Known quantities of the stimulus of a recording, by name."""
     found: dict[str, np.ndarray] = {}
     if trial.level is not None:
         found["force" if trial.stimulus == "force" else "depth"] = trial.level

@@ -44,7 +44,7 @@ ZEROS = {"K": -273.15, "°F": -32.0 / 1.8, "degF": -32.0 / 1.8}
 INVERSE = "1/x"
 """Unit of a column whose inverse is wanted: the resistance of a piezoresistive sensor goes with one over the force."""
 NUMBER = "{}"
-"""What stands for the number of a texel in the name of its column."""
+"""Placeholder for the number of a texel in the name of its column."""
 LARGEST_FACTOR = 1e12
 SMALLEST_INVERTED = 1e-30
 """Numbers below it have no inverse."""
@@ -105,7 +105,7 @@ class _Source:
 
 
 def read_column(quantity: str, words: Any, where: str, without: Iterable[str] = (), texels: int | None = None) -> Column:
-    """Return what the words of a column say: its name alone, or a table.
+    """Return the name and the settings of a column from its words: a name alone, or a table.
 
     Parameters
     ----------

@@ -139,7 +139,7 @@ class Rig:
     probes: Mapping[str, Indenter] = field(default_factory=dict)
 
     def indenter_of(self, trial: Trial) -> Indenter | None:
-        """Return what pressed in a trial; None if only a depth or a force is known."""
+        """Return the probe of a trial; None if only a depth or a force is known."""
         return self.probes[trial.probe] if trial.probe else self.indenter
 
     @property
@@ -551,7 +551,7 @@ def _clock(columns: Mapping[str, np.ndarray], file: Path) -> np.ndarray:
 
 
 def _stimulus_kind(columns: Mapping[str, np.ndarray], file: Path, has_indenter: bool) -> str:
-    """What drove the rig: "pose", "depth" or "force"."""
+    """Kind of the rig's stimulus: "pose", "depth" or "force"."""
     some_pose = [name for name in POSE if name in columns]
     kinds = [kind for kind in ("depth", "force") if kind in columns]
     if {"x", "y"} <= set(some_pose) and kinds == ["force"]:

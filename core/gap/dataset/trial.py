@@ -118,7 +118,7 @@ def runs(flag: np.ndarray) -> list[tuple[int, int]]:
 
 
 FREE = "free"
-"""What a rig writes for a number that is fitted."""
+"""Word in a rig for a number that is fitted."""
 SHARED_HEIGHT = "all"
 """Name of the contact height that all recordings share."""
 LARGEST_HEIGHT = 1.0
@@ -203,7 +203,7 @@ LONGEST_TIME = 1e10
 
 @dataclass(frozen=True)
 class TrialHistory:
-    """What the rig says of a recording's place in time.
+    """Place of a recording in time, from the rig.
 
     Attributes
     ----------
@@ -221,7 +221,7 @@ class TrialHistory:
 
 
 def read_history(session: str, started: Any, where: str) -> TrialHistory:
-    """Return what the words `session` and `started` of a [[trial]] say; `where` names the trial in messages.
+    """Return session and start from the words `session` and `started` of a [[trial]]; `where` names the trial in messages.
 
     Raises
     ------

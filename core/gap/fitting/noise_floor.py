@@ -193,7 +193,7 @@ def _median_deviation(values: Sequence[np.ndarray]) -> float:
 
 @dataclass(frozen=True)
 class Coverage:
-    """What the trials do to the sensor, as far as it helps to distinguish effects.
+    """Coverage of the trials: features of their stimuli that help to distinguish effects.
 
     Attributes
     ----------

@@ -66,7 +66,7 @@ def box_contact(
 
 
 def _untouched(samples: int, position: np.ndarray, outward: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What nothing touches: depth, normal and point."""
+    """Depth, normal and point without contact."""
     shape = (samples, *position.shape)
     return np.zeros(shape[:2]), np.broadcast_to(-outward, shape).copy(), np.broadcast_to(position, shape).copy()
 

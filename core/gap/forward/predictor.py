@@ -98,7 +98,7 @@ class Model:
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a model predicts for a trial.
+    """Predicted readings and forces of a trial.
 
     Attributes
     ----------

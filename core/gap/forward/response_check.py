@@ -19,7 +19,7 @@ _NO_CONTACT = {
     "depth": "`depth` is never above zero: give it in metres, positive where the sensor is pressed in",
     "force": "`force` is never above zero: give it in newtons, positive for compression",
 }
-"""What is wrong with a recording without contact, by the kind of its stimulus."""
+"""Faults of a recording without contact, by the kind of its stimulus."""
 
 
 def check_responses(rig: Rig, stimuli: Sequence[Stimulus]) -> None:

@@ -63,7 +63,7 @@ class PlannedExperiment:
 
 @dataclass(frozen=True)
 class ExperimentPlan:
-    """What recordings separate, and the next experiment.
+    """Kinds that recordings separate, and the next experiment.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class ExperimentPlan:
 
 @dataclass(frozen=True)
 class Wishes:
-    """What the user wants of an experiment; None and empty are decided from the recordings.
+    """The user's requirements of an experiment; None and empty are decided from the recordings.
 
     Attributes
     ----------

@@ -214,7 +214,7 @@ FAST = 0.95
 
 @dataclass(frozen=True)
 class RecordingSummary:
-    """What was done in a recording, and how its readings lie beside a model's.
+    """Stimulus of a recording, and its measured and predicted readings.
 
     Attributes
     ----------

@@ -105,7 +105,7 @@ def _gap_table(found: dict[str, Any]) -> Table:
 
 
 def _effect(one: dict[str, Any]) -> dict[str, str]:
-    """What the page says of an effect that was found."""
+    """Section of the page on an effect that was found."""
     kind, form = kind_of(one["effect"]), form_of(one["effect"], one["form"])
     return {
         "title": kind.title,
@@ -169,7 +169,7 @@ def _open_questions(found: dict[str, Any]) -> list[str]:
 
 
 def _structure_table(found: dict[str, Any]) -> Table:
-    """What the residual depends on, before and after."""
+    """Features on which the residual depends, before and after."""
     before, after = found["varies_with"], found["left_varies_with"]
     rows = [
         [FEATURES.get(key, key), f"{before[key]:.1%}", f"{after.get(key, 0.0):.1%}"]

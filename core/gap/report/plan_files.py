@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What recordings can tell apart and what to record next, as sentences, rows of a table, JSON and the CSV of a trajectory."""
+"""Kinds that recordings separate and the next recording, as sentences, rows of a table, JSON and the CSV of a trajectory."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def _left(one: Separation) -> str:
 
 
 def planned_sentence(words: Mapping[str, Any]) -> str:
-    """Return what a planned experiment, as :func:`experiment_words` gives it, is good for."""
+    """Return the purpose of a planned experiment, as :func:`experiment_words` gives it, as a sentence."""
     what = " from ".join(words["between"])
     before, after = words["separation_before"], words["separation_after"]
     if after < LEAST_GAIN * before:

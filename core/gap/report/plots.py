@@ -96,7 +96,7 @@ def curves(result: Diagnosis) -> Figure:
 
 
 def _quantity(result: Diagnosis, channel: str) -> str:
-    """What a channel measures, with its unit."""
+    """Quantity of a channel, with its unit."""
     if not channel.startswith("texel"):
         return f"{channel} (N)"
     unit = result.rig.parameters.unit

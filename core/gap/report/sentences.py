@@ -33,7 +33,7 @@ HINTS = {
     "shared by loaded texels": "hold one constant load for as long as a trial, to see how the reading moves by itself",
     "clock": "record as long without touching the sensor",
 }
-"""What to record for an unexplained gap, by the feature that its residual depends on most."""
+"""Recommended recording for an unexplained gap, by the feature that its residual depends on most."""
 SLIDING_HINTS = {
     "turning": (
         "turn back after slides of several lengths, some very slowly, to see whether the residual follows the "
@@ -45,7 +45,7 @@ SLIDING_HINTS = {
 
 
 def next_experiment(result: Diagnosis) -> str:
-    """Return what to record next, in one sentence; empty if no question is open."""
+    """Return the recommended next recording, in one sentence; empty if no question is open."""
     if result.ambiguous:
         return _experiment_between_rivals(result)
     if result.coverage.slides and all(p.trial.reading is None for p in result.predictors):
@@ -57,7 +57,7 @@ def next_experiment(result: Diagnosis) -> str:
 
 
 def _experiment_between_rivals(result: Diagnosis) -> str:
-    """What distinguishes the kinds of effects that these recordings leave as rivals."""
+    """Return the experiment that distinguishes the kinds of effects that these recordings leave as rivals."""
     pairs = [f"{names[0]} from {' and '.join(names[1:])}" for names in result.ambiguous]
     involved = list(dict.fromkeys(name for names in result.ambiguous for name in names))
     parts = [kind_of(name).experiment for name in involved]
@@ -65,7 +65,7 @@ def _experiment_between_rivals(result: Diagnosis) -> str:
 
 
 def _sliding_experiment(result: Diagnosis) -> str:
-    """What to record if only net forces were measured while a surface slid."""
+    """Return the recommended recording if only net forces were measured while a surface slid."""
     if result.verdict != "unexplained":
         return ""
     hint = SLIDING_HINTS.get(result.structure.strongest, REPEAT)
@@ -73,7 +73,7 @@ def _sliding_experiment(result: Diagnosis) -> str:
 
 
 def _hint(result: Diagnosis) -> str:
-    """What to record to find the cause of an unexplained gap."""
+    """Return the recommended recording to find the cause of an unexplained gap."""
     if result.line is not None:
         return (
             "record the same seconds without touching the sensor, with mains, motors and fans off in turn: the source of the "
@@ -84,7 +84,7 @@ def _hint(result: Diagnosis) -> str:
 
 
 def _lacking(result: Diagnosis) -> list[str]:
-    """What the trials did not do to the sensor."""
+    """Return the features that the trials lack."""
     coverage, lacking = result.coverage, []
     if result.noise[0].deviation > LOUD_NOISE * result.full[0]:
         lacking.append("press harder, or repeat a trial exactly and average, until the noise is below a hundredth of the range")
@@ -245,7 +245,7 @@ def _noise_share(result: Diagnosis, quantity: int) -> float:
 
 
 def caution(result: Diagnosis) -> str:
-    """Return what to know before the amended sensor is used; empty if nothing speaks against it."""
+    """Return a warning about the use of the amended sensor; empty if there is none."""
     failure = check_failure(result)
     if failure:
         return f"The amended sensor fails on the check recordings: {failure}."
@@ -325,7 +325,7 @@ def evidence(result: Diagnosis, errors: GapErrors) -> list[str]:
 
 
 def noise_sentence(share: float, left: float | None) -> str:
-    """Return what a reader should know of loud noise.
+    """Return sentences about loud noise.
 
     Parameters
     ----------
@@ -345,7 +345,7 @@ def noise_sentence(share: float, left: float | None) -> str:
 
 
 def warnings(result: Diagnosis) -> list[str]:
-    """Return what a reader should know about the recordings, without the rig's own warnings."""
+    """Return warnings about the recordings, without those of the rig."""
     said = [fault.sentence for fault in result.faults] + [text for text in (caution(result),) if text]
     for one in result.outlying:
         said.append(

@@ -140,7 +140,7 @@ def _tactile(path: str | os.PathLike, root: ElementTree.Element, model: Any, dat
 def _in_full_precision(
     root: ElementTree.Element, mesh: str, scale: np.ndarray, single: np.ndarray, key: str = "vertex"
 ) -> np.ndarray:
-    """Return what the file writes of a mesh where MuJoCo has the same numbers in single precision, else what MuJoCo has."""
+    """Return a mesh with the file's numbers where MuJoCo has the same in single precision, else with MuJoCo's."""
     for element in root.iterfind("mujoco/asset/mesh"):
         words = (element.get(key) or "").split()
         if element.get("name") == mesh and len(words) == single.size:
@@ -307,7 +307,7 @@ def _model(item: SensorOnMesh, contact: MujocoContact, notes: list[str]) -> Elem
 
 
 def _notes(item: SensorOnMesh, contact: MujocoContact) -> list[str]:
-    """Return what MuJoCo cannot express, one sentence each."""
+    """Return the properties that MuJoCo cannot express, one sentence each."""
     name = item.name
     solid, layered = item.solid
     found = [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the threads of a block do together on a GPU. On a processor, and in plain Python, a block is one thread."""
+"""Operations that the threads of a block share on a GPU. On a processor, and in plain Python, a block is one thread."""
 
 from __future__ import annotations
 

@@ -78,7 +78,7 @@ class TargetArrays(NamedTuple):
 
 
 class Jumps(NamedTuple):
-    """What is needed to find targets that go through the sensor within a step; fields as in :class:`.JumpSearch`."""
+    """Arrays for finding targets that go through the sensor within a step; fields as in :class:`.JumpSearch`."""
 
     frame: np.ndarray
     bound: np.ndarray
@@ -139,7 +139,7 @@ class Worlds(NamedTuple):
 
 
 class Slots(NamedTuple):
-    """What each of N contact points remembers of each of T targets in E environments.
+    """Memory of each of N contact points for each of T targets in E environments.
 
     Attributes
     ----------
@@ -177,7 +177,7 @@ class Slots(NamedTuple):
 
 
 class Results(NamedTuple):
-    """What E environments of a sensor with n texels and T targets give; fields as in :class:`.PressedTexels`."""
+    """Results of E environments of a sensor with n texels and T targets; fields as in :class:`.PressedTexels`."""
 
     texels: np.ndarray
     readings: np.ndarray

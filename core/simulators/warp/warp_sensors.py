@@ -213,7 +213,7 @@ class WarpSensors:
         return reason_of_pulls(pulling_loads(given, direction, rotation, self._item.texels.normal))
 
     def fault(self) -> str:
-        """Return what :meth:`.Contacts.fault` says; the arrays come to the host for it."""
+        """Return :meth:`.Contacts.fault`; the arrays come to the host for it."""
         return fault_of(self.valid.numpy(), self.jumped.numpy())
 
     def reset(self, mask: Any = None) -> None:

@@ -128,7 +128,7 @@ class SurfaceMotion(NamedTuple):
 
 @by_reference
 class NeighbourLists(NamedTuple):
-    """What the contact point of each slot can meet; a cache that changes the speed and never the numbers.
+    """Neighbour list of the contact point of each slot; a cache that changes the speed and never the numbers.
 
     Attributes
     ----------
@@ -164,7 +164,7 @@ class NeighbourLists(NamedTuple):
 
 @by_reference
 class TargetShapes(NamedTuple):
-    """What T targets are.
+    """Surfaces of T targets.
 
     Attributes
     ----------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a contact point's segment can meet while it moves little, so that the tree is searched seldom (kernels).
+"""Neighbour lists: triangles near a contact point's segment, so that the tree is searched seldom (kernels).
 
 These are neighbour lists as in molecular dynamics (Verlet 1967), extended for surfaces. A tube around each segment is searched,
 and the result is valid until some point of the segment has moved by more than the tube's radius. It is one of these:

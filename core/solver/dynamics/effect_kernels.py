@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a sensor's effects make of its contacts while a step is solved, and what they remember of it (kernels).
+"""Effects on the contacts of a sensor while a step is solved, and their memory at its end (kernels).
 
 Laws are written for a whole texel; one of several contact points has its share of the force at its own depth. Each point
 has a memory of its own, whatever presses on it; of several targets at one point the deepest counts.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the mode of a body makes of it in a step (kernels): no other module of the solver asks for it.
+"""Update of a body's motion in a step, by its mode (kernels): no other module of the solver asks for it.
 
 A keyframed body follows its path. A free one has six unknowns, the velocity and the mean spin of the step. A driven one follows
 its carrier, and has the speed along its axis as its only unknown, which coupled bodies share (see :mod:`.actuators`).

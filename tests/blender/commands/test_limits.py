@@ -35,8 +35,8 @@ def test_a_limit_ends_a_bake(option, value, tmp_path, repository):
 def test_a_call_that_does_not_return_is_ended():
     code = (
         "import time\n"
-        "from palpate.commands import export, limits, run_process\n"
-        "limits.GRACE = 0.5\n"
+        "from palpate.commands import console, export, run_process\n"
+        "console.GRACE = 0.5\n"
         "export.find_bake = lambda _: time.sleep(60)\n"
         "run_process()\n"
     )

@@ -114,14 +114,14 @@ def test_ctrl_c_ends_work_that_looks_at_no_keyboard(command, tmp_path):
         "from palpate.core.gap.calibration import stiffness\n"
         "from palpate.core.gap.dataset import rig\n"
         "from palpate.commands import export\n"
-        "from palpate.core.export import registry\n"
+        "from palpate.core.export import exporter\n"
         "def wait(*_):\n"
         "    pathlib.Path('begun').touch()\n"
         "    time.sleep(60)\n"
         "stiffness.read_foam = rig.read_rig = wait\n"
         "from types import SimpleNamespace as Fake\n"
         "export.find_bake = lambda _: Fake(folders={}, texels={'pad': None}, recording=Fake(frames=()))\n"
-        "registry.export = wait\n"
+        "exporter.export = wait\n"
         "commands.run_process()\n"
     )
     words = {
