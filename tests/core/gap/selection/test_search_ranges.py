@@ -20,7 +20,8 @@ def test_a_speed_is_that_of_sliding_for_friction_and_that_of_pressing_for_other_
     rates = [np.abs(np.diff(p.stimulus.depth, axis=0)).max(axis=1) / np.diff(p.trial.time) for p in predictors]
     fastest = max(rate.max() for rate in rates)
     assert scales.rate == pytest.approx(fastest) and 1e-4 < fastest < 1.0
-    parameter, scales = Parameter("rate", "m/s", 0.01, 1e-9, 2.0, "Of something.", log=True), replace(scales, sliding_speed=1e-6)
+    parameter = Parameter("rate", "m/s", 0.01, 1e-9, 2.0, "Of something.", log=True)
+    scales = replace(scales, sliding_speed=1e-6)
     friction, creep = form_of("stribeck", "gaussian"), form_of("creep")
     assert search_range(parameter, scales, creep) == pytest.approx((0.02 * fastest, 2.0 * fastest))
     assert search_range(parameter, scales, friction) == pytest.approx((2e-8, 2e-6))
