@@ -158,8 +158,8 @@ class _Parts:
         warnings: list[str] = []
         for i, body in enumerate(self.bodies):
             moved = body.moved(self.paths[body.name]) if body.name in self.paths else body
-            made, said = moved.of_model(fps)
+            made, notes = moved.of_model(fps)
             same = sum(one.name == body.name for one in self.bodies[:i])
             found.append(replace(made, name=f"{body.name} {same + 1}") if same else made)
-            warnings += said
+            warnings += notes
         return found, warnings

@@ -42,7 +42,7 @@ class PALPATE_OT_bake(modal_job.ModalJob, bpy.types.Operator):
             self.report({"WARNING"}, warning)
 
 
-def is_of_hands(event) -> bool:
+def is_user_input(event) -> bool:
     """Return True for the press of a key or of a mouse button, but not of ESC."""
     return event.value == "PRESS" and event.type not in {"ESC", "TIMER"}
 
@@ -77,7 +77,7 @@ class PALPATE_OT_catch_up(modal_job.ModalJob, bpy.types.Operator):
     def modal(self, context, event):
         if event.type == "SPACE" and event.value == "PRESS":  # the user does not want to go on playing afterwards
             self._was_playing = False
-        elif self.by_itself and is_of_hands(event):
+        elif self.by_itself and is_user_input(event):
             return self.stop(context) | {"PASS_THROUGH"}  # nobody asked for the computation
         return super().modal(context, event)
 
@@ -127,10 +127,10 @@ class PALPATE_OT_reset(support.ErrorReporting, bpy.types.Operator):
         playback.reset(context.scene)
 
 
-class PALPATE_OT_dress(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_display_refresh(support.ErrorReporting, bpy.types.Operator):
     """Show the bake with the current colours, scales, arrows and markers; nothing is computed"""
 
-    bl_idname = "palpate.dress"
+    bl_idname = "palpate.display_refresh"
     bl_label = "Apply to Bake"
     bl_options = {"REGISTER", "UNDO"}
 
@@ -146,4 +146,4 @@ class PALPATE_OT_dress(support.ErrorReporting, bpy.types.Operator):
         bake_display.refresh(context.scene, baked_scene.bake_folders(context.scene))
 
 
-CLASSES = (PALPATE_OT_bake, PALPATE_OT_catch_up, PALPATE_OT_bake_clear, PALPATE_OT_reset, PALPATE_OT_dress)
+CLASSES = (PALPATE_OT_bake, PALPATE_OT_catch_up, PALPATE_OT_bake_clear, PALPATE_OT_reset, PALPATE_OT_display_refresh)

@@ -49,8 +49,8 @@ class PALPATE_OT_sensor_add(support.ErrorReporting, bpy.types.Operator):
         support.leave_edit_mode(context)
         count = sensors.make_sensor(obj, source, self.role)
         note = sensors.follow_size(context.scene, obj)
-        said = f"'{obj.name}' is a {self.role.lower()} of {count} texels"
-        self.report({"INFO"}, f"{said}. {note}" if note else said)
+        text = f"'{obj.name}' is a {self.role.lower()} of {count} texels"
+        self.report({"INFO"}, f"{text}. {note}" if note else text)
 
 
 class PALPATE_OT_role_set(support.ErrorReporting, bpy.types.Operator):

@@ -78,7 +78,7 @@ class Display(Subpanel):
             column.prop(own, "arrow_scale")
             column.prop(own, "texel_arrow_scale")
         if baked_scene.baked_objects(context.scene):
-            layout.operator("palpate.dress")
+            layout.operator("palpate.display_refresh")
 
 
 class Figures(Subpanel):

@@ -36,7 +36,7 @@ class PALPATE_MT_object(bpy.types.Menu):
         layout.separator()
         layout.operator("palpate.bake", icon="RENDER_ANIMATION")
         layout.operator("palpate.bake_clear")
-        layout.operator("palpate.dress")
+        layout.operator("palpate.display_refresh")
         layout.operator("palpate.figures_make")
         layout.operator("palpate.catch_up")
         layout.operator("palpate.reset")

@@ -193,7 +193,7 @@ def _find_grid(position: np.ndarray, edges: _Edges, sizes: tuple[int, int], quad
     found: list[tuple[float, np.ndarray]] = []
     for shift in shifts[possible]:
         grid = _grow(edges, np.roll(rim, -shift), rows, columns)
-        if grid is not None and _keeps(grid, quads):
+        if grid is not None and _quads_match_grid(grid, quads):
             steps = (np.diff(position[grid], axis=0), np.diff(position[grid], axis=1))
             found.append((sum(float((step**2).sum()) for step in steps), grid))
     found.sort(key=lambda item: item[0])
@@ -223,7 +223,7 @@ def _grow(edges: _Edges, rim: np.ndarray, rows: int, columns: int) -> np.ndarray
     return grid if placed.all() else None
 
 
-def _keeps(grid: np.ndarray, quads: np.ndarray) -> bool:
+def _quads_match_grid(grid: np.ndarray, quads: np.ndarray) -> bool:
     """Tell whether every quad is a cell of the grid."""
     row, column = _places(grid)
     sides = [place[quads].max(axis=1) - place[quads].min(axis=1) for place in (row, column)]

@@ -149,11 +149,11 @@ def read_json(path: str | os.PathLike, kind: Callable[..., T], format_name: str,
         raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): check its permissions.") from error
     except (ValueError, RecursionError) as error:
         raise FileError(f"'{path}' is damaged (not JSON): {advice}.") from error
-    said = content.get("format") if isinstance(content, dict) else None
-    if said is None:
+    stated = content.get("format") if isinstance(content, dict) else None
+    if stated is None:
         raise FileError(f"'{path}' is damaged (it says no format): {advice}.")
-    if said != format_name:
-        raise FileError(f"'{path}' is not a '{format_name}' file but {said!r:.60}: {advice} with this version.")
+    if stated != format_name:
+        raise FileError(f"'{path}' is not a '{format_name}' file but {stated!r:.60}: {advice} with this version.")
     try:
         return _made(content, kind, {}), content
     except _Fault as fault:
@@ -163,8 +163,8 @@ def read_json(path: str | os.PathLike, kind: Callable[..., T], format_name: str,
 class _Fault(Exception):
     """A word that is missing or has a wrong value, in words for the brackets of a message."""
 
-    def __init__(self, word: str, hint: Any, said: str):
-        super().__init__(said)
+    def __init__(self, word: str, hint: Any, stated: str):
+        super().__init__(stated)
         self.word, self.hint = word, hint
 
 

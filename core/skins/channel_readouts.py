@@ -134,6 +134,6 @@ def with_clipping_warnings(recording: Recording) -> Recording:
         if sensor.channels is not None:
             parts = (part.sensors[name].channels for part in recording.blocks())
             clipped = np.concatenate([part.clipped for part in parts if part is not None])
-            said = replace(sensor.channels, values=clipped, clipped=clipped).said()
-            found += [f"Sensor '{name}', {said}"] if said else []
+            sentence = replace(sensor.channels, values=clipped, clipped=clipped).said()
+            found += [f"Sensor '{name}', {sentence}"] if sentence else []
     return replace(recording, warnings=(*recording.warnings, *found)) if found else recording

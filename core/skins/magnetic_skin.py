@@ -97,27 +97,8 @@ TOUCHING = 1e-9
 """m: a dipole that is nearer is at the place itself."""
 
 
-def dipole_field(offset: np.ndarray, moment: np.ndarray) -> np.ndarray:
-    """Return the flux density of dipoles.
-
-    Parameters
-    ----------
-    offset : (..., 3) float, m
-        From the dipole to where the field is wanted; not zero.
-    moment : (..., 3) float, A·m²
-
-    Returns
-    -------
-    (..., 3) float, T
-    """
-    square = np.sum(offset**2, axis=-1, keepdims=True)
-    along = np.sum(moment * offset, axis=-1, keepdims=True)
-    field: np.ndarray = MU0_4PI * (3.0 * along * offset / square - moment) / square**1.5
-    return field
-
-
 class DipoleSum:
-    """The sum of :func:`dipole_field` of dipoles that move, by products of matrices, at places that do not.
+    """The sum of the fields of dipoles that move, by products of matrices, at places that do not.
 
     The square of a distance has an error of some 1e-15 of the square of the skin's size: of 1 mm in a skin of 100 mm, 1e-11.
 
@@ -186,18 +167,6 @@ def dipole_gradient(offset: np.ndarray, moment: np.ndarray) -> np.ndarray:
     both = m_j * r_i + m_i * r_j + along * np.eye(3)
     gradient: np.ndarray = 3.0 * MU0_4PI * (both - 5.0 * along * r_i * r_j / square) / square**2.5
     return gradient
-
-
-def moment_of_magnet(remanence: float, volume: float) -> float:
-    """Return the dipole moment of a permanent magnet that is magnetised evenly, A·m².
-
-    Parameters
-    ----------
-    remanence : float, T
-        1.43 to 1.48 T for N52.
-    volume : float, m³
-    """
-    return remanence * volume / (4.0 * np.pi * MU0_4PI)
 
 
 BLOCK_NUMBERS = 1 << 14

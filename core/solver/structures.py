@@ -378,7 +378,7 @@ class LastStructures:
         self._kept: Structures | None = None
         self._user: weakref.ref[Any] | None = None
 
-    def lend(
+    def acquire(
         self, user: object, scenario: Scenario, center: np.ndarray, dt: float, threads: int | None, shared: SharedResults
     ) -> Structures:
         """Return structures at the beginning of a scenario: new ones while the last user of the kept ones is there.
@@ -410,8 +410,8 @@ def structures_for(
     """Return structures for a simulation: those of an earlier one with the same `shared` that is gone, if they fit."""
     if any_deforms(scenario):
         return Structures(scenario, center, dt, threads, shared)
-    last = shared.of(LastStructures, dt, threads or 0, *_what_shapes(scenario))
-    return last.lend(user, scenario, center, dt, threads, shared)
+    last = shared.of(LastStructures, dt, threads or 0, *_shape_key(scenario))
+    return last.acquire(user, scenario, center, dt, threads, shared)
 
 
 def any_deforms(scenario: Scenario) -> bool:
@@ -420,7 +420,7 @@ def any_deforms(scenario: Scenario) -> bool:
     return any(found is not None for found in deformations)
 
 
-def _what_shapes(scenario: Scenario) -> Iterator[Any]:
+def _shape_key(scenario: Scenario) -> Iterator[Any]:
     """Yield all that structures depend on, apart from what :meth:`Structures.begin_again` sets."""
     yield len(scenario.sensors)
     for sensor in scenario.sensors:

@@ -48,8 +48,8 @@ def only_name_where(condition: Callable[[Kind], bool]) -> str:
     """Return the name of the one kind for which a condition holds; raise :class:`EffectError` if there is none or several."""
     names = names_where(condition)
     if len(names) != 1:
-        said = f"{' and '.join(names)} state" if names else "no effect states"
-        raise EffectError(f"Of the library {said} what exactly one effect has to state: compare their KINDs.")
+        text = f"{' and '.join(names)} state" if names else "no effect states"
+        raise EffectError(f"Of the library {text} what exactly one effect has to state: compare their KINDs.")
     return names[0]
 
 

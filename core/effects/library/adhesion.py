@@ -21,8 +21,8 @@ def constant(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit
     pull, length = constants[0], constants[1]
     if texel.depth <= 0.0:
         return texel.force, texel.slope
-    left = math.exp(-texel.depth / length)
-    return texel.force - pull * (1.0 - left), texel.slope - pull * left / length
+    decay = math.exp(-texel.depth / length)
+    return texel.force - pull * (1.0 - decay), texel.slope - pull * decay / length
 
 
 def unloading(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
@@ -76,9 +76,9 @@ def _at_once(values: Values, dt: np.ndarray) -> np.ndarray:
 
 
 def _with_time(values: Values, dt: np.ndarray) -> np.ndarray:
-    left = np.exp(-np.asarray(dt) / scalar(values, "time"))
+    decay = np.exp(-np.asarray(dt) / scalar(values, "time"))
     same = np.tile([scalar(values, "pull"), scalar(values, "depth")], (len(dt), 1))
-    return np.column_stack([same, left, np.zeros(len(dt))])
+    return np.column_stack([same, decay, np.zeros(len(dt))])
 
 
 def _held(values: Values, dt: np.ndarray) -> np.ndarray:

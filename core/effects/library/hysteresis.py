@@ -28,8 +28,8 @@ def duhem(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: b
     width, length = constants[0], constants[1]
     z, change = state[0], texel.depth - state[1]
     aim = 1.0 if change >= 0.0 else -1.0
-    left = math.exp(-abs(change) / length)
-    z = aim + (z - aim) * left
+    decay = math.exp(-abs(change) / length)
+    z = aim + (z - aim) * decay
     if commit:
         state[0] = z if texel.depth > 0.0 else 0.0
         state[1] = texel.depth

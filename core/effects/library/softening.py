@@ -30,9 +30,9 @@ def peak(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bo
     """``f · (1 − s · (1 − exp(−dm/D)))`` with dm the largest depth so far. State: dm. Constants: s, D."""
     share, length = constants[0], constants[1]
     most = max(state[0], texel.depth)
-    left = math.exp(-most / length)
-    factor = 1.0 - share * (1.0 - left)
-    factor_slope = -share * left / length if texel.depth >= state[0] else 0.0
+    decay = math.exp(-most / length)
+    factor = 1.0 - share * (1.0 - decay)
+    factor_slope = -share * decay / length if texel.depth >= state[0] else 0.0
     if commit:
         state[0] = most
     return texel.force * factor, texel.slope * factor + texel.force * factor_slope
@@ -45,9 +45,9 @@ def path(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bo
     """
     share, length = constants[0], constants[1]
     more = max(texel.depth - state[1], 0.0)
-    left = math.exp(-(state[0] + more) / length)
-    factor = 1.0 - share * (1.0 - left)
-    factor_slope = -share * left / length if more > 0.0 else 0.0
+    decay = math.exp(-(state[0] + more) / length)
+    factor = 1.0 - share * (1.0 - decay)
+    factor_slope = -share * decay / length if more > 0.0 else 0.0
     if commit:
         state[0] += more
         state[1] = texel.depth

@@ -54,8 +54,8 @@ def archard(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit:
         return 0.0, 0.0
     if worn == 0.0:
         return texel.force, texel.slope
-    left = 1.0 - worn / texel.depth
-    return texel.force * left, texel.slope * left + texel.force * worn / (texel.depth * texel.depth)
+    remaining = 1.0 - worn / texel.depth
+    return texel.force * remaining, texel.slope * remaining + texel.force * worn / (texel.depth * texel.depth)
 
 
 def work(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:

@@ -317,7 +317,7 @@ def _forward_check(data: ReadoutData) -> float | None:
 
 def _reasons(data: ReadoutData, best: MethodResult, floor: np.ndarray) -> tuple[str, ...]:
     """Say where the error of the best read-out is larger than elsewhere on the check recordings."""
-    said = []
+    sentences = []
     whole = _samples(data.fit, (), MOST_SAMPLES * 10).targets
     for i, target in enumerate(data.targets):
         low, high = float(whole[:, i].min()), float(whole[:, i].max())
@@ -334,21 +334,21 @@ def _reasons(data: ReadoutData, best: MethodResult, floor: np.ndarray) -> tuple[
         error, outside, way = (np.concatenate(part) for part in (errors, beyond, rises))
         if outside.any():
             size = float(np.sqrt(np.mean(error[outside] ** 2)))
-            said.append(
+            sentences.append(
                 f"{outside.mean():.1%} of the check samples have a {target} beyond what was fitted ({low:.4g} to {high:.4g} "
                 f"{data.unit(target)}): the error there is {size:.3g} {data.unit(target)}."
             )
         up, down = (float(np.mean(error[way == sign])) if (way == sign).any() else 0.0 for sign in (1.0, -1.0))
         total = float(np.sqrt(np.mean(error**2)))
         if abs(up - down) > total:
-            said.append(
+            sentences.append(
                 f"The error of {target} is {up:+.3g} while it rises and {down:+.3g} {data.unit(target)} while it falls: the "
                 "sensor answers on another way back, which its readings do not tell."
             )
         shift = float(np.mean(error))
         if abs(shift) > 0.5 * total:
-            said.append(
+            sentences.append(
                 f"{target} is {shift:+.3g} {data.unit(target)} off on average, more than half of its error: the sensor, or its "
                 "place, has moved since the fitted recordings."
             )
-    return tuple(said)
+    return tuple(sentences)

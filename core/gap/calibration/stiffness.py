@@ -76,11 +76,6 @@ class StiffnessFit:
         """True if the curve bends upwards: a straight line does not describe it, and the effect stiffening does."""
         return self.bend > STIFFENS
 
-    @property
-    def offset_is_significant(self) -> bool:
-        """True if the interval of `offset` does not contain zero: the measurements distinguish the two lines."""
-        return not self.offset.low <= 0.0 <= self.offset.high
-
 
 def texel_stiffness(pressure: float, area: float, texels: int, compression: float) -> float:
     """Return ``k = p A / (n x)``, N/m (Eq. 18).

@@ -218,12 +218,12 @@ def _read_trials(words: RigWords, reader: _TrialReader) -> tuple[list[Trial], li
     path = reader.path
     trials, histories, warnings = [], [], []
     for number, entry in enumerate(words.trial, start=1):
-        trial, history, said = reader.read(entry, number)
+        trial, history, notes = reader.read(entry, number)
         trials.append(trial)
         histories.append(history)
-        warnings += said
+        warnings += notes
     check_free_heights(trials, path)
-    trials, said = on_common_clocks(trials, histories, words.clock, path)
+    trials, notes = on_common_clocks(trials, histories, words.clock, path)
     trials = [_on_own_clock(trial) for trial in trials]
     names = [trial.name for trial in trials]
     for name in names:
@@ -237,7 +237,7 @@ def _read_trials(words: RigWords, reader: _TrialReader) -> tuple[list[Trial], li
         raise FileError(
             f"All responses in '{path.name}' are zero: check that the sensor was connected and the right columns exported."
         )
-    return trials, [*warnings, *said]
+    return trials, [*warnings, *notes]
 
 
 def _faults_to_correct(table: Mapping[str, Any], path: Path) -> tuple[str, ...]:
@@ -433,12 +433,12 @@ class _TrialReader:
         if words.readings is not None:
             second = read_words(words.readings, SecondLogger, f"the readings of {where_in_rig}")
         columns = self._columns(file, second, where)
-        trial, said = self._recorded(columns, file, words.use, self.has_indenter or bool(words.probe))
+        trial, notes = self._recorded(columns, file, words.use, self.has_indenter or bool(words.probe))
         if own["contact_height"] is None:
             own["contact_height"] = self.height
         if trial.stimulus == "force":
             own["contact_height"] = 0.0  # the force is known, wherever contact begins
-        return replace(trial, probe=words.probe or "", repeats=words.repeats, tared=words.tared, **own), history, said
+        return replace(trial, probe=words.probe or "", repeats=words.repeats, tared=words.tared, **own), history, notes
 
     def _columns(self, file: Path, second: SecondLogger | None, where: str) -> dict[str, np.ndarray]:
         """The columns of a trial, from its CSV file or from those of two loggers."""
@@ -478,7 +478,7 @@ class _TrialReader:
                 place = [columns["x"], columns["y"], np.zeros(len(time))]
                 position, quaternion = np.stack(place, axis=1), _turns(columns, file)
         stimuli = [(POSE, position), (TURN, quaternion), ((kind,), level), (SLIDE, travel)]
-        unknown, said = _gaps_filled(stimuli, time, file)
+        unknown, notes = _gaps_filled(stimuli, time, file)
         reading, force = (_known_responses(part, unknown) for part in (reading, force))
         if reading is None and force is None:
             raise FileError(
@@ -488,11 +488,11 @@ class _TrialReader:
             quaternion = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
         strangers = [name for name in columns if not _meaning(name)]
         if strangers:
-            said.append(f"'{file.name}': {', '.join(map(repr, strangers))} mean nothing here and were left out.")
+            notes.append(f"'{file.name}': {', '.join(map(repr, strangers))} mean nothing here and were left out.")
         travel = np.zeros((len(time), 2)) if travel is None else travel
         temperature = _temperatures(columns, time, file)
         found = Trial(file.stem, use, time, kind, position, quaternion, level, travel, reading, force, temperature=temperature)
-        return found, said
+        return found, notes
 
 
 def _meaning(name: str) -> bool:
@@ -633,7 +633,7 @@ def _gaps_filled(
     -------
     unknown : (T,) bool
         Samples in gaps that are too long for it: what answered there cannot be judged.
-    said : list of str
+    notes : list of str
         Remarks.
     """
     unknown, total = np.zeros(len(time), bool), 0
@@ -646,13 +646,13 @@ def _gaps_filled(
             total += int(missing.sum())
             unknown |= np.isnan(bridged(time, column))
             column[missing] = np.interp(time[missing], time[~missing], column[~missing])
-    said = [f"'{file.name}': {total} missing values of the stimulus were interpolated."] if total else []
+    notes = [f"'{file.name}': {total} missing values of the stimulus were interpolated."] if total else []
     if unknown.any():
-        said.append(
+        notes.append(
             f"'{file.name}': responses at {unknown.sum()} samples are not used, because the stimulus is missing for too long "
             "there."
         )
-    return unknown, said
+    return unknown, notes
 
 
 def _known_responses(part: np.ndarray | None, unknown: np.ndarray) -> np.ndarray | None:
@@ -677,13 +677,13 @@ def _channel_warnings(trials: list[Trial]) -> list[str]:
     values = np.concatenate(readings)
     measured = ~np.isnan(values).all(axis=0)
     high, low = np.nanmax(values, axis=0, initial=-np.inf), np.nanmin(values, axis=0, initial=np.inf)
-    said = []
+    notes = []
     for found, what in ((~measured, "no values in any recording"), (measured & (high == low) & (high != 0), "one value only")):
         names = [f"texel_{i}" for i in np.flatnonzero(found)]
         if names:
             more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-            said.append(f"{', '.join(names[:3])}{more}: {what}; check the connection, they say nothing about the sensor.")
-    return said
+            notes.append(f"{', '.join(names[:3])}{more}: {what}; check the connection, they say nothing about the sensor.")
+    return notes
 
 
 def _check_units(rig: Rig, path: Path) -> None:

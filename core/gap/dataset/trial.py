@@ -272,7 +272,7 @@ def on_common_clocks(
     FileError
         The recordings of a session overlap, or only some of them say when they started.
     """
-    trials, said = list(trials), list[str]()
+    trials, notes = list(trials), list[str]()
     names = list(dict.fromkeys(history.session for history in histories if history.session))
     if not names and clock != "own" and len(trials) > 1:
         goes_on = _go_on(trials) and not _is_mixed(trials)
@@ -284,11 +284,11 @@ def on_common_clocks(
         if goes_on:
             began = min(float(trial.time[0]) for trial in trials)
             if clock is None:
-                said.append(
+                notes.append(
                     "The time stamps go on from recording to recording, so they are one session: what the sensor remembers "
                     'goes on, too (clock = "own" in the rig if each was recorded with a fresh sensor).'
                 )
-            return [replace(trial, time=trial.time - began, session=ONE_CLOCK) for trial in trials], said
+            return [replace(trial, time=trial.time - began, session=ONE_CLOCK) for trial in trials], notes
     alone = [float(trial.time[0]) for trial, history in zip(trials, histories, strict=True) if not history.session]
     for i, history in enumerate(histories):
         if not history.session:
@@ -305,11 +305,11 @@ def on_common_clocks(
             time = trials[i].time
             trials[i] = replace(trials[i], time=time - time[0] + start, session=name)
         if unknown and len(members) > 1:
-            said.append(
+            notes.append(
                 f"Nothing says how long the pauses of session '{name}' were: {UNKNOWN_PAUSE:g} s each were assumed; "
                 "started says when a recording began."
             )
-    return trials, said
+    return trials, notes
 
 
 def _go_on(trials: Sequence[Trial]) -> bool:

@@ -193,8 +193,8 @@ class Signals:
 
     def _separation(self, products: Products, kind: str, other: str) -> Separation:
         base, signals = range(len(self._free)), [column for common, _ in self._forms[kind] for column in common]
-        whole, alone = np.diagonal(products.common)[signals], _left(products, base, (), signals)
-        left = np.min([_left(products, (*base, *common), texel, signals) for common, texel in self._forms[other]], axis=0)
+        whole, alone = np.diagonal(products.common)[signals], _residuals(products, base, (), signals)
+        left = np.min([_residuals(products, (*base, *common), texel, signals) for common, texel in self._forms[other]], axis=0)
         acts = alone > RANK * np.maximum(whole, 1e-300)
         if not acts.any():
             return Separation(kind, other, 0.0, 0.0)
@@ -202,8 +202,8 @@ class Signals:
         return Separation(kind, other, float(np.median(left[acts] / alone[acts])), float(np.median(size)))
 
 
-def _left(products: Products, columns: Sequence[int], texel: Sequence[int], signals: Sequence[int]) -> np.ndarray:
-    """Squares that least squares on columns, and on parameters of single texels, leave of signals."""
+def _residuals(products: Products, columns: Sequence[int], texel: Sequence[int], signals: Sequence[int]) -> np.ndarray:
+    """Return the residual squares of k signals after least squares on columns and on texels' parameters, (k,) float."""
     both = [*columns, *signals]
     gram = products.common[np.ix_(both, both)]
     size = np.sqrt(np.where(np.diagonal(gram) > 0.0, np.diagonal(gram), 1.0))

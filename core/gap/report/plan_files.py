@@ -27,12 +27,12 @@ def table_rows(plan: ExperimentPlan) -> list[tuple[str, str]]:
     """Return for each kind with which others it may be confused, and how much of it these leave."""
     rows = []
     for kind in plan.kinds:
-        words = ", ".join(f"{one.other} ({_left(one)})" for one in plan.taken_for(kind))
+        words = ", ".join(f"{one.other} ({_confusion(one)})" for one in plan.taken_for(kind))
         rows.append((kind, words or "distinguishable from all others"))
     return rows + [(kind, why) for kind, why in plan.cannot_show.items()]
 
 
-def _left(one: Separation) -> str:
+def _confusion(one: Separation) -> str:
     """Why a kind may be taken for another one."""
     return f"{one.share:.0%} left" if one.share < LEAST_SHARE else "if it is small"
 

@@ -115,7 +115,7 @@ def test_factor_and_checkbox_are_applied_and_nothing_is_left(tmp_path):
     scene.frame_set(8)
     once = -surface(pad)[:, 2].min()
     scene.palpate.indentation_factor = 3.0
-    assert bpy.ops.palpate.dress() == {"FINISHED"}
+    assert bpy.ops.palpate.display_refresh() == {"FINISHED"}
     assert -surface(pad)[:, 2].min() == pytest.approx(3.0 * once, rel=1e-4)
     assert indentation.factor_of(pad) == 3.0
     save(tmp_path)
@@ -123,11 +123,11 @@ def test_factor_and_checkbox_are_applied_and_nothing_is_left(tmp_path):
     pad = scene.objects["Pad"]
     assert -surface(pad)[:, 2].min() == pytest.approx(3.0 * once, rel=1e-4)
     scene.palpate.show_indentation = False
-    assert bpy.ops.palpate.dress() == {"FINISHED"}
+    assert bpy.ops.palpate.display_refresh() == {"FINISHED"}
     assert np.ptp(surface(pad)[:, 2]) < 1e-9 and indentation.factor_of(pad) == 0.0
     assert not [image.name for image in bpy.data.images if "depth" in image.name]
     scene.palpate.show_indentation, scene.palpate.indentation_factor = True, 1.0
-    assert bpy.ops.palpate.dress() == {"FINISHED"}
+    assert bpy.ops.palpate.display_refresh() == {"FINISHED"}
     scene.frame_set(1)
     assert bpy.ops.palpate.bake_clear() == {"FINISHED"}
     assert [line for line in changes(before, dump()) if "baked_" not in line and "settings" not in line] == []

@@ -129,7 +129,7 @@ def test_display_settings_are_applied_to_a_bake_without_computing(baked, monkeyp
     scene.palpate.overlays = {"CENTRE"}
     scene.palpate.color_map = "CIVIDIS"
     scene.palpate.use_auto_range, scene.palpate.range_max = False, 0.25
-    assert bpy.ops.palpate.dress() == {"FINISHED"}
+    assert bpy.ops.palpate.display_refresh() == {"FINISHED"}
     left = [obj.name for obj in scene.objects if materials.SENSOR_KEY in obj]
     assert sorted(left) == ["Centre of Pressure Pad", "Centre of Pressure Pad 2"]
     kinds = {name: [block.name for block in getattr(bpy.data, name)] for name in ("node_groups", "materials")}

@@ -108,7 +108,7 @@ def test_hands_come_before_frames_that_nobody_asked_for():
     events = {("G", "PRESS"): True, ("LEFTMOUSE", "PRESS"): True, ("G", "RELEASE"): False, ("MOUSEMOVE", "NOTHING"): False}
     events |= {("ESC", "PRESS"): False, ("TIMER", "NOTHING"): False}
     for (kind, value), expected in events.items():
-        assert bake_operators.is_of_hands(SimpleNamespace(type=kind, value=value)) is expected
+        assert bake_operators.is_user_input(SimpleNamespace(type=kind, value=value)) is expected
     assert bpy.ops.palpate.catch_up.get_rna_type().properties["by_itself"].is_hidden
 
 
