@@ -253,7 +253,6 @@ class Form:
         Whether the gap analysis takes the form as a candidate, if the form is not random.
     fitted_up_to : dict of str to float
         Upper bounds of parameters in a fit, below their own: beyond them the formula is valid but describes another effect.
-        Where all other kinds leave far more, a fit goes on up to the parameter's own bound.
     over_within : dict of str to float
         Upper bounds of paths (m) in a fit, as shares of the path that texels are pressed in along a session.
     same_as : str

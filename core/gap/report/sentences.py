@@ -15,7 +15,6 @@ from ..selection.findings import Diagnosis, Finding
 from ..selection.gap_sizes import FORCES, READINGS, friction_kinds
 from ..selection.identifiability import LEAST_CYCLES
 from ..selection.silenced_texels import silenced_texels
-from ..selection.wear_or_drift import CLOCK, NOTHING, TEXELS, USE
 from .comparison import LEAST_GAIN, LEAST_LEVEL, GapErrors, nrmse, recording_differences
 
 LOUD_NOISE = 0.05
@@ -111,18 +110,12 @@ MANY_FLOORS = 3.0
 LEAST_SHARE = 0.01
 """Smallest share of the residual that a quantity must predict to be named."""
 ASSUMED_SESSION = "If they were recorded in another order or with pauses that matter, name their session and its times."
-EVIDENCE_TEXTS = {
-    USE: " The gains fall with the accumulated load, not with time.",
-    CLOCK: " The gains fall with time or the number of recordings, not with the accumulated load.",
-    TEXELS: " All texels change alike, whatever their load: this is not wear of single texels.",
-    NOTHING: "",
-}
-"""Evidence that distinguishes wear from drift between recordings."""
+NO_WEAR = " All texels change alike, whatever their load: this is not wear of single texels."
 NOT_TOLD = (
     "The gains fall, and the recordings do not show whether with the accumulated load or with time: name their session and "
     "when they started, and load the sensor far more in some recordings than in others."
 )
-CHANGED_ONCE = "It follows neither the accumulated load nor time: check what was done to the sensor or its electronics before."
+CHANGED_ONCE = "Check what was done to the sensor or its electronics before."
 FRICTION_MATTERS = 1.5
 """The headline mentions the base model's friction if without it the error would be at least this many times as large."""
 
@@ -154,7 +147,7 @@ def _outcome(result: Diagnosis, errors: GapErrors) -> str:
         said += f" ({shrinks}). {NOT_TOLD}"
     else:
         said = f"Missing: {own.name} between recordings (each with its own level and gain); {shrinks}."
-        said += f"{EVIDENCE_TEXTS[own.evidence]}{_odd_one(result)} Name their session to learn more."
+        said += f"{NO_WEAR if own.evidence else ''}{_odd_one(result)} Name their session to learn more."
     return f"{said} Also: {_effects(result, errors)}" if result.findings else said
 
 

@@ -16,5 +16,4 @@ __all__ = [
     "identifiability",
     "silenced_texels",
     "unfitted",
-    "wear_or_drift",
 ]

@@ -16,7 +16,7 @@ from ...effects.engine.registry import form_of, kind_of, names_found_by
 from ...effects.engine.specification import STEPS
 from ...model.sensor import Effect
 from ..fitting.least_squares import Fit
-from .candidates import DIRECTLY_ESTIMATED, is_spatial, parameters_at_bounds
+from .candidates import DIRECTLY_ESTIMATED, parameters_at_bounds
 from .direct_estimates import coarsest_step
 from .findings import Diagnosis
 from .forward_selection import SelectionState, means_of
@@ -34,8 +34,6 @@ from .view_set import ViewSet
 
 EXPLAINED = 0.5
 """Share of the gap that must be closed for the verdict "explained", and for a sure effect."""
-PARTLY_EXPLAINED, DISTINCT_RATIO = 0.35, 1.5
-"""Share of the gap that suffices for a sure effect if all other kinds leave at least `DISTINCT_RATIO` times as much."""
 CLEAR_LEAD = 2.0
 """A kind is sure, although the recordings leave its parameters open or one of them is at a bound, if all others leave this many
 times as much. Set on the creep of a real adhesive, whose amount, time and exponent trade against each other."""
@@ -56,14 +54,9 @@ CALIBRATED_ODDS = 2.3
 """A sure name's odds are this many times the odds of its support. Of the 308 sure names from 31000 on without the third family,
 3.9 fits best (three of them are wrong); of all 381 names it is 2.3 (exp of 0.85, with a standard error of 0.22). The lower one
 is taken, because a real sensor is further from the library than these cases."""
-SAME_PATTERN = 0.8
-"""Correlation over the texels from which on two effects with parameters of single texels count as one. An offset that fades
-under load, for example, takes off everywhere what it has put on."""
 MOST_OF_THE_GAP = 0.5
 """An effect that closes at least this share of the gap keeps its confidence beside ambiguous ones that each close less than
 `SMALL_SHARE`."""
-DEAD_TEXEL_SHARE = 0.5
-"""Share of an effect's variance over the texels that is on dead texels, from which on it only describes these."""
 
 
 def probability(support: float) -> float:
@@ -82,59 +75,21 @@ def probability(support: float) -> float:
     return CALIBRATED_ODDS * support / (CALIBRATED_ODDS * support + 1.0 - support)
 
 
-def least_share(name: str, leaves: dict[str, float]) -> float:
-    """Return the least share of the gap that an effect must close to be sure.
-
-    Quantization steps are seen in the readings themselves, so nothing is asked of them. There are only two effects on friction,
-    so a lead over the other one says little.
-
-    Parameters
-    ----------
-    name : str
-    leaves : dict of str to float
-        How many times as much of the gap each other kind leaves in its place.
-    """
-    if kind_of(name).found_by == STEPS:
-        return 0.0
-    apart = min(leaves.values(), default=np.inf) > DISTINCT_RATIO and name not in friction_kinds()
-    return PARTLY_EXPLAINED if apart else EXPLAINED
+def least_share(name: str) -> float:
+    """Return the least share of the gap that an effect must close to be sure; steps are seen in the readings, so none."""
+    return 0.0 if kind_of(name).found_by == STEPS else EXPLAINED
 
 
 def misfit_of_another(effect: Effect, state: SelectionState, fitted: Sequence[Effect], gap_sizes: GapSizes) -> str:
     """Return in words why one of several effects may only be the misfit of another one's formula; empty if nothing says so."""
     improvement, step = state.improvements.get(effect.name), state.steps.get(effect.name)
-    if _describes_dead_texels(effect, fitted):
-        return "it varies mostly over texels that are dead"
     if _larger_effect_of_same_kind(effect, state, fitted, gap_sizes):
         return "it may only compensate for the formula of a similar effect that closes more"
     if step is not None and step.times_worse(step.remaining_repeated, effect.name) < REPEATED_RATIO:
         return "a second effect of a kind already in the model fits nearly as well"
-    if improvement is None or improvement.of_gap >= SMALL_SHARE:
+    if improvement is None or improvement.of_gap >= SMALL_SHARE or improvement.of_remaining >= NEARLY_ALL:
         return ""
-    little = f"it closes {max(improvement.of_gap, 0.0):.1%} of the gap, and the misfit of another formula may close as much"
-    if improvement.of_remaining < NEARLY_ALL:
-        return little
-    own = [np.asarray(value) for value in effect.values.values() if isinstance(value, tuple)]
-    if own and any(is_spatial(form_of(other.name, other.form)) for other in fitted if other is not effect):
-        return little  # texels at the rim have fewer neighbours: a misfit there looks like parameters of single texels
-    others = [np.asarray(v) for other in fitted if other is not effect for v in other.values.values() if isinstance(v, tuple)]
-    pairs = [np.corrcoef(a, b)[0, 1] for a in own for b in others if np.ptp(a) > 0 and np.ptp(b) > 0]
-    return "it has the pattern of another effect over the texels" if any(abs(r) > SAME_PATTERN for r in pairs) else ""
-
-
-def may_absorb_misfit(effect: Effect, state: SelectionState) -> bool:
-    """Return whether parameters of single texels may have absorbed the unexplained part.
-
-    They may if a larger effect was found beside them and much of the gap is left.
-    """
-    mine = state.improvements[effect.name].of_gap if effect.name in state.improvements else 0.0
-    larger = any(improvement.of_gap > mine for name, improvement in state.improvements.items() if name != effect.name)
-    return larger and effect.name not in DIRECTLY_ESTIMATED and _has_texel_numbers(effect)
-
-
-def _has_texel_numbers(effect: Effect) -> bool:
-    """True if an effect has a parameter of which each texel has its own value."""
-    return any(isinstance(value, tuple) for value in effect.values.values())
+    return f"it closes {max(improvement.of_gap, 0.0):.1%} of the gap, and the misfit of another formula may close as much"
 
 
 def unsettled_parameters(effect: Effect, index: int, result: Diagnosis, lead: float = 1.0) -> tuple[str, ...]:
@@ -179,18 +134,6 @@ def _larger_effect_of_same_kind(effect: Effect, state: SelectionState, fitted: S
     groups = (SPREADING, LOSING, () if gap_sizes.both else NONLINEAR)
     same = {name for group in groups if effect.name in group for name in group}
     return any(share(other.name) > share(effect.name) for other in fitted if other.name in same and other.name != effect.name)
-
-
-def _describes_dead_texels(effect: Effect, fitted: Sequence[Effect]) -> bool:
-    """True if the variation of an effect over the texels is mostly on dead texels, which still answer a little."""
-    for other in fitted:
-        dead = np.asarray(other.values.get("dead", 0.0))
-        for value in effect.values.values():
-            if other is not effect and isinstance(value, tuple) and dead.shape:
-                moved = (np.asarray(value) - np.median(value)) ** 2
-                if float(moved[dead > 0.5].sum()) > DEAD_TEXEL_SHARE * float(moved.sum()):
-                    return True
-    return False
 
 
 def unsure_names(result: Diagnosis, view_set: ViewSet, state: SelectionState, gap_sizes: GapSizes) -> dict[str, str]:

@@ -21,7 +21,7 @@ from ..fitting.intervals import parameter_intervals
 from ..fitting.least_squares import BASE, Fit, fit, free_base_parameters, held_out_squares
 from ..fitting.noise_floor import SHORTEST_STRETCH, ChannelNoise, coverage, is_scatter_of_repeats
 from ..fitting.residual_tests import LEAST_STRUCTURE, ResidualStructure, proportional_noise, residual_structure, strongest_line
-from ..forward.predictor import Model, Predictor, number_name, predictors_of
+from ..forward.predictor import Model, Predictor, predictors_of
 from .base_model import base_fit, identified_base_parameters, prepared
 from .between_recordings import (
     DRIFT,
@@ -33,6 +33,7 @@ from .between_recordings import (
     as_one_session,
     differences,
     may_differ,
+    texels_can_tell,
     with_common_zero,
     with_own_numbers,
 )
@@ -41,14 +42,12 @@ from .check_recordings import check_views, checked
 from .confidence import EXPLAINED, UNSURE_CONFIDENCE
 from .contact_heights import with_starting_heights
 from .findings import Diagnosis, Finding
-from .forms_at_bounds import without_bounds_of_forms
 from .forward_selection import ForwardSelection, SelectionState
 from .gap_sizes import FORCES, READINGS, UNRESOLVED_SQUARE, GapSizes, friction_kinds
 from .outlying_channels import outlying_channels, without_channels
 from .screening import screen
 from .verdict import conclude
 from .view_set import ViewSet, view_set_of
-from .wear_or_drift import USE, evidence_of_recordings, texels_can_tell
 
 TOTAL_WORK = 1000
 BASE_MODEL_BEGINS, SELECTION_BEGINS = 40, 60
@@ -244,14 +243,8 @@ def _doubt_wear(session: _Search, own: _Search) -> None:
     The pauses are not known, so a gain that falls with the time was not looked for along the session.
     """
     result = session.result
-    stimuli = [one.stimulus for one in own.result.predictors]
-    factors = {
-        one.trial.name: own.result.base.model.recordings.get(number_name("factor", one.trial.name), 1.0)
-        for one in own.result.of("fit")
-    }
-    by_texels = texels_can_tell(stimuli) and session.left < MOST_LEFT * own.left_of_base
-    wears = any(one.name == WEAR and one.confidence > UNSURE_CONFIDENCE for one in result.findings)
-    if wears and not by_texels and evidence_of_recordings(stimuli, factors) != USE:
+    by_texels = texels_can_tell([one.stimulus for one in own.result.predictors]) and session.left < MOST_LEFT * own.left_of_base
+    if not by_texels and any(one.name == WEAR and one.confidence > UNSURE_CONFIDENCE for one in result.findings):
         result.findings = [_in_doubt(one) if one.name == WEAR else one for one in result.findings]
         result.ambiguous.append((WEAR, DRIFT))
 
@@ -336,7 +329,6 @@ def _select_effects(result: Diagnosis, view_set: ViewSet) -> Generator[tuple[str
         state = base
     else:
         state = yield from selection.run(base, partial(_structure, view_set))
-        state = without_bounds_of_forms(view_set.whole, state, result.scales)
     deviations = result.noise[READINGS].deviation, result.noise[FORCES].deviation
     check = check_views(result.predictors, deviations)
     result.outlying = outlying_channels(view_set.whole, check, result.base.model, state.fit.model)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +21,6 @@ from .confidence import (
     UNLIKELY_CONFIDENCE,
     UNSURE_CONFIDENCE,
     least_share,
-    may_absorb_misfit,
     misfit_of_another,
     probability,
     unsettled_parameters,
@@ -32,7 +30,6 @@ from .findings import ClosedShares, Diagnosis, Finding
 from .forward_selection import SelectionState, SelectionStep, means_of
 from .gap_sizes import FORCES, LEAST_IMPROVEMENT, READINGS, GapSizes, friction_kinds, quantities_changed_by
 from .identifiability import SPREADING, curvature_ratio, hardly_distinguishable, indistinguishable, unidentifiable
-from .plausibility import HEIGHT_ALONE, is_height_alone
 from .view_set import ViewSet
 
 RIVAL_RATIO = 1.35
@@ -46,7 +43,6 @@ UNRESOLVED_TIMES = 2.0
 """A spreading effect that leaves less than this many times what no fit can resolve has the sensor's own formula."""
 FAULTY = "the data have faults that were not put right"
 REFUTED = "the amended model fails on the check recordings"
-ABSORBS = "much of the gap remains, and parameters of single texels may have absorbed part of it"
 """Why a name is not sure, in words."""
 MOST_MEAN_SQUARE = 2.0
 """Mean square of the base model's residual, in units of the noise, up to which a residual without structure is no gap. In a
@@ -57,7 +53,7 @@ def conclude(result: Diagnosis, view_set: ViewSet, state: SelectionState, gap_si
     """Write verdict, findings, groups of rivals and ruled-out kinds into a result that has its models already."""
     result.closed = _closed_shares(result, state, gap_sizes)
     result.unlike_fitted = _unlike_fitted(result, gap_sizes)
-    _judge_effects(result, view_set, state, gap_sizes)
+    _judge_effects(result, state, gap_sizes)
     unsure = unsure_names(result, view_set, state, gap_sizes)
     if result.misleading_faults:
         unsure = {one.name: FAULTY for one in result.findings} | unsure
@@ -97,7 +93,7 @@ def _closed_shares(result: Diagnosis, state: SelectionState, gap_sizes: GapSizes
     return ClosedShares((fitted[0], fitted[1]), (left_out[0], left_out[1]), result.check.closed)
 
 
-def _judge_effects(result: Diagnosis, view_set: ViewSet, state: SelectionState, gap_sizes: GapSizes) -> None:
+def _judge_effects(result: Diagnosis, state: SelectionState, gap_sizes: GapSizes) -> None:
     """Write the verdict and, for each effect of the model, a finding with its confidence and rivals."""
     effects = result.best.model.effects
     fitted = result.best.model.fitted_effects
@@ -116,15 +112,13 @@ def _judge_effects(result: Diagnosis, view_set: ViewSet, state: SelectionState, 
         share = closed[quantity] if fitted else 1.0
         lead = min(leaves.values(), default=np.inf)
         unsettled = unsettled_parameters(effect, index, result, lead)
-        only_height = is_height_alone(result.best.model, index, view_set)
-        unsettled += (HEIGHT_ALONE,) if only_height else ()
-        support = weight * (0.5 + 0.5 * share if share >= least_share(effect.name, leaves) else 0.5 * share)
-        doubts = _doubts(effect, result, state, gap_sizes, is_open)
+        support = weight * (0.5 + 0.5 * share if share >= least_share(effect.name) else 0.5 * share)
+        doubts = _doubts(effect, result, state, gap_sizes)
         doubts += (REFUTED,) if fitted and any(map(result.check.refutes, quantities_changed_by(effect))) else ()
-        lowered = rivals or doubts or only_height or (unsettled and lead < CLEAR_LEAD)
+        lowered = rivals or doubts or (unsettled and lead < CLEAR_LEAD)
         confidence = min(support, UNSURE_CONFIDENCE) if lowered else probability(support)
         if confidence < SURE and not lowered:
-            doubts = (_low_support(share, least_share(effect.name, leaves)),)
+            doubts = (_low_support(share, least_share(effect.name)),)
         if rivals:
             result.ambiguous.append((effect.name, *rivals))
         nearest = min(times_worse, key=lambda name: times_worse[name], default="")
@@ -135,15 +129,12 @@ def _judge_effects(result: Diagnosis, view_set: ViewSet, state: SelectionState, 
         )
 
 
-def _doubts(
-    effect: Effect, result: Diagnosis, state: SelectionState, gap_sizes: GapSizes, is_open: Sequence[bool]
-) -> tuple[str, ...]:
+def _doubts(effect: Effect, result: Diagnosis, state: SelectionState, gap_sizes: GapSizes) -> tuple[str, ...]:
     """Why an effect may only compensate for the formula of another one; empty if there is no reason."""
     fitted = result.best.model.fitted_effects
     if len(fitted) < 2:
         return ()
-    absorbs = any(is_open[quantity] for quantity in quantities_changed_by(effect)) and may_absorb_misfit(effect, state)
-    why = ABSORBS if absorbs else misfit_of_another(effect, state, fitted, gap_sizes)
+    why = misfit_of_another(effect, state, fitted, gap_sizes)
     return (why,) if why else ()
 
 

@@ -36,7 +36,7 @@ def shifted(gains, levels):
     """What is found of recordings with such gains and levels."""
     names = [f"t{i}" for i in range(len(gains))]
     own = dict(zip(names, gains, strict=True)), dict(zip(names, levels, strict=True))
-    return RecordingDifferences("drift", 0.9, 0.95, 0.05, *own)
+    return RecordingDifferences(0.9, 0.95, 0.05, *own)
 
 
 @pytest.mark.parametrize(("gains", "levels", "odd"), [
