@@ -220,9 +220,7 @@ class Readout(Subpanel):
         box = layout.box().column()
         box.label(text=f"Frame {context.scene.frame_current}:" + ("" if readings else " not computed"))
         for name, value in _measured(context, readings):  # as many lines without numbers: what is below does not jump
-            row = box.split(factor=0.45)
-            row.label(text=name)
-            row.label(text=value)
+            box.label(text=f"{name}: {value}")
         if readings is not None and readings.channels is not None:
             box.label(text=_summary(readings.channels))
         draw_sentences(box, _sentence_of_net(context.scene, context.object), "NONE", context)

@@ -102,5 +102,6 @@ def draw_sentences(layout, text: str, icon: str, context) -> None:
     letters = int((context.region.width / context.preferences.system.ui_scale - 70) / 6.2)
     column = layout.column(align=True)
     column.scale_y = 0.8
+    indent = "NONE" if icon == "NONE" else "BLANK1"
     for i, line in enumerate(textwrap.wrap(text, max(letters, 20))):
-        column.label(text=line, icon=icon if i == 0 else "BLANK1")
+        column.label(text=line, icon=indent if i else icon)

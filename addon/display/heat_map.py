@@ -36,37 +36,57 @@ def apply(sensor: BakedSensor, image, scale: Scale) -> None:
     frames = int(sensor.frames[0]), int(sensor.frames[-1])
     is_in_image = scale.quantity.channel == materials.IMAGE_CHANNEL
     user_map = is_in_image and isinstance(layout, UVLayout) and layout.map_name
-    uv = _one_uv_per_texel(texels) if is_in_image and not user_map else None
-    on_vertices = uv is None and not user_map
-    if on_vertices:
+    uv = None if user_map else _one_uv_per_texel(texels)
+    mapping = materials.ImageMapping(user_map, not layout.nearest) if user_map else materials.ImageMapping()
+    if uv is not None and is_in_image:
+        _write_uv(mesh, texels, uv)
+    elif not user_map:
+        attribute = materials.attribute_of(scale.quantity)
         group = materials.empty_node_group(uid, obj.name)
         add = materials.NodeAdder(group)
         start = add("NodeGroupInput").outputs[0]
-        if is_in_image:
+        if uv is not None:
+            pictures = _pictures(sensor, scale)
+            column, _ = _table_attributes(uid)
+            played_table.store_vectors(mesh, column, texels.vertex, np.column_stack([uv, np.zeros(len(uv))]))
+            value = pictures.place(add, played_table.attribute(add, column))
+            image, mapping = pictures.image, materials.ImageMapping(attribute)
+        elif is_in_image:
             _store_texel_uv(mesh, texels)
-            value = materials.image_values(add, image, frames)
+            value, image = materials.image_values(add, image, frames), None
         else:
-            value = _table(sensor, scale).lookup(add)
-        shown = played_table.stored(add, start, materials.attribute_of(scale.quantity), value, "FLOAT")
+            value, image = _table(sensor, scale).lookup(add), None
+        shown = played_table.stored(add, start, attribute, value, "FLOAT" if image is None else "FLOAT_VECTOR")
         group.links.new(shown, add("NodeGroupOutput").inputs[0])
         modifier = obj.modifiers.new(HEAT_MAP_MODIFIER, "NODES")
         modifier.node_group = group
         obj.modifiers.move(len(obj.modifiers) - 1, 0)  # before modifiers that would change the vertices
-    elif uv is not None:
-        _write_uv(mesh, texels, uv)
-    mapping = materials.ImageMapping(user_map, not layout.nearest) if user_map else materials.ImageMapping()
-    material = materials.heat_map_material(uid, obj.name, None if on_vertices else image, frames, scale, mapping)
+    material = materials.heat_map_material(uid, obj.name, image, frames, scale, mapping)
     _assign(obj, texels, material)
 
 
 def _table(sensor: BakedSensor, scale: Scale) -> played_table.PlayedTable:
     """Return a table of what a scale shows of a sensor."""
-    obj, texels, mark = sensor.obj, sensor.texels, f"{sensor.obj.palpate.uid}:{materials.TABLE}"
-    step = played_table.frame_step(len(sensor.frames), len(texels))
-    rows = scale.values(sensor.readings.part(slice(None, None, step)), texels)
-    name = f"Palpate {obj.name} {scale.quantity.name}"
+    obj, texels = sensor.obj, sensor.texels
+    rows = scale.values(
+        sensor.readings.part(slice(None, None, played_table.frame_step(len(sensor.frames), len(texels)))), texels
+    )
     attributes = _table_attributes(obj.palpate.uid)
-    return played_table.PlayedTable.packed(mark, name, obj.data, texels.vertex, rows, sensor.frames, attributes)
+    return played_table.PlayedTable.packed(*_names(obj, scale), obj.data, texels.vertex, rows, sensor.frames, attributes)
+
+
+def _pictures(sensor: BakedSensor, scale: Scale) -> played_table.PlayedPictures:
+    """Return the tactile images of what a scale shows of a sensor."""
+    texels, layout = sensor.texels, sensor.texels.layout
+    step = played_table.frame_step(len(sensor.frames), 3 * layout.shape[0] * layout.shape[1])
+    rows = scale.values(sensor.readings.part(slice(None, None, step)), texels)
+    pictures = np.moveaxis(layout.image(rows.T), -1, 0)
+    return played_table.PlayedPictures.packed(*_names(sensor.obj, scale), pictures, sensor.frames, step)
+
+
+def _names(obj, scale: Scale) -> tuple[str, str]:
+    """Return the mark and the name of the image of a sensor's values."""
+    return f"{obj.palpate.uid}:{materials.TABLE}", f"Palpate {obj.name} {scale.quantity.name}"
 
 
 def _table_attributes(uid: str) -> tuple[str, str]:

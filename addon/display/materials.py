@@ -4,7 +4,8 @@
 Blender's nodes read the first three channels of the baked images. A quantity in the first one is shown pixel by pixel by an
 image texture, where the tactile image of the region is in one piece. A region that is cut open for its image, such as a whole
 sphere, has no UV map in which faces share corners: there geometry nodes look up the image once per texel and pass the value to
-the material as a vertex attribute. They do the same with a table of any other quantity (:mod:`.played_table`).
+the material as a vertex attribute. Other quantities are packed into the .blend (:mod:`.played_table`) and shown likewise: where
+the image is in one piece pixel by pixel, and geometry nodes choose the picture of the frame.
 """
 
 from __future__ import annotations
@@ -86,9 +87,9 @@ def set_image_frames(user, frame_start: int, frame_end: int) -> None:
 
 @dataclass(frozen=True)
 class ImageMapping:
-    """Mapping of an image onto a sensor: its UV map, and if its pixels are blended."""
+    """How an image lies on a sensor: its UV map or another attribute with texture coordinates, and if pixels are blended."""
 
-    uv_map: str = UV_MAP
+    coordinates: str = UV_MAP
     smooth: bool = False
 
 
@@ -102,7 +103,7 @@ def heat_map_material(
     uid, name : str
         Identity and name of the sensor.
     image : Image or None
-        From :func:`load_sequence`; None to read the values from the vertex attribute :func:`attribute_of`.
+        From :func:`load_sequence`, or packed; None to read the values from the vertex attribute :func:`attribute_of`.
     frames : (int, int)
         First and last frame of the bake.
     scale : Scale
@@ -131,6 +132,8 @@ def _add_value(add, image, frames: tuple[int, int], scale: Scale, mapping: Image
     if image is None:
         return add("ShaderNodeAttribute", attribute_name=attribute_of(scale.quantity)).outputs["Fac"], None
     texture = _texture(add, image, mapping)
+    if image.source != "SEQUENCE":
+        return _red(add, texture), None  # it is in the .blend
     set_image_frames(texture.image_user, *frames)
     return _red(add, texture), add_missing_test(add, texture.outputs["Color"])
 
@@ -171,12 +174,12 @@ def _add_surface(add, color) -> None:
     add.tree.links.new(surface.outputs["BSDF"], output.inputs["Surface"])
 
 
-def _texture(add, image, coordinates: ImageMapping):
-    """Return a node that shows an image by a UV map."""
-    interpolation = "Linear" if coordinates.smooth else "Closest"
+def _texture(add, image, mapping: ImageMapping):
+    """Return a node that shows an image."""
+    interpolation = "Linear" if mapping.smooth else "Closest"
     texture = add("ShaderNodeTexImage", image=image, interpolation=interpolation, extension="EXTEND")
-    uv = add("ShaderNodeUVMap", uv_map=coordinates.uv_map)
-    add.tree.links.new(uv.outputs["UV"], texture.inputs["Vector"])
+    place = add("ShaderNodeAttribute", attribute_name=mapping.coordinates)
+    add.tree.links.new(place.outputs["Vector"], texture.inputs["Vector"])
     return texture
 
 

@@ -51,15 +51,11 @@ class PlayedTable:
             Names of the attributes that `mesh` gets.
         """
         width = max(1, -(-len(vertices) // 3))
-        image = bpy.data.images.new(name, width, len(rows), alpha=False, float_buffer=True, is_data=True)
-        image[materials.SENSOR_KEY] = mark
-        pixels = np.zeros((len(rows), width, 4), dtype=np.float32)
-        pixels[..., 3] = 1.0
+        pixels = np.zeros((len(rows), width, 3))
         for channel in range(3):
             own = rows[:, channel::3]
             pixels[:, : own.shape[1], channel] = own
-        image.pixels.foreach_set(pixels.ravel())
-        image.pack()
+        image = _packed_image(mark, name, pixels)
         place = np.arange(len(vertices))
         store_vectors(mesh, attributes[0], vertices, np.outer((place // 3 + 0.5) / width, (1.0, 0.0, 0.0)))
         store_vectors(mesh, attributes[1], vertices, np.eye(3)[place % 3])
@@ -67,8 +63,7 @@ class PlayedTable:
 
     def lookup(self, add):
         """Return the socket of the value at each vertex, between two frames in between."""
-        frame = out(add, "GeometryNodeInputSceneTime", output="Frame")
-        frame = out(add, "ShaderNodeClamp", {"Value": frame, "Min": self.first, "Max": self.last})
+        frame = _frame(add, self.first, self.last)
         rows = self.image.size[1]
         last_row = self.first + self.step * (rows - 1)
         ends = {"From Min": self.first, "From Max": max(last_row, self.first + 1)}
@@ -79,6 +74,63 @@ class PlayedTable:
         color = out(add, "GeometryNodeImageTexture", given, interpolation="Linear", extension="EXTEND")
         chosen = {0: color, 1: attribute(add, self.channel)}
         return out(add, "ShaderNodeVectorMath", chosen, output="Value", operation="DOT_PRODUCT")
+
+
+@dataclass(frozen=True)
+class PlayedPictures:
+    """An image with a picture of each frame beside the others, of which a material shows one pixel by pixel.
+
+    Its first and last frame, the frames from one picture to the next, and how many of them are in a row and in a column.
+    """
+
+    image: object
+    first: int
+    last: int
+    step: int
+    across: int
+    down: int
+
+    @classmethod
+    def packed(cls, mark: str, name: str, pictures: np.ndarray, frames: np.ndarray, step: int) -> PlayedPictures:
+        """Return a new image of (r, height, width) pictures, one for every `step` of the frames, (F,) one after another."""
+        count, height, width = pictures.shape
+        across = min(count, -(-round((count * height * width) ** 0.5) // width))
+        down = -(-count // across)
+        pixels = np.zeros((down, height, across, width, 3))
+        for number, picture in enumerate(pictures):
+            pixels[number // across, :, number % across, :, 0] = picture
+        image = _packed_image(mark, name, pixels.reshape(down * height, across * width, 3))
+        return cls(image, int(frames[0]), int(frames[-1]), step, across, down)
+
+    def place(self, add, uv):
+        """Return the socket of texture coordinates in the image at the frame in view; `uv` is that of them in one picture."""
+
+        def math(operation: str, *given):
+            return out(add, "ShaderNodeMath", dict(enumerate(given)), operation=operation)
+
+        passed = math("SUBTRACT", _frame(add, self.first, self.last), self.first)
+        number = math("FLOOR", math("DIVIDE", passed, self.step))
+        row = math("FLOOR", math("DIVIDE", number, self.across))
+        corner = out(add, "ShaderNodeCombineXYZ", {"X": math("MODULO", number, self.across), "Y": row})
+        moved = out(add, "ShaderNodeVectorMath", {0: uv, 1: corner}, operation="ADD")
+        return out(add, "ShaderNodeVectorMath", {0: moved, 1: (self.across, self.down, 1.0)}, operation="DIVIDE")
+
+
+def _packed_image(mark: str, name: str, pixels: np.ndarray):
+    """Return a new image with (height, width, 3) values, in the .blend."""
+    height, width, _ = pixels.shape
+    image = bpy.data.images.new(name, width, height, alpha=False, float_buffer=True, is_data=True)
+    image[materials.SENSOR_KEY] = mark
+    image.use_half_precision = False  # a material would show a small change of a large value in steps
+    image.pixels.foreach_set(np.concatenate([pixels, np.ones((height, width, 1))], axis=2).astype(np.float32).ravel())
+    image.pack()
+    return image
+
+
+def _frame(add, first: int, last: int):
+    """Return the socket of the frame in view, which is `first` before it and `last` after it."""
+    frame = out(add, "GeometryNodeInputSceneTime", output="Frame")
+    return out(add, "ShaderNodeClamp", {"Value": frame, "Min": first, "Max": last})
 
 
 def frame_step(frames: int, vertices: int) -> int:

@@ -29,6 +29,11 @@ def play(scene, last=8):
     return live_cache.get(scene)
 
 
+def both_sides(texels):
+    """Return the texels at the corners of an overlay: the lower side comes first, and its faces are turned downwards."""
+    return np.concatenate([texels.layout.triangles[:, ::-1].ravel(), texels.layout.triangles.ravel()])
+
+
 def expected_colors(quantity, felt, texels, scale):
     share = (quantity.values(felt, texels) - scale.low) / (scale.high - scale.low)
     return color_maps.colors(scale.colour_map, share)
@@ -46,8 +51,7 @@ def test_it_is_seen_while_playing(name):
     assert scale.low <= values.min() and values.max() <= scale.high and scale.unit == quantity.unit_of(frame.sensors["Pad"])
     colors = expected_colors(quantity, frame.sensors["Pad"], texels, scale)
     (overlay,) = overlays.sensor_overlays(scene, run, frame)
-    half = len(overlay.colors) // 2
-    assert overlay.colors[:half, :3] == pytest.approx(colors[texels.layout.triangles.ravel()], abs=1e-6)
+    assert overlay.colors[:, :3] == pytest.approx(colors[both_sides(texels)], abs=1e-6)
     content = overlays.inset_content(scene, run, frame)
     assert content.scale == scale and scale.unit in content.scale.words(scale.high)
     pixels = content.insets[0].pixels
@@ -72,16 +76,25 @@ def test_it_is_seen_on_a_bake(tmp_path, name):
     if quantity.channel != materials.IMAGE_CHANNEL:
         scene.frame_set(7)
         mesh = pad.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-        shown = np.empty(len(mesh.vertices), dtype=np.float32)
-        mesh.attributes[materials.attribute_of(quantity)].data.foreach_get("value", shown)
-        values = quantity.values(felt, texels)
-        assert shown[texels.vertex] == pytest.approx(values, rel=1e-5, abs=1e-5 * np.abs(values).max())
+        place = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+        mesh.attributes[materials.attribute_of(quantity)].data.foreach_get("vector", place.ravel())
+        image = next(image for image in bpy.data.images if image.name == f"Palpate Pad {name}")
+        pixels = np.array(image.pixels[:]).reshape(image.size[1], image.size[0], 4)[..., 0]
+        # a material shows the pixel that is nearest: one colour per texel, also beside its vertex
+        for shift in (-0.4, 0.0, 0.4):
+            column, row = (place[texels.vertex, :2] * image.size + shift).astype(int).T
+            values = quantity.values(felt, texels)
+            assert pixels[row, column] == pytest.approx(values, rel=1e-5, abs=1e-5 * np.abs(values).max())
+        texture = next(
+            node for node in pad.material_slots[-1].material.node_tree.nodes if node.bl_idname == "ShaderNodeTexImage"
+        )
+        assert texture.image == image and texture.interpolation == "Closest"
     colors = expected_colors(quantity, felt, texels, scale)
     assert np.ptp([quantity.values(found.recording.sensors["Pad"].at(i), texels) for i in (0, 6)]) > 0.0
     (overlay,) = overlays.baked_overlays(scene, found, 7, scale)  # what Solid view shows
-    corner = texels.layout.triangles.ravel()
-    free = np.tile(felt.depth[corner] == 0.0, 2)
-    assert overlay.colors[free, :3] == pytest.approx(np.tile(colors[corner], (2, 1))[free], abs=1e-6)
+    corner = both_sides(texels)
+    free = felt.depth[corner] == 0.0
+    assert overlay.colors[free, :3] == pytest.approx(colors[corner][free], abs=1e-6)
     with workbench_colors.workbench_colors(baked_scene.bake_folders(scene), found, bake_display.figure_style(scene)) as show:
         show(7)
         attribute = pad.data.attributes[workbench_colors.COLOR_ATTRIBUTE]

@@ -71,7 +71,7 @@ def test_files_and_material_show_the_force_on_the_uv_map(tmp_path, pixels):
     image = materials.find_block(bpy.data.images, obj.palpate.uid)
     node = next(node for node in obj.material_slots[-1].material.node_tree.nodes if node.type == "TEX_IMAGE")
     assert node.image == image and node.interpolation == {"SMOOTH": "Linear", "NEAREST": "Closest"}[pixels]
-    assert node.inputs["Vector"].links[0].from_node.uv_map == "UVMap"
+    assert node.inputs["Vector"].links[0].from_node.attribute_name == "UVMap"
     assert list(obj.data.uv_layers.keys()) == ["UVMap"]
     force = np.zeros(len(obj.data.vertices))
     force[texels.vertex] = readings.normal_force

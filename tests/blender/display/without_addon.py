@@ -28,6 +28,19 @@ def deepest(pad):
     return max(heights) - min(heights)
 
 
+def shown(mesh, vertices):
+    """Return what a material finds at each vertex, by quantity: the pixel at its texture coordinates in the packed image."""
+    found = {}
+    for item in mesh.attributes:
+        image = bpy.data.images.get(f"Palpate Pad {item.name.removeprefix('palpate_')}")
+        if item.data_type == "FLOAT_VECTOR" and image is not None:
+            pixels = np.array(image.pixels[:]).reshape(image.size[1], image.size[0], 4)[..., 0]
+            places = np.array([value.vector for value in item.data][:vertices])[:, :2] * image.size
+            column, row = np.minimum(places.astype(int), np.array(image.size) - 1).T
+            found[item.name] = pixels[row, column].tolist()
+    return found
+
+
 report = {"has_addon": hasattr(bpy.types.Object, "palpate"), "frames": {}}
 for frame in map(int, frames):
     scene.frame_set(frame)
@@ -43,11 +56,7 @@ for frame in map(int, frames):
     report["frames"][frame] = {
         # the vertices of the mesh itself come first; those of the indented surface follow
         "tip": [item.value for item in getattr(tip.attributes.get("palpate_force"), "data", ())][:corners],
-        "shown": {
-            item.name: [value.value for value in item.data][: len(scene.objects["Pad"].data.vertices)]
-            for item in pad_mesh.attributes
-            if item.name.startswith("palpate_") and item.data_type == "FLOAT" and ":" not in item.name
-        },
+        "shown": shown(pad_mesh, len(scene.objects["Pad"].data.vertices)),
         "depth": deepest(scene.objects["Pad"]),
         "size": list(picture.size),
         "pixels": np.round(pixels, 4).tolist(),

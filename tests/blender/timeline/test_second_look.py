@@ -237,11 +237,12 @@ def test_views_without_materials_show_the_colours_of_a_bake_on_both_sides(tmp_pa
     scale = FigureStyle(limit=0.5).scale(bake_read.recording, bake_read.texels)
     (overlay,) = overlays.baked_overlays(scene, bake_read, 4, scale)
     texels, readings = bake_read.texels["Pad"], bake_read.recording.at(4).sensors["Pad"]
-    corner = texels.layout.triangles.ravel()
+    corner = np.concatenate([texels.layout.triangles[:, ::-1].ravel(), texels.layout.triangles.ravel()])  # below, then above
     assert overlay.plain_only and overlay.line is None
     expected = color_maps.colors(scene.palpate.color_map, readings.normal_force / 0.5)[corner]
-    np.testing.assert_allclose(overlay.colors[:, :3], np.tile(expected, (2, 1)), atol=1e-6)
-    above, below = np.split(overlay.corners, 2)
+    np.testing.assert_allclose(overlay.colors[:, :3], expected, atol=1e-6)
+    below, above = np.split(overlay.corners, 2)
+    below, corner = below.reshape(-1, 3, 3)[:, ::-1].reshape(-1, 3), texels.layout.triangles.ravel()
     away = np.einsum("ij,ij->i", above - below, texels.normal[corner])
     assert (away > 0).all()  # the pad stands at the origin, unturned
     assert readings.depth.max() > 1e-4
