@@ -20,12 +20,9 @@ FEATURES = {
 }
 """Features of recordings by which an effect is known. Recordings without them do not identify it, however well it fits."""
 FAMILIES = {
-    "spreading": "passes a part of a texel's load on to its neighbours, in a pattern that each sensor has of its own",
     "nonlinear": "bends the curve of reading over load",
     "loop": "opens a loop between loading and unloading at any speed; the loading curve of the loop is bent as well",
     "late": "answers late, so that it lowers the unloading curve of a single cycle",
-    "moving": "lets a reading move while nothing else does",
-    "losing": "loses force with what was pressed; how fast the loss dies away is a matter of the formula",
 }
 """Families of effects that resemble each other, so that a better fit says little which of them acts."""
 
@@ -51,8 +48,6 @@ NEEDS = {
     "axes": "the same, with a number of channels that is a multiple of three",
 }
 """What recordings must hold for an effect, or a form of it, to be a candidate."""
-GAIN_FALLS_WITH = {"use": "what the sensor was pressed", "clock": "the time"}
-"""With what the gain falls from recording to recording."""
 DRAWINGS = {
     "time": "reading over time, for a course of depths",
     "depth": "force over depth, for a course of depths",

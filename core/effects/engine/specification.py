@@ -33,7 +33,7 @@ from ...errors import EffectError
 from ...model.effect import Value, Values
 from ...model.parameter import Parameter
 from .coupling_matrix import CouplingMatrix
-from .declarations import DRAWINGS, FAMILIES, FEATURES, FIT, FOUND_BY, GAIN_FALLS_WITH, NEEDS, SIGNATURES, Drawing
+from .declarations import DRAWINGS, FAMILIES, FEATURES, FIT, FOUND_BY, NEEDS, SIGNATURES, Drawing
 
 SITES_OF_ACTION = ("contact", "pad", "readout")
 """Where an effect acts, in the order in which a load passes: `contact` changes the contact law itself and has no memory, `pad`
@@ -155,13 +155,15 @@ class Form:
         Whether the gap analysis takes the form as a candidate, if the form is not random.
     fitted_up_to : dict of str to float
         Upper bounds of parameters in a fit, below their own: beyond them the formula is valid but describes another effect.
-        Where all other kinds leave far more, a fit goes on up to the parameter's own bound.
     over_within : dict of str to float
         Upper bounds of paths (m) in a fit, as shares of the path that texels are pressed in along a session.
     same_as : str
         Parameter of the base model that does the same; the form is no candidate where that is free.
     needs : str
         What recordings must hold for this form, one of :data:`.declarations.NEEDS`, if it differs from the kind's.
+    error : float or None
+        φ of a form that is free to follow any law of its kind: the share of the mean square of the kind's change that it leaves
+        of other laws, measured on laws that the library does not have. None for formulas of textbooks.
     """
 
     name: str
@@ -186,6 +188,7 @@ class Form:
     over_within: dict[str, float] = field(default_factory=dict)
     same_as: str = ""
     needs: str = ""
+    error: float | None = None
 
     @cached_property
     def mechanism(self) -> str:
@@ -234,9 +237,6 @@ class Kind:
         What recordings must hold, one of :data:`.declarations.NEEDS`; empty if nothing more is asked.
     known_parameters : tuple of str
         Parameters that a fit leaves at their neutral values, because the recordings hold them.
-    gain_falls_with : str
-        With what it lowers the gain from recording to recording, one of :data:`.declarations.GAIN_FALLS_WITH`; at most one
-        kind for each. Empty if it does not, or not alone.
     """
 
     name: str
@@ -254,7 +254,6 @@ class Kind:
     signature: str = ""
     needs: str = ""
     known_parameters: tuple[str, ...] = ()
-    gain_falls_with: str = ""
 
     def __post_init__(self) -> None:
         stated = (
@@ -263,7 +262,6 @@ class Kind:
             ("found_by", (self.found_by,), FOUND_BY),
             ("signature", (self.signature,), SIGNATURES),
             ("needs", (self.needs, *(form.needs for form in self.forms)), NEEDS),
-            ("gain_falls_with", (self.gain_falls_with,), GAIN_FALLS_WITH),
             ("drawing", (self.drawing.over,), DRAWINGS),
         )
         for attribute, words, known in stated:

@@ -135,5 +135,4 @@ KIND = Kind(
         },
     ),
     known_from=("places",),
-    families=("spreading",),
 )

@@ -7,7 +7,6 @@ from scipy import stats
 
 from palpate.core.gap.fitting.regression import student_quantile
 from palpate.core.gap.selection.candidates import _halton_points
-from palpate.core.gap.selection.wear_or_drift import BENT_FROM, CHANCE, _least_ratio
 
 
 @pytest.mark.parametrize("dimensions", [1, 2, 5, 12])
@@ -20,6 +19,3 @@ def test_halton_points(dimensions):
 def test_quantiles():
     for freedom in (1, 2, 7, 40, 1000):
         assert student_quantile(freedom) == pytest.approx(stats.t.ppf(0.975, freedom), rel=1e-14)
-    for count in range(4, 20):
-        free = count - (2 if count < BENT_FROM else 3)
-        assert _least_ratio(count) == pytest.approx(stats.f.ppf(CHANCE, free, free), rel=1e-14)
