@@ -160,5 +160,6 @@ def examine_rig(folder: str, case: str, answer: dict) -> dict:
         "answer": " + ".join(hidden) or "nothing",
         "said": " + ".join(sorted(sure)) or result.verdict,
         "outcome": "right" if is_right else "part" if said == "right" else said,
+        "confidences": {one.name: one.confidence for one in result.findings},
         "seconds": round(time.process_time() - began, 1),
     }
