@@ -43,12 +43,12 @@ def picture_of(scene, folder, **options):
 
 
 def loaded_pixels(scene, pad):
-    """Return the loaded texels, rows and columns of the most loaded one and of the top of the ball, and the weights."""
+    """Return the loaded texels, rows and columns of the most loaded one and of the ball beside the arrow, and the weights."""
     bake = figure_export.read_scene_bake(scene)
     with render_setup.render_setup(scene, [3], FigureRequest(view=VIEW).render_options(SIZE)):
         scene.frame_set(3)
         loaded = loaded_texels.loaded_texels(scene, bake, 3)
-        points = [loaded.points[loaded.forces.argmax()], (0.0, 0.0, 0.0125 + 0.013)]
+        points = [loaded.points[loaded.forces.argmax()], (0.007, 0.0, 0.0125 + 0.0105)]
         places = np.array([render.image_position(scene, point) for point in points])
         weights = see_through.clear_weights(scene, loaded, SIZE)
     columns, rows = (places * SIZE).astype(int).T
