@@ -6,7 +6,7 @@ The base model is refitted, effects are added to it by forward selection, and th
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import TypeVar
@@ -74,8 +74,12 @@ def diagnose(rig: Rig) -> Job[Diagnosis]:
     -------
     Diagnosis
     """
-    plain = yield from _begun(rig)
-    yield from _selected(plain, SELECTION_BEGINS, OTHER_SEARCHES_BEGIN if may_differ(rig) else TOTAL_WORK)
+    yield Progress("contacts of every trial", 0, TOTAL_WORK)
+    rig, predictors, faults = _with_checked_data(with_starting_heights(rig))
+    noise, full = prepared(rig, predictors)
+    yield Progress("base model", BASE_MODEL_BEGINS, TOTAL_WORK)
+    plain = _search_of(rig, predictors, noise, full, faults)
+    yield from _progress_of(_find_effects(plain), SELECTION_BEGINS, OTHER_SEARCHES_BEGIN if may_differ(rig) else TOTAL_WORK)
     best = plain
     if may_differ(rig) and not _is_settled(plain):
         best = yield from _best_of_other_searches(plain)
@@ -83,23 +87,25 @@ def diagnose(rig: Rig) -> Job[Diagnosis]:
     return best.result
 
 
-def fit_base(rig: Rig) -> Job[Diagnosis]:
-    """Fit the base model as :func:`diagnose` does before it looks for effects; what it returns names none."""
-    return (yield from _begun(rig)).result
-
-
-def _begun(rig: Rig) -> Generator[Progress, None, _Search]:
-    """Prepare recordings and fit the base model."""
-    yield Progress("contacts of every trial", 0, TOTAL_WORK)
-    rig, predictors, faults = _without_faults(with_starting_heights(rig))
-    noise, full = prepared(rig, predictors)
-    yield Progress("base model", BASE_MODEL_BEGINS, TOTAL_WORK)
-    return _search_of(rig, predictors, noise, full, faults)
-
-
-def _selected(search: _Search, begins: int, ends: int) -> Iterator[Progress]:
-    """Select the effects of a search, between two shares of the whole work."""
-    yield from _progress_of(_select_effects(search.result, search.views), begins, ends)
+def _find_effects(search: _Search) -> Generator[tuple[str, float], None, None]:
+    """Find the effects that a base model lacks: select, compare with the check recordings, judge. Completes the diagnosis."""
+    result, views = search.result, search.views
+    base, gap_sizes = _measured_gap(result, views)
+    selection = ForwardSelection(views, result.scales, result.coverage, gap_sizes)
+    state = base
+    if not is_scatter_of_repeats(result.noise, result.base.sse, result.base.count):
+        state = yield from selection.run(base, partial(_structure, views))
+    check = check_views(result.predictors, (result.noise[READINGS].deviation, result.noise[FORCES].deviation))
+    result.outlying = outlying_channels(views.whole, check, result.base.model, state.fit.model)
+    state = replace(state, fit=_with_base_refitted(result, views, state.fit))
+    result.best, result.structure = state.fit, _structure(views, state.fit)
+    result.line = strongest_line(views.whole, state.fit.model)
+    _separate_noise(result, views, state, gap_sizes)
+    result.intervals = parameter_intervals(result.best)
+    memory = result.noise[READINGS].correlation_time, result.noise[FORCES].correlation_time
+    check = without_channels(check, result.outlying)
+    result.check = checked(check, result.base.model, result.best.model, gap_sizes, memory)
+    conclude(result, views, state, gap_sizes)
 
 
 def _progress_of(
@@ -133,14 +139,14 @@ def _best_of_other_searches(plain: _Search) -> Generator[Progress, None, _Search
     own, session, best = _search_with_own_numbers(plain), _search_of_one_session(plain), plain
     middle = (OTHER_SEARCHES_BEGIN + TOTAL_WORK) // 2
     if session is not None and session.is_wanted:
-        yield from _selected(session, OTHER_SEARCHES_BEGIN, middle)
+        yield from _progress_of(_find_effects(session), OTHER_SEARCHES_BEGIN, middle)
         if _is_one_session(session, plain):
             session.result.assumed_session, best = True, session
             _doubt_wear(session, own)
             if session.left <= own.left_of_base:
                 return session
     if own.is_wanted:
-        yield from _selected(own, middle, TOTAL_WORK)
+        yield from _progress_of(_find_effects(own), middle, TOTAL_WORK)
         if own.left < MOST_LEFT * plain.left and (best is plain or own.left < best.left):
             _name_differences(own, plain, session)
             best = own
@@ -161,7 +167,7 @@ class _Search:
     is_wanted : bool
         True if this is enough for a search for effects.
     left_by_load : float
-        What wear or softening alone leaves, in a search of one session.
+        Excess error with wear or softening alone, in a search of one session.
     """
 
     result: Diagnosis
@@ -172,13 +178,13 @@ class _Search:
 
     @property
     def left(self) -> float:
-        """What the amended model leaves (see :func:`_left`)."""
-        return _left(self.views, self.result.best)
+        """Excess error of the amended model (see :func:`_excess_error`)."""
+        return _excess_error(self.views, self.result.best)
 
     @cached_property
     def left_of_base(self) -> float:
-        """What the base model leaves."""
-        return _left(self.views, self.result.base)
+        """Excess error of the base model."""
+        return _excess_error(self.views, self.result.base)
 
 
 def _search_of(
@@ -198,13 +204,13 @@ def _search_with_own_numbers(plain: _Search) -> _Search:
     """The search with a factor and a zero of each recording. What a zero of all recordings closes does not count."""
     result = plain.result
 
-    def twins(rig: Rig) -> list[Predictor]:
+    def predictors_for(rig: Rig) -> list[Predictor]:
         return [one.with_numbers_of(trial) for one, trial in zip(result.predictors, rig.trials, strict=True)]
 
     common, rig = with_common_zero(result.rig), with_own_numbers(result.rig)
-    with_zero = _fitted_base(common, twins(common), result.noise, result.full)
-    own = _search_of(rig, twins(rig), result.noise, result.full, result.faults)
-    before, after = min(plain.left_of_base, _left(*with_zero)), own.left_of_base
+    with_zero = _fitted_base(common, predictors_for(common), result.noise, result.full)
+    own = _search_of(rig, predictors_for(rig), result.noise, result.full, result.faults)
+    before, after = min(plain.left_of_base, _excess_error(*with_zero)), own.left_of_base
     own.closes = 1.0 - after / before
     own.is_wanted = own.closes >= LEAST_CLOSED and before - after > LEAST_LOWERED
     return own
@@ -223,7 +229,7 @@ def _search_of_one_session(plain: _Search) -> _Search | None:
     for _, _, found in screen(session.views, session.result.base, forms, session.result.scales):
         ranked = found or ranked
     session.left_by_load = min(
-        (_left(session.views, one.fit) for one in ranked if one.candidate.name in LOAD_HISTORY), default=np.inf
+        (_excess_error(session.views, one.fit) for one in ranked if one.candidate.name in LOAD_HISTORY), default=np.inf
     )
     session.closes = 1.0 - session.left_by_load / plain.left_of_base
     session.is_wanted = session.closes > 1.0 - MOST_LEFT
@@ -302,13 +308,13 @@ def _relative_error(found: Fit, noise: tuple[ChannelNoise, ChannelNoise], full: 
     return float(np.sqrt((found.sse.sum(axis=0) * scale**2).sum() / max(float(found.count.sum()), 1.0)))
 
 
-def _left(view_set: ViewSet, found: Fit) -> float:
+def _excess_error(view_set: ViewSet, found: Fit) -> float:
     """Mean square of a fit on unseen stretches, less that of noise, plus what no fit can resolve."""
     mean = float(held_out_squares(view_set.whole, found).sum()) / max(float(found.count.sum()), 1.0)
     return max(mean - 1.0, 0.0) + UNRESOLVED_SQUARE
 
 
-def _without_faults(rig: Rig) -> tuple[Rig, list[Predictor], list[DataFault]]:
+def _with_checked_data(rig: Rig) -> tuple[Rig, list[Predictor], list[DataFault]]:
     """The rig with those faults of its data put right for which it asks, predictors of its trials, and all faults."""
     predictors = predictors_of(rig.trials, rig)
     faults = find_faults(rig, [predictor.stimulus for predictor in predictors])
@@ -318,36 +324,24 @@ def _without_faults(rig: Rig) -> tuple[Rig, list[Predictor], list[DataFault]]:
     return rig, predictors_of(rig.trials, rig), faults
 
 
-def _select_effects(result: Diagnosis, view_set: ViewSet) -> Generator[tuple[str, float], None, None]:
-    """Add effects to the base model while each improves it enough; write the outcome into `result`."""
+def _measured_gap(result: Diagnosis, view_set: ViewSet) -> tuple[SelectionState, GapSizes]:
+    """The base model as the state in which a selection begins, and the gaps of readings and forces that it leaves."""
     base = SelectionState(result.base, held_out_squares(view_set.whole, result.base))
     start = base.means
     noise = np.array([min(1.0, start[READINGS]), min(_unloaded_force_noise(view_set, result.base), start[FORCES])])
-    gap_sizes = GapSizes(start, noise, result.base.count.sum(axis=0).astype(float))
-    selection = ForwardSelection(view_set, result.scales, result.coverage, gap_sizes)
-    if is_scatter_of_repeats(result.noise, result.base.sse, result.base.count):
-        state = base
-    else:
-        state = yield from selection.run(base, partial(_structure, view_set))
-    deviations = result.noise[READINGS].deviation, result.noise[FORCES].deviation
-    check = check_views(result.predictors, deviations)
-    result.outlying = outlying_channels(view_set.whole, check, result.base.model, state.fit.model)
-    check = without_channels(check, result.outlying)
-    state = replace(state, fit=_with_base_refitted(result, view_set, state.fit))
-    result.best, result.structure = state.fit, _structure(view_set, state.fit)
-    result.line = strongest_line(view_set.whole, state.fit.model)
+    return base, GapSizes(start, noise, result.base.count.sum(axis=0).astype(float))
+
+
+def _separate_noise(result: Diagnosis, view_set: ViewSet, state: SelectionState, gap_sizes: GapSizes) -> None:
+    """Correct the noise of the main quantity by the part of the residual that depends on nothing."""
     main, mean = gap_sizes.main_quantity, float(state.means[gap_sizes.main_quantity])
-    unpredictable = min(start[main] * (1.0 - result.base_structure.total), mean * (1.0 - result.structure.total))
-    gap_sizes.noise[main] = float(np.clip(unpredictable, LEAST_NOISE, 1.0))
+    before = gap_sizes.base[main] * (1.0 - result.base_structure.total)
+    gap_sizes.noise[main] = float(np.clip(min(before, mean * (1.0 - result.structure.total)), LEAST_NOISE, 1.0))
     if result.structure.total < LEAST_STRUCTURE and result.line is None:
         noise_effect = proportional_noise(view_set.whole, state.fit.model)
         if noise_effect is not None:  # then the whole residual is noise
             result.best = replace(state.fit, model=state.fit.model.with_effect(noise_effect))
             gap_sizes.noise[main] = max(gap_sizes.noise[main], mean)
-    result.intervals = parameter_intervals(result.best)
-    memory = result.noise[READINGS].correlation_time, result.noise[FORCES].correlation_time
-    result.check = checked(check, result.base.model, result.best.model, gap_sizes, memory)
-    conclude(result, view_set, state, gap_sizes)
 
 
 def _stages(result: Diagnosis, view_set: ViewSet) -> list[Model]:
@@ -362,7 +356,10 @@ def _stages(result: Diagnosis, view_set: ViewSet) -> list[Model]:
 
 
 def _structure(view_set: ViewSet, found: Fit) -> ResidualStructure:
-    """What the residual of a fit depends on. Without readings the largest component of the net force stands for all texels."""
+    """Dependence of a fit's residual on what is known of each sample.
+
+    Without readings the largest component of the net force stands for all texels.
+    """
     width = len(view_set.whole[0].predictor.rig.texels)
     predictors = [view.predictor for view in view_set.whole]
     residuals = [view.residual(found.model) for view in view_set.whole]

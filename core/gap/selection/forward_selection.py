@@ -207,13 +207,13 @@ class ForwardSelection:
             `base` itself if no effect joins.
         """
         state = base
-        lone = yield from self._best_next(base, 0.0, 0.25, first=True)
-        base.first = lone
-        state = self._extended(base, lone, first=True)
+        first = yield from self._best_next(base, 0.0, 0.25, is_first=True)
+        base.first = first
+        state = self._extended(base, first, is_first=True)
         if _is_displaced(state):
             self.gap_sizes.placed = state.means
-        if state is not base or (lone.ranked and self._is_gap_open(base, structure)):
-            state = yield from self._best_pair(base, lone, state, structure)
+        if state is not base or (first.ranked and self._is_gap_open(base, structure)):
+            state = yield from self._best_pair(base, first, state, structure)
             while (
                 self._effect_count(state) >= 2
                 and self._effect_count(state) < MOST_EFFECTS
@@ -225,7 +225,7 @@ class ForwardSelection:
                     break
                 state = longer
             state = yield from self._all_reconsidered(state)
-        state.first = lone
+        state.first = first
         if self.gap_sizes.both:
             state = yield from self._friction(state)
             state = yield from self._contact_by_forces(state)
@@ -234,13 +234,15 @@ class ForwardSelection:
     # --- one effect more
 
     def _best_next(
-        self, state: SelectionState, start: float, share: float, first: bool = False, friction: bool = False
+        self, state: SelectionState, start: float, share: float, is_first: bool = False, friction: bool = False
     ) -> StepSearch:
         """Judge every effect that is not in the model yet on top of it."""
         taken = {effect.name for effect in state.fit.model.effects}
         forms = candidates([s.predictor for s in self.view_set.whole], state.fit.model)
         forms = [c for c in forms if c.name not in taken or may_repeat(c)]
-        forms = [c for c in forms if not is_free_already(c, state.fit.free) and (first or c.name not in self.confounded_kinds)]
+        forms = [
+            c for c in forms if not is_free_already(c, state.fit.free) and (is_first or c.name not in self.confounded_kinds)
+        ]
         if self.gap_sizes.both:
             forms = [c for c in forms if (c.form.friction_law is not None) == friction]
         ranked: list[FittedCandidate] = []
@@ -311,14 +313,12 @@ class ForwardSelection:
             best = settled[0] if settled else best
         return best
 
-    def _extended(
-        self, state: SelectionState, step: SelectionStep, first: bool = False, choice: FittedCandidate | None = None
-    ) -> SelectionState:
+    def _extended(self, state: SelectionState, step: SelectionStep, is_first: bool = False) -> SelectionState:
         """The state with the best candidate of a step, or the same state if the candidate does not improve it enough."""
         if not step.ranked:
             return state
-        best = choice or self.simplest(step)
-        if not self._earns_its_place(best, state, first):
+        best = self.simplest(step)
+        if not is_accepted(best, state, self.gap_sizes, is_first):
             return state
         return self._joined(state, step, best, self.gap_sizes.quantity_for(best.candidate.name))
 
@@ -327,23 +327,6 @@ class ForwardSelection:
         name = one.candidate.name
         improvement = self.gap_sizes.improvement(state.means, means_of(one.held_out, one.fit), quantity)
         return SelectionState(one.fit, one.held_out, {**state.steps, name: step}, {**state.improvements, name: improvement})
-
-    def _earns_its_place(self, one: FittedCandidate, state: SelectionState, first: bool) -> bool:
-        """True if a candidate closes enough of the gap, and does worse in hardly any trial."""
-        g, quantity = self.gap_sizes, self.gap_sizes.quantity_for(one.candidate.name)
-        before, after = state.means[quantity], means_of(one.held_out, one.fit)[quantity]
-        gained, left = float(before - after), max(float(before - g.noise[quantity]), 1e-12)
-        if not _is_consistent(one.held_out, state, quantity):
-            return False
-        if g.both and quantity == FORCES:
-            return gained >= max(LEAST_FORCE_IMPROVEMENT * float(g.noise[quantity]), FIRST_LEAST_SHARE * left)
-        if gained < LEAST_IMPROVEMENT:
-            return False
-        if one.candidate.kind.found_by == STEPS:
-            return True  # the steps are seen in the readings, however small a part of the gap they are
-        return gained >= (
-            FIRST_LEAST_SHARE if first else NEXT_LEAST_SHARE
-        ) * left and gained >= NEXT_LEAST_SHARE_OF_GAP * g.sensor_gap(quantity)
 
     # --- several
 
@@ -363,7 +346,7 @@ class ForwardSelection:
         return structure(state.fit).total >= LEAST_STRUCTURE or mean >= OPEN_MEAN_SQUARE
 
     def _best_pair(
-        self, base: SelectionState, lone: SelectionStep, single: SelectionState, structure: StructureOfFit
+        self, base: SelectionState, first: SelectionStep, single: SelectionState, structure: StructureOfFit
     ) -> Generator[tuple[str, float], None, SelectionState]:
         """The best pair of effects that begins with one of the best first effects, or the first effect alone.
 
@@ -371,7 +354,7 @@ class ForwardSelection:
         """
         if not self._is_gap_open(single, structure):
             return single
-        firsts = self._first_effects(base, lone, single)
+        firsts = self._first_effects(base, first, single)
         ends = []
         for number, state in enumerate(firsts):
             step = yield from self._best_next(state, 0.25 + 0.35 * number / len(firsts), 0.35 / len(firsts))
@@ -386,16 +369,18 @@ class ForwardSelection:
         best = int(np.argmin(remaining))
         return ends[best] if best == 0 or remaining[best] < PAIR_ADVANTAGE * remaining[0] else ends[0]
 
-    def _first_effects(self, base: SelectionState, lone: SelectionStep, single: SelectionState) -> list[SelectionState]:
+    def _first_effects(self, base: SelectionState, first: SelectionStep, single: SelectionState) -> list[SelectionState]:
         """States with one effect that a pair may begin with; those that join alone, if any does, else no friction."""
         firsts = [] if single is base else [single]
-        least = lone.of(next(iter(single.improvements))) if firsts else lone.remaining[0]
-        for one, left in zip(lone.ranked, lone.remaining, strict=True):
+        least = first.of(next(iter(single.improvements))) if firsts else first.remaining[0]
+        for one, left in zip(first.ranked, first.remaining, strict=True):
             name = one.candidate.name
             fresh = name not in self.confounded_kinds and all(name not in state.improvements for state in firsts)
             if len(firsts) < BEAM_WIDTH and left < BEAM_RATIO * least and fresh:
-                joins = self._earns_its_place(one, base, first=True) if single is not base else name not in friction_kinds()
-                firsts += [self._joined(base, lone, one, self.gap_sizes.quantity_for(name))] if joins else []
+                joins = (
+                    name not in friction_kinds() if single is base else is_accepted(one, base, self.gap_sizes, is_first=True)
+                )
+                firsts += [self._joined(base, first, one, self.gap_sizes.quantity_for(name))] if joins else []
         return firsts
 
     def _closes_enough(self, pair: SelectionState, base: SelectionState) -> bool:
@@ -445,22 +430,22 @@ class ForwardSelection:
                 steps={own: step, **steps},
                 improvements={own: found.improvements[own], **improvements},
             )
-        told = step if np.isfinite(step.of(name)) else state.steps[name]  # its rivals are judged beside the later effects
+        judged = step if np.isfinite(step.of(name)) else state.steps[name]  # its rivals are judged beside the later effects
         improvements = {**state.improvements, name: self.gap_sizes.improvement(without.means, state.means, quantity)}
-        return replace(state, steps={**state.steps, name: told}, improvements=improvements)
+        return replace(state, steps={**state.steps, name: judged}, improvements=improvements)
 
     def _friction(self, state: SelectionState) -> Generator[tuple[str, float], None, SelectionState]:
         """Add effects on friction, judged by forces alone."""
-        said = state.first.passed_over
+        reasons = state.first.passed_over
         for _ in friction_kinds():
             if state.means[FORCES] < (1.0 + LEAST_FORCE_IMPROVEMENT) * self.gap_sizes.noise[FORCES]:
-                said |= {name: "the net forces leave no gap for it to explain" for name in friction_kinds()}
+                reasons |= {name: "the net forces leave no gap for it to explain" for name in friction_kinds()}
                 break
-            step = yield from self._best_next(state, 0.9, 0.05, first=True, friction=True)
-            said |= step.passed_over
+            step = yield from self._best_next(state, 0.9, 0.05, is_first=True, friction=True)
+            reasons |= step.passed_over
             for one in reversed(step.ranked):
                 share = self.gap_sizes.improvement(state.means, means_of(one.held_out, one.fit), FORCES).of_remaining
-                said[one.candidate.name] = (
+                reasons[one.candidate.name] = (
                     f"it closes {max(share, 0.0):.0%} of the remaining gap of the net forces on unseen trials"
                 )
             longer = self._extended(state, step)
@@ -484,6 +469,34 @@ class ForwardSelection:
             if gained[FORCES] >= LEAST_SHARE_OF_FORCES * left and gained[READINGS] >= -LEAST_IMPROVEMENT:
                 return replace(self._joined(state, step, one, FORCES), first=state.first)
         return state
+
+
+def is_accepted(one: FittedCandidate, state: SelectionState, gap_sizes: GapSizes, is_first: bool = False) -> bool:
+    """Return whether a candidate joins a model: it closes enough of the gap, and does worse in hardly any trial.
+
+    Parameters
+    ----------
+    one : FittedCandidate
+        Fitted on top of the model.
+    state : SelectionState
+        The model without it.
+    gap_sizes : GapSizes
+    is_first : bool
+        Whether the model has no effect yet.
+    """
+    quantity = gap_sizes.quantity_for(one.candidate.name)
+    before, after = state.means[quantity], means_of(one.held_out, one.fit)[quantity]
+    gained, remaining = float(before - after), max(float(before - gap_sizes.noise[quantity]), 1e-12)
+    if not _is_consistent(one.held_out, state, quantity):
+        return False
+    if gap_sizes.both and quantity == FORCES:
+        return gained >= max(LEAST_FORCE_IMPROVEMENT * float(gap_sizes.noise[quantity]), FIRST_LEAST_SHARE * remaining)
+    if gained < LEAST_IMPROVEMENT:
+        return False
+    if one.candidate.kind.found_by == STEPS:
+        return True  # the steps are seen in the readings, however small a part of the gap they are
+    least_share = FIRST_LEAST_SHARE if is_first else NEXT_LEAST_SHARE
+    return gained >= max(least_share * remaining, NEXT_LEAST_SHARE_OF_GAP * gap_sizes.sensor_gap(quantity))
 
 
 def _is_consistent(held_out: np.ndarray, state: SelectionState, quantity: int) -> bool:

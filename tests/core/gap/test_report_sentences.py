@@ -15,9 +15,11 @@ from palpate.core.gap.report.plots import CAPTIONS
 from palpate.core.gap.report.sentences import headline
 from palpate.core.gap.report.summary import summary
 from palpate.core.gap.selection import screening
+from palpate.core.gap.selection.base_model import base_fit, prepared
 from palpate.core.gap.selection.between_recordings import RecordingDifferences
-from palpate.core.gap.selection.diagnosis import diagnose, fit_base
+from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.silenced_texels import silenced_texels
+from palpate.core.gap.selection.view_set import view_set_of
 from palpate.core.jobs import run_job
 
 
@@ -89,5 +91,9 @@ def test_a_texel_that_dies_midway_is_named_with_the_time(fades):
 @pytest.mark.slow("the base model of the sample rig")
 def test_the_end_of_a_release_is_no_death():
     """The sample rig creeps: late in a release its texels read nothing where the base model says a small load."""
-    result = run_job(fit_base(read_rig(Path(__file__).parents[3] / "docs" / "sample-rig" / "rig.toml")))
-    assert not silenced_texels(result.predictors, result.base.model, result.noise[0].deviation)
+    rig = read_rig(Path(__file__).parents[3] / "docs" / "sample-rig" / "rig.toml")
+    predictors = predictors_of(rig.trials, rig)
+    noise, full = prepared(rig, predictors)
+    views = view_set_of([one for one in predictors if one.trial.use == "fit"], (noise[0].deviation, noise[1].deviation))
+    base = base_fit(rig, views.whole, full[0])
+    assert not silenced_texels(predictors, base.model, noise[0].deviation)

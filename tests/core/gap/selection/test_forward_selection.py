@@ -14,7 +14,7 @@ from palpate.core.gap.selection.base_model import friction_parameters_to_search
 from palpate.core.gap.selection.candidates import Candidate, FittedCandidate
 from palpate.core.gap.selection.confidence import EXPLAINED, REPEATED_RATIO, least_share, misfit_of_another
 from palpate.core.gap.selection.direct_estimates import companding_starts, few_levels
-from palpate.core.gap.selection.forward_selection import SelectionState, SelectionStep
+from palpate.core.gap.selection.forward_selection import SelectionState, SelectionStep, is_accepted
 from palpate.core.gap.selection.gap_sizes import FORCES, READINGS, GapSizes, Improvement, friction_kinds
 from palpate.core.gap.selection.view_set import view_set_of
 from palpate.core.model.sensor_parameters import SensorParameters
@@ -35,6 +35,36 @@ def test_readings_and_forces_have_a_gap_each():
     assert alone.quantity_for("creep") == alone.quantity_for("stribeck") == FORCES  # nothing was read
     trembling = GapSizes(np.array([1.0, 14.3]), np.array([1.0, 13.0]), gap_sizes.count)
     assert gap_sizes.has_gap(FORCES) and not trembling.has_gap(FORCES)  # coloured noise is not known to a tenth
+
+
+def accepts(kind, closed, remaining=8.0, is_first=False, worse=0.0, forces=0.0):
+    """Whether a candidate joins that closes this share of what the model leaves, in two trials of 50 readings each.
+
+    The noise is 1 and the base model leaves 8 above it. `worse` is the second trial's loss as a share of the first one's gain.
+    """
+
+    class Counted:
+        count = np.array([[50.0, 5.0], [50.0, 5.0]])
+
+    gap_sizes = GapSizes(np.array([9.0, 9.0]), np.ones(2), Counted.count.sum(axis=0))
+    before = np.array([[1.0 + remaining, 9.0]] * 2) * Counted.count
+    gained = 100.0 * closed * remaining
+    after = before - [[gained / (1.0 - worse), 80.0 * forces], [-worse * gained / (1.0 - worse), 0.0]]
+    one = FittedCandidate(Candidate(kind_of(kind), kind_of(kind).forms[0]), Counted, after)
+    return is_accepted(one, SelectionState(Counted, before), gap_sizes, is_first)
+
+
+def test_an_effect_joins_that_closes_a_quarter_of_the_gap_or_a_fifth_of_what_is_left():
+    """A limit that is changed by a third fails here: what joins decides what is named."""
+    assert accepts("creep", 0.28, is_first=True) and not accepts("creep", 0.22, is_first=True)
+    assert accepts("creep", 0.22) and not accepts("creep", 0.18)
+    assert accepts("creep", 0.5, remaining=0.2) and not accepts("creep", 0.5, remaining=0.12)  # and a hundredth of the whole
+    assert accepts("quantization", 0.02), "steps that are seen join, however small a part of the gap they are"
+    assert accepts("stribeck", 0.0, forces=0.28) and not accepts("stribeck", 0.9, forces=0.22), "friction is judged by forces"
+
+
+def test_an_effect_joins_that_does_worse_in_hardly_any_trial():
+    assert accepts("creep", 0.5, worse=0.15) and not accepts("creep", 0.5, worse=0.35)
 
 
 def test_a_handful_of_values_is_seen():
