@@ -123,7 +123,7 @@ class Gap:
 
     @property
     def error_after(self) -> float | None:
-        """The same with the effects."""
+        """Root mean square error with the effects, as a share of the measured range."""
         return self.errors.amended["fit"]
 
     @cached_property

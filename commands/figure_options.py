@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ..core.figures import color_maps, gel_image
+from ..core.figures import color_maps, figure_style
 from ..core.figures.figure_style import WIDTHS, FigureStyle
 from ..core.figures.quantities import QUANTITIES
 
@@ -33,20 +33,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_gel_arguments(parser: argparse.ArgumentParser) -> None:
-    low, high = gel_image.LIGHT_ANGLES
+    low, high = figure_style.LIGHT_ANGLES
     parser.add_argument(
         "--light-angle",
         metavar="DEGREES",
         type=float,
         help=f"gel: angle between the gel and the light of its three lamps, {low:g} to {high:g} degrees "
-        f"(default: {gel_image.GelStyle.light_angle:g})",
+        f"(default: {figure_style.GelStyle.light_angle:g})",
     )
     parser.add_argument("--no-markers", dest="markers", action="store_false", help="gel: print no markers on it")
     parser.add_argument(
         "--marker-pitch",
         metavar="METRES",
         type=float,
-        help=f"gel: distance between markers (default: a round one, about {gel_image.MARKERS_ALONG} along the gel)",
+        help=f"gel: distance between markers (default: a round one, about {figure_style.MARKERS_ALONG} along the gel)",
     )
 
 

@@ -246,7 +246,7 @@ def _summary(channels) -> str:
 
 
 def _sentence_of_net(scene, obj) -> str:
-    """Return what Net is, and in which axes."""
+    """Return the meaning of Net and its axes."""
     body = moved_bodies.body_object(obj, moved_bodies.objects_with_role(scene))
     mirrored = ", x reversed because its scale mirrors it" if body.matrix_world.is_negative else ""
     return (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the sample scenes are built from: shapes as plain meshes, materials, a backdrop, soft lamps and a camera.
+"""Parts of the sample scenes: shapes as plain meshes, materials, a backdrop, soft lamps and a camera.
 
 Lengths are Blender units of the sample scenes, which are millimetres.
 """

@@ -239,7 +239,7 @@ class _Statistics:
         self._least, self._most, self._mean, self._squares = least, most, mean, squares
 
     def result(self) -> dict[str, Any]:
-        """Return what LeRobot's ``stats.json`` has; the deviation is that of all values, not of a sample."""
+        """Return the entries of LeRobot's ``stats.json``; the deviation is that of all values, not of a sample."""
         found = {"min": self._least, "max": self._most, "mean": self._mean, "std": np.sqrt(self._squares / self._count)}
         return {**{name: values.tolist() for name, values in found.items()}, "count": [self._count]}
 
@@ -271,7 +271,7 @@ def _array(values: np.ndarray, kind: pyarrow.DataType) -> pyarrow.Array:
 
 
 def _described(feature: Feature) -> dict[str, Any]:
-    """Return what ``info.json`` says of a feature: LeRobot's keys, and unit and meaning under a key of ours."""
+    """Return the entry of a feature in ``info.json``: LeRobot's keys, and unit and meaning under a key of ours."""
     about: dict[str, Any] = {"about": feature.about}
     if feature.unit:
         about["unit"] = feature.unit

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender shows of forces: heat maps, markers and arrows of a bake, overlays and tactile images while the timeline plays.
+"""Display of forces in Blender: heat maps, markers and arrows of a bake, overlays and tactile images while the timeline plays.
 
 What a bake shows is stored in the .blend as Blender's own materials, node groups and keyframed objects, so that it plays where
 Palpate is not installed. What playing shows is drawn over the 3D view and is part of no file.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the scene shows of a bake: heat maps, markers and arrows, with the same scales for all sensors.
+"""Display of a bake in the scene: heat maps, markers and arrows, with the same scales for all sensors.
 
 :func:`show_bake` makes them when a scene is baked. :func:`refresh` makes them again from the files of the bake, after the
 settings of the display have changed.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a scene holds of its bake: the objects that show it, the folders of its files, and its removal."""
+"""Parts of a bake in its scene: the objects that show it, the folders of its files, and its removal."""
 
 from __future__ import annotations
 

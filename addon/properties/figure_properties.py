@@ -15,7 +15,7 @@ from bpy.props import (
 )
 
 from ...core.export.exporter import exporters
-from ...core.figures.gel_image import LIGHT_ANGLES, MARKERS_ALONG, GelStyle
+from ...core.figures.figure_style import LIGHT_ANGLES, MARKERS_ALONG, GelStyle
 from . import scene_units
 from .scene_units import in_units
 

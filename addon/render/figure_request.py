@@ -10,8 +10,7 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import FileError, ParameterError
-from ...core.figures.figure_style import FigureStyle
-from ...core.figures.gel_image import GelStyle
+from ...core.figures.figure_style import FigureStyle, GelStyle
 from ..display import bake_display
 from ..properties import figure_properties
 from ..session import transforms
@@ -51,7 +50,7 @@ class FigureRequest:
     samples : int or None
         Samples per pixel; None: the scene's.
     light_angle, markers, marker_pitch
-        See :class:`.gel_image.GelStyle`.
+        See :class:`.figure_style.GelStyle`.
     """
 
     kinds: tuple[str, ...] = ("scene", "strip", "curves", "numbers")

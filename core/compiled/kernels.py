@@ -88,7 +88,7 @@ if COMPILED:
         """Numba's cache of one kernel. What cannot be kept is used in this process alone."""
 
         def load_overload(self, sig: Any, target_context: Any) -> Any:
-            """Return what was kept for these types, or None."""
+            """Return the kept machine code for these types, or None."""
             try:
                 return super().load_overload(sig, target_context)
             except OSError:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an exporter is, and what all of them need from a bake."""
+"""Exporters of a bake, and the arrays that all of them take from it."""
 
 from __future__ import annotations
 

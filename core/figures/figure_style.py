@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -24,6 +25,10 @@ INK, GREY, RULE = "#1c2430", "#68727f", "#e4e7eb"
 NORMAL_COLOUR, SHEAR_COLOUR = "#1f5fa8", "#c8501e"
 SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#4d4d4d")
 """Colours of curves that the colour-blind can tell apart (Okabe and Ito 2008, without the yellow)."""
+LIGHT_ANGLES = (25.0, 85.0)
+"""Least and largest angle of the lamps, degrees. From 20.5° on no slope is brighter than white; at 90° none would show."""
+MARKERS_ALONG = 18
+"""Markers along the longer side, about, where no distance is given."""
 
 
 def width_below(curves: int) -> float:
@@ -88,3 +93,32 @@ class FigureStyle:
     def scale_of(self, extent: Extent) -> Scale:
         """Return the colour scale of a run in which the quantity has an extent."""
         return Scale.of(self.shown, extent, self.colour_map, self.limit, self.lowest)
+
+
+@dataclass(frozen=True)
+class GelStyle:
+    """How images of a gel are lit and what is printed on it.
+
+    Attributes
+    ----------
+    light_angle : float, degrees
+        Of the lamps above the surface; flat light makes slopes strong, and shadows.
+    markers : bool
+        Print markers, which the shear carries along.
+    marker_pitch : float or None, metres
+        Distance between markers. None: a round one, at which there are about :data:`MARKERS_ALONG` along the longer side.
+    size : (2,) int, pixels
+        Width and height into which an image fits.
+    """
+
+    light_angle: float = 60.0
+    markers: bool = True
+    marker_pitch: float | None = None
+    size: tuple[int, int] = (1280, 960)
+
+    def __post_init__(self) -> None:
+        low, high = LIGHT_ANGLES
+        if not low <= self.light_angle <= high:
+            raise ParameterError(f"The light angle of the gel is {self.light_angle:g}°: choose {low:g}° to {high:g}°.")
+        if self.marker_pitch is not None and not 0.0 < self.marker_pitch < math.inf:
+            raise ParameterError(f"The marker pitch of the gel is {self.marker_pitch:g} m: choose more than zero.")

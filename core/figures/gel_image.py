@@ -11,7 +11,6 @@ model of a camera and its lamps.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -23,51 +22,19 @@ from ..geometry.texels import Texels
 from ..model.recording import SensorFrame
 from . import color_maps
 from .figure_canvas import save_pixels
+from .figure_style import MARKERS_ALONG, GelStyle
 from .tactile_image import SensorView
 
 LAMP_AZIMUTHS = (90.0, 210.0, 330.0)
 """Directions of the red, the green and the blue lamp in the image, degrees from its right side towards its upper side."""
 BRIGHTNESS = 0.35
 """Linear light of each colour where nothing touches: a light grey, chosen by eye."""
-LIGHT_ANGLES = (25.0, 85.0)
-"""Least and largest angle of the lamps, degrees. From 20.5° on no slope is brighter than white; at 90° none would show."""
 MARKER_ALBEDO = 0.12
 """Share of the light that a printed marker reflects, beside that of the gel; chosen by eye."""
 MARKER_RADIUS = 0.15
 """Of a marker over the distance between markers; chosen by eye."""
-MARKERS_ALONG = 18
-"""Markers along the longer side, about, where no distance is given."""
 MOST_MARKERS = 20_000
 """More would take long to draw, and be smaller than pixels of most images."""
-
-
-@dataclass(frozen=True)
-class GelStyle:
-    """How images of a gel are lit and what is printed on it.
-
-    Attributes
-    ----------
-    light_angle : float, degrees
-        Of the lamps above the surface; flat light makes slopes strong, and shadows.
-    markers : bool
-        Print markers, which the shear carries along.
-    marker_pitch : float or None, metres
-        Distance between markers. None: a round one, at which there are about :data:`MARKERS_ALONG` along the longer side.
-    size : (2,) int, pixels
-        Width and height into which an image fits.
-    """
-
-    light_angle: float = 60.0
-    markers: bool = True
-    marker_pitch: float | None = None
-    size: tuple[int, int] = (1280, 960)
-
-    def __post_init__(self) -> None:
-        low, high = LIGHT_ANGLES
-        if not low <= self.light_angle <= high:
-            raise ParameterError(f"The light angle of the gel is {self.light_angle:g}°: choose {low:g}° to {high:g}°.")
-        if self.marker_pitch is not None and not 0.0 < self.marker_pitch < math.inf:
-            raise ParameterError(f"The marker pitch of the gel is {self.marker_pitch:g} m: choose more than zero.")
 
 
 def require_grid(texels: Texels, name: str) -> None:

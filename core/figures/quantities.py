@@ -171,7 +171,7 @@ class Extent:
 
 @dataclass(frozen=True)
 class Scale:
-    """What colours mean: a quantity between two values, in the colours of one map.
+    """Colour scale: a quantity between two values, in the colours of one map.
 
     Attributes
     ----------
@@ -205,7 +205,7 @@ class Scale:
         return cls(quantity, " or ".join(extent.units), low, high, color_maps.SIGNED if is_signed else colour_map)
 
     def values(self, source: Any, texels: Texels) -> np.ndarray:
-        """Return what the colours show, (F, n) or (n,) float."""
+        """Return the values that the colours show, (F, n) or (n,) float."""
         return self.quantity.values(source, texels)
 
     def colors(self, values: np.ndarray) -> np.ndarray:

@@ -121,7 +121,7 @@ class SensorView:
 
     @property
     def caption(self) -> str:
-        """What kind of sensor this is."""
+        """Kind of sensor."""
         layout = self.texels.layout
         if isinstance(layout, GridLayout):
             return f"{layout.rows} × {layout.columns} texels\n{three_digits(self.width / layout.columns)} mm pitch"

@@ -75,7 +75,7 @@ def damped_force_derivatives(
 
 @inlined
 def linear_normal_force(depth: float, rate: float, law: ContactLaw) -> float:
-    """Do as :func:`normal_force` for the linear law."""
+    """Normal force of the linear law, as :func:`normal_force`."""
     return max(law.k * depth + law.cn * rate, 0.0)
 
 
@@ -89,7 +89,7 @@ def normal_force(depth: float, rate: float, law: ContactLaw) -> float:
 
 @inlined
 def linear_tangent(depth: float, dt: float, law: ContactLaw) -> tuple[float, float]:
-    """Do as :func:`normal_tangent` for the linear law, which is its own tangent at every rate."""
+    """Tangent of the linear law, as :func:`normal_tangent`, which is its own tangent at every rate."""
     return law.k * depth, law.k * dt + law.cn
 
 

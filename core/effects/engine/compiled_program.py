@@ -162,7 +162,7 @@ def _call_law_plain(
     first_state: int,
     commit: bool,
 ) -> None:
-    """Do as :func:`call_law` without compiled code."""
+    """Call a law as :func:`call_law` does, without compiled code."""
     these = slice(points.first, points.first + points.number)
     rows = points.rows.reshape(-1)[points.first_row : points.first_row + points.number]
     parts = tuple(column[points.block, these] for column in columns)

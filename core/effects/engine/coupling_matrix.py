@@ -87,7 +87,7 @@ def _distances(position: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=8)
 def _distances_kept(position: bytes) -> np.ndarray:
-    """The same; positions are given as bytes. Nobody may write to the result."""
+    """Coupling matrix for positions given as bytes. Nobody may write to the result."""
     distance = _distances(np.frombuffer(position).reshape(-1, 3))
     distance.setflags(write=False)
     return distance

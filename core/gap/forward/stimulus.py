@@ -377,7 +377,7 @@ def _spin(quaternion: np.ndarray, time: np.ndarray) -> np.ndarray:
 
 
 def _mesh_contact(trial: Trial, rig: Rig, texels: Texels, reach: float) -> Contact:
-    """The same as :func:`sphere_contact` for any mesh, through the solver's contact search."""
+    """Contact of any mesh, as :func:`sphere_contact` of a ball, through the solver's contact search."""
     assert trial.position is not None and trial.quaternion is not None
     indenter = rig.indenter_of(trial)
     assert indenter is not None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is known about logs: which column is what, in which unit, which files belong together. A file of answers says it, or
+"""Answers about logs: which column is what, in which unit, which files belong together. A file of answers says it, or
 a :class:`~.guess.Proposal` that leaves no question open, by the same words.
 """
 

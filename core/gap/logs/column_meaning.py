@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a column seems to be, by its name, its unit and the size of its values.
+"""Meaning of a column, guessed from its name, its unit and the size of its values.
 
 A name tells a quantity; a unit is what the file states, or stands in the name. Where neither tells the unit, the size of the
 values does, and the answer is not sure: a person has to confirm it.
@@ -101,7 +101,7 @@ _RATE = re.compile(r"/\s*(ms|s|sec|min|h)$")
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a name says.
+    """Meaning of a name.
 
     Attributes
     ----------
@@ -132,7 +132,7 @@ def name_and_unit(column: str) -> tuple[str, str]:
 
 
 def meaning_of(column: str) -> Meaning:
-    """Return what the name of a column says."""
+    """Return the meaning of a column's name."""
     plain, unit = name_and_unit(column)
     if plain.lower() in QUANTITIES and plain.lower() != "texel":
         return Meaning(plain.lower(), unit, 3)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What logs seem to be, as one list of guesses: each says what, the value, the reason, the evidence and how it is corrected.
+"""Guesses about logs, as one list: each says what, the value, the reason, the evidence and how it is corrected.
 
 The template, the questions at the terminal and in Blender, and the answers from which a rig is written all come from this list.
 """
@@ -14,7 +14,7 @@ from ..dataset.column_names import numbered
 
 FORMAT = "palpate-log-answers/1"
 UNKNOWN = "?"
-"""What nobody can know from the logs."""
+"""Value that nobody can know from the logs."""
 Evidence = Literal["stated", "shown", "thin"]
 """The file states it, its numbers show it, or it only seems so: then a person has to confirm it."""
 
@@ -67,7 +67,7 @@ class Guess:
 
     @property
     def what(self) -> str:
-        """What is guessed, for sentences."""
+        """Name of the guess in sentences."""
         return f"{self.word} of '{self.of}'" if self.of else f"{self.word} of [{self.table}]"
 
     @property
@@ -99,7 +99,7 @@ class Proposal:
 
     @property
     def questions(self) -> list[str]:
-        """What is not known or not sure, a sentence each."""
+        """Open guesses, a sentence each."""
         return [guess.question for guess in self.guesses if guess.is_open]
 
     @property
@@ -120,7 +120,7 @@ class Proposal:
         return "\n".join([*lines, "", *(f"# {note}" for note in self.notes)]) + "\n"
 
     def columns(self, number: int = 0) -> dict[str, Guess]:
-        """Return what each quantity of a logger is taken from."""
+        """Return the source of each quantity of a logger."""
         return {one.word: one for one in self.guesses if (one.table, one.number) == ("logger.columns", number)}
 
     def of(self, table: str, word: str) -> Guess:

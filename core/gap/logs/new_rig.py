@@ -39,7 +39,7 @@ DIGITS = 10
 
 @dataclass(frozen=True)
 class NewRig:
-    """What was written.
+    """Files of a new rig.
 
     Attributes
     ----------

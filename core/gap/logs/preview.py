@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What was read from logs, as a table of text and as a plot."""
+"""Preview of logs: a table of text and a plot of what was read."""
 
 from __future__ import annotations
 

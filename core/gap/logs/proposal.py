@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What logs seem to be: guesses, each with the reason for it."""
+"""Proposal for logs: guesses, each with its reason."""
 
 from __future__ import annotations
 
@@ -49,11 +49,11 @@ CHECK_EVERY = 3
 """One recording in so many is proposed for `check`, as whole recordings; of two recordings the second."""
 
 Columns = dict[str, Guess]
-"""What each quantity of a logger is taken from."""
+"""Sources of the quantities of a logger."""
 
 
 def propose(logs: Sequence[LogFile], name: str = "rig") -> Proposal:
-    """Return what some logs seem to be.
+    """Return the proposal for some logs.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ class _Logger:
         return (zeros[0], max(ways, key=abs), all(rests)) if zeros else (0.0, 0.0, False)
 
     def columns(self) -> Columns:
-        """Return what each quantity seems to come from."""
+        """Return the likely source of each quantity."""
         for name, meaning in self.meanings.items():
             if meaning.quantity and (self.span(name) > 0.0 or meaning.quantity in (*POSE, *TURN, *FORCE)):
                 self.candidates.setdefault(meaning.quantity, []).append(name)

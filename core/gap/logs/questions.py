@@ -13,7 +13,7 @@ from .column_meaning import KNOWN_UNITS
 from .guess import Guess, Proposal, toml_value
 
 LEFT_OUT = "-"
-"""What is typed for a column that is not to be used."""
+"""Reply for a column that is not to be used."""
 
 
 class OpenQuestion(Exception):
@@ -57,7 +57,7 @@ def _asked(guess: Guess, ask: Callable[[str], str]) -> Guess | None:
 
 
 def _typed(typed: str, guess: Guess) -> Any:
-    """Return what was typed as TOML; of a column its name and its unit are enough. None if it is neither."""
+    """Return a reply as TOML; of a column its name and its unit are enough. None if it is neither."""
     try:
         return tomllib.loads(f"value = {typed}")["value"]
     except tomllib.TOMLDecodeError:

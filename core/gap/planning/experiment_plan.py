@@ -57,7 +57,7 @@ class PlannedExperiment:
 
     @property
     def separation_after(self) -> float:
-        """The same with the further recording."""
+        """Table of confusions with the further recording."""
         return min(one.deviations for one in self.after)
 
 

@@ -58,7 +58,7 @@ class CheckedRecording:
 
 @dataclass(frozen=True)
 class CheckOutcome:
-    """What the check recordings say of an amended model.
+    """Comparison of an amended model with the check recordings.
 
     Attributes
     ----------

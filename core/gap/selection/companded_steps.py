@@ -117,7 +117,7 @@ def companded_steps(values: np.ndarray) -> list[CompandedSteps]:
 
 @lru_cache(maxsize=2)
 def _companded_steps_kept(raw: bytes) -> tuple[CompandedSteps, ...]:
-    """The same of readings as bytes. Several forms ask for the steps of the same readings."""
+    """Steps of readings given as bytes. Several forms ask for the steps of the same readings."""
     values = np.frombuffer(raw)
     size = np.abs(values)
     above = values[size > 0.0] if len(values) else values
@@ -175,7 +175,7 @@ def _seeds(above: np.ndarray) -> Iterator[CompandedSteps]:
 
 
 def _with_frequency(steps: CompandedSteps, inside: np.ndarray, near: float | None = None) -> CompandedSteps:
-    """The same transform with the frequency at which the characteristic function of readings is large."""
+    """Transform with the frequency at which the characteristic function of readings is large."""
     x = steps.even(inside)
     width = float(x.max() - x.min())
     if not width > 0.0:

@@ -53,7 +53,7 @@ TOTAL_WORK = 1000
 BASE_MODEL_BEGINS, SELECTION_BEGINS = 40, 60
 """Share of the whole work, in thousandths, at which the fit of the base model and the selection of effects begin."""
 OTHER_SEARCHES_BEGIN = 500
-"""The same for searches that ask how recordings differ."""
+"""Share at which the searches begin that ask how recordings differ."""
 SETTLED_SHARE = 0.05
 """Share of the base model's gap. If a search explains more than the rest of it, no search asks how recordings differ."""
 LEAST_NOISE = 0.8

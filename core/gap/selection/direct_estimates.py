@@ -147,7 +147,7 @@ def even_steps(values: np.ndarray, noise: float) -> float | None:
 
 @lru_cache(maxsize=2)
 def _even_steps_kept(raw: bytes, noise: float) -> float | None:
-    """The same of readings as bytes. Several forms ask for the steps of the same readings."""
+    """Levels of readings given as bytes. Several forms ask for the steps of the same readings."""
     values = np.frombuffer(raw)
     full = float(np.ptp(values))
     if full == 0.0:

@@ -161,7 +161,7 @@ class Diagnosis:
 
     @property
     def carried_over(self) -> Finding | None:
-        """What goes on from recording to recording in an assumed session; None without one."""
+        """States that go on from recording to recording in an assumed session; None without one."""
         return next((one for one in self.findings if self.assumed_session and one.name in LOAD_HISTORY), None)
 
     @property

@@ -111,7 +111,7 @@ class SelectionStep:
     passed_over: dict[str, str] = field(default_factory=dict)
 
     def of(self, name: str) -> float:
-        """Return what the best form of a kind leaves; infinite if it was not judged."""
+        """Return the remaining gap with the best form of a kind; infinite if it was not judged."""
         own = [left for one, left in zip(self.ranked, self.remaining, strict=True) if one.candidate.name == name]
         return min(own, default=np.inf)
 
@@ -270,7 +270,7 @@ class ForwardSelection:
         return SelectionStep([judged[i] for i in order], [left[i] for i in order], before, repeated)
 
     def _remaining(self, means: Sequence[np.ndarray], quantity: int) -> list[float]:
-        """What each of some models leaves of the gap.
+        """Remaining gap with each of some models.
 
         For readings the forces count too, as far as another of these models does better there: friction takes its part in
         them.

@@ -25,7 +25,7 @@ UNRESOLVED_SHARE, UNRESOLVED_SQUARE = 0.004, 0.01
 
 @dataclass(frozen=True)
 class Improvement:
-    """What an effect closed: as a share of the whole gap, and of what was left of it before."""
+    """Part of the gap that an effect closed: as a share of the whole gap, and of the gap that was left before."""
 
     of_gap: float
     of_remaining: float

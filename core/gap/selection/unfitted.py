@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is known of recordings before anything is fitted to them: noise, start of the base model, kinds that they could show."""
+"""Summary of recordings before a fit: noise, start of the base model, kinds that they could show."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Unfitted:
 
 
 def unfitted(rig: Rig) -> Unfitted:
-    """Return what is known of a rig's recordings before a fit.
+    """Return the summary of a rig's recordings before a fit.
 
     Raises
     ------

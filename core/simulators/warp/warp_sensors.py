@@ -202,7 +202,7 @@ class WarpSensors:
 
     @property
     def residual_reason(self) -> str:
-        """What :attr:`.PressedSensors.residual_reason` says; the loads and poses come to the host for it."""
+        """Reasons as :attr:`.PressedSensors.residual_reason` gives them; the loads and poses come to the host for it."""
         if self.residual is None:
             return ""
         search, degrees = self._balance[2], self.residual.shape[1]

@@ -11,7 +11,8 @@ from scipy import ndimage
 
 from palpate.core.errors import ParameterError, SensorError
 from palpate.core.figures import color_maps, gel_image
-from palpate.core.figures.gel_image import GelStyle, gel_pixels, write_gel_image
+from palpate.core.figures.figure_style import GelStyle
+from palpate.core.figures.gel_image import gel_pixels, write_gel_image
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.texels import texels_from_region
 

@@ -111,7 +111,7 @@ def _records(file: Any, path: Path) -> Iterator[Any]:
 
 
 class _Decoders:
-    """What turns the bytes of messages into messages, by channel."""
+    """Decoders of messages, by channel."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

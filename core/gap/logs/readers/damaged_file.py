@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What libraries raise on damaged files, as one sentence.
+"""Errors of libraries about damaged files, as one sentence.
 
 Their readers meet bytes that nobody foresaw and raise whatever their code comes upon, so no list of errors is complete. Only
 the library's own calls stand inside :func:`damage_said`: a fault of ours keeps its traceback.
