@@ -23,7 +23,8 @@ from .sentences import NOT_IDENTIFIABLE, interval_ends, said_confidence
 TEMPLATE = Path(__file__).parent / "templates" / "report.html"
 
 CLOSED_FROM = 0.2
-"""A closed share is shown if the gap, noise removed, is at least this share of the noise floor."""
+"""A closed share is shown if the gap, noise removed, is at least this share of the noise floor. Which effects join is decided
+in :mod:`..selection.forward_selection`."""
 AS_MUCH = 1.05
 """Up to this ratio the next best effect leaves "as much"."""
 WHITE_MEMORY = 1.5

@@ -39,10 +39,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.declarations import Drawing
-from ..engine.specification import Form, Kind, TransducerArray, scalar
+from ...model.sensor import Values
+from ..engine.specification import Drawing, Form, Kind, TransducerArray, scalar
 
 
 def power(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:

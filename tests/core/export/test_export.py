@@ -256,7 +256,7 @@ import matplotlib.image
 bake = read_bake({bake!r})
 exporters()
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-resource.setrlimit(resource.RLIMIT_FSIZE, (400, 400))
+resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
 try:
     run_job(export(bake, {kind!r}, {out!r}))
 except FileError as error:

@@ -71,7 +71,7 @@ def test_a_kind_states_what_others_know(words, said):
 
 
 def test_what_one_effect_alone_states_is_asked_for_by_it():
-    assert only_name_where(lambda kind: "rest" in kind.known_from) == "drift"
+    assert only_name_where(lambda kind: kind.gain_falls_with == "clock") == "drift"
     assert names_where(lambda kind: kind.site == "nowhere") == ()
     with pytest.raises(EffectError, match="no effect states"):
         only_name_where(lambda kind: kind.site == "nowhere")
