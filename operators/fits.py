@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Operators that fit a sensor's parameters to measurements: stiffness of its foam, friction of its surface."""
 
+from functools import partial
 from pathlib import Path
 
 import bpy
@@ -36,16 +37,16 @@ class MeasurementFit(support.ErrorReporting, support.FileChooser):
         layout.label(text="Also write the plot to:")
         layout.prop(self, "plot", text="")
 
-    def picture(self, context, draw, fit, title: str) -> None:
+    def picture(self, draw, fit, title: str) -> None:
         """Plot a fit, store the plot in the .blend as an image, and show it."""
         path = Path(bpy.app.tempdir) / f"{title}.png"
         draw(path, fit)
         if self.plot:
             draw(Path(bpy.path.abspath(self.plot)), fit)
-        show_image(context, path, title)
+        show_image(path, title)
 
 
-def show_image(context, path: Path, title: str) -> None:
+def show_image(path: Path, title: str) -> None:
     """Store a picture in the .blend and show it in an image editor; open a window with one if there is none."""
     old = bpy.data.images.get(title)
     if old is not None:
@@ -53,13 +54,24 @@ def show_image(context, path: Path, title: str) -> None:
     image = bpy.data.images.load(str(path))
     image.name = title
     image.pack()
-    if bpy.app.background:
+    if not bpy.app.background:
+        bpy.app.timers.register(partial(_show_in_editor, title), first_interval=0.1)
+
+
+def _show_in_editor(title: str) -> None:
+    """Show an image of the file in an image editor.
+
+    Called once the operator has ended: Blender 4.3 crashes where a dialog that is closing opens a window.
+    """
+    image, windows = bpy.data.images.get(title), bpy.context.window_manager.windows
+    if image is None or not windows:
         return
-    areas = [area for window in context.window_manager.windows for area in window.screen.areas]
+    areas = [area for window in windows for area in window.screen.areas]
     editor = next((area for area in areas if area.type == "IMAGE_EDITOR" and area.spaces.active.mode == "VIEW"), None)
     if editor is None:
-        bpy.ops.wm.window_new()
-        editor = max(context.window_manager.windows[-1].screen.areas, key=lambda area: area.width * area.height)
+        with bpy.context.temp_override(window=windows[0]):
+            bpy.ops.wm.window_new()
+        editor = max(windows[-1].screen.areas, key=lambda area: area.width * area.height)
         editor.type = "IMAGE_EDITOR"
     editor.spaces.active.image = image
     editor.tag_redraw()
@@ -104,7 +116,7 @@ class PALPATE_OT_stiffness_fit(MeasurementFit, bpy.types.Operator):
         obj.palpate.k = chosen.value
         if self.with_damping:
             obj.palpate.cn = DAMPING_PER_STIFFNESS * chosen.value
-        self.picture(context, plot_stiffness, fit, "Palpate Stiffness Fit")
+        self.picture(plot_stiffness, fit, "Palpate Stiffness Fit")
         text = f"k = {chosen.value:.4g} N/m (95 %: {chosen.low:.4g} to {chosen.high:.4g}) for {len(report.texels)} texels"
         if fit.stiffens:
             text += "; the curve bends upwards: add the effect stiffening for it"
@@ -139,7 +151,7 @@ class PALPATE_OT_friction_fit(MeasurementFit, bpy.types.Operator):
         obj = context.object
         fit = fit_friction(self.filepath, self.normal_force, self.texels, exchange.parameters_of(obj))
         exchange.put_parameters(obj, fit.parameters)
-        self.picture(context, plot_friction, fit, "Palpate Friction Fit")
+        self.picture(plot_friction, fit, "Palpate Friction Fit")
         values = ", ".join(f"{name} = {e.value:.3g} ({e.low:.3g} to {e.high:.3g})" for name, e in fit.estimates.items())
         self.report({"INFO"}, values)
         if fit.unidentifiable:

@@ -101,7 +101,7 @@ def _make_rig(operator, context, paths: list[str], accept: bool, replies: list[s
         bpy.ops.palpate.log_question("INVOKE_DEFAULT", question=str(question), state=state)
         return
     context.object.palpate.measured = bpy.path.relpath(str(written.path)) if bpy.data.filepath else str(written.path)
-    show_image(context, plot, "Palpate Recordings")
+    show_image(plot, "Palpate Recordings")
     for note in written.notes:
         operator.report({"WARNING"}, note)
     operator.report({"INFO"}, f"Wrote {written.path}")
@@ -201,7 +201,7 @@ class PALPATE_OT_gap_curves(support.ErrorReporting, bpy.types.Operator):
         return support.poll_gap_found(cls, context)
 
     def run(self, context):
-        show_image(context, gap_results.of(context.object).pictures["curves"], "Palpate Gap Curves")
+        show_image(gap_results.of(context.object).pictures["curves"], "Palpate Gap Curves")
 
 
 class PALPATE_OT_gap_show(support.ErrorReporting, bpy.types.Operator):

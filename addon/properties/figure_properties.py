@@ -148,12 +148,12 @@ class PALPATE_PG_figures(CheckBoxes, bpy.types.PropertyGroup):
         **_plain,
     )
     own_light: BoolProperty(
-        name="Scene's Own Light",
+        name="Scene Lights",
         description="Keep the lamps, the world and the backdrop of the scene. Without: studio light and a plain background",
         **_plain,
     )
     see_through: BoolProperty(
-        name="See-Through Targets",
+        name="See-Through",
         description="Targets become see-through where they cover texels that carry force",
         default=True,
         **_plain,

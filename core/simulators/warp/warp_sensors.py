@@ -82,7 +82,7 @@ class WarpSensors:
         False where a pose is not finite or a quaternion is zero: everything is zero there, and the environment begins again
         with its next valid poses.
     jumped : (E,) warp.array of bool
-        True where a target went through the sensor within the last step (see :class:`.Contacts`).
+        True where a target went through the sensor within the last step (see :class:`..pressed_sensors.Contacts`).
     poses : (E, 1 + T, 7) warp.array
         Of the sensor and of each target: position (m) and quaternion (w, x, y, z). A program on the device may write them
         itself, and then call :meth:`step` without poses.

@@ -10,13 +10,12 @@ import pytest
 from blender_scenes import press, press_and_drop, save, visible
 from kills import stopped_at
 
-from palpate.addon.bake import scene_writer
+from palpate.addon.bake import bake_files, scene_writer
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import bake_identity, baked_scene
 from palpate.addon.session import fcurves
 from palpate.commands import blender, main
 from palpate.core.errors import FileError
-from palpate.core.io import bake_folder
 from palpate.core.io.bake_reader import read_bake
 from palpate.core.io.hidden_folder import LOCK_NAME, PRIVATE_FOLDER
 from palpate.core.jobs import run_job
@@ -62,14 +61,14 @@ def test_the_first_bake_is_saved_with_the_blend(saved):
 
 def bake_stopped(path, number):
     """Bake and save; once all files are complete, the process is killed at a step of this number. Return all steps."""
-    replace, steps = bake_folder.publish_bake, []
+    replace, steps = bake_files.publish_bake, []
     with pytest.MonkeyPatch.context() as patch, ExitStack() as stack:
 
         def begin(*arguments):
             steps.append(stack.enter_context(stopped_at(number)))
             replace(*arguments)
 
-        patch.setattr(bake_folder, "publish_bake", begin)
+        patch.setattr(bake_files, "publish_bake", begin)
         bake_and_save(path, k=77.0)
     gc.collect()  # the lock of the stopped process
     return steps[0]

@@ -2,7 +2,7 @@
 """docs/gap.md on its sample rig: measurements are opened, what is missing is found, shown, and put on the sensor."""
 
 import bpy
-from steps import add, obj, over_view, palpate, undo
+from steps import add, close_plots, obj, over_view, palpate, undo
 
 
 def found():
@@ -51,9 +51,7 @@ def road(ui):
     yield 3.0
     ui.check("Palpate Gap Curves" in bpy.data.images, "the curves are shown")
     yield from ui.screenshot("curves")
-    with bpy.context.temp_override(window=bpy.context.window_manager.windows[-1]):
-        bpy.ops.wm.window_close()
-    yield 1.0
+    yield from close_plots()
 
     # Use Fitted Sensor
     yield from ui.press("palpate.gap_add()")

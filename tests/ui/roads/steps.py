@@ -142,3 +142,11 @@ def choose_file(ui, folder, name=None):
     buttons = ui.region(browser, "EXECUTE")
     yield from ui.click(buttons.x + buttons.width - 70, buttons.y + buttons.height // 2)
     yield 1.5
+
+
+def close_plots():
+    """Close the windows that plots were shown in."""
+    while len(bpy.context.window_manager.windows) > 1:
+        with bpy.context.temp_override(window=bpy.context.window_manager.windows[-1]):
+            bpy.ops.wm.window_close()
+        yield 1.0
