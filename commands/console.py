@@ -223,17 +223,7 @@ def exit_on_interrupt(message: str, clean_up: Callable[[], object]) -> Iterator[
 def shown_progress(
     label: str, unit: str = "step", describe: Callable[[Progress], str] = lambda progress: progress.stage
 ) -> AbstractContextManager[Callable[[Progress], None]]:
-    """Give a function that shows the progress of a job as a bar on stderr, and raises after Ctrl-C.
-
-    Parameters
-    ----------
-    label : str
-        Before the first progress.
-    unit : str
-        What the job counts.
-    describe : callable, optional
-        Makes the words beside the bar out of a :class:`.Progress`; the default is its stage.
-    """
+    """Give a function that shows progress as :func:`.jobs.shown_progress` does, and raises after Ctrl-C."""
     return bars.shown_progress(label, unit, describe, Interrupt.check)
 
 

@@ -2,8 +2,8 @@
 """Laid sensors: sensors whose texels are laid onto the surface of another object, the carrier.
 
 A laid sensor is a mesh object whose vertices are the texels. It is a child of its carrier and part of the carrier's body
-(:mod:`.attached_objects`), so that one object can carry several sensors, each with its own parameters. It stores the pattern of
-its texels, so that they can be laid again when the surface has changed.
+(:mod:`..scene.moved_bodies`), so that one object can carry several sensors, each with its own parameters. It stores the
+pattern of its texels, so that they can be laid again when the surface has changed.
 """
 
 from __future__ import annotations

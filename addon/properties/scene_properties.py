@@ -73,7 +73,7 @@ class PALPATE_PG_study(bpy.types.PropertyGroup):
 
     file: StringProperty(
         name="Study File",
-        description="The study is written here; its results go into a folder of the same name beside it. "
+        description="Path of the study; its results are written to a folder of the same name beside it. "
         "// is the folder of the .blend",
         default="//study.toml",
         subtype="FILE_PATH",

@@ -106,7 +106,7 @@ def painted_multipliers(obj, key: str) -> np.ndarray | None:
     Parameters
     ----------
     key : str
-        One of :data:`.painted_maps.PAINTED_PARAMETERS`.
+        One of :data:`.parameter_properties.PAINTED_PARAMETERS`.
 
     Returns
     -------

@@ -143,8 +143,8 @@ def export(bake: Bake, kind: str | Exporter, folder: str | os.PathLike, style: F
     Returns
     -------
     list of Path
-        What was written: files, and folders that hold the others. They take the place of the files that an earlier export of
-        this format left, which stay as they are until all new files are complete (:mod:`..io.file_list`).
+        The written files, and folders that hold the others. They take the place of the files that an earlier export of
+        this format left, which stay as they are until all new files are complete (:class:`.hidden_folder.FileList`).
 
     Raises
     ------

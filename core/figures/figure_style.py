@@ -32,7 +32,10 @@ MARKERS_ALONG = 18
 
 
 def width_below(curves: int) -> float:
-    """Return the width of a curve with this many curves drawn over it: it is wider, so that equal ones do not hide it."""
+    """Return the width of a curve with this many curves drawn over it: it is wider, so that equal ones do not hide it.
+
+    There are four widths, 1.4 points apart; no experiment set these numbers.
+    """
     return 1.2 + min(1.4 * curves, 4.2)
 
 

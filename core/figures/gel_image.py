@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The surface of a gel as a camera behind it sees it, lit by a red, a green and a blue lamp from three sides.
 
-The surface is the baked penetration, smooth between texels (:mod:`..geometry.smooth_depth`). It is shaded directly, without a
-renderer: light of lamp i is ``brightness · albedo · max(0, n · lᵢ) / sin(angle)``, n being the unit normal of the surface
+The surface is the baked penetration, smooth between texels (:func:`.grid_layout.smooth_depth`). It is shaded directly, without
+a renderer: light of lamp i is ``brightness · albedo · max(0, n · lᵢ) / sin(angle)``, n being the unit normal of the surface
 towards the camera and lᵢ the unit vector to the lamp. Light that is blocked by other parts of the surface, reflected between
 them or refracted is left out, and the camera has no perspective. So this is a picture of penalty depths and not a calibrated
 model of a camera and its lamps.

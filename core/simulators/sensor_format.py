@@ -256,7 +256,7 @@ def export_sensors(sensors: Sequence[SensorOnMesh], kind: str, folder: str | os.
     -------
     Written
         The files take the place of those that an earlier export of this format left, which stay as they are until all new
-        ones are complete (:mod:`..io.file_list`).
+        ones are complete (:class:`.hidden_folder.FileList`).
 
     Raises
     ------

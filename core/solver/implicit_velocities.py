@@ -39,7 +39,7 @@ def solve_velocities(
     iterations cycle (friction that was guessed for too large a load separates the contact, and without the contact there is no
     friction), the guess moves by a share of the way only. Every mixture of iterates keeps the momentum. With nothing to solve
     for, a single iteration only linearises. Where contacts would give more energy than was put into them
-    (see :mod:`.passivity`), their forces are scaled down.
+    (see :func:`.check_energy`), their forces are scaled down.
     """
     _write_initial_guess(dt, model, state, workspace)
     reset_force_scales(model, state, workspace)

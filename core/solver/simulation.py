@@ -383,7 +383,7 @@ class Simulation:
             positions[:, :, body] += rotation_matrices(quaternions[:, :, body]) @ self._center[body]
         before, after = quaternions[:, :-1], quaternions[:, 1:]
         turning = (after != before).any(axis=3)
-        turns = np.zeros((*turning.shape, 3))  # and not rounding: bodies that animation moves bring energy (:mod:`.passivity`)
+        turns = np.zeros((*turning.shape, 3))  # not rounding: bodies that animation moves bring energy (:func:`.check_energy`)
         if turning.any():
             conjugate = before[turning] * np.array([1.0, -1.0, -1.0, -1.0])
             turns[turning] = rotation_vectors(quaternion_product(after[turning], conjugate))

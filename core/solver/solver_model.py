@@ -200,7 +200,7 @@ class State(NamedTuple):
     effect_memory : (N, columns) float
         What effects remember, by contact point.
     stored_energy : (q,) float, joules
-        Energy that was put into the contacts of each pair and has not come out again (see :mod:`.passivity`).
+        Energy that was put into the contacts of each pair and has not come out again (see :func:`.check_energy`).
     """
 
     position: np.ndarray

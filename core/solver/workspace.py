@@ -181,7 +181,7 @@ class EffectWork(NamedTuple):
 
 @by_reference
 class EnergyWork(NamedTuple):
-    """Working memory for each pair's energy account (see :mod:`.passivity`).
+    """Working memory for each pair's energy account (see :func:`.check_energy`).
 
     Attributes
     ----------

@@ -18,7 +18,7 @@ class DataFault:
     Attributes
     ----------
     kind : str
-        A key of :data:`.fault_kinds.FAULT_KINDS`.
+        A key of :data:`.trial.FAULT_KINDS`.
     trials : tuple of str
         Names of the recordings that have it.
     evidence : str

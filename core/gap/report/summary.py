@@ -164,7 +164,7 @@ def report_bytes(rig: Rig) -> float:
 
 
 def write_report(result: Diagnosis, folder: Path, errors: GapErrors | None = None) -> Job[None]:
-    """Write everything into a folder. All files of an earlier report there are replaced together (:mod:`...io.file_list`).
+    """Write everything into a folder. All files of an earlier report there are replaced together (:class:`.FileList`).
 
     Parameters
     ----------

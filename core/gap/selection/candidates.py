@@ -22,7 +22,7 @@ from ..forward.predictor import Model, Predictor
 from .identifiability import unidentifiable
 
 NOT_FITTED = names_found_by(SCATTER)
-"""Kinds that are not fitted but found in the final residual (see :mod:`.heteroscedastic_noise`)."""
+"""Kinds that are not fitted but found in the final residual (see :func:`.residual_tests.proportional_noise`)."""
 DIRECTLY_ESTIMATED = (*names_found_by(SILENT_TEXELS), *names_found_by(STEPS))
 """Kinds whose parameters are estimated directly from the readings (see :mod:`.direct_estimates`)."""
 SMALL, LARGE = 0.02, 4.0

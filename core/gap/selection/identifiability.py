@@ -30,10 +30,10 @@ NEVER_UNLOADED = "the sensor was never unloaded, and this effect shows after unl
 KNOWN_FROM_UNLOADING, KNOWN_FROM_TIMING = names_known_from("unloading"), names_known_from("timing")
 KNOWN_FROM_REST, KNOWN_FROM_PLACES = names_known_from("rest"), names_known_from("places")
 KNOWN_FROM_CYCLES = names_known_from("cycles")
-"""Effects that are known from a feature of recordings (see :data:`...effects.engine.declarations.FEATURES`)."""
+"""Effects that are known from a feature of recordings (see :data:`...effects.engine.specification.FEATURES`)."""
 SPREADING, NONLINEAR, LOSING = names_in_family("spreading"), names_in_family("nonlinear"), names_in_family("losing")
 MOVING_BY_THEMSELVES, LATE, LOOPS = names_in_family("moving"), names_in_family("late"), names_in_family("loop")
-"""Effects that resemble each other (see :data:`...effects.engine.declarations.FAMILIES`)."""
+"""Effects that resemble each other (see :data:`...effects.engine.specification.FAMILIES`)."""
 SINGLE_SPEED_RATIO = 1.5
 """Ratio of fast to slow loading below which all loading was at one speed."""
 NEVER_AT_REST = "no texel rested for long, and no two loads were held: drift and creep are indistinguishable"

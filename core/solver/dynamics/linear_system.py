@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How the sums of each pair enter the linear system of a step, and which forces follow from its solution (kernels)."""
+"""The linear system of a step: how the sums of each pair enter it, the forces that follow from its solution, and the energy
+account that keeps them passive (kernels).
+"""
 
 from __future__ import annotations
 
