@@ -70,8 +70,8 @@ def bake(scene, into_scene: bool = True, images: bool = True, blend: bake_files.
     """
     if into_scene and not images:
         raise ValueError("a scene shows a bake by its images")
-    name, steps = scene.name, _Steps(scene)
-    with session_state.suspended(), steps:
+    name = scene.name
+    with session_state.suspended(), _Steps(scene) as steps:
         folder = bake_files.writable_bake_folder(scene)
         reading = yield from part_of_job(scene_reader.read_scene(scene), steps.reading)
         scenario = reading.scenario
@@ -127,13 +127,13 @@ def show_bake(scene, found: Bake) -> Job[None]:
             )
     if missing := [name for name in manifest.sensors if name not in found.manifests]:
         raise SceneError(f"The bake in '{place}' also has the sensor '{missing[0]}': give the folder of the whole bake.")
-    for name, obj in sensors.items():
-        if name not in found.manifests:
-            obj.palpate.role = "PAD"
-    scene.frame_start, scene.frame_end = (int(found.recording.frames[end]) for end in (0, -1))
-    steps = _Steps(scene)
-    with session_state.suspended(), steps:
-        reading = yield from part_of_job(scene_reader.read_scene(scene), steps.reading)
+    with session_state.suspended():
+        for name, obj in sensors.items():
+            if name not in found.manifests:
+                obj.palpate.role = "PAD"
+        scene.frame_start, scene.frame_end = (int(found.recording.frames[end]) for end in (0, -1))
+        with _Steps(scene) as steps:
+            reading = yield from part_of_job(scene_reader.read_scene(scene), steps.reading)
         if reading.scenario.digest() != manifest.digest:
             raise SceneError(
                 f"The bake in '{place}' is not of '{scene.name}' as it is now: something that forces depend on has "
@@ -149,8 +149,8 @@ class _Steps:
     def __init__(self, scene):
         self._first, self._total = scene.frame_start, 2 * max(1, scene.frame_end - scene.frame_start + 1)
 
-    def __enter__(self) -> None:
-        pass
+    def __enter__(self) -> _Steps:
+        return self
 
     def __exit__(self, *_) -> None:
         session_state.session.bake_progress = None
