@@ -9,9 +9,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from small_pad import COLUMNS, DEEP, PITCH, RADIUS, RATE, ROWS, K, loads, write_recording
 
 from palpate.benchmarks._hidden.rig_text import rig_head
-from palpate.benchmarks._small_pad import COLUMNS, DEEP, PITCH, RADIUS, RATE, ROWS, K, loads, write_recording
 
 SHARE, TAU, POWER = 0.35, 2.5, 0.6
 """Of the stress that relaxes: by a stretched exponential (Kohlrausch), which the library does not have."""

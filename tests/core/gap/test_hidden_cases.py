@@ -32,7 +32,7 @@ def test_the_generator_shares_nothing_with_the_package(path):
 def test_every_effect_is_hidden_in_some_case():
     """The three families of formulas hide the same effects: all that need nothing but readings and forces.
 
-    What needs more, as a clock or a column, is hidden by the sessions and by benchmarks/temperature.py. A new effect is hidden
+    What needs more, as a clock or a column, is hidden by the sessions and by test_temperature.py. A new effect is hidden
     once somebody who did not write its file has written other formulas of it.
     """
     hidden = set(other.MAKERS)

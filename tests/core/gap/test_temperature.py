@@ -3,9 +3,9 @@
 
 import numpy as np
 import pytest
+import small_pad
 from rig_files import RIG, table, write
 
-from palpate.benchmarks import _small_pad, temperature
 from palpate.benchmarks._hidden.rig_text import rig_head
 from palpate.core.effects.library.temperature import REFERENCE
 from palpate.core.errors import PalpateError
@@ -75,32 +75,54 @@ def test_what_a_log_calls_a_temperature():
 
 @pytest.mark.long("a whole diagnosis of warm and cold recordings")
 def test_a_gain_and_a_zero_that_follow_it_are_named():
-    sure, result = _small_pad.examined(temperature.write, "both", 2)
+    sure, result = small_pad.examined(pad_in_a_warming_room, "both", 2)
     assert sure == {"temperature"} and result.verdict == "explained"
+
+
+def written_rig(folder, recordings):
+    """Write readings (T, n) of paths (T, 3) at temperatures (T,) as a rig."""
+    words = {"k": small_pad.K, "cn": 0.0, "unit": "N", "gain": 1.0, "zero": 0.0}
+    lines = rig_head("pad", (small_pad.ROWS, small_pad.COLUMNS, small_pad.PITCH), words, small_pad.RADIUS)
+    for i, (path, reading, warmth) in enumerate(recordings):
+        parts = np.column_stack([np.arange(len(path)) / small_pad.RATE, path, reading, warmth])
+        lines += small_pad.write_recording(folder / f"t{i}.csv", parts, ("temperature",))
+        lines.append(f'use = "{"check" if i in (2, 4) else "fit"}"')
+    (folder / "rig.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return folder / "rig.toml"
+
+
+def pad_in_a_warming_room(_kind, number, folder):
+    """Six recordings of a room that warms and cools; gain and zero follow it by formulas that the library does not have."""
+    rng = np.random.default_rng(number)
+    spread, recordings = 1.0 + 0.1 * rng.normal(size=small_pad.ROWS * small_pad.COLUMNS), []
+    for _ in range(6):
+        path = small_pad.presses(rng)
+        force, time = small_pad.loads(path), np.arange(len(path)) / small_pad.RATE
+        warmth = rng.uniform(15.0, 32.0) + rng.uniform(-4.0, 4.0) * np.sin(2.0 * np.pi * time / rng.uniform(15.0, 60.0))
+        above = warmth[:, None] - 22.0
+        zero = 0.015 * force.max() * above * (1.0 + 0.01 * above) * spread
+        reading = force / (1.0 + 0.02 * above + 0.0001 * above**2) + zero
+        recordings.append((path, reading + 0.005 * force.max() * rng.normal(size=force.shape), warmth))
+    return written_rig(folder, recordings)
 
 
 def pad_in_rooms(kind, number, folder):
     """Six recordings, each at a temperature of its own: `kind` says whether gain or zero follows it, by a line."""
     rng = np.random.default_rng(number)
     warmth, rate = rng.permutation(np.linspace(16.0, 32.0, 6)), 0.015
-    words = {"k": _small_pad.K, "cn": 0.0, "unit": "N", "gain": 1.0, "zero": 0.0}
-    lines = rig_head("pad", (_small_pad.ROWS, _small_pad.COLUMNS, _small_pad.PITCH), words, _small_pad.RADIUS)
-    for i, warm in enumerate(warmth):
-        path = _small_pad.presses(rng)
-        force, above = _small_pad.loads(path), rate * (warm - REFERENCE)
+    recordings = []
+    for warm in warmth:
+        path = small_pad.presses(rng)
+        force, above = small_pad.loads(path), rate * (warm - REFERENCE)
         full, noise = force.max(), rng.normal(size=force.shape)
         reading = (force * (1.0 + above) if kind == "gain" else force + above * full) + 0.005 * full * noise
-        column = warm + 0.02 * rng.normal(size=len(path))
-        parts = np.column_stack([np.arange(len(path)) / _small_pad.RATE, path, reading, column])
-        lines += _small_pad.write_recording(folder / f"t{i}.csv", parts, ("temperature",))
-        lines.append(f'use = "{"check" if i in (2, 4) else "fit"}"')
-    (folder / "rig.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return folder / "rig.toml"
+        recordings.append((path, reading, warm + 0.02 * rng.normal(size=len(path))))
+    return written_rig(folder, recordings)
 
 
 @pytest.mark.long("two whole diagnoses of six recordings")
 @pytest.mark.parametrize("kind", ["gain", "zero"])
 def test_recordings_that_differ_by_their_temperature_do_not_differ_by_levels_and_gains_of_their_own(kind):
-    sure, result = _small_pad.examined(pad_in_rooms, kind, 1)
+    sure, result = small_pad.examined(pad_in_rooms, kind, 1)
     assert sure == {"temperature"} and result.between is None and result.verdict == "explained"
     assert result.findings[0].confidence > 0.95

@@ -1,23 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A small pad of springs under a ball, written as a rig: what smaller benchmarks of ``palpate gap`` hide their effects in.
-
-It imports nothing of Palpate until a case is diagnosed.
-"""
+"""A small pad of springs under a ball, written as a rig, in which tests of ``palpate gap`` hide effects."""
 
 from __future__ import annotations
 
-import os
-import sys
 import tempfile
-import time as clock
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ._hidden.rig_text import csv_header
-from ._rows import sure_names
+from palpate.benchmarks._hidden.rig_text import csv_header
+from palpate.benchmarks._rows import sure_names
+from palpate.core.gap.dataset.rig import read_rig
+from palpate.core.gap.selection.diagnosis import diagnose
+from palpate.core.jobs import run_job
 
 ROWS, COLUMNS, PITCH, RADIUS, K = 5, 3, 4e-3, 14e-3, 60.0
 SECONDS, RATE, DEEP = 22.0, 25.0, 2.5e-3
@@ -61,48 +58,6 @@ def write_recording(file: Path, table: np.ndarray, more: Sequence[str] = ()) -> 
 
 def examined(write: Write, kind: str, number: int) -> tuple[set[str], Any]:
     """Return what is surely named in a case, and the diagnosis."""
-    from palpate.core.gap.dataset.rig import read_rig
-    from palpate.core.gap.selection.diagnosis import diagnose
-    from palpate.core.jobs import run_job
-
     with tempfile.TemporaryDirectory() as folder:
         result = run_job(diagnose(read_rig(write(kind, number, Path(folder)))))
     return sure_names(result), result
-
-
-def count_named(name: str, write: Write, hidden: Sequence[str], others: Mapping[str, Collection[str]]) -> Iterator[dict]:
-    """Count the cases in which an effect is named, alone, and those in which it or another is named wrongly.
-
-    Parameters
-    ----------
-    name : str
-        Of the effect. ``PALPATE_NAME_CASES`` says how many cases have it and how many have not (10 and 10), and
-        ``PALPATE_NAME_FIRST`` the number of the first (0; from 5000 on those that nobody looked at).
-    write : callable
-    hidden : sequence of str
-        Kinds of cases that have it.
-    others : mapping of str to collection of str
-        Kinds of cases that have not, and what the library may call each.
-    """
-    variable = f"PALPATE_{name.upper().replace('-', '_')}"
-    count, first = (int(os.environ.get(f"{variable}_{key}", value)) for key, value in (("CASES", "10"), ("FIRST", "0")))
-    started, named, wrong, wrong_without = clock.process_time(), 0, 0, 0
-    for number in range(first, first + count):
-        kind = hidden[number % len(hidden)]
-        sure, result = examined(write, kind, number)
-        named += sure == {name}
-        wrong += bool(sure - {name})
-        _say(kind, number, result)
-        kind = list(others)[number % len(others)]
-        sure, result = examined(write, kind, number)
-        wrong_without += bool(sure - set(others[kind]))
-        _say(kind, number, result)
-    for what, value in (("named", named), ("something else named", wrong)):
-        yield {"name": f"{name}, {what}, of {count} with it", "value": value, "unit": "cases"}
-    yield {"name": f"{name}, wrongly named, of {count} without it", "value": wrong_without, "unit": "cases"}
-    yield {"name": f"{name}, CPU per case", "value": (clock.process_time() - started) / (2 * count), "unit": "s"}
-
-
-def _say(kind: str, number: int, result: Any) -> None:
-    said = ", ".join(f"{one.name}/{one.form} {one.confidence}" for one in result.findings) or "nothing"
-    print(f"{kind} {number}: {said}; {result.verdict}; {result.ambiguous}", file=sys.stderr, flush=True)
