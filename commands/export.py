@@ -8,7 +8,8 @@ import importlib.util
 
 from ..api.recordings import Recording
 from ..core.errors import PalpateError
-from ..core.export.exporter import Exporter, exporters
+from ..core.export import FORMATS
+from ..core.export.exporter import Exporter
 from ..core.figures.figure_style import FigureStyle
 from ..core.io.bake_reader import Bake, read_bake
 from . import blender, checks, console, figure_options
@@ -18,7 +19,7 @@ LEROBOT = "lerobot"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    formats = [*exporters(), LEROBOT]
+    formats = [*FORMATS, LEROBOT]
     parser.epilog = "Colours and their scale apply to the format png, the quantity also to the images of mcap."
     parser.add_argument("bake", metavar="BAKE", help="a bake folder, the folder of one sensor in it, or a baked .blend")
     parser.add_argument(

@@ -35,5 +35,5 @@ def write_lerobot(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Pat
     return sorted(path for path in (folder / FOLDER).rglob("*") if path.is_file())
 
 
-EXPORTER = Exporter("lerobot", "LeRobot", "A dataset of one episode; needs the package pyarrow", -1, write_lerobot)
-"""Not in the registry: a .blend stores no choice of it."""
+EXPORTER = Exporter("lerobot", write_lerobot)
+"""Not among the formats that a .blend may choose."""

@@ -14,7 +14,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ...core.export.exporter import exporters
+from ...core.export import FORMATS as DATA_FORMATS
 from ...core.figures.figure_style import LIGHT_ANGLES, MARKERS_ALONG, GelStyle
 from . import scene_units
 from .scene_units import in_units
@@ -32,7 +32,7 @@ FORMATS = (
     ("PDF", "PDF", "Vector graphics with text as text"),
     ("SVG", "SVG", "Vector graphics for web pages"),
 )
-EXPORTS = tuple((exporter.name.upper(), exporter.title, exporter.description) for exporter in exporters().values())
+EXPORTS = tuple((name.upper(), one.title, one.description) for name, one in DATA_FORMATS.items())
 _plain: dict = {"options": set()}  # a setting has no keyframes
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...core import response
 from ...core.errors import SceneError
-from ...core.export.exporter import export, exporters
+from ...core.export.exporter import export, exporter_for
 from ...core.figures.side_by_side import side_by_side
 from ...core.figures.tactile_strip import tactile_strip
 from ...core.figures.texel_numbers import texel_numbers, why_unreadable
@@ -80,7 +80,7 @@ def make_figures(scene, folder, request: FigureRequest, warn: Callable[[str], ob
     frames = request.frames or (_default_frame(bake, request.at_peak),)
     for number in frames:
         frame_index(bake.recording, number)
-    data = sum(exporters()[kind].size(bake) for kind in request.exports)
+    data = sum(exporter_for(kind).size(bake) for kind in request.exports)
     require_space(folder, figure_size.figures_bytes(bake, request, len(frames)) + data, "The set of figures")
     folder = writable_folder(folder, create=True)
     for reason in map(why_unreadable, bake.texels, bake.texels.values()):

@@ -4,12 +4,9 @@
 from __future__ import annotations
 
 import importlib
-import itertools
 import os
-import pkgutil
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +19,7 @@ from ..io.file_writing import CHANNEL_BYTES, recording_bytes, require_space, wri
 from ..io.hidden_folder import FileList
 from ..jobs import Job, Progress
 from ..model.recording import SENSOR_FIELDS, VectorReadings
+from . import FORMATS
 
 UNITS = {
     "normal_force": "N",
@@ -62,10 +60,6 @@ class Exporter:
     ----------
     name : str
         As on the command line, in lower case.
-    title, description : str
-        As in Blender's panels.
-    position : int
-        Place in lists, from 0, without gaps. Scenes store a choice by this number: a new format takes the next one.
     write : callable
         Takes the bake, a folder that exists, and a style for colours. It yields :func:`sensor_progress` before each sensor is
         written, and returns the files that it wrote, in that folder or in a folder in it.
@@ -74,9 +68,6 @@ class Exporter:
     """
 
     name: str
-    title: str
-    description: str
-    position: int
     write: Write
     size: Callable[[Bake], float] = uncompressed_bytes
 
@@ -106,20 +97,12 @@ def sensor_progress(bake: Bake, name: str) -> Progress:
     return Progress(name, names.index(name) + 1, len(names))
 
 
-FORMATS = f"{__package__}.formats"
-"""The package of the formats."""
-
-
-@cache
-def exporters() -> dict[str, Exporter]:
-    """Return every exporter by its name, in the order of their positions; raise ValueError if two have the same position."""
-    package = importlib.import_module(FORMATS)
-    found = [importlib.import_module(f"{FORMATS}.{module.name}").EXPORTER for module in pkgutil.iter_modules(package.__path__)]
-    found.sort(key=lambda exporter: exporter.position)
-    for one, other in itertools.pairwise(found):
-        if one.position == other.position:
-            raise ValueError(f"The formats '{one.name}' and '{other.name}' have the same position {one.position}.")
-    return {exporter.name: exporter for exporter in found}
+def exporter_for(name: str) -> Exporter:
+    """Return the exporter of a format, as "csv"; raise PalpateError if there is none."""
+    if name not in FORMATS:
+        raise PalpateError(f"There is no export to '{name}': choose from {', '.join(FORMATS)}.")
+    found: Exporter = importlib.import_module(f"{__package__}.formats.{FORMATS[name].module}").EXPORTER
+    return found
 
 
 def export(bake: Bake, kind: str | Exporter, folder: str | os.PathLike, style: FigureStyle | None = None) -> Job[list[Path]]:
@@ -129,7 +112,7 @@ def export(bake: Bake, kind: str | Exporter, folder: str | os.PathLike, style: F
     ----------
     bake : Bake
     kind : str or Exporter
-        Name of an exporter, as "csv", or one that is not in the registry.
+        Name of a format, as "csv", or an exporter that is not among them.
     folder : path
         Created if it is missing, with the folders above it.
     style : FigureStyle, optional
@@ -152,9 +135,7 @@ def export(bake: Bake, kind: str | Exporter, folder: str | os.PathLike, style: F
         The format is unknown or needs a package that is not installed, the disk has too little space, or a file cannot be
         written.
     """
-    exporter = kind if isinstance(kind, Exporter) else exporters().get(kind)
-    if exporter is None:
-        raise PalpateError(f"There is no export to '{kind}': choose from {', '.join(exporters())}.")
+    exporter = kind if isinstance(kind, Exporter) else exporter_for(kind)
     require_space(folder, exporter.size(bake), "The export")
     folder = writable_folder(folder, create=True)
     files = FileList(folder)

@@ -17,11 +17,10 @@ import numpy as np
 from ..errors import FileError, PalpateError
 from ..geometry.texels import Texels
 from ..model.recording import Recording
-from ..model.sensor_parameters import Painted, SensorParameters
+from ..model.sensor_parameters import Painted, SensorParameters, stated_parameters
 from .bake_folder import MANIFEST_NAME, RECORDING_NAME, Manifest, is_interrupted, read_manifest
 from .hidden_folder import PRIVATE_FOLDER
 from .recording_npz import SENSOR_NAME, load_recording, load_sensor
-from .sensor_toml import stated_parameters
 
 
 @dataclass(frozen=True)

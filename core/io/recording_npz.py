@@ -30,10 +30,9 @@ from ..geometry.grid_layout import GridLayout
 from ..geometry.texels import Texels
 from ..geometry.texture_maps import UVLayout
 from ..model.recording import CLIPPED, SENSOR_FIELDS, VALUES, Recording, SensorRecording, VectorReadings, row_blocks
-from ..model.sensor_parameters import Painted, SensorParameters
+from ..model.sensor_parameters import Painted, SensorParameters, stated_parameters
 from .file_writing import write_file
 from .input_files import open_regular
-from .sensor_toml import stated_parameters
 
 DAMAGED = (
     ValueError,

@@ -31,7 +31,7 @@ from typing import Annotated, Any
 from ..effects.engine.registry import check, from_dict, to_dict
 from ..errors import FileError, PalpateError
 from ..model.sensor import Effect
-from ..model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters
+from ..model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters, stated_parameters
 from .file_writing import atomic_write
 from .input_files import checked_name, is_number, read_toml
 from .schema import Name, known_words, read_words, wanted
@@ -167,32 +167,6 @@ def checked_lengths(value: Any, count: int, what: str) -> tuple[float, ...]:
             f"{what} is {value!r:.80}: give {many} above zero, in metres, from {SHORTEST_LENGTH:g} to {LONGEST_LENGTH:g}."
         )
     return tuple(float(item) for item in items)
-
-
-def stated_parameters(words: Mapping[str, Any], where: str) -> dict[str, Any]:
-    """Return the values of those parameters of a sensor that the words of a [sensor] state.
-
-    Every file with a [sensor] is read here. What a parameter may be is in :class:`.SensorParameters`.
-
-    Parameters
-    ----------
-    words : mapping
-        The table as it was written; words that are no parameters are left out.
-    where : str
-        Which table of which file this is, for the message.
-
-    Raises
-    ------
-    FileError
-        A word is of another kind than its parameter, such as a text where a number belongs.
-    """
-    values = {}
-    for name, specification in SENSOR_PARAMETERS.items():
-        if name in words:
-            values[name] = specification.read(words[name])
-            if values[name] is None:
-                raise FileError(f"{name} of {where} is {words[name]!r}: give {specification.wanted}.")
-    return values
 
 
 def _plain(words: Mapping[str, Any]) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ParameterError
+from ..errors import FileError, ParameterError
 from .parameter import Choice, ChoiceParameter, Parameter, TextParameter, numbers_of, specifications, specified
 
 LINEAR, HUNT_CROSSLEY = "linear", "hunt-crossley"
@@ -188,3 +188,29 @@ def unit_of(name: str, sensor_unit: str) -> str:
     """Return the unit of a parameter on a sensor that reports in `sensor_unit`; "1" where it has none."""
     specification = SENSOR_PARAMETERS[name]
     return specification.unit_of(sensor_unit) if isinstance(specification, Parameter) else "1"
+
+
+def stated_parameters(words: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """Return the values of those parameters of a sensor that the words of a [sensor] state.
+
+    Every file with a [sensor] is read here. What a parameter may be is in :class:`.SensorParameters`.
+
+    Parameters
+    ----------
+    words : mapping
+        The table as it was written; words that are no parameters are left out.
+    where : str
+        Which table of which file this is, for the message.
+
+    Raises
+    ------
+    FileError
+        A word is of another kind than its parameter, such as a text where a number belongs.
+    """
+    values = {}
+    for name, specification in SENSOR_PARAMETERS.items():
+        if name in words:
+            values[name] = specification.read(words[name])
+            if values[name] is None:
+                raise FileError(f"{name} of {where} is {words[name]!r}: give {specification.wanted}.")
+    return values

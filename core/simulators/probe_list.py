@@ -21,9 +21,9 @@ from ..geometry.texture_maps import uv_layout
 from ..io.file_writing import write_file
 from ..io.input_files import checked_name, read_bounded
 from ..io.schema import known_words
-from ..io.sensor_toml import MOST_TEXELS, stated_parameters
+from ..io.sensor_toml import MOST_TEXELS
 from ..model.sensor import Sensor
-from ..model.sensor_parameters import SENSOR_PARAMETERS, Painted, SensorParameters
+from ..model.sensor_parameters import SENSOR_PARAMETERS, Painted, SensorParameters, stated_parameters
 from .sensor_on_mesh import SensorOnMesh, texel_arrays
 
 PROBES_FORMAT = "palpate-probes/1"

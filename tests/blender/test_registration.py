@@ -140,6 +140,18 @@ def test_enabling_imports_nothing_heavy():
     assert not loaded & {"numba", "llvmlite", "scipy", "matplotlib", "trimesh", "OpenEXR", "tqdm", "tomli_w", "jinja2", "warp"}
 
 
+def test_a_bake_without_a_window_loads_no_panels_and_no_exporters():
+    code = (
+        "import sys, palpate.commands.bake, palpate.addon.bake.bake, palpate.addon.properties.registration;"
+        "print(*[name for name in sys.modules if name.startswith('palpate.')])"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    loaded = run.stdout.split()
+    unwanted = ("palpate.panels", "palpate.operators", "palpate.core.export.", "palpate.addon.display", "palpate.addon.render")
+    assert "palpate.addon.bake.bake_files" in loaded and len(loaded) <= 150
+    assert not [name for name in loaded if name.startswith(unwanted)]
+
+
 def test_a_process_that_forgets_to_disable_still_ends():
     """Blender 4.5 as a module hangs at exit when classes are registered."""
     code = "import bpy, palpate; palpate.register(); bpy.ops.wm.read_factory_settings(use_empty=True)"

@@ -133,4 +133,4 @@ def _csv_bytes(bake: Bake) -> float:
     return float(_NUMBER_BYTES * per_frame * len(bake.recording.frames))
 
 
-EXPORTER = Exporter("csv", "CSV", "Tables, one column per texel", 0, write_csv, _csv_bytes)
+EXPORTER = Exporter("csv", write_csv, _csv_bytes)

@@ -86,4 +86,4 @@ def _unit(bake: Bake, name: str, key: str) -> str:
     return bake.parameters[name].unit if key == "reading" else UNITS.get(key, "1")
 
 
-EXPORTER = Exporter("hdf5", "HDF5", "One file with units; needs the package h5py", 2, write_hdf5)
+EXPORTER = Exporter("hdf5", write_hdf5)

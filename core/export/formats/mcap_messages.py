@@ -277,11 +277,4 @@ def _mcap_bytes(bake: Bake) -> float:
     return uncompressed_bytes(bake) + len(bake.recording.frames) * pixels
 
 
-EXPORTER = Exporter(
-    "mcap",
-    "MCAP",
-    "Messages over time for Foxglove, rerun and ROS 2; needs mcap and rosbags",
-    4,
-    write_mcap,
-    _mcap_bytes,
-)
+EXPORTER = Exporter("mcap", write_mcap, _mcap_bytes)

@@ -31,4 +31,4 @@ def write_npz(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Path]]:
     return written
 
 
-EXPORTER = Exporter("npz", "NPZ", "Arrays for NumPy in double precision", 1, write_npz)
+EXPORTER = Exporter("npz", write_npz)

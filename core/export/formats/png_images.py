@@ -94,4 +94,4 @@ def _png_bytes(bake: Bake) -> float:
     return float(len(bake.recording.frames) * sum(2 * BLOCK + 4 * count for count in pixels))
 
 
-EXPORTER = Exporter("png", "PNG", "Every tactile image as a picture in colours", 3, write_png, _png_bytes)
+EXPORTER = Exporter("png", write_png, _png_bytes)

@@ -19,8 +19,14 @@ from ...geometry.texels import Texels, texels_from_region
 from ...io.csv_table import read_table
 from ...io.input_files import LONGEST_NAME, checked_name, read_toml, require_regular
 from ...io.schema import Name, known_words, read_words, wanted
-from ...io.sensor_toml import SHAPE_WORDS, checked_grid, checked_lengths, stated_parameters
-from ...model.sensor_parameters import DEPTH_PER_THICKNESS, SENSOR_PARAMETERS, SensorParameters, with_dependent_defaults
+from ...io.sensor_toml import SHAPE_WORDS, checked_grid, checked_lengths
+from ...model.sensor_parameters import (
+    DEPTH_PER_THICKNESS,
+    SENSOR_PARAMETERS,
+    SensorParameters,
+    stated_parameters,
+    with_dependent_defaults,
+)
 from .column_names import Column, read_column_rules, translated
 from .cover import COVER_WORDS, Cover, read_cover
 from .second_logger import SecondLogger, bridged, joined

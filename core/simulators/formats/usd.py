@@ -17,8 +17,8 @@ from ...geometry.point_surface import triangles_between
 from ...io.bake_folder import folder_names
 from ...io.file_writing import write_file
 from ...io.input_files import require_regular
-from ...io.sensor_toml import MOST_TEXELS, stated_parameters
-from ...model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters
+from ...io.sensor_toml import MOST_TEXELS
+from ...model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters, stated_parameters
 from ..sensor_format import FoundSensor, SensorFormat, Written, optional_package
 from ..sensor_on_mesh import SensorOnMesh, identifiers, texel_arrays, unmodelled
 

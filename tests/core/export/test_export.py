@@ -16,8 +16,8 @@ import pytest
 from sample_bake import grid_texels, recording_of, round_texels, write_bake, write_sensor
 
 from palpate.core.errors import FileError, PalpateError
-from palpate.core.export import exporter, formats
-from palpate.core.export.exporter import export, exporters
+from palpate.core.export import FORMATS, exporter, formats
+from palpate.core.export.exporter import export
 from palpate.core.export.formats import hdf5
 from palpate.core.figures import color_maps
 from palpate.core.figures.figure_style import FigureStyle
@@ -164,18 +164,14 @@ def test_png_has_one_scale_for_all_sensors(bake, tmp_path):
     assert (color_maps.colors("PAPER", np.array([0.5])) == 0.5).all()
 
 
-def test_an_unknown_format_is_refused(bake, tmp_path):
-    with pytest.raises(PalpateError, match="csv, npz, hdf5, png, mcap"):
+def test_every_format_is_in_the_table(bake, tmp_path):
+    """A module of the package is a format, and its place in the table is its bit in a scene's choice."""
+    assert list(FORMATS) == ["csv", "npz", "hdf5", "png", "mcap"]
+    assert [exporter.exporter_for(name).name for name in FORMATS] == list(FORMATS)
+    modules = {path.stem for path in Path(formats.__file__).parent.glob("*.py")} - {"__init__"}
+    assert modules == {one.module for one in FORMATS.values()}
+    with pytest.raises(PalpateError, match="choose from csv, npz, hdf5, png, mcap"):
         run_job(export(bake, "xls", tmp_path))
-
-
-def test_every_format_is_registered_once():
-    """A module of the package is a format; its position is its bit in a scene's choice, so positions have no gaps."""
-    found = exporters()
-    assert list(found) == ["csv", "npz", "hdf5", "png", "mcap"]
-    assert [one.position for one in found.values()] == list(range(len(found)))
-    modules = {path.stem for path in Path(exporter.__file__).parent.glob("formats/*.py")} - {"__init__"}
-    assert len(modules) == len(found)
 
 
 # --- an export after another one
@@ -249,12 +245,12 @@ FULL_DISK = """
 import resource, signal
 from palpate.core.errors import FileError
 from palpate.core.io.hidden_folder import LIST_FORMAT, LIST_NAME
-from palpate.core.export.exporter import export, exporters
+from palpate.core.export.exporter import export, exporter_for
 from palpate.core.io.bake_reader import read_bake
 from palpate.core.jobs import run_job
 import matplotlib.image
 bake = read_bake({bake!r})
-exporters()
+exporter_for({kind!r})
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
 try:
@@ -281,20 +277,6 @@ def test_hdf5_of_large_arrays_is_written_by_blocks(tmp_path, monkeypatch):
             assert np.array_equal(found[:], bake.recording.sensors["pad"].shear)
             assert np.array_equal(file["bodies/pad/pose"][:], bake.recording.poses[:, 0])
     assert digests[0] == digests[1]
-
-
-def test_two_formats_with_one_position_are_refused(tmp_path, monkeypatch):
-    """Saved scenes would otherwise mean another format by the same bit."""
-    text = 'from palpate.core.export.exporter import Exporter\nEXPORTER = Exporter("tsv", "TSV", "Tables", 0, None)\n'
-    (tmp_path / "tsv_tables.py").write_text(text, encoding="utf-8")
-    monkeypatch.setattr(formats, "__path__", [*formats.__path__, str(tmp_path)])
-    exporters.cache_clear()
-    try:
-        with pytest.raises(ValueError, match="same position 0"):
-            exporters()
-    finally:
-        exporters.cache_clear()
-        sys.modules.pop(f"{formats.__name__}.tsv_tables", None)
 
 
 def test_the_name_of_a_body_is_no_formula_in_a_table(bake, tmp_path):

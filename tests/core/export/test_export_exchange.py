@@ -40,8 +40,9 @@ def write(files, folder, _style):
 @pytest.fixture
 def formats(monkeypatch):
     """A format of plain text; a "bake" is a dictionary of files."""
-    known = {name: Exporter(name, name, "", i, write, lambda _: 0.0) for i, name in enumerate(("text", "other"))}
-    monkeypatch.setattr(exporter, "exporters", lambda: known)
+    known = {name: Exporter(name, write, lambda _: 0.0) for name in ("text", "other")}
+    monkeypatch.setattr(exporter, "exporter_for", known.__getitem__)
+    return known
 
 
 @pytest.fixture
@@ -179,12 +180,12 @@ def test_a_link_stays_a_link(out, tmp_path):
     assert (out / "bodies.csv").is_symlink() and target.read_text() == "new"
 
 
-def test_an_error_names_the_place_of_the_file(out):
+def test_an_error_names_the_place_of_the_file(out, formats):
     def fail(_bake, folder, _style):
         raise FileError(f"'{folder / 'pad.csv'}' could not be written (no space left on device): free some space.")
         yield
 
-    exporter.exporters()["text"] = replace(exporter.exporters()["text"], write=fail)
+    formats["text"] = replace(formats["text"], write=fail)
     with pytest.raises(FileError) as caught:
         run_job(export(NEW, "text", out))
     assert str(caught.value).startswith(f"'{out / 'pad.csv'}' could not be written")

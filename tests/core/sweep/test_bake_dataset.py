@@ -11,7 +11,7 @@ from sample_bake import grid_texels, recording_of, round_texels, write_sensor
 
 from palpate.commands import export as export_command
 from palpate.commands import main
-from palpate.core.export.exporter import exporters
+from palpate.core.export import FORMATS
 from palpate.core.io.bake_reader import read_bake
 from palpate.core.model.sensor_parameters import SensorParameters
 
@@ -52,7 +52,7 @@ def test_the_next_export_takes_its_place_as_a_whole(tmp_path):
 def test_the_name_of_the_format_is_no_other_ones():
     from palpate.sweep.bake_dataset import EXPORTER
 
-    assert EXPORTER.name == export_command.LEROBOT and EXPORTER.name not in exporters()
+    assert EXPORTER.name == export_command.LEROBOT and EXPORTER.name not in FORMATS
 
 
 def test_the_extension_without_studies_says_so(tmp_path, capsys, monkeypatch):
