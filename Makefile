@@ -30,7 +30,7 @@ help:
 	@echo '              BLENDER=5.2 for that one (default $(BLENDER))'
 	@echo 'make bench    benchmarks, one JSON line per figure; ONLY=solver for one group'
 	@echo 'make docs     the documentation as a site, in build/site/'
-	@echo 'make zip      the extension zips for every platform and Python, in dist/, checked by the rules of extensions.blender.org;'
+	@echo 'make zip      the extension zips for every platform and Python, in dist/, checked by Blender's own tool;'
 	@echo '              WEBSITE=https://… makes those to upload, too, in dist/upload/'
 	@echo 'make lint     ruff, mypy and the order of imports alone'
 	@echo 'make clean    remove build products; distclean: the environments too'
@@ -108,10 +108,8 @@ docs: $(VENV)/.docs
 
 zip: env
 	$(BIN)/python tools/build_zip.py
-	$(BIN)/python tools/extension_rules.py dist/*.zip
 ifdef WEBSITE
 	$(BIN)/python tools/build_zip.py --website '$(WEBSITE)'
-	$(BIN)/python tools/extension_rules.py --upload dist/upload/*.zip
 endif
 
 clean:

@@ -16,6 +16,10 @@ from pathlib import Path
 import build_zip
 import pytest
 
+from palpate.core.version import VERSION
+
+SHIPPED = ("numpy-", "requests-", "certifi-", "charset_normalizer-", "idna-", "urllib3-", "zstandard-")
+"""Beginnings of wheels of packages that Blender brings, which would shadow its own."""
 HEAVY = {"numba", "llvmlite", "scipy", "matplotlib", "trimesh", "OpenEXR", "tqdm", "tomli_w", "jinja2"}
 
 
@@ -86,6 +90,7 @@ def test_zip_holds_what_the_extension_needs_and_no_more(zip_path, repository):
     assert manifest["platforms"] == ["linux-x64"]
     assert (manifest["blender_version_min"], manifest["blender_version_max"]) == ("4.2.0", "5.1.0")
     assert not any("cp313" in name for name in names)
+    assert not any(name.startswith(tuple(f"wheels/{package}" for package in SHIPPED)) for name in names)
     # the repository's own manifest is for development: it names no wheels
     assert "wheels" not in tomllib.loads((repository / "blender_manifest.toml").read_text(encoding="utf-8"))
 
@@ -102,6 +107,13 @@ def test_same_sources_give_the_same_zip(zip_path, tmp_path):
 def test_a_line_says_of_a_zip_whether_it_has_machine_code(tmp_path, name, says):
     build_zip.write_zip(tmp_path / "palpate.zip", {name: b"code"})
     assert says in build_zip.description(tmp_path / "palpate.zip")
+
+
+@pytest.mark.parametrize("python", ["cp311", "cp313"])
+def test_the_manifest_of_a_zip_to_upload(python):
+    upload = {"website": "https://palpate.invalid", "python": python}
+    manifest = tomllib.loads(build_zip.manifest_for("linux-x64", [], ("4.2.0", None), upload).decode())
+    assert (manifest["version"], manifest["website"]) == (f"{VERSION}+{python}", "https://palpate.invalid")
 
 
 def test_blender_refuses_a_broken_zip(tmp_path):
