@@ -17,15 +17,14 @@ class PALPATE_OT_bake(modal_job.ModalJob, bpy.types.Operator):
 
     bl_idname = "palpate.bake"
     bl_label = "Bake"
-    bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context):
-        if context.scene is None or not playback.has_participants(context.scene):
-            cls.poll_message_set("No object has a role: make a sensor and a target first")
-            return False
-        return support.poll_idle(cls)
-
+    needs = (
+        support.SCENE,
+        support.Condition(
+            lambda context: playback.has_participants(context.scene), "No object has a role: make a sensor and a target first"
+        ),
+        support.IDLE,
+    )
     stopped = "Bake stopped; the earlier bake is unchanged"
 
     def job(self, context):
@@ -53,6 +52,13 @@ class PALPATE_OT_catch_up(modal_job.ModalJob, bpy.types.Operator):
     bl_idname = "palpate.catch_up"
     bl_label = "Compute to Here"
     bl_options = {"REGISTER"}
+    needs = (
+        support.SCENE,
+        support.Condition(
+            lambda context: bool(playback.missing_frames(context.scene)), "No frame is missing up to the current one"
+        ),
+        support.IDLE,
+    )
     stopped = "Stopped; computed frames are kept"
 
     by_itself: BoolProperty(
@@ -60,13 +66,6 @@ class PALPATE_OT_catch_up(modal_job.ModalJob, bpy.types.Operator):
         description="Begun by a jump on the timeline: any key or click ends it and does what it always does",
         options={"HIDDEN", "SKIP_SAVE"},
     )
-
-    @classmethod
-    def poll(cls, context):
-        if context.scene is None or not playback.missing_frames(context.scene):
-            cls.poll_message_set("No frame is missing up to the current one")
-            return False
-        return support.poll_idle(cls)
 
     def job(self, context):
         self._was_playing = context.screen is not None and context.screen.is_animation_playing
@@ -86,19 +85,16 @@ class PALPATE_OT_catch_up(modal_job.ModalJob, bpy.types.Operator):
             bpy.ops.screen.animation_play()
 
 
-class PALPATE_OT_bake_clear(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_bake_clear(support.PalpateOperator, bpy.types.Operator):
     """Remove baked keyframes, force arrows and heat maps, and reset free bodies. Files on disk stay"""
 
     bl_idname = "palpate.bake_clear"
     bl_label = "Clear Bake"
-    bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context):
-        if context.scene is None or not baked_scene.has_bake(context.scene):
-            cls.poll_message_set("Nothing is baked in this scene")
-            return False
-        return True
+    needs = (
+        support.SCENE,
+        support.Condition(lambda context: baked_scene.has_bake(context.scene), "Nothing is baked in this scene"),
+    )
 
     def run(self, context):
         support.leave_edit_mode(context)
@@ -106,40 +102,32 @@ class PALPATE_OT_bake_clear(support.ErrorReporting, bpy.types.Operator):
         playback.reset(context.scene)
 
 
-class PALPATE_OT_reset(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_reset(support.PalpateOperator, bpy.types.Operator):
     """Discard the frames computed while playing and reset free bodies"""
 
     bl_idname = "palpate.reset"
     bl_label = "Reset"
-    bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context):
-        if context.scene is None or not playback.has_participants(context.scene):
-            cls.poll_message_set("No object has a role")
-            return False
-        if baked_scene.baked_objects(context.scene):
-            cls.poll_message_set("The scene is baked: use Clear Bake")
-            return False
-        return True
+    needs = (
+        support.SCENE,
+        support.Condition(lambda context: playback.has_participants(context.scene), "No object has a role"),
+        support.Condition(lambda context: not baked_scene.baked_objects(context.scene), "The scene is baked: use Clear Bake"),
+    )
 
     def run(self, context):
         playback.reset(context.scene)
 
 
-class PALPATE_OT_display_refresh(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_display_refresh(support.PalpateOperator, bpy.types.Operator):
     """Show the bake with the current colours, scales, arrows and markers; nothing is computed"""
 
     bl_idname = "palpate.display_refresh"
     bl_label = "Apply to Bake"
-    bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context):
-        if context.scene is None or not baked_scene.baked_objects(context.scene):
-            cls.poll_message_set("Nothing is baked in this scene")
-            return False
-        return True
+    needs = (
+        support.SCENE,
+        support.Condition(lambda context: bool(baked_scene.baked_objects(context.scene)), "Nothing is baked in this scene"),
+    )
 
     def run(self, context):
         support.leave_edit_mode(context)

@@ -10,18 +10,14 @@ from ..core.effects.engine import registry
 from . import support
 
 
-class PALPATE_OT_effect_add(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_effect_add(support.PalpateOperator, bpy.types.Operator):
     """Add an effect of real sensors that the base model lacks: creep, hysteresis, noise and more"""
 
     bl_idname = "palpate.effect_add"
     bl_label = "Add Effect"
-    bl_options = {"REGISTER", "UNDO"}
+    needs = support.EDITABLE_SENSOR
 
     effect: EnumProperty(name="Effect", description="What to add", items=effect_stack.kind_items(), options={"SKIP_SAVE"})
-
-    @classmethod
-    def poll(cls, context):
-        return support.poll_editable_sensor(cls, context)
 
     @classmethod
     def description(cls, _context, properties):
@@ -34,23 +30,17 @@ class PALPATE_OT_effect_add(support.ErrorReporting, bpy.types.Operator):
         self.report({"INFO"}, f"'{obj.name}' has {registry.kind_of(self.effect).title.lower()}")
 
 
-class _OnEntry(support.ErrorReporting):
-    @classmethod
-    def poll(cls, context):
-        if not support.poll_editable_sensor(cls, context):
-            return False
-        if not context.object.palpate.effects:
-            cls.poll_message_set(f"'{context.object.name}' has no effects: use Add Effect first")
-            return False
-        return True
+HAS_EFFECTS = support.Condition(
+    lambda context: bool(context.object.palpate.effects), "'{name}' has no effects: use Add Effect first"
+)
 
 
-class PALPATE_OT_effect_remove(_OnEntry, bpy.types.Operator):
+class PALPATE_OT_effect_remove(support.PalpateOperator, bpy.types.Operator):
     """Remove the effect from the sensor"""
 
     bl_idname = "palpate.effect_remove"
     bl_label = "Remove Effect"
-    bl_options = {"REGISTER", "UNDO"}
+    needs = (*support.EDITABLE_SENSOR, HAS_EFFECTS)
 
     index: IntProperty(name="Index", description="Place in the stack", min=0, options={"SKIP_SAVE"})
 
@@ -58,12 +48,12 @@ class PALPATE_OT_effect_remove(_OnEntry, bpy.types.Operator):
         context.object.palpate.effects.remove(self.index)
 
 
-class PALPATE_OT_effect_move(_OnEntry, bpy.types.Operator):
+class PALPATE_OT_effect_move(support.PalpateOperator, bpy.types.Operator):
     """Move the effect in the stack. Different effects act in a fixed order; the stack orders effects of one kind"""
 
     bl_idname = "palpate.effect_move"
     bl_label = "Move Effect"
-    bl_options = {"REGISTER", "UNDO"}
+    needs = (*support.EDITABLE_SENSOR, HAS_EFFECTS)
 
     index: IntProperty(name="Index", description="Place in the stack", min=0, options={"SKIP_SAVE"})
     way: EnumProperty(

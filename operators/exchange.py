@@ -12,12 +12,12 @@ from ..core.errors import SceneError, counted
 from . import support
 
 
-class PALPATE_OT_openrave_import(support.ErrorReporting, support.FileChooser, bpy.types.Operator):
+class PALPATE_OT_openrave_import(support.PalpateOperator, support.FileChooser, bpy.types.Operator):
     """Read the parameters of the active sensor from OpenRAVE's XML (a SimTactileSensor, paper's Table 2)"""
 
     bl_idname = "palpate.openrave_import"
     bl_label = "OpenRAVE Tactile Sensor (.xml)"
-    bl_options = {"REGISTER", "UNDO"}
+    needs = support.EDITABLE_SENSOR
 
     filename_ext = ".xml"
     filter_glob: StringProperty(default="*.xml", options={"HIDDEN"})
@@ -26,10 +26,6 @@ class PALPATE_OT_openrave_import(support.ErrorReporting, support.FileChooser, bp
         description="Its name in the file, when there are several; else the one attached to this object",
         default="",
     )
-
-    @classmethod
-    def poll(cls, context):
-        return support.poll_editable_sensor(cls, context)
 
     def run(self, context):
         from ..core.simulators.openrave_file import read_openrave
@@ -48,18 +44,16 @@ class PALPATE_OT_openrave_import(support.ErrorReporting, support.FileChooser, bp
             self.report({"WARNING"}, f"It leaves out {', '.join(matching[0].missing)}: the defaults are used")
 
 
-class PALPATE_OT_openrave_export(support.ErrorReporting, ExportHelper, bpy.types.Operator):
+class PALPATE_OT_openrave_export(support.PalpateOperator, ExportHelper, bpy.types.Operator):
     """Write the selected sensors, or all of the scene when none is selected, as OpenRAVE's XML (paper's Table 2)"""
 
     bl_idname = "palpate.openrave_export"
     bl_label = "OpenRAVE Tactile Sensor (.xml)"
+    bl_options = set()
+    needs = (support.ANY_SENSOR,)
 
     filename_ext = ".xml"
     filter_glob: StringProperty(default="*.xml", options={"HIDDEN"})
-
-    @classmethod
-    def poll(cls, context):
-        return support.poll_any_sensor(cls, context)
 
     def run(self, context):
         from ..core.simulators.openrave_file import OpenRaveSensor, write_openrave
@@ -70,12 +64,11 @@ class PALPATE_OT_openrave_export(support.ErrorReporting, ExportHelper, bpy.types
         self.report({"INFO"}, f"Wrote {counted(len(sensors), 'sensor')} to '{self.filepath}'")
 
 
-class PALPATE_OT_sensor_toml_import(support.ErrorReporting, support.FileChooser, bpy.types.Operator):
+class PALPATE_OT_sensor_toml_import(support.PalpateOperator, support.FileChooser, bpy.types.Operator):
     """Read a sensor.toml: parameters and effects for the active sensor, or a new pad when none is active and it has a grid"""
 
     bl_idname = "palpate.sensor_toml_import"
     bl_label = "Palpate Sensor (.toml)"
-    bl_options = {"REGISTER", "UNDO"}
 
     filename_ext = ".toml"
     filter_glob: StringProperty(default="*.toml", options={"HIDDEN"})
@@ -86,18 +79,16 @@ class PALPATE_OT_sensor_toml_import(support.ErrorReporting, support.FileChooser,
         self.report({"INFO"}, f"'{obj.name}' has the parameters and {counted(effects, 'effect')} of '{name}'")
 
 
-class PALPATE_OT_sensor_toml_export(support.ErrorReporting, ExportHelper, bpy.types.Operator):
+class PALPATE_OT_sensor_toml_export(support.PalpateOperator, ExportHelper, bpy.types.Operator):
     """Write the active sensor as TOML: its parameters and effects, and its grid where it is a flat one"""
 
     bl_idname = "palpate.sensor_toml_export"
     bl_label = "Palpate Sensor (.toml)"
+    bl_options = set()
+    needs = support.SENSOR
 
     filename_ext = ".toml"
     filter_glob: StringProperty(default="*.toml", options={"HIDDEN"})
-
-    @classmethod
-    def poll(cls, context):
-        return support.poll_sensor(cls, context)
 
     def run(self, context):
         exchange.save_toml(context, context.object, self.filepath)

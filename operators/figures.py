@@ -13,14 +13,14 @@ class PALPATE_OT_figures_make(modal_job.ModalJob, bpy.types.Operator):
     bl_idname = "palpate.figures_make"
     bl_label = "Make Figures"
     bl_options = {"REGISTER"}
+    needs = (
+        support.SCENE,
+        support.Condition(
+            lambda context: bool(baked_scene.bake_folders(context.scene)), "Nothing is baked in this scene: bake first"
+        ),
+        support.IDLE,
+    )
     stopped = "Stopped; earlier figures are unchanged"
-
-    @classmethod
-    def poll(cls, context):
-        if context.scene is None or not baked_scene.bake_folders(context.scene):
-            cls.poll_message_set("Nothing is baked in this scene: bake first")
-            return False
-        return support.poll_idle(cls)
 
     def job(self, context):
         from ..addon.render import figure_export, figure_request

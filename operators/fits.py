@@ -13,9 +13,10 @@ from ..core.model.sensor_parameters import DAMPING_PER_STIFFNESS
 from . import support
 
 
-class MeasurementFit(support.ErrorReporting, support.FileChooser):
+class MeasurementFit(support.PalpateOperator, support.FileChooser):
     """Common part of both fits: choosing a CSV, drawing the settings, and showing the plot."""
 
+    needs = support.EDITABLE_SENSOR
     filename_ext = ".csv"
     filter_glob: StringProperty(default="*.csv;*.txt", options={"HIDDEN"})
     plot: StringProperty(
@@ -24,10 +25,6 @@ class MeasurementFit(support.ErrorReporting, support.FileChooser):
 
     fields: tuple[str, ...] = ()
     """Names of the fit's own settings."""
-
-    @classmethod
-    def poll(cls, context):
-        return support.poll_editable_sensor(cls, context)
 
     def draw(self, _context):
         layout = self.layout
@@ -83,7 +80,6 @@ class PALPATE_OT_stiffness_fit(MeasurementFit, bpy.types.Operator):
 
     bl_idname = "palpate.stiffness_fit"
     bl_label = "Stiffness from Foam…"
-    bl_options = {"REGISTER", "UNDO"}
 
     line: EnumProperty(
         name="Line",
@@ -131,7 +127,6 @@ class PALPATE_OT_friction_fit(MeasurementFit, bpy.types.Operator):
 
     bl_idname = "palpate.friction_fit"
     bl_label = "Friction from Curve…"
-    bl_options = {"REGISTER", "UNDO"}
 
     normal_force: FloatProperty(
         name="Normal Force (N)",

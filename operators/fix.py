@@ -8,12 +8,12 @@ from ..addon.authoring import problems, sensor_report
 from . import support
 
 
-class PALPATE_OT_fix(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_fix(support.PalpateOperator, bpy.types.Operator):
     """Fix this problem of the active sensor"""
 
     bl_idname = "palpate.fix"
     bl_label = "Fix Sensor"
-    bl_options = {"REGISTER", "UNDO"}
+    needs = (*support.MESH, support.IS_SENSOR)
 
     kind: EnumProperty(
         name="Problem",
@@ -21,10 +21,6 @@ class PALPATE_OT_fix(support.ErrorReporting, bpy.types.Operator):
         items=[(kind, label, label) for kind, (label, _) in problems.FIXES.items()],
         options={"SKIP_SAVE"},
     )
-
-    @classmethod
-    def poll(cls, context):
-        return support.poll_mesh_object(cls, context) and support.poll_editable_sensor(cls, context)
 
     def run(self, context):
         support.leave_edit_mode(context)

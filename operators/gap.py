@@ -14,19 +14,15 @@ from . import modal_job, support
 from .fits import show_image
 
 
-class PALPATE_OT_measured_open(support.ErrorReporting, support.FileChooser, bpy.types.Operator):
+class PALPATE_OT_measured_open(support.PalpateOperator, support.FileChooser, bpy.types.Operator):
     """Choose measurements of the real sensor: a rig.toml with its CSV files. They are read and checked"""
 
     bl_idname = "palpate.measured_open"
     bl_label = "Open Rig…"
-    bl_options = {"REGISTER", "UNDO"}
+    needs = support.EDITABLE_SENSOR
 
     filename_ext = ".toml"
     filter_glob: StringProperty(default="*.toml", options={"HIDDEN"})
-
-    @classmethod
-    def poll(cls, context):
-        return support.poll_editable_sensor(cls, context)
 
     def run(self, context):
         from ..core.gap.dataset.rig import read_rig
@@ -39,14 +35,14 @@ class PALPATE_OT_measured_open(support.ErrorReporting, support.FileChooser, bpy.
         self.report({"INFO"}, f"'{rig.name}': {counted(len(rig.trials), 'trial')} on {counted(len(rig.texels), 'texel')}")
 
 
-class PALPATE_OT_measured_logs(support.ErrorReporting, support.FileChooser, bpy.types.Operator):
+class PALPATE_OT_measured_logs(support.PalpateOperator, support.FileChooser, bpy.types.Operator):
     """Make a rig from logs of the real sensor (CSV, NPZ, MAT; HDF5, MCAP and bags where their packages are installed) in the
     folder rig beside them, and show what was read. Rows, columns and pitch are those of the active sensor. What no log says is
     asked"""
 
     bl_idname = "palpate.measured_logs"
     bl_label = "Rig from Logs…"
-    bl_options = {"REGISTER", "UNDO"}
+    needs = support.EDITABLE_SENSOR
 
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})
     directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
@@ -54,17 +50,13 @@ class PALPATE_OT_measured_logs(support.ErrorReporting, support.FileChooser, bpy.
         name="Accept Proposals", description="Take what seems to be true as it is; what no log says is asked nevertheless"
     )
 
-    @classmethod
-    def poll(cls, context):
-        return support.poll_editable_sensor(cls, context)
-
     def run(self, context):
         names = [item.name for item in self.files if item.name]
         paths = [str(Path(self.directory) / name) for name in names] if names else [self.filepath]
         _make_rig(self, context, paths, self.accept, [])
 
 
-class PALPATE_OT_log_question(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_log_question(support.PalpateOperator, bpy.types.Operator):
     """Answer a question that the logs leave open, as in the brackets; an empty reply takes what is in them"""
 
     bl_idname = "palpate.log_question"
@@ -113,11 +105,8 @@ class PALPATE_OT_gap_find(modal_job.ModalJob, bpy.types.Operator):
     bl_idname = "palpate.gap_find"
     bl_label = "Find Gap"
     bl_options = {"REGISTER"}
+    needs = support.MEASURED_SENSOR
     stopped = "Stopped; earlier results are unchanged"
-
-    @classmethod
-    def poll(cls, context):
-        return support.poll_measured_sensor(cls, context) and cls.poll_not_running()
 
     def job(self, context):
         return gap_results.find(context.object)
@@ -132,7 +121,7 @@ class PALPATE_OT_gap_plan(modal_job.ModalJob, bpy.types.Operator):
 
     bl_idname = "palpate.gap_plan"
     bl_label = "Plan Experiment"
-    bl_options = {"REGISTER", "UNDO"}
+    needs = support.MEASURED_SENSOR
     stopped = "Stopped; no probe has changed"
 
     depth: FloatProperty(
@@ -148,10 +137,6 @@ class PALPATE_OT_gap_plan(modal_job.ModalJob, bpy.types.Operator):
     duration: FloatProperty(
         name="Duration (s)", description="Longest duration, s; 0: that of the longest recording", min=0.0, precision=1
     )
-
-    @classmethod
-    def poll(cls, context):
-        return support.poll_measured_sensor(cls, context) and cls.poll_not_running()
 
     def job(self, context):
         from ..core.gap.planning.experiment_plan import Wishes
@@ -171,16 +156,12 @@ class PALPATE_OT_gap_plan(modal_job.ModalJob, bpy.types.Operator):
         self.report({"INFO"}, planned_probe.sentence_of(sensor))
 
 
-class PALPATE_OT_gap_add(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_gap_add(support.PalpateOperator, bpy.types.Operator):
     """Replace the parameters and all effects of the sensor by the fitted ones"""
 
     bl_idname = "palpate.gap_add"
     bl_label = "Use Fitted Sensor"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context):
-        return support.poll_gap_found(cls, context)
+    needs = support.GAP_FOUND
 
     def run(self, context):
         count = gap_results.add_found(context.object)
@@ -189,33 +170,25 @@ class PALPATE_OT_gap_add(support.ErrorReporting, bpy.types.Operator):
         self.report({"WARNING"} if caution else {"INFO"}, f"{said}. {caution}" if caution else said)
 
 
-class PALPATE_OT_gap_curves(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_gap_curves(support.PalpateOperator, bpy.types.Operator):
     """Plot measurement and model, before and after"""
 
     bl_idname = "palpate.gap_curves"
     bl_label = "Before and After"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context):
-        return support.poll_gap_found(cls, context)
+    needs = support.GAP_FOUND
 
     def run(self, context):
         show_image(gap_results.of(context.object).pictures["curves"], "Palpate Gap Curves")
 
 
-class PALPATE_OT_gap_show(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_gap_show(support.PalpateOperator, bpy.types.Operator):
     """Colour the sensor by the error of its texels, and mark the phases of the first trial on the timeline"""
 
     bl_idname = "palpate.gap_show"
     bl_label = "Show on Sensor"
-    bl_options = {"REGISTER", "UNDO"}
+    needs = (*support.MESH, support.IS_SENSOR, support.IS_GAP_FOUND)
 
     amended: BoolProperty(name="Amended", description="With the effects found, on the same scale", options={"SKIP_SAVE"})
-
-    @classmethod
-    def poll(cls, context):
-        return support.poll_mesh_object(cls, context) and support.poll_gap_found(cls, context)
 
     def run(self, context):
         support.leave_edit_mode(context)
@@ -231,15 +204,12 @@ class PALPATE_OT_gap_report(modal_job.ModalJob, bpy.types.Operator):
     bl_idname = "palpate.gap_report"
     bl_label = "Write Report"
     bl_options = {"REGISTER"}
+    needs = support.GAP_FOUND
     stopped = "Stopped; an earlier report is unchanged"
 
     directory: StringProperty(
         name="Folder", description="Another folder, for scripts", subtype="DIR_PATH", options={"SKIP_SAVE"}
     )
-
-    @classmethod
-    def poll(cls, context):
-        return support.poll_gap_found(cls, context) and cls.poll_not_running()
 
     def job(self, context):
         from ..core.gap.report import summary

@@ -10,12 +10,12 @@ from ..addon.properties import object_properties
 from . import support
 
 
-class PALPATE_OT_pad_mesh_add(support.ErrorReporting, AddObjectHelper, bpy.types.Operator):
+class PALPATE_OT_pad_mesh_add(support.PalpateOperator, AddObjectHelper, bpy.types.Operator):
     """Add a pad of texels in rows and columns, flat or bent to a radius, as a sensor"""
 
     bl_idname = "palpate.pad_mesh_add"
     bl_label = "Tactile Pad"
-    bl_options = {"REGISTER", "UNDO"}
+    needs = (support.Condition(lambda context: context.mode == "OBJECT", "Switch to Object Mode first"),)
 
     rows: IntProperty(name="Rows", description="Texels along +Y", default=14, min=2, soft_max=128)
     columns: IntProperty(name="Columns", description="Texels along +X", default=6, min=2, soft_max=128)
@@ -33,13 +33,6 @@ class PALPATE_OT_pad_mesh_add(support.ErrorReporting, AddObjectHelper, bpy.types
     )
     make_sensor: BoolProperty(name="Make Sensor", description="Give it the role Sensor", default=True)
 
-    @classmethod
-    def poll(cls, context):
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Switch to Object Mode first")
-            return False
-        return True
-
     def run(self, context):
         mesh = laid_sensors.pad_mesh(context, self.rows, self.columns, (self.pitch_x, self.pitch_y), self.radius)
         obj = object_data_add(context, mesh, operator=self)
@@ -55,12 +48,12 @@ class PALPATE_OT_pad_mesh_add(support.ErrorReporting, AddObjectHelper, bpy.types
             column.prop(self, name)
 
 
-class PALPATE_OT_skin_add(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_skin_add(support.PalpateOperator, bpy.types.Operator):
     """Lay texels onto the surface of the active mesh: a sensor of its own that is fixed to it; an object can carry several"""
 
     bl_idname = "palpate.skin_add"
     bl_label = "Lay Texels"
-    bl_options = {"REGISTER", "UNDO"}
+    needs = support.MESH
 
     source: EnumProperty(
         name="Region",
@@ -112,10 +105,6 @@ class PALPATE_OT_skin_add(support.ErrorReporting, bpy.types.Operator):
         step=0.01,
     )
 
-    @classmethod
-    def poll(cls, context):
-        return support.poll_mesh_object(cls, context)
-
     def run(self, context):
         carrier = context.object
         source = self._source(carrier)
@@ -146,21 +135,17 @@ class PALPATE_OT_skin_add(support.ErrorReporting, bpy.types.Operator):
             column.prop(self, name)
 
 
-class PALPATE_OT_skin_update(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_skin_update(support.PalpateOperator, bpy.types.Operator):
     """Lay the texels of this sensor again onto the current surface; painted groups and attributes are kept"""
 
     bl_idname = "palpate.skin_update"
     bl_label = "Lay Again"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context):
-        if not support.poll_mesh_object(cls, context):
-            return False
-        if not laid_sensors.is_laid(context.object):
-            cls.poll_message_set(f"'{context.object.name}' was not laid onto a surface: use Lay Texels first")
-            return False
-        return True
+    needs = (
+        *support.MESH,
+        support.Condition(
+            lambda context: laid_sensors.is_laid(context.object), "'{name}' was not laid onto a surface: use Lay Texels first"
+        ),
+    )
 
     def run(self, context):
         support.leave_edit_mode(context)
@@ -168,7 +153,7 @@ class PALPATE_OT_skin_update(support.ErrorReporting, bpy.types.Operator):
         self.report({"INFO"}, f"'{context.object.name}' has {count} texels")
 
 
-class PALPATE_OT_object_activate(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_object_activate(support.PalpateOperator, bpy.types.Operator):
     """Go to this object: make it the active one"""
 
     bl_idname = "palpate.object_activate"

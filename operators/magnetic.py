@@ -9,27 +9,24 @@ from ..core.skins.skin_presets import PRESETS
 from . import support
 
 
-class PALPATE_OT_magnetic_skin_place(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_magnetic_skin_place(support.PalpateOperator, bpy.types.Operator):
     """Place the magnets and magnetometers of a skin as it is built below the texels, as empties that you may move"""
 
     bl_idname = "palpate.magnetic_skin_place"
     bl_label = "Place Magnetic Skin"
-    bl_options = {"REGISTER", "UNDO"}
+    needs = (
+        *support.EDITABLE_SENSOR,
+        support.Condition(
+            lambda context: context.object.palpate.role == "SENSOR",
+            "'{name}' is a pad, which is not read out: change its role to Sensor first",
+        ),
+    )
 
     preset: EnumProperty(
         name="Skin",
         description="Which magnets and magnetometers",
         items=tuple((name, name, one.text) for name, one in PRESETS.items()),
     )
-
-    @classmethod
-    def poll(cls, context):
-        if not support.poll_editable_sensor(cls, context):
-            return False
-        if context.object.palpate.role != "SENSOR":
-            cls.poll_message_set(f"'{context.object.name}' is a pad, which is not read out: change its role to Sensor first")
-            return False
-        return True
 
     def run(self, context):
         obj = context.object

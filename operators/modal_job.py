@@ -10,7 +10,7 @@ from ..core.jobs import SlicedJob, run_job
 from . import support
 
 
-class ModalJob(support.ErrorReporting):
+class ModalJob(support.PalpateOperator):
     """Mixin for an operator that runs a job.
 
     The operator defines `job(context)`, which returns the :class:`.Job`, and `done(result)`, which reports its result.
@@ -20,12 +20,11 @@ class ModalJob(support.ErrorReporting):
     stopped = "Stopped"
 
     @classmethod
-    def poll_not_running(cls) -> bool:
-        """Poll: this operator is not running already, so that its button is grey meanwhile."""
-        is_running = cls.__name__ in session_state.session.jobs
-        if is_running:
+    def poll(cls, context):
+        if cls.__name__ in session_state.session.jobs:
             cls.poll_message_set("It is running; ESC stops it")
-        return not is_running
+            return False
+        return super().poll(context)
 
     def invoke(self, context, _event):
         if bpy.app.background:

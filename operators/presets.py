@@ -46,19 +46,15 @@ def _draw_files(layout) -> None:
     layout.operator("palpate.sensor_toml_export", text="Save as TOML…", icon="EXPORT")
 
 
-class PALPATE_OT_preset_load(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_preset_load(support.PalpateOperator, bpy.types.Operator):
     """Give the active sensor the values of this preset"""
 
     # Blender's own script.execute_preset cannot be undone.
     bl_idname = "palpate.preset_load"
     bl_label = "Load Sensor Preset"
-    bl_options = {"REGISTER", "UNDO"}
+    needs = support.EDITABLE_SENSOR
 
     filepath: StringProperty(subtype="FILE_PATH", options={"HIDDEN", "SKIP_SAVE"})
-
-    @classmethod
-    def poll(cls, context):
-        return support.poll_editable_sensor(cls, context)
 
     def run(self, context):
         path = Path(self.filepath)
@@ -72,19 +68,16 @@ class PALPATE_OT_preset_load(support.ErrorReporting, bpy.types.Operator):
         self.report({"INFO"}, f"'{context.object.name}' has the values of '{bpy.path.display_name(path.name)}'")
 
 
-class PALPATE_OT_preset_add(AddPresetBase, bpy.types.Operator):
+class PALPATE_OT_preset_add(support.Conditions, AddPresetBase, bpy.types.Operator):
     """Save the parameters of the active sensor as a preset, or remove one"""
 
     bl_idname = "palpate.preset_add"
     bl_label = "Add Sensor Preset"
+    needs = support.EDITABLE_SENSOR
     preset_menu = "PALPATE_MT_presets"
     preset_defines = ["settings = bpy.context.object.palpate"]
     preset_values = [f"settings.{name}" for name in laid_sensors.COPIED]
     preset_subdir = SUBDIR
-
-    @classmethod
-    def poll(cls, context):
-        return support.poll_editable_sensor(cls, context)
 
     def execute(self, context):
         if self.remove_name or self.remove_active:
@@ -95,21 +88,26 @@ class PALPATE_OT_preset_add(AddPresetBase, bpy.types.Operator):
         return super().execute(context)
 
 
-class PALPATE_OT_parameters_copy(support.ErrorReporting, bpy.types.Operator):
+def _others(context) -> list:
+    return [
+        obj
+        for obj in context.selected_objects
+        if obj != context.object and obj.palpate.role in {"SENSOR", "PAD"} and obj.is_editable
+    ]
+
+
+class PALPATE_OT_parameters_copy(support.PalpateOperator, bpy.types.Operator):
     """Give the other selected sensors and pads the parameters and effects of the active one; regions stay"""
 
     bl_idname = "palpate.parameters_copy"
     bl_label = "Copy to Selected"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context):
-        if not support.poll_editable_sensor(cls, context):
-            return False
-        if not _others(context):
-            cls.poll_message_set("No other sensor or pad is selected: select them, and the one to copy from last")
-            return False
-        return True
+    needs = (
+        *support.EDITABLE_SENSOR,
+        support.Condition(
+            lambda context: bool(_others(context)),
+            "No other sensor or pad is selected: select them, and the one to copy from last",
+        ),
+    )
 
     def run(self, context):
         support.leave_edit_mode(context)
@@ -117,14 +115,6 @@ class PALPATE_OT_parameters_copy(support.ErrorReporting, bpy.types.Operator):
         for obj in others:
             laid_sensors.copy_parameters(context.object, obj)
         self.report({"INFO"}, f"Copied the parameters of '{context.object.name}' to {counted(len(others), 'other')}")
-
-
-def _others(context) -> list:
-    return [
-        obj
-        for obj in context.selected_objects
-        if obj != context.object and obj.palpate.role in {"SENSOR", "PAD"} and obj.is_editable
-    ]
 
 
 CLASSES = (

@@ -8,12 +8,12 @@ from ..addon.authoring import probes, sensors
 from . import support
 
 
-class PALPATE_OT_probe_add(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_probe_add(support.PalpateOperator, bpy.types.Operator):
     """Add an object that presses on the middle of the active sensor, holds and retracts within the scene's frame range"""
 
     bl_idname = "palpate.probe_add"
     bl_label = "Add Probe"
-    bl_options = {"REGISTER", "UNDO"}
+    needs = support.SENSOR
 
     shape: EnumProperty(
         name="Shape",
@@ -38,10 +38,6 @@ class PALPATE_OT_probe_add(support.ErrorReporting, bpy.types.Operator):
         precision=5,
         step=0.01,
     )
-
-    @classmethod
-    def poll(cls, context):
-        return support.poll_sensor(cls, context)
 
     def run(self, context):
         support.leave_edit_mode(context)

@@ -10,12 +10,12 @@ from ..addon.scene import sensor_regions
 from . import support
 
 
-class PALPATE_OT_sensor_add(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_sensor_add(support.PalpateOperator, bpy.types.Operator):
     """Make the active mesh a tactile sensor: each vertex of the region becomes a texel"""
 
     bl_idname = "palpate.sensor_add"
     bl_label = "Make Sensor"
-    bl_options = {"REGISTER", "UNDO"}
+    needs = support.MESH
 
     source: EnumProperty(
         name="Region",
@@ -39,10 +39,6 @@ class PALPATE_OT_sensor_add(support.ErrorReporting, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
-    @classmethod
-    def poll(cls, context):
-        return support.poll_mesh_object(cls, context)
-
     def run(self, context):
         obj = context.object
         source = sensors.automatic_source(obj, obj.mode) if self.source == "AUTO" else self.source
@@ -53,12 +49,12 @@ class PALPATE_OT_sensor_add(support.ErrorReporting, bpy.types.Operator):
         self.report({"INFO"}, f"{text}. {note}" if note else text)
 
 
-class PALPATE_OT_role_set(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_role_set(support.PalpateOperator, bpy.types.Operator):
     """Set the role of the selected objects"""
 
     bl_idname = "palpate.role_set"
     bl_label = "Set Role"
-    bl_options = {"REGISTER", "UNDO"}
+    needs = support.SURFACE
 
     role: EnumProperty(
         name="Role",
@@ -80,10 +76,6 @@ class PALPATE_OT_role_set(support.ErrorReporting, bpy.types.Operator):
             "SENSOR": "Make the active object a sensor again, on the region it has",
         }[properties.role]
 
-    @classmethod
-    def poll(cls, context):
-        return support.poll_surface_object(cls, context)
-
     def run(self, context):
         support.leave_edit_mode(context)
         chosen = [context.object]
@@ -95,37 +87,24 @@ class PALPATE_OT_role_set(support.ErrorReporting, bpy.types.Operator):
             obj.palpate.role = self.role
 
 
-class PALPATE_OT_sensor_remove(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_sensor_remove(support.PalpateOperator, bpy.types.Operator):
     """Remove the active object from the simulation, with its heat map, arrow and baked keyframes; vertex groups stay"""
 
     bl_idname = "palpate.sensor_remove"
     bl_label = "Remove Role"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context):
-        if not support.poll_surface_object(cls, context):
-            return False
-        if context.object.palpate.role == "NONE":
-            cls.poll_message_set(f"'{context.object.name}' has no role")
-            return False
-        return True
+    needs = (*support.SURFACE, support.Condition(lambda context: context.object.palpate.role != "NONE", "'{name}' has no role"))
 
     def run(self, context):
         support.leave_edit_mode(context)
         sensors.remove_role(context.scene, context.object)
 
 
-class PALPATE_OT_weight_paint(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_weight_paint(support.PalpateOperator, bpy.types.Operator):
     """Paint the region of a sensor, with a brush of full weight. Vertices painted at or above the threshold become texels"""
 
     bl_idname = "palpate.weight_paint"
     bl_label = "Paint Region"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context):
-        return support.poll_mesh_object(cls, context)
+    needs = support.MESH
 
     def run(self, context):
         support.leave_edit_mode(context)
@@ -147,18 +126,14 @@ def _face_sets(_operator, context):
 _items: list = []
 
 
-class PALPATE_OT_face_set_choose(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_face_set_choose(support.PalpateOperator, bpy.types.Operator):
     """Choose the face set that is the sensor"""
 
     bl_idname = "palpate.face_set_choose"
     bl_label = "Choose Face Set"
-    bl_options = {"REGISTER", "UNDO"}
+    needs = (*support.MESH, support.IS_SENSOR)
 
     face_set: EnumProperty(name="Face Set", description="Face set that is the sensor", items=_face_sets)
-
-    @classmethod
-    def poll(cls, context):
-        return support.poll_mesh_object(cls, context) and support.poll_editable_sensor(cls, context)
 
     def run(self, context):
         settings = context.object.palpate

@@ -16,19 +16,17 @@ def _format_items(_self, _context):
     return _format_items.kept  # Blender does not keep the texts itself
 
 
-class PALPATE_OT_sensor_export(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_sensor_export(support.PalpateOperator, bpy.types.Operator):
     """Write the selected sensors, or all of the scene when none is selected, into a folder, for another simulator"""
 
     bl_idname = "palpate.sensor_export"
     bl_label = "Export Sensors"
+    bl_options = set()
+    needs = (support.ANY_SENSOR,)
 
     to: EnumProperty(name="Format", description="Simulator or format to write for", items=_format_items)
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE"})
     filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
-
-    @classmethod
-    def poll(cls, context):
-        return support.poll_any_sensor(cls, context)
 
     def invoke(self, context, _event):
         context.window_manager.fileselect_add(self)
@@ -46,19 +44,15 @@ class PALPATE_OT_sensor_export(support.ErrorReporting, bpy.types.Operator):
         self.report({"INFO"}, f"Wrote {files} to '{self.directory}'")
 
 
-class PALPATE_OT_sensor_import(support.ErrorReporting, support.FileChooser, bpy.types.Operator):
+class PALPATE_OT_sensor_import(support.PalpateOperator, support.FileChooser, bpy.types.Operator):
     """Read sensors of MuJoCo's MJCF, a URDF, a probe list, OpenRAVE's XML or a .blend of GenTact into the scene"""
 
     bl_idname = "palpate.sensor_import"
     bl_label = "Import Sensor"
-    bl_options = {"REGISTER", "UNDO"}
+    needs = (support.SCENE,)
 
     filename_ext = ".xml"
     filter_glob: StringProperty(default="*.xml;*.mjcf;*.urdf;*.json;*.blend", options={"HIDDEN"})
-
-    @classmethod
-    def poll(cls, context):
-        return support.poll_scene(cls, context)
 
     def run(self, context):
         support.leave_edit_mode(context)

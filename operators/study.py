@@ -10,20 +10,16 @@ from bpy.props import IntProperty, StringProperty
 from . import modal_job, support
 
 
-class PALPATE_OT_study_vary(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_study_vary(support.PalpateOperator, bpy.types.Operator):
     """Vary this property in the study of the scene: it gets a range in the panel Study"""
 
     bl_idname = "palpate.study_vary"
     bl_label = "Vary in Study"
-    bl_options = {"REGISTER", "UNDO"}
+    needs = (support.NO_STUDY, support.SCENE)
 
     path: StringProperty(
         name="Path", description="Path of the property, as Copy Full Data Path gives it", options={"SKIP_SAVE"}
     )
-
-    @classmethod
-    def poll(cls, context):
-        return support.poll_study(cls, context)
 
     def invoke(self, context, _event):
         if self.path:
@@ -37,38 +33,33 @@ class PALPATE_OT_study_vary(support.ErrorReporting, bpy.types.Operator):
         self.report({"INFO"}, f"{', '.join(names)} {'varies' if len(names) == 1 else 'vary'} in the study")
 
 
-class PALPATE_OT_study_remove(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_study_remove(support.PalpateOperator, bpy.types.Operator):
     """Remove this from the study; the scene does not change"""
 
     bl_idname = "palpate.study_remove"
     bl_label = "Remove from Study"
-    bl_options = {"REGISTER", "UNDO"}
+    needs = (
+        support.NO_STUDY,
+        support.SCENE,
+        support.Condition(
+            lambda context: bool(context.scene.palpate.study.variables),
+            "Nothing varies yet: right-click on a number and choose Vary in Study",
+        ),
+    )
 
     index: IntProperty(name="Number", description="Index among the varied properties, from zero", min=0, options={"SKIP_SAVE"})
-
-    @classmethod
-    def poll(cls, context):
-        if not support.poll_study(cls, context):
-            return False
-        if not context.scene.palpate.study.variables:
-            cls.poll_message_set("Nothing varies yet: right-click on a number and choose Vary in Study")
-            return False
-        return True
 
     def run(self, context):
         context.scene.palpate.study.variables.remove(self.index)
 
 
-class PALPATE_OT_study_write(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_study_write(support.PalpateOperator, bpy.types.Operator):
     """Write the file of the study, for the command palpate sweep on this machine or another"""
 
     bl_idname = "palpate.study_write"
     bl_label = "Write Study"
     bl_options = {"REGISTER"}
-
-    @classmethod
-    def poll(cls, context):
-        return support.poll_study(cls, context)
+    needs = (support.NO_STUDY, support.SCENE)
 
     def run(self, context):
         from ..addon.study import study_settings
@@ -83,11 +74,8 @@ class PALPATE_OT_study_run(modal_job.ModalJob, bpy.types.Operator):
     bl_idname = "palpate.study_run"
     bl_label = "Run Study"
     bl_options = {"REGISTER"}
+    needs = (support.NO_STUDY, support.SCENE)
     stopped = "Study stopped; finished runs are kept, and Run Study continues"
-
-    @classmethod
-    def poll(cls, context):
-        return support.poll_study(cls, context)
 
     def job(self, context):
         from ..addon.study import study_process, study_settings
@@ -105,16 +93,13 @@ class PALPATE_OT_study_run(modal_job.ModalJob, bpy.types.Operator):
         self.report({"INFO"}, result)
 
 
-class PALPATE_OT_study_report(support.ErrorReporting, bpy.types.Operator):
+class PALPATE_OT_study_report(support.PalpateOperator, bpy.types.Operator):
     """Open the report of the study in a browser: metrics over the varied parameters, the strongest dependencies, failures"""
 
     bl_idname = "palpate.study_report"
     bl_label = "Open Report"
     bl_options = {"REGISTER"}
-
-    @classmethod
-    def poll(cls, context):
-        return support.poll_scene(cls, context)
+    needs = (support.SCENE,)
 
     def run(self, context):
         from ..addon.study import study_process, study_settings

@@ -4,8 +4,8 @@
 from ..addon.display import baked_scene
 from ..addon.properties import scene_properties
 from ..addon.properties.scene_units import name_in_units
-from ..addon.session import frame_status, session_state
-from .subpanels import Subpanel, draw_choices, draw_job, draw_named, draw_progress, draw_sentences
+from ..addon.session import frame_status
+from .subpanels import Subpanel, draw_choices, draw_job, draw_named, draw_progress, draw_sentences, job_progress
 
 
 class Bake(Subpanel):
@@ -25,7 +25,7 @@ class Bake(Subpanel):
         if not own.use_auto_dt:
             column.prop(own, "dt")
         layout.prop(own, "use_live")
-        progress = session_state.session.bake_progress
+        progress = job_progress("palpate.bake")
         if progress is not None:
             text = "Compiling the solver" if progress.frame is None else progress.text
             draw_progress(layout, text, progress.share)

@@ -2,8 +2,7 @@
 """Panel of a scene's study: what varies, over what, and the button that computes it."""
 
 from ..addon.properties.scene_properties import WORDS
-from ..addon.session import session_state
-from .subpanels import Subpanel, draw_named, draw_progress, draw_sentences
+from .subpanels import Subpanel, draw_named, draw_progress, draw_sentences, job_progress
 
 HINT = "Right-click on a number and choose Vary in Study."
 
@@ -36,7 +35,7 @@ class Study(Subpanel):
             layout.prop(own, "run_memory")
         layout.prop(own, "workers")
         layout.prop(own, "file", text="")
-        progress = session_state.session.study_progress
+        progress = job_progress("palpate.study_run")
         if progress is not None:
             draw_progress(layout, progress.text, progress.share)
             return

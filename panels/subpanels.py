@@ -67,10 +67,15 @@ def draw_named(layout, settings, key: str, text: str = "") -> None:
     split.prop(settings, key, text="")
 
 
+def job_progress(operator: str):
+    """Return how far an operator that works beside the window has come; None while it does not work."""
+    module, name = operator.split(".")
+    return session_state.session.jobs.get(f"{module.upper()}_OT_{name}")
+
+
 def draw_job(layout, operator: str, **how) -> None:
     """Draw the button of an operator that works beside the window; while it works, how far it has come."""
-    module, name = operator.split(".")
-    progress = session_state.session.jobs.get(f"{module.upper()}_OT_{name}")
+    progress = job_progress(operator)
     if progress is None:
         layout.operator(operator, **how)
     else:

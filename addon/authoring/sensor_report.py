@@ -114,7 +114,7 @@ def _work() -> float | None:
     manager = bpy.context.window_manager
     playing = any(window.screen.is_animation_playing for window in manager.windows)
     wanted = _requested.difference(_reports) if playing else set(_requested)
-    if session_state.is_baking() or not wanted:
+    if session_state.session.suspension_depth or not wanted:
         return DELAY if _requested else None
     scene, start = bpy.context.scene, time.perf_counter()
     for obj in scene.objects:

@@ -71,13 +71,14 @@ def bake(scene, into_scene: bool = True, images: bool = True, blend: bake_files.
     if into_scene and not images:
         raise ValueError("a scene shows a bake by its images")
     name = scene.name
-    with session_state.suspended(), _Steps(scene) as steps:
+    steps = _Steps(scene)
+    with session_state.suspended():
         folder = bake_files.writable_bake_folder(scene)
         reading = yield from part_of_job(scene_reader.read_scene(scene), steps.reading)
         scenario = reading.scenario
         if into_scene:
             _scene_writer().check_writable(scene, reading)
-        yield from part_of_job(first_use.wait(scenario), steps.shown)
+        yield from first_use.wait(scenario)
         bake_files.check_space(folder, scenario, images)
         simulation = first_use.load_solver().Simulation(scenario)
         owner = _owner(scene, into_scene, blend)
@@ -132,8 +133,7 @@ def show_bake(scene, found: Bake) -> Job[None]:
             if name not in found.manifests:
                 obj.palpate.role = "PAD"
         scene.frame_start, scene.frame_end = (int(found.recording.frames[end]) for end in (0, -1))
-        with _Steps(scene) as steps:
-            reading = yield from part_of_job(scene_reader.read_scene(scene), steps.reading)
+        reading = yield from part_of_job(scene_reader.read_scene(scene), _Steps(scene).reading)
         if reading.scenario.digest() != manifest.digest:
             raise SceneError(
                 f"The bake in '{place}' is not of '{scene.name}' as it is now: something that forces depend on has "
@@ -144,30 +144,19 @@ def show_bake(scene, found: Bake) -> Job[None]:
 
 
 class _Steps:
-    """Progress of a bake, which reads every frame and then solves it; the panel shows the last step until the bake ends."""
+    """Progress of a bake, which reads every frame and then solves it."""
 
     def __init__(self, scene):
         self._first, self._total = scene.frame_start, 2 * max(1, scene.frame_end - scene.frame_start + 1)
 
-    def __enter__(self) -> _Steps:
-        return self
-
-    def __exit__(self, *_) -> None:
-        session_state.session.bake_progress = None
-
-    def shown(self, progress: Progress) -> Progress:
-        """Show progress in the panel, and return it."""
-        session_state.session.bake_progress = progress
-        return progress
-
     def reading(self, progress: Progress) -> Progress:
         """Return how far the bake is, from how far the reading of its scene is."""
-        return self.shown(replace(progress, stage="Reading the scene", total=self._total))
+        return replace(progress, stage="Reading the scene", total=self._total)
 
     def solved(self, frame: Frame) -> Progress:
         """Return how far the bake is when a frame is solved."""
         done = self._total // 2 + frame.frame - self._first + 1
-        return self.shown(Progress("Computing forces", done, self._total, frame.frame))
+        return Progress("Computing forces", done, self._total, frame.frame)
 
 
 def _scene_writer():

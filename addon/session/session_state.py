@@ -28,7 +28,7 @@ class Session:
     object_counts: dict[int, int] = field(default_factory=dict)
     """By scene: whether any object participates, and the number of objects when this was found out."""
     suspension_depth: int = 0
-    """Above zero while a bake reads the scene: the timeline must not simulate then."""
+    """Above zero while a bake or another reader of the scene runs: the timeline must not simulate then."""
     rendering: bool = False
     rendered_from: tuple[int, float] = (0, 0.0)
     """The frame at which the scene stood when the render began."""
@@ -36,10 +36,6 @@ class Session:
     """Parts that the present or last render lacks, in one sentence; empty where nothing is missing."""
     catching_up: bool = False
     """True while the frames that a jump on the timeline left out are computed."""
-    bake_progress: object = None
-    """The last Progress of the running bake, for the panel; None when no bake runs."""
-    study_progress: object = None
-    """The last Progress of the running study, for the panel; None when no study runs."""
     jobs: dict[str, object] = field(default_factory=dict)
     """By the class of an operator that works beside the window: its last Progress, for the panel."""
     unreadable_settings: dict[str, str] = field(default_factory=dict)
@@ -61,11 +57,6 @@ def settings_changed(_settings=None, _context=None) -> None:
         notify()
 
 
-def is_baking() -> bool:
-    """Return True while a bake runs."""
-    return session.bake_progress is not None
-
-
 def participants_changed() -> None:
     """Note that an object may have got or lost its role."""
     session.participants_known = False
@@ -78,9 +69,8 @@ def suspended() -> Iterator[None]:
     try:
         yield
     finally:
-        session.suspension_depth = max(
-            0, session.suspension_depth - 1
-        )  # it is already zero when another file was opened meanwhile
+        # It is already zero when another file was opened meanwhile.
+        session.suspension_depth = max(0, session.suspension_depth - 1)
 
 
 def reset() -> None:

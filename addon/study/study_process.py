@@ -21,7 +21,6 @@ from ...core.io.input_files import read_toml
 from ...core.jobs import Job, Progress
 from ...core.study.study_file import FROZEN, STUDY_NAME, counted_runs
 from ..properties.scene_properties import command_in_preferences
-from ..session import session_state
 
 LOOK = 0.5
 """Seconds between two looks at the folder of a study."""
@@ -82,11 +81,9 @@ def run_study(file: Path, workers: int = 0) -> Job[str]:
         process = _started(command, said, errors)
         try:
             while process.poll() is None:
-                session_state.session.study_progress = _progress(folder)
-                yield session_state.session.study_progress
+                yield _progress(folder)
                 time.sleep(0.01)  # a slice of a job lasts some of these
         finally:
-            session_state.session.study_progress = None
             _stop(process)
         return _outcome(process.returncode, _text(said), _text(errors))
 

@@ -118,7 +118,8 @@ def solver_is_ready() -> None:
     """Compute the frames that had to wait for the solver; a scene that plays starts again."""
     waiting = set(_waiting)
     _waiting.clear()
-    if session_state.is_baking() or session_state.session.catching_up:
+    session = session_state.session
+    if session.suspension_depth or session.catching_up:
         return
     for window in bpy.context.window_manager.windows:
         scene = window.scene
@@ -191,7 +192,7 @@ def _compute_opened_file() -> None:
 def offer_to_compute() -> None:
     """Timer after a jump or a change: compute the missing frames with progress. The handler itself must return at once."""
     scene = bpy.context.scene
-    if scene is not None and not session_state.is_baking() and not session_state.session.catching_up and missing_frames(scene):
+    if scene is not None and not session_state.session.catching_up and missing_frames(scene):
         bpy.ops.palpate.catch_up("INVOKE_DEFAULT", by_itself=True)
 
 

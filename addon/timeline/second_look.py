@@ -112,7 +112,7 @@ def look_again(scene) -> None:
     quick, else with progress once nothing changes any more.
     """
     session = session_state.session
-    if session.suspension_depth or session.rendering or session.catching_up or session_state.is_baking():
+    if session.suspension_depth or session.rendering or session.catching_up:
         return
     if not playback.has_participants(scene):
         return

@@ -66,7 +66,7 @@ def test_progress_reaches_its_end(tmp_path):
     seen = []
     run_job(bake(scene), seen.append)
     assert [step.done for step in seen] == list(range(1, 9)) and {step.total for step in seen} == {8}
-    assert not session_state.is_baking()
+    assert not session_state.session.suspension_depth
 
 
 @pytest.mark.parametrize("mode", ["XYZ", "ZXY", "QUATERNION", "AXIS_ANGLE"])
@@ -214,7 +214,7 @@ def test_a_stopped_bake_leaves_the_old_one(tmp_path):
         assert [path.name for path in (tmp_path / "palpate-bake" / PRIVATE_FOLDER).iterdir()] == [LOCK_NAME]
         assert contents(tmp_path / "palpate-bake") == files
         assert [line for line in changes(before, dump()) if not line.startswith("Pad: settings")] == []
-        assert not session_state.is_baking()
+        assert not session_state.session.suspension_depth
 
 
 @pytest.mark.parametrize("what", ["project", "manifest", ".palpate", "link"])

@@ -23,7 +23,7 @@ def varied():
 
 
 def progress():
-    return palpate("addon.session.session_state").session.study_progress
+    return palpate("addon.session.session_state").session.jobs.get("PALPATE_OT_study_run")
 
 
 def vary(ui, name):
