@@ -21,7 +21,6 @@ VALID_COLOR, FAULTY_COLOR, NORMAL_COLOR, REACH_COLOR = (
 )
 DISC_SIDES = 8
 MAX_LABELS = 600
-_handles: list = []
 
 
 @dataclass
@@ -99,7 +98,7 @@ def _current(report) -> Drawing:
     return _drawing
 
 
-def _draw() -> None:
+def draw() -> None:
     """Draw in a 3D view, after the scene's own geometry."""
     found = _present()
     if found is None:
@@ -163,7 +162,7 @@ def _lines(drawing: Drawing, name: str, color) -> None:
     drawing.batches[name].draw(shader)
 
 
-def _draw_numbers() -> None:
+def draw_numbers() -> None:
     """Draw the labels in a 3D view, in pixels, after everything else."""
     found = _present()
     if found is None or not found[1].show_numbers:
@@ -192,14 +191,7 @@ def _draw_numbers() -> None:
     blf.disable(0, blf.SHADOW)
 
 
-def register() -> None:
-    if not bpy.app.background:
-        for function, when in ((_draw, "POST_VIEW"), (_draw_numbers, "POST_PIXEL")):
-            _handles.append(bpy.types.SpaceView3D.draw_handler_add(function, (), "WINDOW", when))
-
-
-def unregister() -> None:
+def clear() -> None:
+    """Forget what was drawn last."""
     global _drawing
     _drawing = None
-    while _handles:
-        bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")

@@ -44,20 +44,20 @@ def apply(sensor: BakedSensor, image, scale: Scale) -> None:
         attribute = materials.attribute_of(scale.quantity)
         group = materials.empty_node_group(uid, obj.name)
         add = materials.NodeAdder(group)
-        start = add("NodeGroupInput").outputs[0]
+        start = add("NodeGroupInput")
         if uv is not None:
             pictures = _pictures(sensor, scale)
             column, _ = _table_attributes(uid)
             played_table.store_vectors(mesh, column, texels.vertex, np.column_stack([uv, np.zeros(len(uv))]))
-            value = pictures.place(add, played_table.attribute(add, column))
+            value = pictures.place(add, add.attribute(column))
             image, mapping = pictures.image, materials.ImageMapping(attribute)
         elif is_in_image:
             _store_texel_uv(mesh, texels)
             value, image = materials.image_values(add, image, frames), None
         else:
             value, image = _table(sensor, scale).lookup(add), None
-        shown = played_table.stored(add, start, attribute, value, "FLOAT" if image is None else "FLOAT_VECTOR")
-        group.links.new(shown, add("NodeGroupOutput").inputs[0])
+        shown = add.stored(start, attribute, value, "FLOAT" if image is None else "FLOAT_VECTOR")
+        add.end("NodeGroupOutput", {0: shown})
         modifier = obj.modifiers.new(HEAT_MAP_MODIFIER, "NODES")
         modifier.node_group = group
         obj.modifiers.move(len(obj.modifiers) - 1, 0)  # before modifiers that would change the vertices

@@ -24,7 +24,7 @@ from ..scene.stored_names import INDENTATION_MODIFIER, MODIFIERS, REST_POSITION
 from ..session import transforms
 from . import materials, played_table
 from .baked_sensor import BakedSensor
-from .played_table import PlayedTable, attribute, out, stored
+from .played_table import PlayedTable
 
 MARK = "indentation"
 """What follows the sensor's identity in the marks of the image and the node group."""
@@ -163,14 +163,14 @@ def _nodes(uid: str, name: str, play: PlayedTable, levels: int, factor: float):
     """Return geometry nodes that look up each texel's depth, spread it smoothly over finer faces, and move them inwards."""
     group = materials.empty_node_group(f"{uid}:{MARK}", f"{name} indentation")
     add, names, depth_name = materials.NodeAdder(group), _Names(uid), f"palpate_depth:{uid}"
-    rest = stored(add, add("NodeGroupInput").outputs[0], REST_POSITION, out(add, "GeometryNodeInputPosition"), "FLOAT_VECTOR")
-    coarse = stored(add, rest, depth_name, play.lookup(add), "FLOAT")
-    fine, depth = _subdivided(add, coarse, attribute(add, depth_name, "FLOAT"), levels)
+    rest = add.stored(add("NodeGroupInput"), REST_POSITION, add("GeometryNodeInputPosition"), "FLOAT_VECTOR")
+    coarse = add.stored(rest, depth_name, play.lookup(add), "FLOAT")
+    fine, depth = _subdivided(add, coarse, add.attribute(depth_name, "FLOAT"), levels)
     depth = _math(add, "MAXIMUM", depth, 0.0)
-    inward = out(add, "ShaderNodeVectorMath", {0: attribute(add, names.inward), "Scale": depth}, operation="SCALE")
-    moved = out(add, "ShaderNodeVectorMath", {0: inward, "Scale": factor}, operation="SCALE", label=FACTOR_LABEL)
-    move = out(add, "GeometryNodeSetPosition", {"Geometry": fine, "Offset": moved})
-    group.links.new(move, add("NodeGroupOutput").inputs[0])
+    inward = add("ShaderNodeVectorMath", {0: add.attribute(names.inward), "Scale": depth}, operation="SCALE")
+    moved = add("ShaderNodeVectorMath", {0: inward, "Scale": factor}, operation="SCALE", label=FACTOR_LABEL)
+    move = add("GeometryNodeSetPosition", {"Geometry": fine, "Offset": moved})
+    add.end("NodeGroupOutput", {0: move})
     return group
 
 
@@ -182,22 +182,22 @@ def _subdivided(add, geometry, values, levels: int):
     """
     if not levels:
         return geometry, values
-    is_large = _math(add, "GREATER_THAN", out(add, "GeometryNodeInputMeshFaceNeighbors"), float(MOST_CORNERS))
-    geometry = out(add, "GeometryNodeTriangulate", {"Mesh": geometry, "Selection": is_large})
+    is_large = _math(add, "GREATER_THAN", add("GeometryNodeInputMeshFaceNeighbors"), float(MOST_CORNERS))
+    geometry = add("GeometryNodeTriangulate", {"Mesh": geometry, "Selection": is_large})
     sharp = values
     for _ in range(SHARPENINGS):
         blurred = {"Value": sharp, "Iterations": 1, "Weight": NEIGHBOUR_WEIGHT}
-        lost = _math(add, "SUBTRACT", values, out(add, "GeometryNodeBlurAttribute", blurred, data_type="FLOAT"))
+        lost = _math(add, "SUBTRACT", values, add("GeometryNodeBlurAttribute", blurred, data_type="FLOAT"))
         sharp = _math(add, "ADD", sharp, lost)
-    place = out(add, "ShaderNodeCombineXYZ", {"X": sharp})
-    graph = out(add, "GeometryNodeSetPosition", {"Geometry": geometry, "Position": place})
-    smooth = out(add, "GeometryNodeSubdivisionSurface", {"Mesh": graph, "Level": levels})
-    even = out(add, "GeometryNodeSubdivideMesh", {"Mesh": geometry, "Level": levels})
-    position, index = out(add, "GeometryNodeInputPosition"), out(add, "GeometryNodeInputIndex")
+    place = add("ShaderNodeCombineXYZ", {"X": sharp})
+    graph = add("GeometryNodeSetPosition", {"Geometry": geometry, "Position": place})
+    smooth = add("GeometryNodeSubdivisionSurface", {"Mesh": graph, "Level": levels})
+    even = add("GeometryNodeSubdivideMesh", {"Mesh": geometry, "Level": levels})
+    position, index = add("GeometryNodeInputPosition"), add("GeometryNodeInputIndex")
     given = {"Geometry": smooth, "Value": position, "Index": index}
-    found = out(add, "GeometryNodeSampleIndex", given, data_type="FLOAT_VECTOR", domain="POINT")
-    return even, out(add, "ShaderNodeSeparateXYZ", {0: found})
+    found = add("GeometryNodeSampleIndex", given, data_type="FLOAT_VECTOR", domain="POINT")
+    return even, add("ShaderNodeSeparateXYZ", {0: found})
 
 
 def _math(add, operation: str, first, second):
-    return out(add, "ShaderNodeMath", {0: first, 1: second}, operation=operation)
+    return add("ShaderNodeMath", {0: first, 1: second}, operation=operation)

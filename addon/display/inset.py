@@ -84,7 +84,6 @@ class InsetContent:
 _contents: dict[int, InsetContent] = {}
 _projections: dict[int, tuple[Texels, Projection]] = {}
 """By identity of the texels, which are kept with it: views of the sensors that were shown last."""
-_handle = None
 
 
 def picture_layout(texels: Texels) -> GridLayout | UVLayout | Projection:
@@ -154,7 +153,7 @@ def clear(scene=None) -> None:
     session_state.redraw_views()
 
 
-def _draw() -> None:
+def draw() -> None:
     """Called by each 3D view, in pixels of its region."""
     content = _contents.get(bpy.context.scene.session_uid)
     if content is None or not content.insets or not bpy.context.space_data.overlay.show_overlays:
@@ -319,17 +318,3 @@ def _texture(pixels: np.ndarray):
     pixels[..., :3] = color_maps.linear(pixels[..., :3])  # the shader expects scene-linear colours
     buffer = gpu.types.Buffer("FLOAT", height * width * 4, np.ascontiguousarray(pixels, np.float32).ravel())
     return gpu.types.GPUTexture((width, height), format="RGBA32F", data=buffer)
-
-
-def register() -> None:
-    global _handle
-    if not bpy.app.background:
-        _handle = bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL")
-
-
-def unregister() -> None:
-    global _handle
-    clear()
-    if _handle is not None:
-        bpy.types.SpaceView3D.draw_handler_remove(_handle, "WINDOW")
-        _handle = None

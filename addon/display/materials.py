@@ -24,8 +24,8 @@ from ..scene.stored_names import UV_MAP
 TEXEL_UV = "palpate_uv"
 TABLE = "values"
 """What follows the sensor's identity in the mark of the table of its values."""
-IMAGE_CHANNEL = "R"
-"""Channel of the baked images that the material reads."""
+IMAGE_CHANNEL, IMAGE_OUTPUT = "R", "Red"
+"""Channel of the baked images that the material reads, and what Blender's nodes call it."""
 SENSOR_KEY = "palpate_sensor"
 """Custom property of a material, image, node group or marker: the identity of its sensor."""
 RAMP_STOPS = 32
@@ -119,39 +119,40 @@ def heat_map_material(
         material.use_nodes = True
     material.node_tree.nodes.clear()
     add = NodeAdder(material.node_tree)
-    value, missing = _add_value(add, image, frames, scale, mapping)
-    color = _add_colors(add, value, scale)
+    value, missing = _value(add, image, frames, scale, mapping)
+    color = _colors(add, value, scale)
     if missing is not None:
-        color = _add_missing_color(add, color, missing)
+        color = _missing_color(add, color, missing)
     _add_surface(add, color)
     return material
 
 
-def _add_value(add, image, frames: tuple[int, int], scale: Scale, mapping: ImageMapping):
+def _value(add, image, frames: tuple[int, int], scale: Scale, mapping: ImageMapping):
     """Return the sockets of the value and, where it comes from an image, of a test that the image is missing."""
     if image is None:
-        return add("ShaderNodeAttribute", attribute_name=attribute_of(scale.quantity)).outputs["Fac"], None
-    texture = _texture(add, image, mapping)
+        return add("ShaderNodeAttribute", output="Fac", attribute_name=attribute_of(scale.quantity)), None
+    place = add("ShaderNodeAttribute", output="Vector", attribute_name=mapping.coordinates)
+    interpolation = "Linear" if mapping.smooth else "Closest"
+    color = add("ShaderNodeTexImage", {"Vector": place}, image=image, interpolation=interpolation, extension="EXTEND")
+    value = add("ShaderNodeSeparateColor", {"Color": color}, IMAGE_OUTPUT)
     if image.source != "SEQUENCE":
-        return _red(add, texture), None  # it is in the .blend
-    set_image_frames(texture.image_user, *frames)
-    return _red(add, texture), add_missing_test(add, texture.outputs["Color"])
+        return value, None  # it is in the .blend
+    set_image_frames(color.node.image_user, *frames)
+    return value, add_missing_test(add, color)
 
 
-def _add_colors(add, value, scale: Scale):
+def _colors(add, value, scale: Scale):
     """Return the socket of the colour of a value."""
-    share = add("ShaderNodeMapRange", clamp=True, label=f"{scale.quantity.title} ({scale.unit})")
-    add.tree.links.new(value, share.inputs["Value"])
-    share.inputs["From Min"].default_value, share.inputs["From Max"].default_value = scale.low, scale.high
-    ramp = add("ShaderNodeValToRGB")
-    _fill_ramp(ramp.color_ramp, scale.colour_map)
-    add.tree.links.new(share.outputs["Result"], ramp.inputs["Fac"])
-    return ramp.outputs["Color"]
+    ends = {"From Min": scale.low, "From Max": scale.high}
+    share = add("ShaderNodeMapRange", {"Value": value, **ends}, clamp=True, label=f"{scale.quantity.title} ({scale.unit})")
+    color = add("ShaderNodeValToRGB", {"Fac": share})
+    _fill_ramp(color.node.color_ramp, scale.colour_map)
+    return color
 
 
-def _add_missing_color(add, color, missing):
+def _missing_color(add, color, missing):
     """Return the socket of a colour that turns to :data:`MISSING_COLOR` where there is no image."""
-    mix = add("ShaderNodeMix", data_type="RGBA", label="Magenta: no image")
+    mix = add("ShaderNodeMix", data_type="RGBA", label="Magenta: no image").node
     factor, below, above = (next(s for s in mix.inputs if s.identifier == key) for key in MIX_SOCKETS)
     add.tree.links.new(missing, factor)
     add.tree.links.new(color, below)
@@ -161,44 +162,16 @@ def _add_missing_color(add, color, missing):
 
 def _add_surface(add, color) -> None:
     """Add a surface that shows a colour mostly by its own light, and its shape by little of the scene's light."""
-    surface = add("ShaderNodeBsdfPrincipled")
-    surface.inputs["Roughness"].default_value = 1.0
-    surface.inputs["Specular IOR Level"].default_value = 0.0  # gloss would brighten the dark end of the colours
-    surface.inputs["Emission Strength"].default_value = GLOW
-    shaded = add("ShaderNodeVectorMath", operation="SCALE")
-    shaded.inputs["Scale"].default_value = 1.0 - GLOW
-    add.tree.links.new(color, shaded.inputs[0])
-    add.tree.links.new(shaded.outputs["Vector"], surface.inputs["Base Color"])
-    add.tree.links.new(color, surface.inputs["Emission Color"])
-    output = add("ShaderNodeOutputMaterial")
-    add.tree.links.new(surface.outputs["BSDF"], output.inputs["Surface"])
-
-
-def _texture(add, image, mapping: ImageMapping):
-    """Return a node that shows an image."""
-    interpolation = "Linear" if mapping.smooth else "Closest"
-    texture = add("ShaderNodeTexImage", image=image, interpolation=interpolation, extension="EXTEND")
-    place = add("ShaderNodeAttribute", attribute_name=mapping.coordinates)
-    add.tree.links.new(place.outputs["Vector"], texture.inputs["Vector"])
-    return texture
-
-
-def _red(add, texture):
-    """Return the socket of an image's red channel, :data:`IMAGE_CHANNEL`."""
-    channels = add("ShaderNodeSeparateColor")
-    add.tree.links.new(texture.outputs["Color"], channels.inputs["Color"])
-    return channels.outputs["Red"]
+    shaded = add("ShaderNodeVectorMath", {0: color, "Scale": 1.0 - GLOW}, operation="SCALE")
+    dull = {"Roughness": 1.0, "Specular IOR Level": 0.0}  # gloss would brighten the dark end of the colours
+    light = {"Base Color": shaded, "Emission Color": color, "Emission Strength": GLOW}
+    add.end("ShaderNodeOutputMaterial", {"Surface": add("ShaderNodeBsdfPrincipled", {**light, **dull})})
 
 
 def add_missing_test(add, color):
     """Return a socket that is 1 where Blender found no image: the colour shown there must not be read as a large force."""
-    distance = add("ShaderNodeVectorMath", operation="DISTANCE")
-    distance.inputs[1].default_value = MISSING_COLOR
-    add.tree.links.new(color, distance.inputs[0])
-    is_equal = add("ShaderNodeMath", operation="LESS_THAN")
-    is_equal.inputs[1].default_value = 1e-6
-    add.tree.links.new(distance.outputs["Value"], is_equal.inputs[0])
-    return is_equal.outputs[0]
+    distance = add("ShaderNodeVectorMath", {0: color, 1: MISSING_COLOR}, "Value", operation="DISTANCE")
+    return add("ShaderNodeMath", {0: distance, 1: 1e-6}, operation="LESS_THAN")
 
 
 class NodeAdder:
@@ -207,13 +180,32 @@ class NodeAdder:
     def __init__(self, tree):
         self.tree, self.x = tree, 0.0
 
-    def __call__(self, kind: str, **settings):
+    def __call__(self, kind: str, given: dict | None = None, output: int | str = 0, **settings):
+        """Return an output of a new node; `given` are the sockets that lead to its inputs, or their values."""
+        return self.end(kind, given, **settings).outputs[output]
+
+    def end(self, kind: str, given: dict | None = None, **settings):
+        """Return a new node; arguments as above."""
         node = self.tree.nodes.new(kind)
         for key, value in settings.items():
             setattr(node, key, value)
         node.location = self.x, 0.0
         self.x += 300.0
+        for place, value in (given or {}).items():
+            if isinstance(value, bpy.types.NodeSocket):
+                self.tree.links.new(value, node.inputs[place])
+            else:
+                node.inputs[place].default_value = value
         return node
+
+    def attribute(self, name: str, data_type: str = "FLOAT_VECTOR"):
+        """Return the socket of a named attribute."""
+        return self("GeometryNodeInputNamedAttribute", {"Name": name}, data_type=data_type)
+
+    def stored(self, geometry, name: str, value, data_type: str):
+        """Return the socket of a geometry with an attribute on its points."""
+        given = {"Geometry": geometry, "Name": name, "Value": value}
+        return self("GeometryNodeStoreNamedAttribute", given, data_type=data_type, domain="POINT")
 
 
 def _fill_ramp(ramp, color_map: str) -> None:
@@ -240,26 +232,16 @@ def empty_node_group(mark: str, name: str):
 
 def add_image_lookup(add, image, frames: tuple[int, int]):
     """Return the socket of the image's colour at each texel, whose channels are normal force, shear x and shear y (N)."""
-    link = add.tree.links.new
-    where = add("GeometryNodeInputNamedAttribute", data_type="FLOAT_VECTOR")
-    where.inputs["Name"].default_value = TEXEL_UV
-    time = add("GeometryNodeInputSceneTime")
+    time = add("GeometryNodeInputSceneTime", output="Frame")
     # A geometry node's Frame counts files from frame_start, like an image user with offset zero.
-    texture = add("GeometryNodeImageTexture", interpolation="Closest", extension="EXTEND")
-    texture.inputs["Image"].default_value = image
-    link(where.outputs["Attribute"], texture.inputs["Vector"])
-    clamp = add("ShaderNodeClamp")
-    clamp.inputs["Min"].default_value, clamp.inputs["Max"].default_value = frames
-    link(time.outputs["Frame"], clamp.inputs["Value"])
-    link(clamp.outputs["Result"], texture.inputs["Frame"])
-    return texture.outputs["Color"]
+    frame = add("ShaderNodeClamp", {"Value": time, "Min": frames[0], "Max": frames[1]})
+    given = {"Image": image, "Vector": add.attribute(TEXEL_UV), "Frame": frame}
+    return add("GeometryNodeImageTexture", given, interpolation="Closest", extension="EXTEND")
 
 
 def image_values(add, image, frames: tuple[int, int]):
     """Return the socket of the image's channel :data:`IMAGE_CHANNEL` at each texel."""
-    channels = add("FunctionNodeSeparateColor")
-    add.tree.links.new(add_image_lookup(add, image, frames), channels.inputs["Color"])
-    return channels.outputs["Red"]
+    return add("FunctionNodeSeparateColor", {"Color": add_image_lookup(add, image, frames)}, IMAGE_OUTPUT)
 
 
 def remove_blocks(uid: str, keep_image: bool = False) -> None:

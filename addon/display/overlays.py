@@ -68,7 +68,6 @@ class SensorOverlay:
 _overlays: dict[int, list[SensorOverlay]] = {}
 _shown: dict[int, tuple] = {}
 """By scene: the settings of the display with which a frame was shown last."""
-_handle = None
 
 
 def _settings_of(scene) -> tuple:
@@ -246,7 +245,7 @@ def clear(scene=None) -> None:
     session_state.redraw_views()
 
 
-def _draw() -> None:
+def draw() -> None:
     """Called by each 3D view after the scene's own geometry."""
     overlays = _overlays.get(bpy.context.scene.session_uid)
     space = bpy.context.space_data
@@ -361,19 +360,3 @@ def _indentation_shader():
         "}"
     )
     return gpu.shader.create_from_info(info)
-
-
-def register() -> None:
-    global _handle
-    inset.register()
-    if not bpy.app.background:
-        _handle = bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_VIEW")
-
-
-def unregister() -> None:
-    global _handle
-    clear()
-    inset.unregister()
-    if _handle is not None:
-        bpy.types.SpaceView3D.draw_handler_remove(_handle, "WINDOW")
-        _handle = None

@@ -68,12 +68,12 @@ class PlayedTable:
         last_row = self.first + self.step * (rows - 1)
         ends = {"From Min": self.first, "From Max": max(last_row, self.first + 1)}
         ends |= {"To Min": 0.5 / rows, "To Max": 1.0 - 0.5 / rows}
-        row = out(add, "ShaderNodeMapRange", {"Value": frame, **ends}, clamp=True)
-        column = out(add, "ShaderNodeSeparateXYZ", {0: attribute(add, self.column)})
-        given = {"Image": self.image, "Vector": out(add, "ShaderNodeCombineXYZ", {"X": column, "Y": row})}
-        color = out(add, "GeometryNodeImageTexture", given, interpolation="Linear", extension="EXTEND")
-        chosen = {0: color, 1: attribute(add, self.channel)}
-        return out(add, "ShaderNodeVectorMath", chosen, output="Value", operation="DOT_PRODUCT")
+        row = add("ShaderNodeMapRange", {"Value": frame, **ends}, clamp=True)
+        column = add("ShaderNodeSeparateXYZ", {0: add.attribute(self.column)})
+        given = {"Image": self.image, "Vector": add("ShaderNodeCombineXYZ", {"X": column, "Y": row})}
+        color = add("GeometryNodeImageTexture", given, interpolation="Linear", extension="EXTEND")
+        chosen = {0: color, 1: add.attribute(self.channel)}
+        return add("ShaderNodeVectorMath", chosen, output="Value", operation="DOT_PRODUCT")
 
 
 @dataclass(frozen=True)
@@ -106,14 +106,14 @@ class PlayedPictures:
         """Return the socket of texture coordinates in the image at the frame in view; `uv` is that of them in one picture."""
 
         def math(operation: str, *given):
-            return out(add, "ShaderNodeMath", dict(enumerate(given)), operation=operation)
+            return add("ShaderNodeMath", dict(enumerate(given)), operation=operation)
 
         passed = math("SUBTRACT", _frame(add, self.first, self.last), self.first)
         number = math("FLOOR", math("DIVIDE", passed, self.step))
         row = math("FLOOR", math("DIVIDE", number, self.across))
-        corner = out(add, "ShaderNodeCombineXYZ", {"X": math("MODULO", number, self.across), "Y": row})
-        moved = out(add, "ShaderNodeVectorMath", {0: uv, 1: corner}, operation="ADD")
-        return out(add, "ShaderNodeVectorMath", {0: moved, 1: (self.across, self.down, 1.0)}, operation="DIVIDE")
+        corner = add("ShaderNodeCombineXYZ", {"X": math("MODULO", number, self.across), "Y": row})
+        moved = add("ShaderNodeVectorMath", {0: uv, 1: corner}, operation="ADD")
+        return add("ShaderNodeVectorMath", {0: moved, 1: (self.across, self.down, 1.0)}, operation="DIVIDE")
 
 
 def _packed_image(mark: str, name: str, pixels: np.ndarray):
@@ -129,8 +129,8 @@ def _packed_image(mark: str, name: str, pixels: np.ndarray):
 
 def _frame(add, first: int, last: int):
     """Return the socket of the frame in view, which is `first` before it and `last` after it."""
-    frame = out(add, "GeometryNodeInputSceneTime", output="Frame")
-    return out(add, "ShaderNodeClamp", {"Value": frame, "Min": first, "Max": last})
+    frame = add("GeometryNodeInputSceneTime", output="Frame")
+    return add("ShaderNodeClamp", {"Value": frame, "Min": first, "Max": last})
 
 
 def frame_step(frames: int, vertices: int) -> int:
@@ -143,25 +143,3 @@ def store_vectors(mesh, name: str, vertices: np.ndarray, values: np.ndarray) -> 
     table = np.zeros((len(mesh.vertices), 3), dtype=np.float32)
     table[vertices] = values
     mesh.attributes.new(name, "FLOAT_VECTOR", "POINT").data.foreach_set("vector", table.ravel())
-
-
-def out(add, kind: str, given: dict | None = None, output: int | str = 0, **settings):
-    """Return an output of a new node; `given` are the sockets that lead to its inputs, or their values."""
-    node = add(kind, **settings)
-    for place, value in (given or {}).items():
-        if isinstance(value, bpy.types.NodeSocket):
-            add.tree.links.new(value, node.inputs[place])
-        else:
-            node.inputs[place].default_value = value
-    return node.outputs[output]
-
-
-def stored(add, geometry, name: str, value, data_type: str):
-    """Return the socket of a geometry with an attribute on its points."""
-    given = {"Geometry": geometry, "Name": name, "Value": value}
-    return out(add, "GeometryNodeStoreNamedAttribute", given, data_type=data_type, domain="POINT")
-
-
-def attribute(add, name: str, data_type: str = "FLOAT_VECTOR"):
-    """Return the socket of a named attribute."""
-    return out(add, "GeometryNodeInputNamedAttribute", {"Name": name}, data_type=data_type)

@@ -86,74 +86,43 @@ def _points(sensor: BakedSensor, name: str):
 def _nodes(mark: str, name: str, image, frames, kind: str, length: float, longest: float, material):
     """Return geometry nodes that compute a vector per texel and put an arrow along it where it is long enough."""
     group = materials.empty_node_group(mark, name)
-    add, link = materials.NodeAdder(group), group.links.new
+    add = materials.NodeAdder(group)
 
-    def vector(operation: str, *inputs, **values):
-        node = add("ShaderNodeVectorMath", operation=operation)
-        for socket, source in zip(node.inputs, inputs):
-            link(source, socket)
-        for key, value in values.items():
-            node.inputs[key].default_value = value
-        return node
-
-    def attribute(key: str):
-        node = add("GeometryNodeInputNamedAttribute", data_type="FLOAT_VECTOR")
-        node.inputs["Name"].default_value = key
-        return node.outputs["Attribute"]
+    def vector(operation: str, *given, output: int | str = 0, **scale):
+        return add("ShaderNodeVectorMath", {**dict(enumerate(given)), **scale}, output, operation=operation)
 
     start = add("NodeGroupInput")
     color = materials.add_image_lookup(add, image, frames)
-    parts = add("FunctionNodeSeparateColor")
-    link(color, parts.inputs["Color"])
+    parts = add.end("FunctionNodeSeparateColor", {"Color": color}).outputs
 
     def times(key: str, channel: str):
-        node = vector("SCALE", attribute(key))
-        link(parts.outputs[channel], node.inputs["Scale"])
-        return node.outputs["Vector"]
+        return vector("SCALE", add.attribute(key), Scale=parts[channel])
 
     if kind == "NORMALS":
         force = times(NORMAL, "Red")
     else:  # the reaction: the negative of the shear on the sensor
-        along = vector("ADD", times(X_AXIS, "Green"), times(Y_AXIS, "Blue")).outputs["Vector"]
-        force = vector("SCALE", along, Scale=-1.0).outputs["Vector"]
-    arrow = vector("SCALE", force, Scale=length).outputs["Vector"]
-    size = vector("LENGTH", arrow).outputs["Value"]
-    long_enough = add("ShaderNodeMath", operation="GREATER_THAN")
-    link(size, long_enough.inputs[0])
-    long_enough.inputs[1].default_value = MIN_ARROW_SHARE * longest
-    is_drawn = add("ShaderNodeMath", operation="SUBTRACT")
-    link(long_enough.outputs[0], is_drawn.inputs[0])
-    link(materials.add_missing_test(add, color), is_drawn.inputs[1])
-    align = add("FunctionNodeAlignRotationToVector", axis="Z")
-    link(arrow, align.inputs["Vector"])
-
-    lift = vector("SCALE", attribute(NORMAL), Scale=0.04 * longest if kind == "SHEARS" else 0.0)
-    place = add("GeometryNodeSetPosition")
-    link(start.outputs[0], place.inputs["Geometry"])
-    link(lift.outputs["Vector"], place.inputs["Offset"])
-    on_points = add("GeometryNodeInstanceOnPoints")
-    link(place.outputs["Geometry"], on_points.inputs["Points"])
-    link(_arrow(add, material), on_points.inputs["Instance"])
-    link(is_drawn.outputs[0], on_points.inputs["Selection"])
-    link(align.outputs["Rotation"], on_points.inputs["Rotation"])
-    link(size, on_points.inputs["Scale"])
-    link(on_points.outputs["Instances"], add("NodeGroupOutput").inputs[0])
+        force = vector("SCALE", vector("ADD", times(X_AXIS, "Green"), times(Y_AXIS, "Blue")), Scale=-1.0)
+    arrow = vector("SCALE", force, Scale=length)
+    size = vector("LENGTH", arrow, output="Value")
+    long_enough = add("ShaderNodeMath", {0: size, 1: MIN_ARROW_SHARE * longest}, operation="GREATER_THAN")
+    is_drawn = add("ShaderNodeMath", {0: long_enough, 1: materials.add_missing_test(add, color)}, operation="SUBTRACT")
+    lift = vector("SCALE", add.attribute(NORMAL), Scale=0.04 * longest if kind == "SHEARS" else 0.0)
+    given = {
+        "Points": add("GeometryNodeSetPosition", {"Geometry": start, "Offset": lift}),
+        "Selection": is_drawn,
+        "Instance": _arrow(add, material),
+        "Rotation": add("FunctionNodeAlignRotationToVector", {"Vector": arrow}, axis="Z"),
+        "Scale": size,
+    }
+    add.end("NodeGroupOutput", {0: add("GeometryNodeInstanceOnPoints", given)})
     return group
 
 
 def _arrow(add, material):
     """Return the socket of an arrow of length one along z; it is built by nodes, so that no other object is needed."""
-    link = add.tree.links.new
-    join = add("GeometryNodeJoinGeometry")
+    join = add.end("GeometryNodeJoinGeometry")
     for bottom, top, begin, end in ((0.035, 0.035, 0.0, 0.66), (0.1, 0.0, 0.66, 1.0)):
-        cone = add("GeometryNodeMeshCone")
-        for key, value in (("Vertices", 12), ("Radius Top", top), ("Radius Bottom", bottom), ("Depth", end - begin)):
-            cone.inputs[key].default_value = value
-        move = add("GeometryNodeTransform")
-        move.inputs["Translation"].default_value = (0.0, 0.0, begin)
-        link(cone.outputs["Mesh"], move.inputs["Geometry"])
-        link(move.outputs["Geometry"], join.inputs["Geometry"])
-    paint = add("GeometryNodeSetMaterial")
-    paint.inputs["Material"].default_value = material
-    link(join.outputs["Geometry"], paint.inputs["Geometry"])
-    return paint.outputs["Geometry"]
+        cone = add("GeometryNodeMeshCone", {"Vertices": 12, "Radius Top": top, "Radius Bottom": bottom, "Depth": end - begin})
+        moved = add("GeometryNodeTransform", {"Geometry": cone, "Translation": (0.0, 0.0, begin)})
+        add.tree.links.new(moved, join.inputs["Geometry"])
+    return add("GeometryNodeSetMaterial", {"Geometry": join.outputs[0], "Material": material})

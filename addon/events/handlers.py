@@ -7,7 +7,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..authoring import sensor_report, texel_overlay
-from ..display import overlays
+from ..display import inset, overlays
 from ..scene import participants
 from ..session import fcurves, first_use, session_state
 from ..timeline import playback, second_look
@@ -77,6 +77,15 @@ LISTS = {
     "render_cancel": palpate_render_ends,
 }
 
+DRAWN = (
+    (overlays.draw, "POST_VIEW"),
+    (inset.draw, "POST_PIXEL"),
+    (texel_overlay.draw, "POST_VIEW"),
+    (texel_overlay.draw_numbers, "POST_PIXEL"),
+)
+"""What is drawn into each 3D view, and when: with its geometry, or in pixels after it."""
+_drawn: list = []
+
 
 def register():
     for name, function in LISTS.items():
@@ -84,13 +93,15 @@ def register():
     first_use.when_ready.append(playback.solver_is_ready)
     session_state.when_settings_change.append(second_look.soon)
     session_state.when_baked.append(playback.show_new_bake)
-    overlays.register()
-    texel_overlay.register()
+    if not bpy.app.background:
+        _drawn.extend(bpy.types.SpaceView3D.draw_handler_add(draw, (), "WINDOW", when) for draw, when in DRAWN)
 
 
 def unregister():
-    texel_overlay.unregister()
-    overlays.unregister()
+    while _drawn:
+        bpy.types.SpaceView3D.draw_handler_remove(_drawn.pop(), "WINDOW")
+    overlays.clear()
+    texel_overlay.clear()
     sensor_report.forget()
     session_state.when_settings_change.clear()
     session_state.when_baked.clear()
