@@ -171,18 +171,12 @@ def _thickness(mesh: TriangleMesh, texels: Texels, behind: float) -> np.ndarray:
 
 def _overlapping(texels: Texels, spacing: float) -> np.ndarray:
     """Return the texels that overlap a texel with a smaller index, (k,) int."""
-    cell = np.floor(texels.position / (OVERLAP_DISTANCE * spacing)).astype(np.int64)
-    homes: dict[tuple[int, ...], list[int]] = {}
-    near = []
-    around = [(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)]
-    for number, (x, y, z) in enumerate(cell.tolist()):
-        others = np.array([other for dx, dy, dz in around for other in homes.get((x + dx, y + dy, z + dz), ())], int)
-        apart = np.linalg.norm(texels.position[others] - texels.position[number], axis=1)
-        alike = texels.normal[others] @ texels.normal[number] > 0.5  # not the two sides of a thin plate
-        if (alike & (apart < OVERLAP_DISTANCE * spacing)).any():
-            near.append(number)
-        homes.setdefault((x, y, z), []).append(number)
-    return np.array(near, int)
+    from scipy.spatial import cKDTree
+
+    pairs = cKDTree(texels.position).query_pairs(OVERLAP_DISTANCE * spacing, output_type="ndarray")
+    one, other = (texels.normal[pairs[:, end]] for end in (0, 1))
+    alike = np.einsum("ij,ij->i", one, other) > 0.5  # not the two sides of a thin plate
+    return np.unique(pairs[alike].max(axis=1, initial=0)) if alike.any() else np.zeros(0, int)
 
 
 # Fixes

@@ -16,6 +16,7 @@ from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 from mathutils.interpolate import poly_3d_calc
 
+from ..display import materials
 from ..properties import parameter_properties
 from ..scene import deforming_objects, mesh_arrays, participants, sensor_regions
 from ..session import transforms
@@ -115,51 +116,6 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
     return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
 
-class _NodeBuilder:
-    """Adds nodes to a tree and links them. Its methods return the output socket of what they add."""
-
-    def __init__(self, tree):
-        self.tree = tree
-
-    def node(self, kind: str, **settings):
-        """Add a node and return it."""
-        made = self.tree.nodes.new(kind)
-        for key, value in settings.items():
-            setattr(made, key, value)
-        return made
-
-    def link(self, source, socket) -> None:
-        """Link an output to an input."""
-        self.tree.links.new(source, socket)
-
-    def vector(self, operation: str, *inputs):
-        """Add a vector operation."""
-        made = self.node("ShaderNodeVectorMath", operation=operation)
-        for socket, source in zip([s for s in made.inputs if s.enabled], inputs, strict=False):
-            self.link(source, socket)
-        return made.outputs["Vector"]
-
-    def attribute(self, name: str, kind: str):
-        """Read an attribute of the texels."""
-        made = self.node("GeometryNodeInputNamedAttribute", data_type=kind)
-        made.inputs["Name"].default_value = name
-        return next(socket for socket in made.outputs if socket.enabled and socket.name == "Attribute")
-
-    def components(self, source):
-        """Separate a vector into its three components."""
-        made = self.node("ShaderNodeSeparateXYZ")
-        self.link(source, made.inputs[0])
-        return made.outputs
-
-    def sampled_position(self, geometry, position, index):
-        """Read the position of the vertex with an index from a geometry."""
-        made = self.node("GeometryNodeSampleIndex", data_type="FLOAT_VECTOR", domain="POINT")
-        self.link(geometry, made.inputs["Geometry"])
-        self.link(position, next(s for s in made.inputs if s.enabled and s.name == "Value"))
-        self.link(index, made.inputs["Index"])
-        return next(socket for socket in made.outputs if socket.enabled)
-
-
 def _binding_nodes():
     """Return new geometry nodes that move points to where :func:`_store_bound_positions` has bound them."""
     tree = bpy.data.node_groups.new(NODES, "GeometryNodeTree")
@@ -169,31 +125,33 @@ def _binding_nodes():
         ("Geometry", "Geometry", "OUTPUT"),
     ):
         tree.interface.new_socket(name, in_out=direction, socket_type=f"NodeSocket{kind}")
-    add = _NodeBuilder(tree)
-    given = add.node("NodeGroupInput")
-    surface = add.node("GeometryNodeObjectInfo", transform_space="RELATIVE")
-    add.link(given.outputs["Surface"], surface.inputs["Object"])
-    position = add.node("GeometryNodeInputPosition").outputs[0]
-    geometry = surface.outputs["Geometry"]
-    corners = [add.sampled_position(geometry, position, add.attribute(name, "INT")) for name in CORNER_ATTRIBUTES]
-    moved = add.node("GeometryNodeSetPosition")
-    add.link(given.outputs["Geometry"], moved.inputs["Geometry"])
-    add.link(_bound_position(add, *corners), moved.inputs["Position"])
-    add.link(moved.outputs["Geometry"], add.node("NodeGroupOutput").inputs["Geometry"])
+    add = materials.NodeAdder(tree)
+    given = add.end("NodeGroupInput").outputs
+    surface = add("GeometryNodeObjectInfo", {"Object": given["Surface"]}, "Geometry", transform_space="RELATIVE")
+    where = {"Geometry": surface, "Value": add("GeometryNodeInputPosition")}
+    corners = [
+        add("GeometryNodeSampleIndex", {**where, "Index": add.attribute(name, "INT")}, data_type="FLOAT_VECTOR", domain="POINT")
+        for name in CORNER_ATTRIBUTES
+    ]
+    placed = {"Geometry": given["Geometry"], "Position": _bound_position(add, *corners)}
+    add.end("NodeGroupOutput", {0: add("GeometryNodeSetPosition", placed)})
     return tree
 
 
-def _bound_position(add: _NodeBuilder, a, b, c):
+def _bound_position(add: materials.NodeAdder, a, b, c):
     """Return the socket of a texel's position: weighted corners of its triangle, plus the offset along the triangle's axes."""
-    edge, other = add.vector("SUBTRACT", b, a), add.vector("SUBTRACT", c, a)
-    along, normal = add.vector("NORMALIZE", edge), add.vector("NORMALIZE", add.vector("CROSS_PRODUCT", edge, other))
-    axes = (along, add.vector("CROSS_PRODUCT", normal, along), normal)
-    weights = add.components(add.attribute(WEIGHTS, "FLOAT_VECTOR"))
-    offset = add.components(add.attribute(OFFSET, "FLOAT_VECTOR"))
+
+    def vector(operation: str, *given, **scale):
+        return add("ShaderNodeVectorMath", {**dict(enumerate(given)), **scale}, operation=operation)
+
+    edge, other = vector("SUBTRACT", b, a), vector("SUBTRACT", c, a)
+    along, normal = vector("NORMALIZE", edge), vector("NORMALIZE", vector("CROSS_PRODUCT", edge, other))
+    axes = (along, vector("CROSS_PRODUCT", normal, along), normal)
+    weights, offset = (add.end("ShaderNodeSeparateXYZ", {0: add.attribute(name)}).outputs for name in (WEIGHTS, OFFSET))
     total = None
     for source, factor in zip((a, b, c, *axes), (*weights, *offset), strict=True):
-        scaled = add.vector("SCALE", source, factor)
-        total = scaled if total is None else add.vector("ADD", total, scaled)
+        scaled = vector("SCALE", source, Scale=factor)
+        total = scaled if total is None else vector("ADD", total, scaled)
     return total
 
 

@@ -62,6 +62,14 @@ def of(obj) -> Result | None:
     return _results.get(identity.key(obj))
 
 
+def _found(obj) -> Result:
+    """Return the results of a sensor; raises SceneError where there are none."""
+    result = of(obj)
+    if result is None:
+        raise SceneError(f"Nothing was found for '{obj.name}' yet: use Find Gap first.")
+    return result
+
+
 def shown_on(obj) -> Shown | None:
     """Return which errors the colours of a sensor show; None if they show none, as after an undo."""
     layer = obj.data.color_attributes.active_color
@@ -117,9 +125,7 @@ def add_found(obj) -> int:
     """Put the fitted parameters and what was found on the sensor; return how many effects it has now."""
     from ...core.gap.report.amended_sensor import amended_sensor
 
-    result = of(obj)
-    if result is None:
-        raise SceneError(f"Nothing was found for '{obj.name}' yet: use Find Gap first.")
+    result = _found(obj)
     model = amended_sensor(result.diagnosis)
     per_texel = [e.name for e in model.effects if any(isinstance(value, tuple) for value in e.values.values())]
     own = len(_texels(bpy.context, obj)) if per_texel else 0
@@ -155,9 +161,7 @@ def show_on_sensor(context, obj, amended: bool) -> str:
     """Colour the sensor's vertices by the error of their texels; return the largest one in words."""
     from ...core.gap.report.comparison import rms_by_texel
 
-    result = of(obj)
-    if result is None:
-        raise SceneError(f"Nothing was found for '{obj.name}' yet: use Find Gap first.")
+    result = _found(obj)
     d = result.diagnosis
     texels = _texels(context, obj)
     base, values = (ERROR.values(rms_by_texel(d, model), texels) for model in (d.base.model, (d.base, d.best)[amended].model))
@@ -191,9 +195,7 @@ def mark_phases(scene, obj) -> int:
     """Put timeline markers where the most loaded texel of the first fitted trial enters a phase; return how many."""
     from ...core.gap.forward.contact_phases import PHASES, phase_indices, relative_load
 
-    result = of(obj)
-    if result is None:
-        raise SceneError(f"Nothing was found for '{obj.name}' yet: use Find Gap first.")
+    result = _found(obj)
     predictor = result.diagnosis.of("fit")[0]
     texel = int(relative_load(predictor.stimulus).sum(axis=0).argmax())
     at, time = phase_indices(predictor.stimulus)[:, texel], predictor.trial.time
