@@ -11,7 +11,6 @@ from blender_scenes import grid
 from oracles import contact_laws
 
 from palpate.addon.authoring import exchange
-from palpate.core.effects.engine import registry
 from palpate.core.gap.calibration.stiffness import texel_stiffness
 from palpate.core.model.sensor_parameters import SensorParameters
 
@@ -106,13 +105,6 @@ def test_effects_are_copied_with_the_parameters():
     bpy.ops.palpate.parameters_copy()
     assert [item.kind for item in other.palpate.effects] == ["saturation"]
     assert other.palpate.k == 44.0
-
-
-def test_every_effect_can_be_added():
-    pad = sensor()
-    for name in registry.library():
-        assert bpy.ops.palpate.effect_add(effect=name) == {"FINISHED"}
-    assert len(pad.palpate.effects) == len(registry.library())
 
 
 # --- fits

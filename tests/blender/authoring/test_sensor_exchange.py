@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import json
-
 import blender_scenes as scenes
 import bpy
 import numpy as np
@@ -16,25 +14,6 @@ from palpate.addon.scene import participants, sensor_reader
 from palpate.commands import main
 from palpate.core.errors import SceneError
 from palpate.core.simulators.sensor_format import export_sensors, written_formats
-
-SAMPLES = {"weighing": ("Finger", 84), "fingertip": ("Fingertip", 176), "hand": ("Index finger", 195)}
-"""Scene → a sensor in it and the number of its texels: a flat grid, a fingertip without rows, and a finger of a hand."""
-
-
-@pytest.fixture
-def item(sample, repository):
-    """Return the sensor of a sample scene."""
-    bpy.ops.wm.open_mainfile(filepath=str(repository / "sample_blends" / f"{sample}.blend"))
-    (found,) = sensor_exchange.sensors_on_meshes(bpy.context.scene, [SAMPLES[sample][0]])
-    return found
-
-
-@pytest.mark.parametrize("sample", SAMPLES)
-def test_probe_lists_of_sample_scenes(sample, item, tmp_path):
-    assert SAMPLES[sample][1] == len(item.sensor.texels)
-    listed = json.loads(export_sensors([item], "probes", tmp_path).files[0].read_text(encoding="utf-8"))
-    assert np.array_equal(np.array(listed["position"]), item.sensor.texels.position)
-    assert ("row" in listed) == (sample != "fingertip")
 
 
 def test_a_laid_sensor_brings_the_surface_that_carries_it(scene):

@@ -55,21 +55,8 @@ def test_figures_are_those_of_a_saved_bake(written):
 
 def test_a_part_of_the_sensors_and_of_the_frames(written, capfd):
     assert main(["bake", "scene.blend", "--out", "part", "--sensor", "Pad", "--frames", "2", "5"]) == 0
-    words = [
-        "render",
-        "scene.blend",
-        "--bake",
-        "part",
-        "--only",
-        "numbers",
-        "--frame",
-        "5",
-        "--format",
-        "svg",
-        "--out",
-        "figures",
-    ]
-    assert main(words) == 0
+    words = "render scene.blend --bake part --only numbers --frame 5 --format svg --out figures"
+    assert main(words.split()) == 0
     assert [path.name for path in (written / "figures").glob("*.svg")] == ["numbers_Pad_0005.svg"]
 
 
