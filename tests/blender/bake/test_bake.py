@@ -140,6 +140,8 @@ def test_clearing_brings_everything_back(tmp_path):
     scene, pad, _, _, free = press_and_drop(frames=4)
     bpy.ops.palpate.reset()
     scene.palpate.use_live = False
+    scene.palpate.overlays = {"FORCE", "TORQUE", "CENTRE", "SLIP", "NORMALS", "SHEARS"}
+    cube("Tip", (0.0, 0.3, 0.0), size=0.02).palpate.role = "SENSOR"  # its heat map has geometry nodes
     pad.data.materials.append(bpy.data.materials.new("Rubber"))
     free.keyframe_insert("hide_render", frame=1)  # an animation of its own stays
     save(tmp_path)
@@ -147,19 +149,12 @@ def test_clearing_brings_everything_back(tmp_path):
     before = dump()
     baked(scene)
     assert bpy.ops.palpate.bake() == {"FINISHED"}  # twice, since the second replaces the first
+    assert len([obj for obj in scene.objects if materials.SENSOR_KEY in obj]) == 18
     scene.frame_set(3)
     assert bpy.ops.palpate.bake_clear() == {"FINISHED"}
     scene.frame_set(1)
     assert [line for line in changes(before, dump()) if "baked_" not in line and "start_" not in line] == []
     assert fcurves.animated_paths(free) == {"hide_render"}
-
-
-def test_baking_keeps_the_frame_and_moves_nothing_by_hand(tmp_path):
-    scene, *_ = press_and_drop(frames=4)
-    save(tmp_path)
-    scene.frame_set(3)
-    baked(scene)
-    assert scene.frame_current == 3
 
 
 def test_reopened_and_baked_again_it_is_the_same_bit_for_bit(tmp_path):
@@ -179,24 +174,12 @@ def test_reopened_and_baked_again_it_is_the_same_bit_for_bit(tmp_path):
         scene = reopen(path)
         scene.frame_set(5)
         baked(scene)
-        assert recordings() == first
+        assert recordings() == first and scene.frame_current == 5
         save(tmp_path)
     bpy.ops.palpate.bake_clear()
     save(tmp_path)
     baked(reopen(path))
     assert recordings() == first
-
-
-def test_another_parameter_is_another_recording(tmp_path):
-    scene, pad, *_ = press(frames=3)
-    save(tmp_path)
-    first = baked(scene).recording
-    pad.palpate.k *= 2.0
-    second = baked(scene).recording
-    assert second.digest != first.digest
-    assert second.sensors["Pad"].normal_force[-1].max() == pytest.approx(
-        2.0 * first.sensors["Pad"].normal_force[-1].max(), rel=0.05
-    )
 
 
 def test_a_stopped_bake_leaves_the_old_one(tmp_path):
@@ -363,15 +346,6 @@ def test_frame_zero_can_be_baked(tmp_path):
     save(tmp_path)
     folder = baked(scene).folders["Pad"]
     assert (folder / "tactile_0000.exr").exists()
-
-
-def test_the_other_sensors_are_pads_to_a_grid(tmp_path):
-    scene, *_ = press(frames=3)
-    table = grid("Table", (0.0, 0.0, 0.001))
-    table.palpate.role = "PAD"
-    save(tmp_path)
-    assert list(baked(scene).folders) == ["Pad"]
-    assert not table.palpate.is_baked
 
 
 def test_materials_given_after_a_bake_outlive_the_next(tmp_path):

@@ -13,7 +13,6 @@ from sample_bake import pictures_of, read_exr
 
 from palpate.core.geometry.grid_layout import GridLayout
 from palpate.core.geometry.texture_maps import uv_layout
-from palpate.core.io.bake_folder import frame_file
 from palpate.core.io.tactile_exr import CHANNELS, write_exrs
 from palpate.core.model.recording import SensorFrame
 
@@ -109,51 +108,3 @@ def test_either_library_may_come_first(tmp_path, first):
         "assert image.pixels[0] == file.channels()['R'].pixels[-1, 0] != 0\n"
     )
     assert subprocess.run([sys.executable, "-c", program, str(tmp_path / "a.exr")]).returncode == 0
-
-
-def test_sequence_of_frames_plays(tmp_path, scene):
-    frames = [tactile_frame(ROWS * COLUMNS, seed) for seed in range(3)]
-    write_exrs([tmp_path / frame_file(i + 1) for i in range(3)], grid(), frames, [{}] * 3)
-    mesh = bpy.data.meshes.new("plane")
-    mesh.from_pydata([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [], [(0, 1, 2, 3)])
-    mesh.uv_layers.new().data.foreach_set("uv", [0, 0, 1, 0, 1, 1, 0, 1])
-    plane = bpy.data.objects.new("plane", mesh)
-    scene.collection.objects.link(plane)
-    material = bpy.data.materials.new("picture")
-    if bpy.app.version < (5, 0):
-        material.use_nodes = True  # later always
-    tree = material.node_tree
-    tree.nodes.clear()
-    texture, emission, output = (
-        tree.nodes.new(kind) for kind in ("ShaderNodeTexImage", "ShaderNodeEmission", "ShaderNodeOutputMaterial")
-    )
-    texture.image = bpy.data.images.load(str(tmp_path / frame_file(1)))
-    texture.image.source = "SEQUENCE"
-    texture.image.colorspace_settings.name = "Non-Color"
-    texture.interpolation = "Closest"
-    texture.image_user.frame_duration = len(frames)
-    texture.image_user.frame_start = 1
-    texture.image_user.use_auto_refresh = True
-    tree.links.new(texture.outputs["Color"], emission.inputs["Color"])
-    tree.links.new(emission.outputs[0], output.inputs["Surface"])
-    mesh.materials.append(material)
-    camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
-    camera.data.type, camera.data.ortho_scale, camera.location = "ORTHO", 2.0, (0, 0, 1)
-    scene.collection.objects.link(camera)
-    scene.camera = camera
-    scene.render.engine = "CYCLES"
-    scene.cycles.samples = 1
-    scene.render.pixel_aspect_y = COLUMNS / ROWS  # one pixel of the render for each texel
-    scene.render.resolution_x, scene.render.resolution_y = COLUMNS, ROWS
-    scene.cycles.pixel_filter_type = "BOX"
-    scene.cycles.use_denoising = False
-    scene.render.image_settings.file_format = "OPEN_EXR"
-    scene.render.image_settings.color_depth = "32"
-    for i, frame in enumerate(frames):
-        scene.frame_set(i + 1)
-        scene.render.filepath = str(tmp_path / "render.exr")
-        bpy.ops.render.render(write_still=True)
-        channels, _ = read_exr(tmp_path / "render.exr")
-        expected = pictures_of(grid(), frame)
-        for name in "RGB":  # negative shear too
-            np.testing.assert_allclose(channels[name], expected[name], atol=1e-5)

@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import changes, cube, dump, press_and_drop, save
+from blender_scenes import press_and_drop, save
 
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import bake_display, baked_scene, markers, materials, overlays, texel_arrows
@@ -153,22 +153,6 @@ def test_applying_without_the_files_says_so(baked, tmp_path):
     (tmp_path / "palpate-bake").rename(tmp_path / "lost")
     with pytest.raises(PalpateError, match="bake"):
         bake_display.refresh(scene, baked_scene.bake_folders(scene))
-
-
-def test_clearing_takes_all_overlays_away(tmp_path):
-    scene, *_ = press_and_drop(frames=4)
-    tip = cube("Tip", (0.0, 0.3, 0.0), size=0.02)
-    tip.palpate.role = "SENSOR"
-    scene.palpate.overlays, scene.palpate.quantity = ALL, "PRESSURE"
-    bpy.ops.palpate.reset()
-    save(tmp_path)
-    before = dump()
-    run_job(bake(scene))
-    run_job(bake(scene))
-    assert len([obj for obj in scene.objects if materials.SENSOR_KEY in obj]) == 18
-    assert bpy.ops.palpate.bake_clear() == {"FINISHED"}
-    assert not [group.name for group in bpy.data.node_groups if materials.SENSOR_KEY in group]
-    assert [line for line in changes(before, dump()) if "baked_" not in line and "settings" not in line] == []
 
 
 def test_arrows_of_a_lost_image_do_not_show(baked, tmp_path):

@@ -9,7 +9,6 @@ import pytest
 from blender_scenes import changes, dump, press, press_and_drop, reopen, save
 
 from palpate.addon.bake.bake import bake
-from palpate.addon.events import handlers as handlers_of_palpate
 from palpate.addon.scene import stored_names
 from palpate.addon.session import frame_status, session_state
 from palpate.addon.timeline import live_cache, playback
@@ -153,55 +152,6 @@ def test_sub_frames_loops_steps_and_handlers_off_give_the_same_pictures(tmp_path
     assert alone.tolist() == baked.tolist()
 
 
-def test_steps_loops_and_handlers_off_render_the_same_pixels(tmp_path):
-    scene, pad, _, _, free = press_and_drop(frames=16)
-    scene.palpate.use_auto_range, scene.palpate.range_max = False, 0.035  # N; so that the colours of these frames differ
-    save(tmp_path)
-    run_job(bake(scene))
-    bpy.ops.object.light_add(type="SUN")
-    bpy.context.object.data.energy = 10.0
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    scene.collection.objects.link(camera)
-    camera.location, camera.data.type, camera.data.ortho_scale, scene.camera = (0.0, 0.0, 0.5), "ORTHO", 0.08, camera
-    for obj in scene.objects:
-        obj.hide_render = obj not in (pad, free) and obj.type == "MESH"  # the heat map is seen from above
-    render, scene.cycles.samples, scene.cycles.use_denoising = scene.render, 1, False
-    render.engine, render.image_settings.file_format, render.image_settings.color_depth = "CYCLES", "PNG", "16"
-    render.resolution_x = render.resolution_y = 24
-
-    def pixels(path):
-        picture = bpy.data.images.load(str(path))
-        values = np.empty(len(picture.pixels), dtype=np.float32)
-        picture.pixels.foreach_get(values)
-        bpy.data.images.remove(picture)
-        return values
-
-    def still(number, part=0.0):
-        scene.frame_set(number, subframe=part)
-        render.filepath = str(tmp_path / "still.png")
-        bpy.ops.render.render(write_still=True)
-        return pixels(render.filepath)
-
-    stills = {number: still(number) for number in (12, 14, 16)}
-    between = still(14, 0.5)
-    assert (still(12) == stills[12]).all()  # around the loop
-    handlers = {name: getattr(bpy.app.handlers, name).copy() for name in handlers_of_palpate.LISTS}
-    for name in handlers:
-        getattr(bpy.app.handlers, name).clear()
-    try:
-        scene.frame_start, scene.frame_step, render.filepath = 12, 2, str(tmp_path / "step_")
-        bpy.ops.render.render(animation=True)
-        alone = still(14, 0.5)
-    finally:
-        for name, functions in handlers.items():
-            getattr(bpy.app.handlers, name).extend(functions)
-    assert sorted(path.name for path in tmp_path.glob("step_*")) == [f"step_00{number}.png" for number in stills]
-    for number, expected in stills.items():
-        assert (pixels(tmp_path / f"step_00{number}.png") == expected).all()
-    assert (alone == between).all()
-    assert all(np.abs(stills[a] - stills[b]).max() > 0.1 for a, b in ((12, 14), (14, 16)))
-
-
 def test_time_stretching_shows_the_same_bake_slower(tmp_path):
     """Twice as slow: frame 2 n of the timeline is frame n of the animation, for bodies, images and numbers alike."""
     scene, pad, _, _, free = press_and_drop(frames=8)
@@ -257,8 +207,9 @@ def test_a_start_in_the_middle_computes_nothing():
         lambda scene, pad, target: setattr(pad.location, "z", 0.001),
         lambda scene, pad, target: target.hide_set(True),
         lambda scene, pad, target: bpy.data.objects.remove(target),
+        lambda scene, pad, target: (setattr(target.location, "z", 0.02), target.keyframe_insert("location", frame=3)),
     ],
-    ids=["parameter", "role", "gravity", "fps", "vertex", "location", "hidden", "deleted"],
+    ids=["parameter", "role", "gravity", "fps", "vertex", "location", "hidden", "deleted", "keyframe"],
 )
 def test_a_change_makes_it_stale(change):
     scene, pad, target = press(frames=8)
@@ -277,16 +228,6 @@ def test_its_own_writing_does_not_make_it_stale():
         scene.frame_set(frame)
         bpy.context.view_layer.update()  # as the window does between frames
     assert sorted(live_cache.get(scene).frames) == list(range(1, 9))
-
-
-def test_edited_keyframes_make_it_stale():
-    scene, _, target = press(frames=8)
-    play(scene, 1, 2, 3)
-    target.location.z = 0.02
-    target.keyframe_insert("location", frame=3)
-    bpy.context.view_layer.update()
-    play(scene, 4)
-    assert live_cache.get(scene) is None
 
 
 @pytest.mark.parametrize("is_known", [True, False], ids=["after a run", "first of all"])
@@ -523,34 +464,3 @@ def test_a_scene_without_roles_costs_nothing(monkeypatch):
     scene.frame_set(1)
     monkeypatch.setattr(playback.baked_scene, "baked_objects", lambda scene: pytest.fail("looked at objects"))
     play(scene, 2, 3)
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda scene, pad, target: setattr(pad.palpate, "k", 99.0),
-        lambda scene, pad, target: setattr(pad.data.vertices[5].co, "z", 0.01),
-        lambda scene, pad, target: setattr(pad.location, "z", 0.001),
-        lambda scene, pad, target: setattr(pad.palpate, "region", "GROUP"),
-        lambda scene, pad, target: target.animation_data_clear(),
-        lambda scene, pad, target: bpy.data.objects.remove(target),
-        lambda scene, pad, target: setattr(scene, "gravity", (0.0, 0.0, -1.6)),
-    ],
-    ids=["parameter", "vertex", "location", "region", "animation", "deleted", "gravity"],
-)
-def test_a_bake_that_is_out_of_date_says_so(tmp_path, change):
-    scene, *_ = press_and_drop(frames=4)
-    save(tmp_path)
-    run_job(bake(scene))
-    path = save(tmp_path)
-    scene = reopen(path)
-    for frame in (1, 2, 4, 3):
-        scene.frame_set(frame)
-        assert frame_status.status_of(scene).text == f"Frame {frame} of the bake."
-    pad = bpy.data.objects["Pad"]
-    change(scene, pad, bpy.data.objects["Ball"])
-    pad.data.update()
-    bpy.context.view_layer.update()
-    play(scene, 2)
-    assert frame_status.status_of(scene).text.startswith("The scene has changed since this bake")
-    assert frame_status.status_of(scene).frame is not None  # it is still shown

@@ -69,6 +69,13 @@ def bow(curve):
 
 
 CHANGES = {
+    "parameter": lambda pad, ball: setattr(pad.palpate, "k", 99.0),
+    "region": lambda pad, ball: setattr(pad.palpate, "region", "GROUP"),
+    "gravity": lambda pad, ball: setattr(bpy.context.scene, "gravity", (0.0, 0.0, -1.6)),
+    "vertex": lambda pad, ball: (setattr(pad.data.vertices[5].co, "z", 0.01), pad.data.update()),
+    "location": lambda pad, ball: setattr(pad.location, "z", 0.001),
+    "no animation": lambda pad, ball: ball.animation_data_clear(),
+    "no target": lambda pad, ball: bpy.data.objects.remove(ball),
     "modifier of a target": lambda pad, ball: setattr(ball.modifiers["Cast"], "factor", 0.2),
     "modifier of a sensor": lambda pad, ball: setattr(pad.modifiers["Wave"], "factor", 0.1),
     "modifier switched off": lambda pad, ball: setattr(ball.modifiers["Cast"], "show_viewport", False),
