@@ -8,7 +8,7 @@ from blender_scenes import grid, press, reopen, save
 
 from palpate.addon.bake import bake
 from palpate.addon.properties import effect_stack
-from palpate.addon.scene import scene_fingerprint, scene_reader, sensor_reader
+from palpate.addon.scene import scene_reader, sensor_reader
 from palpate.addon.session import frame_status
 from palpate.addon.timeline import staleness
 from palpate.core.effects.engine.registry import check_scenario, effect, library
@@ -128,12 +128,6 @@ def test_a_sensor_with_an_effect_out_of_bounds_says_where():
     pad.palpate.effects[0].offset_common_offset = 1e9
     with pytest.raises(EffectError, match="offset of effect 'offset' \\(common\\) of sensor 'Pad' is 1e\\+09 unit"):
         check_scenario(run_job(scene_reader.read_scene(scene)).scenario)
-
-
-def test_settings_tell_stacks_apart(pad):
-    before = scene_fingerprint.settings_of(bpy.context.scene, [pad])
-    bpy.ops.palpate.effect_add(effect="noise")
-    assert scene_fingerprint.settings_of(bpy.context.scene, [pad]) != before
 
 
 def test_without_a_sensor_the_button_says_why():

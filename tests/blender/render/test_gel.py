@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Images of a baked gel: what they show is the surface that Blender shows, and the shear that was baked."""
+"""Images of a baked gel show the surface that Blender shows. Markers and lamps are tested in tests/core/figures/."""
 
 import math
 from types import SimpleNamespace
@@ -8,7 +8,6 @@ import bpy
 import numpy as np
 import pytest
 from blender_scenes import ball, grid, press, save
-from scipy.interpolate import RegularGridInterpolator
 
 from palpate.addon.bake.bake import bake
 from palpate.addon.render import figure_export
@@ -16,7 +15,7 @@ from palpate.addon.render.figure_request import FigureRequest
 from palpate.addon.scene import mesh_arrays
 from palpate.commands import main
 from palpate.core.errors import SensorError
-from palpate.core.figures import color_maps, gel_image
+from palpate.core.figures import color_maps
 from palpate.core.io.hidden_folder import LIST_NAME
 from palpate.core.io.recording_npz import load_recording
 from palpate.core.jobs import run_job
@@ -33,11 +32,10 @@ def folder(tmp_path_factory):
 @pytest.fixture
 def pressed(scene, folder):
     """A ball of 40 mm is pressed 3 mm into a gel and drawn aside by 4 mm; the images are drawn by the command, once for all."""
-    if not (folder / "printed").exists():
+    if not (folder / "plain").exists():
         path = press_gel(scene, folder)
         command = ["render", str(path), "--only", "gel", "--size", "450", "300", "--light-angle", str(ANGLE)]
         assert main([*command, "--no-markers", "--out", str(folder / "plain")]) == 0
-        assert main([*command, "--marker-pitch", "0.004", "--out", str(folder / "printed")]) == 0
     bpy.ops.wm.open_mainfile(filepath=str(folder / "scene.blend"))
     return SimpleNamespace(folder=folder, recording=load_recording(folder / "palpate-bake" / "Gel" / "recording.npz"))
 
@@ -72,8 +70,7 @@ def light(path):
 
 def test_there_is_an_image_for_each_frame_or_for_those_that_are_named(pressed, tmp_path):
     every = {f"gel_Gel_{number:04d}.png" for number in range(1, 7)} | {LIST_NAME}
-    for name in ("plain", "printed"):
-        assert {path.name for path in (pressed.folder / name).iterdir()} == every
+    assert {path.name for path in (pressed.folder / "plain").iterdir()} == every
     for options, frames in (({"frames": (2, 5)}, (2, 5)), ({"at_peak": True}, None)):
         request = FigureRequest(("gel",), size=(60, 40), **options)
         stages = []
@@ -103,40 +100,6 @@ def test_three_colours_tell_the_normals_of_the_surface_that_blender_shows(presse
     assert np.median(np.degrees(np.arccos(shown[touched, 2]))) > 10.0
     assert np.median(error[touched]) < 3.0
     assert np.percentile(error, 95) < 6.0
-
-
-def test_markers_follow_the_baked_shear(pressed):
-    """Each marker's middle, found in the image, moves by the shear of the texels around it (linear between them) over σ0."""
-    sensor = pressed.recording.sensors["Gel"]
-    texel = np.linspace(-0.5 * SIDE, 0.5 * SIDE, 16)
-    where = np.arange(12) * 0.004 - 0.022
-    shift_at = RegularGridInterpolator((texel, texel), sensor.shear[5].reshape(16, 16, 2) / 30.0)
-    moved, expected = [], []
-    dark = 1.0 - light(pressed.folder / "printed" / "gel_Gel_0006.png").mean(axis=2) / light(
-        pressed.folder / "plain" / "gel_Gel_0006.png"
-    ).mean(axis=2)
-    pixel = (0.5 - (np.arange(300) + 0.5) / 300) * SIDE  # x and y of the middles of pixels
-    for y in where:
-        for x in where:
-            guess = shift_at((y, x))
-            window = np.abs(pixel[:, None] - y - guess[1]) < 0.0015, np.abs(pixel[None] - x - guess[0]) < 0.0015
-            part = np.where(window[0] & window[1], np.maximum(dark, 0.0), 0.0)
-            assert part.sum() > 10.0
-            moved.append(((part * pixel[None]).sum() / part.sum() - x, (part * pixel[:, None]).sum() / part.sum() - y))
-            expected.append(guess)
-    moved, expected = np.array(moved), np.array(expected)
-    assert np.abs(expected).max() > 2e-3
-    for axis in (0, 1):
-        assert np.corrcoef(moved[:, axis], expected[:, axis])[0, 1] > 0.99
-        assert np.polyfit(expected[:, axis], moved[:, axis], 1)[0] == pytest.approx(1.0, abs=0.05)
-
-
-def test_before_contact_the_image_is_uniform(pressed):
-    picture = light(pressed.folder / "plain" / "gel_Gel_0001.png")
-    assert np.ptp(picture) == 0.0
-    printed = light(pressed.folder / "printed" / "gel_Gel_0001.png")
-    np.testing.assert_array_equal(printed, printed[::-1, ::-1])  # markers stand in the middle of the gel
-    assert printed.min() == pytest.approx(gel_image.MARKER_ALBEDO * gel_image.BRIGHTNESS, rel=0.05)
 
 
 def test_a_sensor_without_rows_and_columns_is_refused(tmp_path):

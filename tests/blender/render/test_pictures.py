@@ -13,7 +13,6 @@ import pytest
 from blender_scenes import changes, dump, press_and_drop, save
 
 from palpate.addon.bake.bake import bake
-from palpate.addon.display import bake_display
 from palpate.addon.render import figure_export, figure_request, render, render_setup, video
 from palpate.addon.render.figure_request import FigureRequest
 from palpate.commands import main
@@ -131,16 +130,6 @@ def test_all_that_matters_is_in_the_picture_and_lit(baked, tmp_path):
     assert picture.shape[2] == 4 and (picture[..., 3] == 0.0).any()  # no background
     covered = picture[..., 3] > 0.9
     assert covered.any() and picture[covered][:, :3].mean() > 0.1
-
-
-def test_the_scene_shows_the_colours_of_the_colour_bar(baked):
-    """The heat map ends where the figures' colour bar does."""
-    scene, _ = baked
-    made = figure_export.read_scene_bake(scene)
-    pad = scene.objects["Pad"]
-    nodes = pad.material_slots[-1].material.node_tree.nodes
-    end = next(node.inputs["From Max"].default_value for node in nodes if node.bl_idname == "ShaderNodeMapRange")
-    assert end == pytest.approx(bake_display.figure_style(scene).scale(made.recording, made.texels).high)
 
 
 def test_a_scene_that_is_not_baked_and_a_frame_that_is_not_are_one_sentence(baked, tmp_path):

@@ -170,16 +170,6 @@ def test_rendering_leaves_the_scene_as_it_was(scene, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["a.png"]
 
 
-def test_a_blender_without_denoiser_takes_more_samples(scene, tmp_path, monkeypatch):
-    """Debian's Blender has none, and refuses to render a scene that asks for one."""
-    assert render.can_denoise()  # this one has
-    demo.build(scene)
-    monkeypatch.setattr(render, "can_denoise", lambda: False)
-    with render._settings(scene, tmp_path / "a.png", 3, 8, None):
-        assert (scene.cycles.use_denoising, scene.cycles.samples) == (False, 32)
-    assert scene.cycles.use_denoising
-
-
 def test_a_scene_without_camera_says_so(scene, tmp_path):
     with pytest.raises(SceneError, match="no perspective camera"):
         render.render_frame(scene, tmp_path / "a.png", 1)

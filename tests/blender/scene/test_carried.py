@@ -58,16 +58,14 @@ def grandchild(pad):
     raise_object(outer)
 
 
-def constrained(pad):
+def constrained(pad, constraint="COPY_TRANSFORMS"):
     carrier = empty()
-    pad.constraints.new("COPY_TRANSFORMS").target = carrier
+    pad.constraints.new(constraint).target = carrier
     raise_object(carrier)
 
 
 def child_of(pad):
-    carrier = empty()
-    pad.constraints.new("CHILD_OF").target = carrier
-    raise_object(carrier)
+    constrained(pad, "CHILD_OF")
 
 
 def armature_bone(pad):

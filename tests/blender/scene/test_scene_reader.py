@@ -52,13 +52,6 @@ def test_roles_parameters_and_motion():
     assert reading.objects(scene) == [pad, target]
 
 
-def test_the_grid_of_the_pad_is_found():
-    scene, *_ = press()
-    texels = sampled(scene).scenario.sensors[0].texels
-    assert texels.layout.shape == (14, 6)
-    assert texels.normal == pytest.approx(np.tile([0.0, 0.0, 1.0], (84, 1)))
-
-
 def test_unit_scale_makes_metres():
     scene, pad, target = press()
     here = sampled(scene).scenario
