@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from exported_sensors import ball, pad
-from pressed_poses import DT, LEVEL, SIZE, assert_equal_bits, pose, random_poses
+from pressed_poses import DT, LEVEL, SIZE, assert_environments_are_singles, assert_equal_bits, pose, random_poses
 from solver_scenes import box
 
 from palpate.core.compiled.kernels import COMPILED
@@ -42,14 +42,7 @@ def test_environments_have_the_bits_of_single_sensors(kind, threads):
         poses = random_poses(seed, 5, 7)
         many.reset()
         singles = [PressedSensor(item, box(SIZE, SIZE, SIZE), DT, *map(pose, one)) for one in poses[0]]
-        for step, now in enumerate(poses):
-            if step == 3:
-                many.reset(np.arange(7) == 2)
-                singles[2].reset(*map(pose, now[2]))
-            found = many.step(now[:, 0], now[:, 1])
-            touched += found.contact.sum()
-            for number, single in enumerate(singles):
-                assert_equal_bits(found, number, single.step(*map(pose, now[number])))
+        touched += assert_environments_are_singles(many, singles, poses)
     assert touched > 50 * len(seeds)
 
 
@@ -108,24 +101,6 @@ def test_several_targets_share_a_sensor():
     assert (found.force_on_target[:, 2] > 0.1).all()
     with pytest.raises(ParameterError, match="There are 1 poses of targets for 2 targets"):
         both.step(pose(LEVEL), [pose(left)])
-
-
-def test_friction_holds_against_the_slope():
-    """1 kg on a pad that is tilted by 10°, coupled explicitly: weight and signed shear on the pad."""
-    item, dt, mass = pad(8, 8, k=1000.0, cn=10.0, sigma0=1000.0, sigma1=10.0), 5e-4, 1.0
-    pull = mass * 9.81 * np.array([0.0, -np.sin(np.radians(10.0)), -np.cos(np.radians(10.0))])
-    where, speed = np.array([0.0, 0.0, 0.05]), np.zeros(3)
-    pressed = PressedSensor(item, box(0.1, 0.1, 0.1), dt, pose(LEVEL), (where, LEVEL[3:]))
-    out = pressed.step(pose(LEVEL), (where, LEVEL[3:]))
-    for _ in range(3000 if COMPILED else 1):
-        speed += dt * (out.force_on_target + pull) / mass
-        where += dt * speed
-        assert pressed.step(pose(LEVEL), (where, LEVEL[3:]), out) is out
-    if COMPILED:
-        assert out.texels.contact.all()
-        assert out.texels.net_force == pytest.approx([0.0, -1.7035, -9.6610], abs=1e-4)
-        assert np.abs(out.texels.shear.sum(axis=0)).max() == pytest.approx(1.7035, abs=1e-3)
-        assert out.force_on_target == pytest.approx(-out.texels.net_force, abs=1e-12)
 
 
 def test_environments_without_poses_are_flagged_and_the_others_go_on():

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from exported_sensors import pad
-from pressed_poses import DT, LEVEL, SIZE, assert_equal_bits, pose, random_poses
+from pressed_poses import DT, LEVEL, SIZE, assert_environments_are_singles, pose, random_poses
 from scipy.spatial.transform import Rotation
 from solver_scenes import box
 
@@ -61,13 +61,6 @@ def test_a_capsule_that_lies_presses_as_a_cylinder():
     assert (expected > 0.0).sum() == 9
 
 
-def test_a_capsule_that_stands_presses_as_a_sphere():
-    where, radius = [1e-3, 2e-3, 0.0], 0.02
-    sphere, _, _ = at_rest(shapes.sphere(radius), [*where[:2], radius - DEPTH])
-    capsule, _, _ = at_rest(shapes.capsule(radius, 0.06), [*where[:2], 0.03 + radius - DEPTH])
-    assert capsule.texels.normal_force == pytest.approx(sphere.texels.normal_force, abs=1e-11)
-
-
 def test_a_leaning_plane_presses_by_its_depth():
     """The plane's normal leads down to the pad and leans by 1°, so that one end of the pad is not pressed."""
     lean = np.radians(1.0)
@@ -112,22 +105,11 @@ def test_a_pad_in_parts_has_the_same_bits_with_two_threads(shape):
 @pytest.mark.parametrize("name", SHAPES)
 def test_environments_have_the_bits_of_single_sensors(name):
     shape, height = SHAPES[name]
-    item, lit, count = pad(5, 4), 0, 6
-    many = PressedSensors(item, shape, DT, count, 2)
-    poses = random_poses(7, 5, count)
-    poses[:, :, 1, :3] += [0.0, 0.0, height - SIZE / 2 - DEPTH]
+    item, poses = pad(5, 4), random_poses(7, 5, 6, height=height - DEPTH)
     poses[:, :, 1, 0] *= 0.3
     poses[:, :, 1, 3:] = turned(name, poses[:, :, 1, 3:])
     singles = [PressedSensor(item, shape, DT, *map(pose, one)) for one in poses[0]]
-    for step, now in enumerate(poses):
-        if step == 3:
-            many.reset(np.arange(count) == 2)
-            singles[2].reset(*map(pose, now[2]))
-        found = many.step(now[:, 0], now[:, 1])
-        lit += found.contact.sum()
-        for number, single in enumerate(singles):
-            assert_equal_bits(found, number, single.step(*map(pose, now[number])))
-    assert lit > 20
+    assert assert_environments_are_singles(PressedSensors(item, shape, DT, 6, 2), singles, poses) > 20
 
 
 @pytest.mark.parametrize("name", [*SHAPES, "mesh"])
@@ -135,8 +117,7 @@ def test_contacts_that_are_known_have_the_bits_of_contacts_that_are_found(name):
     """A step begins with the contacts that the step before ended with; finding them again changes nothing."""
     shape, height = SHAPES.get(name, (box(SIZE, SIZE, SIZE), SIZE / 2))
     item, lit = pad(5, 4), 0
-    poses = random_poses(9, 8, 1)[:, 0]
-    poses[:, 1, :3] += [0.0, 0.0, height - SIZE / 2 - DEPTH]
+    poses = random_poses(9, 8, 1, height=height - DEPTH)[:, 0]
     poses[:, 1, 0] *= 0.3
     poses[:, 1, 3:] = turned(name, poses[:, 1, 3:])
     knows, finds = (PressedSensor(item, shape, DT, *map(pose, poses[0])) for _ in range(2))
