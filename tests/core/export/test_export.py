@@ -22,7 +22,7 @@ from palpate.core.export.formats import hdf5
 from palpate.core.figures import color_maps
 from palpate.core.figures.figure_style import FigureStyle
 from palpate.core.io.bake_reader import frame_index, read_bake
-from palpate.core.io.hidden_folder import LIST_FORMAT, LIST_NAME
+from palpate.core.io.hidden_folder import LIST_NAME
 from palpate.core.io.recording_npz import load_sensor, save_sensor
 from palpate.core.jobs import run_job
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
@@ -177,49 +177,8 @@ def test_every_format_is_in_the_table(bake, tmp_path):
 # --- an export after another one
 
 
-def shortened(bake, count):
-    """The first frames of a bake."""
-    recording = bake.recording
-    parts = {key: getattr(recording, key)[:count] for key in ("frames", "times", "poses", "velocities")}
-    sensors = {name: sensor.part(slice(count)) for name, sensor in recording.sensors.items()}
-    return replace(bake, recording=replace(recording, sensors=sensors, **parts))
-
-
 def files_in(folder):
     return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-
-
-def test_fewer_frames_leave_no_images_of_more_frames(bake, tmp_path):
-    out = tmp_path / "out"
-    run_job(export(bake, "png", out))
-    run_job(export(bake, "npz", out))
-    (out / "pad" / "mine.txt").write_text("mine")
-    (out / "pad" / "tactile_0009.png").write_text("changed by the user")
-    run_job(export(shortened(bake, 4), "png", out))
-    found = files_in(out)
-    assert {name for name in found if name.startswith("pad/tactile")} == {
-        *(f"pad/tactile_{frame:04d}.png" for frame in range(1, 5)),
-        "pad/tactile_0009.png",
-    }
-    assert "pad/mine.txt" in found and "pad.npz" in found
-    run_job(export(bake.select(["pad"]), "png", out))
-    assert {path.split("/")[0] for path in files_in(out) if "/" in path} == {"pad"}
-
-
-@pytest.mark.parametrize(
-    "name", ["../victim.txt", "/victim.txt", "link/victim.txt", "pad/../../victim.txt", "", ".", "a\\..\\b"]
-)
-def test_a_list_from_the_net_removes_nothing_outside_of_the_folder(bake, tmp_path, name):
-    out, victim = tmp_path / "out", tmp_path / "victim.txt"
-    out.mkdir()
-    victim.write_text("victim")
-    (out / "link").symlink_to(tmp_path)
-    digest = hashlib.sha256(b"victim").hexdigest()
-    name = str(victim) if name.startswith("/") else name
-    exports = {"npz": {"complete": True, "files": {name: digest}}}
-    (out / LIST_NAME).write_text(json.dumps({"format": LIST_FORMAT, "exports": exports}))
-    run_job(export(bake, "npz", out))
-    assert victim.read_text() == "victim"
 
 
 @pytest.mark.parametrize("content", ["", "[]", "{", "[" * 100_000, '{"format": "palpate-export/1", "exports": {"npz": 3}}'])

@@ -192,9 +192,12 @@ def test_an_error_names_the_place_of_the_file(out, formats):
     assert exported(out) == OLD and hidden(out) == [LIST_NAME] and is_complete(out)
 
 
-@pytest.mark.parametrize("name", ["../victim.txt", "link/victim.txt", "a\0b"])
+@pytest.mark.parametrize(
+    "name", ["../victim.txt", "/victim.txt", "link/victim.txt", "pad/../../victim.txt", "", ".", "a\\..\\b", "a\0b"]
+)
 def test_a_list_from_the_net_removes_nothing_outside_of_the_folder(out, tmp_path, name):
     (tmp_path / "victim.txt").write_text("victim")
+    name = str(tmp_path / "victim.txt") if name.startswith("/") else name
     (out / "link").symlink_to(tmp_path)
     listed = {"complete": True, "files": {name: hashlib.sha256(b"victim").hexdigest()}}
     (out / LIST_NAME).write_text(json.dumps({"format": LIST_FORMAT, "exports": {"text": listed}}))

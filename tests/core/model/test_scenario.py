@@ -10,11 +10,10 @@ from solver_scenes import cube_on_pad, pressed
 
 from palpate.core.effects.engine.registry import check_scenario
 from palpate.core.errors import EffectError, PalpateError, ParameterError
-from palpate.core.geometry.rotations import quaternions_from_vectors, rotation_matrices, rotation_vectors
-from palpate.core.model.body import Motion
+from palpate.core.geometry.rotations import quaternions_from_vectors, rotation_vectors
 from palpate.core.model.sensor import Effect
 from palpate.core.model.sensor_parameters import SensorParameters
-from palpate.core.solver.simulation import poses_at, run
+from palpate.core.solver.simulation import run
 from palpate.core.solver.time_step_adviser import LONGEST, SHARE_OF_LIMIT, advise, plan, stability_limit
 
 NUMBERS = [item.name for item in fields(SensorParameters) if item.type == "float"]
@@ -112,23 +111,6 @@ def test_advice_names_the_body_and_its_reason():
     moved = advise(pressed(cube_on_pad().targets[0].mesh, [[0, 0, 1]]))
     assert moved.dt == LONGEST
     assert np.isinf(moved.limit)
-
-
-def test_poses_meet_samples_exactly_and_turn_at_constant_speed():
-    rng = np.random.default_rng(7)
-    times = np.cumsum(rng.random(6) + 0.1)
-    quaternions = rng.normal(size=(6, 4))
-    quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
-    motion = Motion(times, rng.normal(size=(6, 3)), quaternions)
-    positions, turned = poses_at(motion, times)
-    assert np.array_equal(positions, motion.positions)
-    assert np.array_equal(turned, quaternions)
-    middle, half = poses_at(motion, np.array([0.5 * (times[0] + times[1])]))
-    np.testing.assert_allclose(middle[0], 0.5 * (motion.positions[0] + motion.positions[1]))
-    first, second = (rotation_matrices(half[0]).T @ rotation_matrices(q) for q in quaternions[:2])
-    np.testing.assert_allclose(first, second.T, atol=1e-12)
-    outside, _ = poses_at(motion, np.array([times[0] - 1, times[-1] + 1]))
-    assert np.array_equal(outside, motion.positions[[0, -1]])
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-14, 1e-8, 1e-3, 1.0, 3.1])

@@ -38,34 +38,6 @@ def test_smooth_motions_follow_scipy_to_the_first_order(drag, bar):
     assert fine < bar
 
 
-def test_presliding_is_hysteretic():
-    """Bristles bent to and fro enclose an area: the last loop's work against friction is scipy's, and is lost, not gained."""
-    times, shear, expected = hysteresis(1200)
-    travel = 4e-5 * np.sin(2 * np.pi * times)
-    last = slice(-401, None)
-
-    def work(force):
-        return np.sum(0.5 * (force[last][1:] + force[last][:-1]) * np.diff(travel[last]))
-
-    assert work(expected) > 0.0
-    assert work(shear) == pytest.approx(work(expected), rel=5e-3)
-
-
-def test_friction_lags_behind_the_speed():
-    """At the same speed it is higher while the plate speeds up than while it slows down (Hess and Soom), as in scipy."""
-    times, shear, expected = lag(1200)
-    period = slice(-401, None)
-    speed = 0.02 - 0.018 * np.cos(2 * np.pi * 40.0 * times[period])
-    up, down = np.diff(speed, append=speed[-1]) > 0, np.diff(speed, append=speed[-1]) < 0
-
-    def gap(force):
-        fast, slow = force[period][up], force[period][down]
-        return np.interp(0.02, speed[up], fast) - np.interp(0.02, speed[down][::-1], slow[::-1])
-
-    assert gap(expected) > 0.02 * expected.max()
-    assert gap(shear) == pytest.approx(gap(expected), rel=0.02)
-
-
 # ---- a mass on a spring ----
 def test_stick_slip_follows_scipy():
     """A block drawn by a spring sticks and slips, several times; errors halve with the step, and what is left without the

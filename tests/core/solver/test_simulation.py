@@ -18,7 +18,6 @@ from palpate.core.model.scenario import Target
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.model.shared_results import SharedResults
-from palpate.core.solver import simulation as simulation_module
 from palpate.core.solver.simulation import Simulation, run, solve
 
 STIFF_FRICTION = {"sigma0": 1e3, "sigma1": 10.0, "x0": 0.01}
@@ -279,28 +278,6 @@ def test_learning_the_motion_frame_by_frame_gives_the_same_bits():
         assert np.array_equal(frame.sensors["pad"].shear, known.sensors["pad"].shear[i])
         assert np.array_equal(frame.sensors["pad"].normal_force, known.sensors["pad"].normal_force[i])
         assert np.array_equal(frame.poses, known.poses[i])
-
-
-@pytest.mark.parametrize("interpolation", ["linear", "smooth"])
-def test_poses_of_many_frames_at_once_are_those_of_each_frame(monkeypatch, interpolation):
-    """Bit by bit, also where a frame has a single step and where the last block is not full."""
-    times = np.array([0.0, 0.03, 0.1, 0.35])
-    positions = np.cumsum(np.random.default_rng(3).normal(0, 0.01, (4, 3)), axis=0)
-    quaternions = np.array([about((1, 2, 3), angle) for angle in (0.0, 20.0, -70.0, 10.0)])
-    scenario = pressed(box(0.03, 0.02, 0.02), [[0.0, 0.0, 0.0093]])
-    moving = replace(scenario.bodies[1], motion=Motion(times, positions, quaternions))
-    bodies = (scenario.bodies[0], moving, *scenario.bodies[2:])
-    for dt in (None, 1.0):
-        scenario = replace(scenario, bodies=bodies, frame_end=9, dt=dt, interpolation=interpolation)
-        paths = []
-        for rows in (0, 30, 10_000):
-            monkeypatch.setattr(simulation_module, "PATH_ROWS", rows)
-            simulation = Simulation(scenario)
-            paths.append([simulation._prescribed_motion(frame, 1) for frame in range(scenario.frame_start, scenario.frame_end)])
-        for path in paths[1:]:
-            for own, alone in zip(path, paths[0], strict=True):
-                for values, expected in zip(own, alone, strict=True):
-                    np.testing.assert_array_equal(values, expected)
 
 
 def test_simulations_that_share_what_is_alike_give_the_same_bits():

@@ -51,6 +51,15 @@ def two_sensors_and_a_pad():
     return replace(scenario, bodies=(*scenario.bodies, side), sensors=(*scenario.sensors, *more))
 
 
+def smooth_paths():
+    """Poses between samples that are not those of frames."""
+    return replace(two_sensors_and_a_pad(), interpolation="smooth", frame_end=9)
+
+
+def one_step_a_frame():
+    return replace(smooth_paths(), dt=1.0)
+
+
 def drives_by_position():
     scenario = gripper(box(0.03, 0.03, 0.04), 0.1, 3.0, np.linspace(0.02, 0.05, 9))
     bodies = tuple(
@@ -82,6 +91,8 @@ def pressed_too_deep():
         slipping_cube,
         with_effects,
         two_sensors_and_a_pad,
+        smooth_paths,
+        one_step_a_frame,
         drives_by_position,
         controllers,
         plate_that_is_too_fast,

@@ -82,11 +82,3 @@ def test_the_loop_allocates_nothing():
         counts.append(rtsys.get_allocation_stats().alloc - before)
     assert simulation.substeps == 1000
     assert counts[0] == counts[1]
-
-
-def test_a_pad_in_parts_weighs_as_one():
-    """A cube that rests across the parts' borders is held by all of them together."""
-    simulation = Simulation(cube_on_pad(1.0, texels=pad(40, 40, 0.0012), dt=1e-3, k=50.0, cn=0.5))
-    for _ in range(24):
-        frame = simulation.advance()
-    assert frame.sensors["pad"].normal_force.sum() == pytest.approx(9.81, rel=1e-9)

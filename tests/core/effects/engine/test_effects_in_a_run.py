@@ -11,9 +11,7 @@ from trimesh.creation import icosphere
 
 from palpate.core.effects.engine.contact_forces import normal_forces
 from palpate.core.effects.engine.readout_chain import readings, transducers_of
-from palpate.core.effects.engine.registry import check_scenario, effect, library, mounted_texels
-from palpate.core.errors import EffectError
-from palpate.core.model.sensor import Effect
+from palpate.core.effects.engine.registry import effect, library, mounted_texels
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
 from palpate.core.solver.simulation import Simulation, run
 
@@ -192,14 +190,3 @@ def test_a_sticky_pad_holds_a_light_cube_back():
     felt = run(with_effects(scenario, effect("adhesion", "unloading", pull=0.3, depth=5e-5))).sensors["pad"].normal_force
     assert felt.min() < -0.15
     assert (felt[-1] == 0.0).all()
-
-
-@pytest.mark.parametrize("at", [0, 1, 2])
-def test_the_effects_of_every_sensor_are_checked(at):
-    """Whatever the position of the sensor among the others."""
-    scenario = press(frames=2)
-    sensors = [replace(scenario.sensors[0], name=name) for name in ("first", "second", "third")]
-    check_scenario(replace(scenario, sensors=tuple(sensors)))
-    sensors[at] = replace(sensors[at], effects=(Effect("noise", "white", {"spread": -1.0}),))
-    with pytest.raises(EffectError, match=f"of sensor '{sensors[at].name}'"):
-        check_scenario(replace(scenario, sensors=tuple(sensors)))

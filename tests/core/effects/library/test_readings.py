@@ -119,42 +119,34 @@ def test_saturation_counts_from_the_reading_without_load():
 # --- with memory
 
 
-@pytest.mark.parametrize(("form", "denominator"), [("first-order", [0.3, 1.0]), ("second-order", [0.09, 0.6, 1.0])])
-def test_lag_is_the_linear_system_that_it_says(form, denominator):
+TURN = 2.0 * np.pi / 0.3
+LAGS = [("first-order", {"time": 0.3}, [0.3, 1.0]), ("second-order", {"time": 0.3}, [0.09, 0.6, 1.0])]
+LAGS += [
+    ("resonance", {"period": 0.3, "damping": damping}, [TURN**-2, 2.0 * damping / TURN, 1.0])
+    for damping in (0.001, 0.05, 0.5, 0.95)
+]
+
+
+@pytest.mark.parametrize(("form", "values", "denominator"), LAGS)
+def test_lag_is_the_linear_system_that_it_says(form, values, denominator):
     random = np.random.default_rng(0)
     signal = np.cumsum(random.normal(size=len(TIME)))
     signal -= signal[0]
     _, expected, _ = lsim(TransferFunction([1.0], denominator), signal, TIME)
-    found = read(effect("lag", form, time=0.3), signal[:, None])
-    np.testing.assert_allclose(found[:, 0], expected, atol=1e-9)
+    found = read(effect("lag", form, **values), signal[:, None])
+    np.testing.assert_allclose(found[:, 0], expected, atol=1e-9 * (np.abs(expected).max() if form == "resonance" else 1.0))
 
 
-@pytest.mark.parametrize("damping", [0.001, 0.05, 0.5, 0.95])
-def test_a_resonance_is_the_oscillator_that_it_says(damping):
-    random = np.random.default_rng(0)
-    signal = np.cumsum(random.normal(size=len(TIME)))
-    signal -= signal[0]
-    turn = 2.0 * np.pi / 0.3
-    _, expected, _ = lsim(TransferFunction([turn**2], [1.0, 2.0 * damping * turn, turn**2]), signal, TIME)
-    found = read(effect("lag", "resonance", period=0.3, damping=damping), signal[:, None])
-    np.testing.assert_allclose(found[:, 0], expected, atol=1e-9 * np.abs(expected).max())
+STEPS = (1e-7, 9e-5, 1.1e-4, 9e-3, 1.1e-2, 50.0)
+SEAMS = [(form, {"time": 1.0}, step) for form in ("first-order", "second-order") for step in STEPS]
+SEAMS += [("resonance", {"period": 1.0, "damping": 0.3}, step) for step in (1e-9, 1.5e-3, 1.7e-3, 0.3, 50.0)]
 
 
-@pytest.mark.parametrize("step", [1e-9, 1.5e-3, 1.7e-3, 0.3, 50.0])
-def test_a_resonance_has_no_seam_between_its_series_and_its_formula(step):
+@pytest.mark.parametrize(("form", "values", "step"), SEAMS)
+def test_lag_has_no_seam_between_its_series_and_its_formula(form, values, step):
     """One step against a thousand small ones, over a ramp."""
     coarse, fine = np.array([0.0, step]), np.linspace(0.0, step, 1001)
-    item = effect("lag", "resonance", period=1.0, damping=0.3)
-    one, many = (read(item, (time / step)[:, None], time)[-1, 0] for time in (coarse, fine))
-    assert one == pytest.approx(many, rel=1e-6, abs=1e-18)
-
-
-@pytest.mark.parametrize("form", ["first-order", "second-order"])
-@pytest.mark.parametrize("step", [1e-7, 9e-5, 1.1e-4, 9e-3, 1.1e-2, 50.0])
-def test_lag_has_no_seam_between_its_series_and_its_formula(form, step):
-    """One step against a thousand small ones, over a ramp."""
-    coarse, fine = np.array([0.0, step]), np.linspace(0.0, step, 1001)
-    item = effect("lag", form, time=1.0)
+    item = effect("lag", form, **values)
     one, many = (read(item, (time / step)[:, None], time)[-1, 0] for time in (coarse, fine))
     assert one == pytest.approx(many, rel=1e-6, abs=1e-18)
 
