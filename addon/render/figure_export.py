@@ -14,22 +14,23 @@ import numpy as np
 
 from ...core import response
 from ...core.errors import SceneError
-from ...core.export.exporter import export, exporter_for
+from ...core.export.exporter import export
 from ...core.figures.side_by_side import side_by_side
 from ...core.figures.tactile_strip import tactile_strip
 from ...core.figures.texel_numbers import texel_numbers, why_unreadable
 from ...core.figures.time_curves import time_curves
 from ...core.io.bake_folder import file_stems
 from ...core.io.bake_reader import Bake, frame_index, read_sensors
-from ...core.io.file_writing import require_space, writable_folder
+from ...core.io.file_writing import writable_folder
 from ...core.io.hidden_folder import FileList, temporary_folder
 from ...core.jobs import Job, Progress, part_of_job
 from ..display import bake_identity, baked_scene
-from . import figure_size, gel_figures, loaded_texels, render, render_setup, see_through, video, workbench_colors
+from . import gel_figures, loaded_texels, render, render_setup, see_through, video, workbench_colors
 from .figure_request import FigureRequest
 
 SIGHTS = 12
 """Frames of a video, at most, whose loaded texels the camera is turned to."""
+MAX_VIDEO_HEIGHT = 720
 DRAWN = {"strip", "curves", "numbers"}
 """Kinds of figures that need no render."""
 
@@ -72,7 +73,7 @@ def make_figures(scene, folder, request: FigureRequest, warn: Callable[[str], ob
     Raises
     ------
     PalpateError
-        The scene or one of the frames is not baked, the disk has too little space, or a file cannot be written.
+        The scene or one of the frames is not baked, or a file cannot be written.
     """
     bake = read_scene_bake(scene)
     if request.sensors:
@@ -80,8 +81,8 @@ def make_figures(scene, folder, request: FigureRequest, warn: Callable[[str], ob
     frames = request.frames or (_default_frame(bake, request.at_peak),)
     for number in frames:
         frame_index(bake.recording, number)
-    data = sum(exporter_for(kind).size(bake) for kind in request.exports)
-    require_space(folder, figure_size.figures_bytes(bake, request, len(frames)) + data, "The set of figures")
+    if "gel" in request.kinds:
+        gel_figures.gel_sensors(bake, request)  # raises before anything is made
     folder = writable_folder(folder, create=True)
     for reason in map(why_unreadable, bake.texels, bake.texels.values()):
         if reason and "numbers" in request.kinds and not request.sensors:
@@ -158,10 +159,16 @@ def _render(scene, path, number: int, request: FigureRequest, bake: Bake, size: 
     return see_through.render_picture(scene, path, number, loaded, samples=request.samples, size=size)
 
 
+def video_size(request: FigureRequest) -> tuple[int, int]:
+    """Return width and height of the renders of a video, pixels; both are even."""
+    height = 2 * (min(request.size[1], MAX_VIDEO_HEIGHT) // 2)
+    return 2 * round(0.5 * height * request.size[0] / request.size[1]), height
+
+
 def _make_video(scene, folder, request, bake, steps) -> Job[list[Path]]:
     """Render all frames with the tactile images beside them, and encode them; return the file."""
     numbers = [int(number) for number in bake.recording.frames]
-    size = figure_size.video_size(request)
+    size = video_size(request)
     with temporary_folder(folder, "video") as temporary:
         pictures = []
         with _prepared_scene(scene, request, bake, numbers, size) as show_frame:

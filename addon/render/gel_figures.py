@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ...core import response
 from ...core.errors import SensorError
-from ...core.figures.gel_image import image_size, require_grid, write_gel_image
+from ...core.figures.gel_image import require_grid, write_gel_image
 from ...core.geometry.grid_layout import GridLayout
 from ...core.io.bake_folder import file_stems
 from ...core.io.bake_reader import Bake, frame_index
@@ -41,12 +41,6 @@ def gel_sensors(bake: Bake, request: FigureRequest) -> list[str]:
             "or lay texels in rows on a sensor."
         )
     return names
-
-
-def gel_pixels_in_all(bake: Bake, request: FigureRequest) -> int:
-    """Return the number of pixels of all images."""
-    sizes = [image_size(bake.texels[name], request.size) for name in gel_sensors(bake, request)]
-    return len(gel_frames(bake, request)) * sum(width * height for width, height in sizes)
 
 
 def draw_gels(bake: Bake, folder: Path, request: FigureRequest, next_step: Callable[[str, int], Progress]) -> Job[list[Path]]:

@@ -17,6 +17,7 @@ from mathutils import Vector
 
 from ...core.errors import FileError, SceneError
 from ...core.io.file_writing import atomic_write
+from ..scene import participants
 
 NEED_GL = {"BLENDER_EEVEE_NEXT", "BLENDER_EEVEE", "BLENDER_WORKBENCH"}
 """Engines that need OpenGL, from a graphics card or from Mesa's software renderer."""
@@ -41,6 +42,53 @@ def bounding_box_corners(objects) -> np.ndarray:
         matrix = np.array(evaluated.matrix_world)
         found.append(box @ matrix[:3, :3].T + matrix[:3, 3])
     return np.concatenate(found)
+
+
+def is_rendered(obj) -> bool:
+    """Return True for an object with a surface that pictures show."""
+    return obj.type in participants.OBJECT_TYPES and not obj.hide_render and obj.visible_get()
+
+
+class TemporaryChanges:
+    """Properties that are changed, and data-blocks that are added, until the context is left."""
+
+    def __init__(self):
+        self._before: list[tuple[object, str, object]] = []
+        self._added: list = []
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        for owner, name, value in self._before:
+            setattr(owner, name, value)
+        for block in self._added:
+            _remove(block)
+
+    def keep(self, owner, *names: str) -> None:
+        """Restore these properties at the end, before those that are named later."""
+        known = [name for other, name, _ in self._before if other == owner]
+        self._before += [(owner, name, getattr(owner, name)) for name in names if name not in known]
+
+    def set(self, owner, name: str, value) -> None:
+        """Give a property another value."""
+        self.keep(owner, name)
+        setattr(owner, name, value)
+
+    def add(self, block):
+        """Return a new data-block, which is removed at the end."""
+        self._added.append(block)
+        return block
+
+
+def _remove(block) -> None:
+    if isinstance(block, bpy.types.World | bpy.types.Material):
+        (bpy.data.worlds if isinstance(block, bpy.types.World) else bpy.data.materials).remove(block)
+        return
+    data = block.data
+    bpy.data.objects.remove(block)
+    kinds = {bpy.types.Camera: bpy.data.cameras, bpy.types.Light: bpy.data.lights, bpy.types.Mesh: bpy.data.meshes}
+    next(blocks for kind, blocks in kinds.items() if isinstance(data, kind)).remove(data)
 
 
 def fit_camera(scene, points: np.ndarray, region=(0.05, 0.05, 0.95, 0.95)) -> None:
@@ -217,35 +265,30 @@ def _half_angles(scene, camera) -> tuple[float, float]:
 def _settings(scene, path: Path, frame: int, samples: int | None, size) -> Iterator[None]:
     """Change the settings of a scene for one render, then restore them."""
     render, image = scene.render, scene.render.image_settings
-    changes: list[tuple[object, str, object]] = []
-    if hasattr(image, "media_type"):  # Blender 5.0: decides which file formats there are to choose from
-        changes.append((image, "media_type", "IMAGE"))
-    changes += [
-        (image, "file_format", "PNG"),
-        (image, "color_mode", "RGBA" if render.film_transparent else "RGB"),
-        (image, "color_depth", "8"),
-    ]
-    changes += [(render, "filepath", str(path)), (render, "use_file_extension", False), (render, "use_overwrite", True)]
-    if size is not None:
-        changes += [(render, "resolution_x", int(size[0])), (render, "resolution_y", int(size[1]))]
-        changes.append((render, "resolution_percentage", 100))
-    denoise = render.engine != "CYCLES" or not scene.cycles.use_denoising or can_denoise()
-    if not denoise:
-        changes.append((scene.cycles, "use_denoising", False))
-        samples = SAMPLES_WITHOUT_DENOISER * int(scene.cycles.samples if samples is None else samples)
-    if samples is not None:
-        if render.engine == "CYCLES":
-            changes.append((scene.cycles, "samples", int(samples)))
-        elif hasattr(scene, "eevee"):
-            changes.append((scene.eevee, "taa_render_samples", int(samples)))
-    before = [(owner, name, getattr(owner, name)) for owner, name, _ in changes]
     frame_before = scene.frame_current
     try:
-        for owner, name, value in changes:
-            setattr(owner, name, value)
-        scene.frame_set(frame)
-        yield
+        with TemporaryChanges() as changes:
+            # Blender 5.0 has media types, which decide about the formats to choose from, as these do about the colours.
+            kinds = ("media_type", "file_format", "color_mode", "color_depth")
+            changes.keep(image, *(name for name in kinds if hasattr(image, name)))
+            if hasattr(image, "media_type"):
+                image.media_type = "IMAGE"
+            image.file_format, image.color_depth = "PNG", "8"
+            image.color_mode = "RGBA" if render.film_transparent else "RGB"
+            for name, value in (("filepath", str(path)), ("use_file_extension", False), ("use_overwrite", True)):
+                changes.set(render, name, value)
+            if size is not None:
+                for name, value in (("x", size[0]), ("y", size[1]), ("percentage", 100)):
+                    changes.set(render, f"resolution_{name}", int(value))
+            if render.engine == "CYCLES" and scene.cycles.use_denoising and not can_denoise():
+                changes.set(scene.cycles, "use_denoising", False)
+                samples = SAMPLES_WITHOUT_DENOISER * int(scene.cycles.samples if samples is None else samples)
+            if samples is not None:
+                if render.engine == "CYCLES":
+                    changes.set(scene.cycles, "samples", int(samples))
+                elif hasattr(scene, "eevee"):
+                    changes.set(scene.eevee, "taa_render_samples", int(samples))
+            scene.frame_set(frame)
+            yield
     finally:
-        for owner, name, value in before:
-            setattr(owner, name, value)
         scene.frame_set(frame_before)

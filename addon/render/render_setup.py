@@ -60,17 +60,15 @@ def engine_of(scene, name: str) -> str:
 def subjects(scene) -> list:
     """Return the objects that a picture should show: sensors, pads, targets, their children, arrows and markers."""
     taking_part = {obj for obj in scene.objects if obj.palpate.role != "NONE" or materials.SENSOR_KEY in obj}
-    return [obj for obj in scene.objects if _is_rendered(obj) and (obj in taking_part or taking_part & set(_ancestors(obj)))]
+    return [
+        obj for obj in scene.objects if render.is_rendered(obj) and (obj in taking_part or taking_part & set(_ancestors(obj)))
+    ]
 
 
 def _ancestors(obj) -> Iterator:
     while obj.parent is not None:
         obj = obj.parent
         yield obj
-
-
-def _is_rendered(obj) -> bool:
-    return obj.type in {"MESH", "CURVE", "SURFACE", "META", "FONT"} and not obj.hide_render and obj.visible_get()
 
 
 @dataclass(frozen=True)
@@ -105,28 +103,6 @@ class RenderOptions:
     size: tuple[int, int] | None = None
 
 
-class _TemporaryChanges:
-    """Properties that are changed, and data-blocks that are added, until :meth:`undo`."""
-
-    def __init__(self):
-        self._before: list[tuple[object, str, object]] = []
-        self._added: list = []
-
-    def set(self, owner, name: str, value) -> None:
-        self._before.append((owner, name, getattr(owner, name)))
-        setattr(owner, name, value)
-
-    def add(self, block):
-        self._added.append(block)
-        return block
-
-    def undo(self) -> None:
-        for owner, name, value in reversed(self._before):
-            setattr(owner, name, value)
-        for block in self._added:
-            _remove(block)
-
-
 @contextmanager
 def render_setup(
     scene, frames: Sequence[int], options: RenderOptions, loaded: Mapping[int, LoadedTexels] | None = None
@@ -142,22 +118,21 @@ def render_setup(
     loaded : mapping of int to LoadedTexels, optional
         Loaded texels at some of the frames, which the camera is turned to.
     """
-    changes = _TemporaryChanges()
     now = scene.frame_current, scene.frame_subframe
     try:
-        _set_output(scene, options, changes)
-        _set_colors(scene, changes)
-        _set_camera(scene, frames, options, loaded or {}, changes)
-        _set_lights(scene, frames, options, changes)
-        if scene.render.engine == "BLENDER_WORKBENCH":
-            _set_workbench(scene, changes)
-        yield
+        with render.TemporaryChanges() as changes:
+            _set_output(scene, options, changes)
+            _set_colors(scene, changes)
+            _set_camera(scene, frames, options, loaded or {}, changes)
+            _set_lights(scene, frames, options, changes)
+            if scene.render.engine == "BLENDER_WORKBENCH":
+                _set_workbench(scene, changes)
+            yield
     finally:
-        changes.undo()
         scene.frame_set(now[0], subframe=now[1])
 
 
-def _set_colors(scene, changes: _TemporaryChanges) -> None:
+def _set_colors(scene, changes: render.TemporaryChanges) -> None:
     """Show colours as they are: everything else would make a heat map differ from its colour bar."""
     view = scene.view_settings
     for name, value in (("view_transform", "Standard"), ("look", "None"), ("exposure", 0.0), ("gamma", 1.0)):
@@ -168,7 +143,7 @@ def _set_colors(scene, changes: _TemporaryChanges) -> None:
     changes.set(scene.render, "use_sequencer", False)
 
 
-def _set_output(scene, options: RenderOptions, changes: _TemporaryChanges) -> None:
+def _set_output(scene, options: RenderOptions, changes: render.TemporaryChanges) -> None:
     """Set engine, size and background."""
     if options.engine is not None:
         changes.set(scene.render, "engine", engine_of(scene, options.engine))
@@ -183,7 +158,7 @@ def _set_output(scene, options: RenderOptions, changes: _TemporaryChanges) -> No
         changes.set(scene.cycles, "use_denoising", True)
 
 
-def _set_camera(scene, frames: Sequence[int], options: RenderOptions, loaded, changes: _TemporaryChanges) -> None:
+def _set_camera(scene, frames: Sequence[int], options: RenderOptions, loaded, changes: render.TemporaryChanges) -> None:
     """Add a camera that frames the subjects, unless the scene's own is to stay."""
     own = scene.camera if scene.camera is not None and scene.camera.data.type == "PERSP" else None
     if own is not None and options.view is None and options.own_camera:
@@ -226,7 +201,7 @@ def _frame(scene, corners: np.ndarray, surroundings: np.ndarray) -> None:
     distance(low)
 
 
-def _set_lights(scene, frames: Sequence[int], options: RenderOptions, changes: _TemporaryChanges) -> None:
+def _set_lights(scene, frames: Sequence[int], options: RenderOptions, changes: render.TemporaryChanges) -> None:
     """Set studio light; where the scene's own light counts, add lamps and a bright world to a scene without light."""
     if not options.own_light:
         scene.frame_set(frames[-1])
@@ -242,7 +217,7 @@ def _set_lights(scene, frames: Sequence[int], options: RenderOptions, changes: _
         changes.set(scene, "world", changes.add(studio.bright_world()))
 
 
-def _set_workbench(scene, changes: _TemporaryChanges) -> None:
+def _set_workbench(scene, changes: render.TemporaryChanges) -> None:
     """Let Workbench show the colours of the vertices, unshaded."""
     shading = scene.display.shading
     changes.set(shading, "light", "FLAT")  # shading would make a heat map darker than its colour bar
@@ -261,7 +236,7 @@ def _in_picture(scene) -> list:
     corners = render.bounding_box_corners(seen)
     low, high = corners.min(axis=0), corners.max(axis=0)
     size = float(np.linalg.norm(high - low))
-    others = {obj: _box(obj) for obj in scene.objects if _is_rendered(obj) and obj not in seen}
+    others = {obj: _box(obj) for obj in scene.objects if render.is_rendered(obj) and obj not in seen}
     small = {obj: box for obj, box in others.items() if np.linalg.norm(box[1] - box[0]) <= NEARBY_RATIO * size}
     touching = {
         obj for obj, box in small.items() if (box[0] <= high + NEARBY * size).all() and (box[1] >= low - NEARBY * size).all()
@@ -280,7 +255,7 @@ def _backdrops(scene) -> list:
     seen = subjects(scene)
     carriers = {ancestor for obj in seen for ancestor in _ancestors(obj)}
     size = float(np.linalg.norm(np.ptp(render.bounding_box_corners(seen), axis=0))) if seen else 0.0
-    others = [obj for obj in scene.objects if _is_rendered(obj) and obj not in seen and obj not in carriers]
+    others = [obj for obj in scene.objects if render.is_rendered(obj) and obj not in seen and obj not in carriers]
     return [
         obj
         for obj in others
@@ -356,13 +331,3 @@ def _is_dark(world) -> bool:
         return max(world.color) < 0.1
     nodes = [node for node in tree.nodes if node.type == "BACKGROUND"]
     return len(nodes) == 1 and not nodes[0].inputs["Color"].is_linked and max(nodes[0].inputs["Color"].default_value[:3]) < 0.1
-
-
-def _remove(block) -> None:
-    if isinstance(block, bpy.types.World | bpy.types.Material):
-        (bpy.data.worlds if isinstance(block, bpy.types.World) else bpy.data.materials).remove(block)
-        return
-    data = block.data
-    bpy.data.objects.remove(block)
-    kinds = {bpy.types.Camera: bpy.data.cameras, bpy.types.Light: bpy.data.lights, bpy.types.Mesh: bpy.data.meshes}
-    next(blocks for kind, blocks in kinds.items() if isinstance(data, kind)).remove(data)

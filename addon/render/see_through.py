@@ -19,7 +19,6 @@ from mathutils import Vector
 from ...core.io.file_writing import atomic_write
 from ...core.io.hidden_folder import temporary_folder
 from ..display import materials
-from ..scene import participants
 from . import camera_direction, render
 from .loaded_texels import LoadedTexels
 
@@ -77,11 +76,7 @@ def _target_parts(scene) -> list:
     """Return the targets and what hangs on them, as far as it is rendered and no sensor or pad."""
     found = [obj for obj in scene.objects if obj.palpate.role == "TARGET"]
     found += [child for obj in found for child in obj.children_recursive if child.palpate.role == "NONE"]
-    return [obj for obj in dict.fromkeys(found) if _is_rendered(obj)]
-
-
-def _is_rendered(obj) -> bool:
-    return obj.type in participants.OBJECT_TYPES and not obj.hide_render and obj.visible_get()
+    return [obj for obj in dict.fromkeys(found) if render.is_rendered(obj)]
 
 
 def _cover(scene, objects, loaded: LoadedTexels) -> bool:
@@ -138,7 +133,7 @@ def _outline(scene, objects, size: tuple[int, int]) -> np.ndarray:
 
     image, depsgraph = Image.new("1", size), bpy.context.evaluated_depsgraph_get()
     draw = ImageDraw.Draw(image)
-    for obj in filter(_is_rendered, objects):
+    for obj in filter(render.is_rendered, objects):
         evaluated = obj.evaluated_get(depsgraph)
         places = [render.image_position(scene, evaluated.matrix_world @ vertex.co) for vertex in evaluated.data.vertices]
         pixels = [(x * size[0], (1.0 - y) * size[1]) for x, y in places]
@@ -212,18 +207,12 @@ def _without(scene, objects, rows: np.ndarray, columns: np.ndarray, shape: tuple
         "use_border": True,
         "use_crop_to_border": False,
     }
-    before = {name: getattr(scene.render, name) for name in border}
-    try:
+    with render.TemporaryChanges() as changes:
         for name, value in border.items():
-            setattr(scene.render, name, value)
+            changes.set(scene.render, name, value)
         for obj in objects:
-            obj.hide_render = True
+            changes.set(obj, "hide_render", True)
         yield
-    finally:
-        for obj in objects:
-            obj.hide_render = False
-        for name, value in before.items():
-            setattr(scene.render, name, value)
 
 
 def _blend(path: Path, clear: Path, weights: np.ndarray) -> None:

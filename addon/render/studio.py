@@ -53,7 +53,7 @@ def set_studio(scene, changes, backdrops, frame: int, bottom: np.ndarray, transp
     ----------
     scene : Scene
         Its camera stands.
-    changes : TemporaryChanges
+    changes : render.TemporaryChanges
     backdrops : list of Object
         Are not rendered.
     frame : int
@@ -117,15 +117,9 @@ def _brightness(scene, frame: int) -> float:
     """Return the mean displayed brightness of what is not background, 0 to 1, in a small render; 0 where nothing is seen."""
     from matplotlib.image import imread
 
-    before = scene.render.film_transparent
-    scene.render.film_transparent = True
-    try:
-        with temporary_folder(Path(bpy.app.tempdir), "studio") as folder:
-            picture = imread(
-                render.render_frame(scene, folder / "small.png", frame, samples=PREVIEW_SAMPLES, size=PREVIEW_SIZE)
-            )
-    finally:
-        scene.render.film_transparent = before
+    with render.TemporaryChanges() as changes, temporary_folder(Path(bpy.app.tempdir), "studio") as folder:
+        changes.set(scene.render, "film_transparent", True)
+        picture = imread(render.render_frame(scene, folder / "small.png", frame, samples=PREVIEW_SAMPLES, size=PREVIEW_SIZE))
     seen = picture[..., 3] > 0.5
     return float(picture[seen][:, :3].mean()) if seen.any() else 0.0
 

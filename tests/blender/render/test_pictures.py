@@ -5,7 +5,6 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
-from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -18,7 +17,6 @@ from palpate.addon.render.figure_request import FigureRequest
 from palpate.commands import main
 from palpate.core.errors import FileError, ParameterError, SceneError
 from palpate.core.figures.figure_style import FigureStyle
-from palpate.core.io import file_writing
 from palpate.core.io.file_writing import atomic_write
 from palpate.core.io.hidden_folder import LIST_NAME
 from palpate.core.jobs import run_job
@@ -97,15 +95,6 @@ def test_figures_take_the_place_of_earlier_ones(baked, tmp_path, monkeypatch):
     monkeypatch.setattr(figure_export, "read_scene_bake", lambda _: another)
     draw(out, 2)
     assert {name for name in ages(out) if "Pad" in name} == {"numbers_Pad_0002.png", "numbers_Pad_2_0002.png"}
-
-
-def test_a_full_disk_is_found_before_a_render(baked, tmp_path, monkeypatch):
-    scene, _ = baked
-    monkeypatch.setattr(figure_export.render, "render_frame", None)
-    monkeypatch.setattr(file_writing.shutil, "disk_usage", lambda _: SimpleNamespace(free=8e6))
-    with pytest.raises(FileError, match=r"The set of figures needs up to 13 MB and the disk of .* has 8 MB left"):
-        run_job(figure_export.make_figures(scene, tmp_path / "out", FigureRequest(("scene",))))
-    assert not (tmp_path / "out").exists()
 
 
 def test_the_video_has_a_picture_per_frame(baked, tmp_path):
