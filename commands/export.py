@@ -8,8 +8,8 @@ import importlib.util
 
 from ..api.recordings import Recording
 from ..core.errors import PalpateError
-from ..core.export import FORMATS
 from ..core.export.exporter import Exporter
+from ..core.export.format_table import FORMATS
 from ..core.figures.figure_style import FigureStyle
 from ..core.io.bake_reader import Bake, read_bake
 from . import blender, checks, console, figure_options

@@ -14,7 +14,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ...core.export import FORMATS as DATA_FORMATS
+from ...core.export.format_table import FORMATS as DATA_FORMATS
 from ...core.figures.figure_style import LIGHT_ANGLES, MARKERS_ALONG, GelStyle
 from . import scene_units
 from .scene_units import in_units

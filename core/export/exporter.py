@@ -19,7 +19,7 @@ from ..io.file_writing import CHANNEL_BYTES, recording_bytes, require_space, wri
 from ..io.hidden_folder import FileList
 from ..jobs import Job, Progress
 from ..model.recording import SENSOR_FIELDS, VectorReadings
-from . import FORMATS
+from .format_table import FORMATS
 
 UNITS = {
     "normal_force": "N",

@@ -16,8 +16,9 @@ import pytest
 from sample_bake import grid_texels, recording_of, round_texels, write_bake, write_sensor
 
 from palpate.core.errors import FileError, PalpateError
-from palpate.core.export import FORMATS, exporter, formats
+from palpate.core.export import exporter, formats
 from palpate.core.export.exporter import export
+from palpate.core.export.format_table import FORMATS
 from palpate.core.export.formats import hdf5
 from palpate.core.figures import color_maps
 from palpate.core.figures.figure_style import FigureStyle

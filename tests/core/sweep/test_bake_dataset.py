@@ -11,7 +11,7 @@ from sample_bake import grid_texels, recording_of, round_texels, write_sensor
 
 from palpate.commands import export as export_command
 from palpate.commands import main
-from palpate.core.export import FORMATS
+from palpate.core.export.format_table import FORMATS
 from palpate.core.io.bake_reader import read_bake
 from palpate.core.model.sensor_parameters import SensorParameters
 
