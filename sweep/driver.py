@@ -10,7 +10,6 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -33,8 +32,6 @@ MOST_FAILURES = 100
 """Failed runs whose sentences the driver keeps."""
 LOOK = 0.1
 """Seconds between two looks at the keyboard."""
-LOOK_FOR_WORKERS = 1.0
-"""Seconds between two looks for workers of this machine that are gone."""
 
 SETTINGS = {
     "distributed.logging.distributed": "critical",
@@ -48,7 +45,7 @@ SETTINGS = {
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 64 << 20,
     "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 32 << 20,
     "distributed.nanny.pre-spawn-environ.NUMBA_NUM_THREADS": 1,
-    "distributed.scheduler.allowed-failures": 0,  # of this machine: a batch that ended its worker is halved, not repeated
+    "distributed.scheduler.allowed-failures": 0,  # of this machine: a batch that ended its worker is taken apart, not repeated
     "distributed.deploy.lost-worker-timeout": "5s",  # in which a nanny starts another worker, before it is replaced, too
 }
 
@@ -124,28 +121,8 @@ def dask_client(
                 f"The {workers} worker processes did not start ({error}): look whether something ends processes on this "
                 "machine, as a limit of memory does, and give the same command again."
             ) from error
-        kept = workers if make_cluster is None else 0
-        with _closing(cluster, timeout=10), _keeping(cluster, kept), _closing(Client(cluster)) as client:
+        with _closing(cluster, timeout=10), _closing(Client(cluster)) as client:
             yield client
-
-
-@contextmanager
-def _keeping(cluster: Any, workers: int) -> Iterator[None]:
-    """Replace lost workers of a local cluster, if there are to be any.
-
-    A nanny starts no other worker after one that ended before the nanny knew that it had started, as a first run can end it.
-    """
-    from tornado.ioloop import PeriodicCallback
-
-    if not workers:
-        yield
-        return
-    watch = PeriodicCallback(partial(cluster.scale, workers), LOOK_FOR_WORKERS * 1e3)
-    cluster.loop.add_callback(watch.start)
-    try:
-        yield
-    finally:
-        cluster.loop.add_callback(watch.stop)
 
 
 @contextmanager
@@ -178,8 +155,8 @@ def batches_of(indices: np.ndarray, total: int, seconds: float, workers: int) ->
 class Dispatch:
     """Batches of a study at Dask workers.
 
-    A batch that takes its worker down is halved until the run is alone that does it. Such runs come last, one after the
-    other: if a worker is lost then, the run is the reason, and it has failed.
+    The runs of a batch that takes its worker down are computed again, each in a batch of its own, and those that do so again
+    last, one after the other: if a worker is lost then, the run is the reason, and it has failed.
 
     Parameters
     ----------
@@ -196,7 +173,6 @@ class Dispatch:
         self.client, self.opened, self.on_progress = client, opened, on_progress
         self.words = {"folder": os.fspath(opened.folder), "scripts": scripts, "limit": opened.study.run_limit}
         self.over = BatchResult()
-        self.suspects: list[int] = []
 
     def run(self, indices: np.ndarray) -> BatchResult:
         """Compute runs and return what became of them.
@@ -210,37 +186,46 @@ class Dispatch:
         """
         workers = max(1, len(self.client.scheduler_info(n_workers=-1)["workers"]))
         first, rest = indices[:workers], indices[workers:]
-        self._compute([[index] for index in first.tolist()])  # nobody knows how long a run takes before
+        lost = self._compute([[index] for index in first.tolist()])  # nobody knows how long a run takes before
         seconds = self.over.seconds / max(1, self.over.finished)
-        self._compute(batches_of(rest, len(self.opened.runs), seconds, workers))
-        for index in self.suspects:
-            self._compute([[index]], is_last=True)
+        lost += self._compute(batches_of(rest, len(self.opened.runs), seconds, workers))
+        for index in self._compute([[index] for index in lost]):
+            if self._compute([[index]]):
+                self._note_fatal(index)
         return self.over
 
-    def _compute(self, batches: Sequence[Sequence[int]], is_last: bool = False) -> None:
+    def _compute(self, batches: Sequence[Sequence[int]]) -> list[int]:
+        """Compute batches and return the runs of those that took their workers down."""
         from distributed import as_completed
 
         futures = self.client.map(compute_batch, batches, **self.words, pure=False, retries=RETRIES)
-        waiting = dict(zip(futures, batches, strict=True))
+        waiting, lost = dict(zip(futures, batches, strict=True)), list[int]()
         completed = as_completed(futures)
         try:
-            while completed.count() or not completed.is_empty():
+            while waiting:
                 self.on_progress(self.over)
                 if self.client.status != "running":
                     raise _scheduler_gone()
                 time.sleep(LOOK)
+                self._replace_lost_workers()
                 for future in completed.next_batch(block=False):
-                    halves = self._take(future, waiting.pop(future), is_last)
-                    more = self.client.map(compute_batch, halves, **self.words, pure=False, retries=RETRIES)
-                    waiting |= dict(zip(more, halves, strict=True))
-                    completed.update(more)
+                    lost += self._take(future, waiting.pop(future))
             self.on_progress(self.over)
         finally:
             with suppress(Exception):  # the scheduler may be gone
                 self.client.cancel(list(waiting), force=True)
+        return lost
 
-    def _take(self, future: Any, batch: Sequence[int], is_last: bool) -> list[Sequence[int]]:
-        """Note what became of a batch; return the halves of one that took its worker down."""
+    def _replace_lost_workers(self) -> None:
+        """Start workers of this machine again whose nannies do not, as a first run can end one before its nanny knows it."""
+        from distributed import LocalCluster
+
+        cluster = self.client.cluster
+        if isinstance(cluster, LocalCluster):
+            cluster.scale(len(cluster.worker_spec))
+
+    def _take(self, future: Any, batch: Sequence[int]) -> Sequence[int]:
+        """Note what became of a batch; return its runs if it took its worker down."""
         from distributed.scheduler import KilledWorker
 
         if future.status == "cancelled":  # as all batches are when the scheduler ends
@@ -248,18 +233,10 @@ class Dispatch:
         try:
             found = future.result()  # waits where a result is lost with its worker, as Dask computes it again
         except KilledWorker:
-            pass
-        else:
-            self.over.done += found.done
-            self.over.seconds += found.seconds
-            self._note_failed(found.failed, found.failures)
-            return []
-        if len(batch) > 1:
-            return [batch[: len(batch) // 2], batch[len(batch) // 2 :]]
-        if not is_last:
-            self.suspects.append(batch[0])
-            return []
-        self._note_fatal(batch[0])
+            return batch
+        self.over.done += found.done
+        self.over.seconds += found.seconds
+        self._note_failed(found.failures, found.failed)
         return []
 
     def _note_fatal(self, index: int) -> None:
@@ -267,9 +244,9 @@ class Dispatch:
         advice = f"raise run_memory, {memory:g} MB" if memory else "it may need more memory"
         sentence = f"Run {index} ended its worker each time that it was computed: {advice}, or vary less widely."
         write_part(self.opened.folder, [RunResult(self.opened.runs[index], sentence)])
-        self._note_failed(1, [(index, sentence)])
+        self._note_failed([(index, sentence)], 1)
 
-    def _note_failed(self, count: int, failures: list[tuple[int, str]]) -> None:
+    def _note_failed(self, failures: list[tuple[int, str]], count: int) -> None:
         self.over.failed += count
         self.over.failures += failures[: MOST_FAILURES - len(self.over.failures)]
 

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import errno
-import math
 import os
 import shutil
 import threading
@@ -13,6 +12,7 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -21,18 +21,9 @@ import numpy as np
 
 from ..core.errors import FileError, PalpateError, os_error_reason
 from ..core.geometry.rotations import rotation_matrices
-from ..core.io.bake_folder import (
-    IMAGE_LIST_NAME,
-    RECORDING_NAME,
-    checksum_line,
-    folder_names,
-    frame_file,
-    manifest_of,
-    write_manifest,
-)
-from ..core.io.file_writing import file_sha256
-from ..core.io.recording_npz import SENSOR_NAME, save_recording, save_sensor
-from ..core.io.tactile_exr import describe, nearest_places, write_exrs
+from ..core.io.bake_folder import folder_names, manifest_of, write_arrays_of, write_images, write_manifest
+from ..core.io.hidden_folder import temporary_folder
+from ..core.io.scenario_npz import load_scenario
 from ..core.jobs import run_job
 from ..core.model.recording import Recording, SensorRecording
 from ..core.model.scenario import Scenario
@@ -40,13 +31,13 @@ from ..core.model.sensor import Sensor
 from ..core.model.shared_results import SharedResults
 from ..core.response import net_shear, share_on, slipping
 from ..core.study.presses import Press, place_of
-from ..core.study.scene_property import is_scene_property, scene_values
-from ..core.study.study_file import RUNS, SCENE, STUDY_NAME, Run
+from ..core.study.scene_property import is_scene_property, scene_values, write_overrides
+from ..core.study.study_file import RUNS, SCENE, SCENES, STUDY_NAME, Run, at_rate
 from ..core.study.variation import PRESS, varied_scenario
 from .features import FrameStyle, solved_frames
 from .parts import RunResult, write_part
 from .program import Program, frozen_program, require_allowed
-from .scene_evaluation import REFUSE, SceneReader
+from .scene_evaluation import REFUSE, read_blend
 from .study_folder import OpenStudy, resume_study
 
 # Metrics of a run of a study.
@@ -143,8 +134,8 @@ def _is_held(index: int, scenario: Scenario, recording: Recording) -> bool:
     return False
 
 
-MOST_PIXELS = 1 << 20
-"""Pixels that are in memory at once; one call for many small images is faster than one for each."""
+MOST_SCENES_KEPT = 4
+"""Scenarios of scenes that a process keeps: the runs of a grid, whose last number changes fastest, share them."""
 
 
 def write_run_folder(folder: Path, scenario: Scenario, recording: Recording, images: bool) -> None:
@@ -170,30 +161,9 @@ def write_run_folder(folder: Path, scenario: Scenario, recording: Recording, ima
             continue
         own = folder / names[sensor.name]
         own.mkdir()
-        alone = replace(recording, sensors={sensor.name: recording.sensors[sensor.name]})
-        save_recording(own / RECORDING_NAME, alone, atomic=False)
-        save_sensor(own / SENSOR_NAME, sensor.texels, sensor.painted, atomic=False)
-        files = [RECORDING_NAME, SENSOR_NAME]
-        if images:
-            _write_images(own, sensor, recording)
-            files.append(IMAGE_LIST_NAME)  # it lists the images
-        digests = {name: file_sha256(own / name) for name in files}
-        write_manifest(own, manifest_of(scenario, sensor, recording, digests))
-
-
-def _write_images(folder: Path, sensor: Sensor, recording: Recording) -> None:
-    """Write an image for each frame of a sensor, and the list of their SHA-256."""
-    at_once = max(1, MOST_PIXELS // math.prod(sensor.texels.layout.shape))
-    nearest = nearest_places(sensor.texels, recording.sensors[sensor.name].channels)
-    lines = []
-    numbers = [int(frame) for frame in recording.frames]
-    for start in range(0, len(numbers), at_once):
-        frames = [recording.at(number) for number in numbers[start : start + at_once]]
-        paths = [folder / frame_file(frame.frame) for frame in frames]
-        headers = [describe(sensor, frame, recording.digest) for frame in frames]
-        write_exrs(paths, sensor.texels.layout, [frame.sensors[sensor.name] for frame in frames], headers, nearest)
-        lines += [checksum_line(path.name, file_sha256(path)) for path in paths]
-    (folder / IMAGE_LIST_NAME).write_bytes(b"".join(lines))
+        for part in recording.blocks() if images else ():
+            write_images(own, sensor, [part.at(int(number)) for number in part.frames], recording.digest)
+        write_manifest(own, manifest_of(scenario, sensor, recording, write_arrays_of(own, sensor, recording)))
 
 
 PART_BYTES = 256 << 20
@@ -238,37 +208,27 @@ class RunComputer:
     opened : OpenStudy
     scripts : str
         What is done about the Python in a .blend and a job, one of :data:`.scene_evaluation.SCRIPTS`.
+    limit : float, optional
+        Seconds that a run may take, asked for between frames.
     """
 
-    def __init__(self, opened: OpenStudy, scripts: str = REFUSE):
+    def __init__(self, opened: OpenStudy, scripts: str = REFUSE, limit: float | None = None):
         from ..core.solver import precompile
 
         require_allowed(opened.study, scripts)
-        self.opened = opened
-        self._reader = SceneReader(opened.folder, scripts)
+        self.opened, self._scripts, self._limit = opened, scripts, limit
+        self._read = lru_cache(maxsize=MOST_SCENES_KEPT)(self._read_scene)
         self._programs: dict[str, Program] = {}
         self._style = FrameStyle.of(opened.study)
         self._shared = SharedResults()
         if not opened.study.is_job:
             precompile.compile_solver()  # loads what was compiled, so that the first run is as fast as the others
 
-    def result(self, index: int, limit: float | None = None) -> RunResult:
-        """Compute a run.
-
-        Parameters
-        ----------
-        index : int
-        limit : float, optional
-            Seconds that it may take, asked for between frames.
-
-        Raises
-        ------
-        FileError
-            Its files cannot be written, so no run can be computed.
-        """
+    def result(self, index: int) -> RunResult:
+        """Compute a run; raise FileError where its files cannot be written, so that no run can be computed."""
         run, began, details = self.opened.runs[index], time.perf_counter(), ""
         try:
-            found = self._by_program(run, limit) if self.opened.study.is_job else self._solved(run, limit)
+            found = self._by_program(run) if self.opened.study.is_job else self._solved(run)
             return replace(found, seconds=time.perf_counter() - began)
         except FileError:
             raise
@@ -280,11 +240,11 @@ class RunComputer:
             message, details = f"A fault of the program: {type(error).__name__}: {error}", traceback.format_exc()
         return RunResult(run, message, details, time.perf_counter() - began)
 
-    def _solved(self, run: Run, limit: float | None) -> RunResult:
+    def _solved(self, run: Run) -> RunResult:
         study, press = self.opened.study, self.opened.plans[run.scene].press
         values = {**self.opened.plans[run.scene].fixed, **{key: value for key, value in run.values.items() if key != SCENE}}
-        scenario = self.scenario(run.scene, values, limit)
-        recording = self._recording(scenario, run.index, limit)
+        scenario = self._scenario(run.scene, values)
+        recording = self._recording(scenario, run.index)
         if press is not None:
             own: dict[str, Any] = {
                 key.removeprefix(f"{PRESS}."): value for key, value in values.items() if key.startswith(f"{PRESS}.")
@@ -297,21 +257,29 @@ class RunComputer:
                 write_run_folder(folder, scenario, recording, study.images)
         return RunResult(run, metrics=metrics, frames=frames)
 
-    def scenario(self, scene: str, values: Mapping[str, Any], limit: float | None = None) -> Scenario:
+    def _scenario(self, scene: str, values: Mapping[str, Any]) -> Scenario:
         """Return the scenario of a scene with the values of a run; it is read again where they have properties of the scene."""
         plan, read_with = self.opened.plans[scene], scene_values(values)
         assert plan.scenario is not None  # but for a program
-        scenario = self._reader.read(scene, read_with, self.opened.study.fps, limit) if read_with else plan.scenario
+        scenario = self._read(scene, tuple(sorted(read_with.items()))) if read_with else plan.scenario
         rest = {name: value for name, value in values.items() if not is_scene_property(name)}
         return varied_scenario(scenario, rest, plan.press, plan.meshes, self._shared)
 
-    def _recording(self, scenario: Scenario, index: int, limit: float | None) -> Recording:
+    def _read_scene(self, scene: str, values: tuple[tuple[str, Any], ...]) -> Scenario:
+        """Let a Blender read a scene with other values of its properties."""
+        scenes = self.opened.folder / SCENES
+        with temporary_folder(scenes, "scene") as place:
+            overrides, target = place / "overrides.toml", place / "scene.npz"
+            write_overrides(overrides, dict(values))
+            read_blend(scenes / f"{scene}.blend", target, self._scripts, "--overrides", str(overrides), limit=self._limit)
+            return at_rate(load_scenario(target), self.opened.study.fps)
+
+    def _recording(self, scenario: Scenario, index: int) -> Recording:
         from ..core.solver.simulation import Simulation, solve
 
-        simulation = Simulation(scenario, threads=1, shared=self._shared)
-        if (
-            limit is None
-        ):  # many frames are computed in one call; only the files of a recording say the digest of their scenario
+        simulation, limit = Simulation(scenario, threads=1, shared=self._shared), self._limit
+        if limit is None:
+            # Many frames are computed in one call; only the files of a recording say the digest of their scenario.
             return simulation.advance_all(with_digest=self.opened.study.has_folders)
         until = time.monotonic() + limit
 
@@ -321,7 +289,7 @@ class RunComputer:
 
         return run_job(solve(scenario, simulation), ask)
 
-    def _by_program(self, run: Run, limit: float | None) -> RunResult:
+    def _by_program(self, run: Run) -> RunResult:
         """Compute a run by the program of a study that has no scene; nothing can end it before it returns."""
         if run.scene not in self._programs:
             self._programs[run.scene] = frozen_program(self.opened.study, self.opened.folder, run.scene)
@@ -329,8 +297,8 @@ class RunComputer:
         values = {**self.opened.plans[run.scene].fixed, **run.values}
         with _run_folder(self.opened.folder, run) as folder:
             metrics = _checked_metrics(_called(program.run, values, folder), run)
-            if limit is not None and time.monotonic() - began > limit:
-                raise TimeLimit(f"Run {run.index} took longer than its limit of {limit:g} s: raise run_limit.")
+            if self._limit is not None and time.monotonic() - began > self._limit:
+                raise TimeLimit(f"Run {run.index} took longer than its limit of {self._limit:g} s: raise run_limit.")
         return RunResult(run, metrics=metrics)
 
 
@@ -385,11 +353,11 @@ _kept = threading.local()
 """The computer of runs of each thread of a worker, and the study that it is for."""
 
 
-def _computer_for(folder: Path, scripts: str) -> RunComputer:
+def _computer_for(folder: Path, scripts: str, limit: float | None) -> RunComputer:
     written = (folder / STUDY_NAME).stat()
-    key = folder, scripts, written.st_ino, written.st_mtime_ns
+    key = folder, scripts, limit, written.st_ino, written.st_mtime_ns
     if getattr(_kept, "key", None) != key:
-        _kept.computer, _kept.key = RunComputer(resume_study(folder), scripts), key
+        _kept.computer, _kept.key = RunComputer(resume_study(folder), scripts, limit), key
     found: RunComputer = _kept.computer
     return found
 
@@ -415,9 +383,9 @@ def compute_batch(indices: Sequence[int], folder: str, scripts: str = REFUSE, li
         The study cannot be opened.
     """
     place, batch, waiting = Path(folder), BatchResult(), list[RunResult]()
-    computer = _computer_for(place, scripts)
+    computer = _computer_for(place, scripts, limit)
     for index in indices:
-        result = computer.result(index, limit)
+        result = computer.result(index)
         batch.seconds += result.seconds
         batch.done += not result.message
         if result.message:

@@ -17,7 +17,6 @@ from palpate.core.io.bake_folder import (
     IMAGE_LIST_NAME,
     RECORDING_NAME,
     Manifest,
-    checksum_line,
     folder_names,
     frame_file,
     write_manifest,
@@ -103,7 +102,7 @@ def write_sensor(
         [{**about, "frame": str(frame.frame), "time": repr(frame.time)} for frame in frames],
     )
     images = [frame_file(frame.frame) for frame in frames]
-    (own / IMAGE_LIST_NAME).write_bytes(b"".join(checksum_line(image, file_sha256(own / image)) for image in images))
+    (own / IMAGE_LIST_NAME).write_bytes("".join(f"{file_sha256(own / image)}  {image}\n" for image in images).encode())
     manifest = Manifest(
         sensor=name,
         palpate="0",

@@ -20,28 +20,24 @@ import bpy
 from ...core.errors import FileError, os_error_reason
 from ...core.io.bake_folder import (
     BAKE_FILE_NAMES,
-    IMAGE_LIST_NAME,
     MANIFEST_FORMAT,
     MANIFEST_NAME,
-    RECORDING_NAME,
     BakeOwner,
     begin_bake,
-    checksum_line,
     discard_bake,
     folder_names,
-    frame_file,
     manifest_of,
     other_owner,
     publish_bake,
     read_manifest,
+    write_arrays_of,
+    write_images,
     write_manifest,
 )
-from ...core.io.file_writing import bake_bytes, file_sha256, require_space, writable_folder
+from ...core.io.file_writing import bake_bytes, require_space, writable_folder
 from ...core.io.hidden_folder import PRIVATE_FOLDER, FolderLock, is_private_folder
 from ...core.io.input_files import read_bytes
-from ...core.io.recording_npz import SENSOR_NAME, save_recording, save_sensor
 from ...core.io.row_tables import FrameTable
-from ...core.io.tactile_exr import describe, nearest_places, write_exrs
 from ...core.model.recording import Frame, Recording
 from ...core.model.scenario import Scenario
 from ...core.model.sensor import Sensor
@@ -71,10 +67,6 @@ class BakeImages:
 
     def __init__(self, sensors: Mapping[str, Sensor], folders: Mapping[str, Path], digest: str):
         self._sensors, self._folders, self._digest = sensors, folders, digest
-        self._nearest = {
-            name: nearest_places(sensor.texels, sensor.channels and sensor.channels.no_frames())
-            for name, sensor in sensors.items()
-        }
         pixels = max((math.prod(sensor.texels.layout.shape) for sensor in sensors.values()), default=1)
         self._batch = max(1, min(MAX_BATCH_IMAGES, MAX_BATCH_PIXELS // pixels))
         self._frames: list[Frame] = []
@@ -87,11 +79,9 @@ class BakeImages:
         if len(self._frames) >= self._batch:
             self._submit(MAX_WAITING_BATCHES)
 
-    def finish(self) -> dict[str, dict[str, str]]:
-        """Return, once all images are written, the SHA-256 of the list of each sensor by its name, by the sensor's name."""
+    def finish(self) -> None:
+        """Return once all images are written."""
         self._submit(0)
-        lists = {name: folder / IMAGE_LIST_NAME for name, folder in self._folders.items()}
-        return {name: {IMAGE_LIST_NAME: file_sha256(path)} for name, path in lists.items()}
 
     def stop(self) -> None:
         """Drop the waiting batches and end the thread."""
@@ -106,15 +96,8 @@ class BakeImages:
 
     def _write(self, frames: list[Frame]) -> None:
         """Write the images of some frames, and their checksums."""
-        names = [frame_file(frame.frame) for frame in frames]
         for name, sensor in self._sensors.items():
-            paths = [self._folders[name] / file for file in names]
-            headers = [describe(sensor, frame, self._digest) for frame in frames]
-            if frames:
-                own = [frame.sensors[name] for frame in frames]
-                write_exrs(paths, sensor.texels.layout, own, headers, self._nearest[name])
-            with (self._folders[name] / IMAGE_LIST_NAME).open("ab") as file:
-                file.writelines(checksum_line(path.name, file_sha256(path)) for path in paths)
+            write_images(self._folders[name], sensor, frames, self._digest)
 
 
 def bake_folder(scene) -> Path:
@@ -281,14 +264,9 @@ class BakeFiles:
             A file cannot be written.
         """
         with _refusals_named(self.folder):
-            files = self._images.finish() if self._images is not None else {name: {} for name in self._sensors}
-            for name, sensor in self._sensors.items():
-                place = self._new[name]
-                own = replace(recording, sensors={name: recording.sensors[name]})
-                save_recording(place / RECORDING_NAME, own, atomic=False)
-                save_sensor(place / SENSOR_NAME, sensor.texels, sensor.painted, atomic=False)
-                checked = {file: file_sha256(place / file) for file in (RECORDING_NAME, SENSOR_NAME)}
-                files[name] = checked | files[name]
+            if self._images is not None:
+                self._images.finish()
+            files = {name: write_arrays_of(self._new[name], sensor, recording) for name, sensor in self._sensors.items()}
             table = json.dumps([self._digest, *(sorted(own.items()) for own in files.values())])
             self.bake_id = hashlib.sha256(table.encode("utf-8", "surrogatepass")).hexdigest()[:32]
             for name, sensor in self._sensors.items():

@@ -19,21 +19,22 @@ import shutil
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
 from ..effects.engine.registry import to_dict
 from ..errors import FileError, os_error_reason
-from ..model.recording import Recording
+from ..model.recording import Frame, Recording
 from ..model.scenario import Scenario
 from ..model.sensor import Sensor
 from ..version import VERSION
 from .file_writing import atomic_write, file_sha256
 from .hidden_folder import PRIVATE_FOLDER
 from .input_files import open_regular
-from .recording_npz import SENSOR_NAME, described
+from .recording_npz import SENSOR_NAME, described, save_recording, save_sensor
 from .schema import read_json
+from .tactile_exr import describe, nearest_places, write_exrs
 
 MANIFEST_FORMAT = "palpate-bake/1"
 MANIFEST_NAME = "manifest.json"
@@ -194,9 +195,44 @@ def check_sha256(path: Path, sha256: str) -> None:
         raise FileError(f"'{path}' is damaged (its content is not what was baked): bake again.")
 
 
-def checksum_line(name: str, sha256: str) -> bytes:
-    """Return the line of one file in a list of checksums."""
-    return f"{sha256}  {name}\n".encode("ascii")
+def write_images(folder: Path, sensor: Sensor, frames: Sequence[Frame], digest: str) -> None:
+    """Write the tactile images of some frames of a sensor into its folder, and add their SHA-256 to the list there.
+
+    Parameters
+    ----------
+    folder : Path
+    sensor : Sensor
+    frames : sequence of Frame
+    digest : str
+        Of the scenario.
+
+    Raises
+    ------
+    FileError, OSError
+        A file cannot be written.
+    """
+    paths = [folder / frame_file(frame.frame) for frame in frames]
+    headers = [describe(sensor, frame, digest) for frame in frames]
+    nearest = nearest_places(sensor.texels, None if sensor.channels is None else sensor.channels.no_frames())
+    if frames:
+        write_exrs(paths, sensor.texels.layout, [frame.sensors[sensor.name] for frame in frames], headers, nearest)
+    with (folder / IMAGE_LIST_NAME).open("a", encoding="ascii", newline="\n") as file:
+        file.writelines(f"{file_sha256(path)}  {path.name}\n" for path in paths)
+
+
+def write_arrays_of(folder: Path, sensor: Sensor, recording: Recording) -> dict[str, str]:
+    """Write recording and texels of a sensor into its folder, and return the SHA-256 of all files there, by name.
+
+    Raises
+    ------
+    FileError, OSError
+        A file cannot be written.
+    """
+    own = replace(recording, sensors={sensor.name: recording.sensors[sensor.name]})
+    save_recording(folder / RECORDING_NAME, own, atomic=False)
+    save_sensor(folder / SENSOR_NAME, sensor.texels, sensor.painted, atomic=False)
+    names = (RECORDING_NAME, SENSOR_NAME, IMAGE_LIST_NAME)
+    return {name: file_sha256(folder / name) for name in names if (folder / name).exists()}
 
 
 def read_checksums(path: Path) -> Iterator[tuple[str, str]]:
