@@ -95,8 +95,7 @@ def run_study(
     number = None if workers is None else arguments.count(workers, "workers")
     with studies.locked_folder(place, target):
         opened = studies.open_study(place, target, scripts)
-        how = studies.Computing(workers=number, scripts=scripts, retry_failed=retry_failed)
         with shown(progress, "sweep", "run") as show:
-            failures = studies.compute_runs(opened, how, show)
+            failures = studies.compute_runs(opened, show, number, scripts, retry_failed)
         found, written = studies.write_results(opened, formats)
     return StudyRun(opened.folder, found.total, found.done, found.failed, tuple(failures), tuple(written))

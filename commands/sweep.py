@@ -89,8 +89,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.status:
         print(studies.status_of(folder))
         return 0
-    from ..core.study.study_file import STUDY_NAME
-    from ..sweep import driver, exports, study_folder
+    from ..sweep import driver, exports
 
     driver.require_dask()
     exports.require_packages(arguments.format)
@@ -101,19 +100,14 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.list:
         _print_names(place, arguments)
         return 0
-    was_begun = (folder / STUDY_NAME).exists()
+    if arguments.dry_run:
+        return _estimate(place, folder, arguments)
     with studies.locked_folder(place, folder):
-        try:
-            opened = _opened(place, folder, arguments)
-            if arguments.begin:
-                print(f"{counted(len(opened.runs), 'run')} begun: {opened.folder}")
-                return 0
-            if arguments.dry_run:
-                return _estimate(opened, arguments)
-            return _compute(opened, arguments)
-        finally:
-            if arguments.dry_run and not was_begun:
-                study_folder.forget_study(folder)  # so that the study may still be changed
+        opened = _opened(place, folder, arguments)
+        if arguments.begin:
+            print(f"{counted(len(opened.runs), 'run')} begun: {opened.folder}")
+            return 0
+        return _compute(opened, arguments)
 
 
 def _count(text: str) -> int:
@@ -171,23 +165,21 @@ def _slurm(arguments: argparse.Namespace) -> Callable[[], Any] | None:
     return None if arguments.slurm is None else lambda: slurm.slurm_cluster(options, arguments.slurm)
 
 
-def _estimate(opened: OpenStudy, arguments: argparse.Namespace) -> int:
+def _estimate(place: Path, folder: Path, arguments: argparse.Namespace) -> int:
     """Print what a study takes."""
-    from ..sweep.program import require_allowed
-    from ..sweep.trial import try_runs
+    from ..sweep.trial import try_study
 
-    require_allowed(opened.study, arguments.scripts)
+    workers = _workers(arguments)
+    opened, found = try_study(place, arguments.scripts, console.Interrupt.check)
     print(_kind_of_runs(opened))
     if arguments.slurm:
         from ..sweep import slurm
 
         print(slurm.job_script(slurm.options_of(arguments.slurm_option)))
-    workers = _workers(arguments)
-    found = try_runs(opened, arguments.scripts)
     seconds = found.seconds_of(len(opened.runs), workers)
     print(f"{counted(len(opened.runs), 'run')}, {found.seconds:.3g} s and {_size(found.size)} each")
     size = _size(found.size * len(opened.runs))
-    print(f"about {_duration(seconds)} with {counted(workers, 'worker')}, {size} in '{opened.folder}'")
+    print(f"about {_duration(seconds)} with {counted(workers, 'worker')}, {size} in '{folder}'")
     for sentence in found.failures:
         print(f"one of the {found.tried} runs that were tried failed: {sentence}")
     return 0
@@ -222,16 +214,17 @@ def _duration(seconds: float) -> str:
 def _compute(opened: OpenStudy, arguments: argparse.Namespace) -> int:
     from ..sweep import studies
 
-    how = studies.Computing(
-        workers=arguments.workers,
-        scheduler=arguments.scheduler,
-        make_cluster=_slurm(arguments),
-        scripts=arguments.scripts,
-        part=arguments.part or (1, 1),
-        retry_failed=arguments.retry_failed,
-    )
     with console.shown_progress("sweep", "run") as show:
-        failures = studies.compute_runs(opened, how, show)
+        failures = studies.compute_runs(
+            opened,
+            show,
+            workers=arguments.workers,
+            scripts=arguments.scripts,
+            retry_failed=arguments.retry_failed,
+            part=arguments.part or (1, 1),
+            scheduler=arguments.scheduler,
+            make_cluster=_slurm(arguments),
+        )
     for index, sentence in failures[:MOST_FAILURES_NAMED]:
         print(f"run {index} failed: {sentence}")
     if arguments.part is None:

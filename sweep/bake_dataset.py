@@ -10,7 +10,7 @@ from ..core.export.exporter import Exporter, sensor_progress
 from ..core.figures.figure_style import FigureStyle
 from ..core.io.bake_reader import Bake
 from ..core.jobs import Job
-from .features import bake_frames
+from .features import frames_of
 from .lerobot import LeRobotWriter
 from .parts import require_pyarrow
 
@@ -22,7 +22,7 @@ def write_lerobot(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Pat
     require_pyarrow()
     first = next(iter(bake.texels))
     yield sensor_progress(bake, first)
-    frames, scene = bake_frames(bake), bake.manifests[first].scene_file
+    frames, scene = frames_of(bake.recording, bake.sensors), bake.manifests[first].scene_file
     try:
         writer = LeRobotWriter(folder / FOLDER, frames.layout, Path(scene).stem if scene else "bake")
         try:

@@ -67,20 +67,20 @@ def dask_setup(_worker: Any) -> None:
 
 @contextmanager
 def dask_client(
-    scheduler: str | None, workers: int, make_cluster: Callable[[], Any] | None = None, memory: float | None = None
+    workers: int, memory: float | None = None, scheduler: str | None = None, make_cluster: Callable[[], Any] | None = None
 ) -> Iterator[Any]:
     """Connect to a scheduler, or start workers on this machine, and yield the client.
 
     Parameters
     ----------
-    scheduler : str or None
-        Address, as in tcp://127.0.0.1:8786. None: a cluster of this machine's own.
     workers : int
         Of the local cluster, one thread each.
-    make_cluster : callable, optional
-        Returns another cluster than that of this machine, as :func:`.slurm.slurm_cluster` does.
     memory : float, optional
         MB that a worker of the local cluster may hold, before Dask's nanny ends it.
+    scheduler : str, optional
+        Address of a running scheduler, as in tcp://127.0.0.1:8786.
+    make_cluster : callable, optional
+        Returns another cluster than that of this machine, as :func:`.slurm.slurm_cluster` does.
 
     Raises
     ------

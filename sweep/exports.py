@@ -14,8 +14,6 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..core.errors import FileError, os_error_reason
 from ..core.io.file_writing import atomic_write
 from ..core.io.hidden_folder import temporary_folder
@@ -24,8 +22,6 @@ from .dataset import DATASET_FOLDER, exchange_folder
 EPISODE_COLUMNS = ("run", "length", "dataset_from_index", "dataset_to_index", "digest")
 ZARR_FILES = re.compile(r"(.+/)?(\.z(group|attrs|array|metadata)|[0-9.]+)")
 """Names of the files of a Zarr store of format 2."""
-CHUNK_BYTES = 1 << 20
-"""Numbers of an array that are compressed together."""
 PACKAGES = {"hdf5": "h5py", "zarr": "zarr"}
 """Package that each export needs, by the name that the command takes."""
 
@@ -57,10 +53,9 @@ def export_hdf5(folder: Path) -> list[Path]:
         target = folder / f"{stem}.h5"
         with atomic_write(target) as temporary, h5py.File(temporary, "w", libver="latest", locking=False) as file:
 
-            def create(name: str, shape: tuple[int, ...], kind: str, rows: int, file: Any = file) -> Any:
-                packed = {"compression": "gzip", "shuffle": True, "chunks": (rows, *shape[1:])} if shape[0] else {}
+            def create(name: str, shape: tuple[int, ...], kind: str, file: Any = file) -> Any:
                 kind = h5py.string_dtype() if kind == "string" else kind
-                return file.create_dataset(name, shape, kind, track_times=False, **packed)
+                return file.create_dataset(name, shape, kind, track_times=False, compression="gzip", shuffle=True)
 
             _fill(part, create, file.attrs)
         written.append(target)
@@ -79,10 +74,8 @@ def export_zarr(folder: Path) -> list[Path]:
             with temporary_folder(folder, "zarr") as hidden:
                 group = zarr.open_group(hidden / "new", mode="w", zarr_format=2)  # what the most readers know
 
-                def create(name: str, shape: tuple[int, ...], kind: str, rows: int, group: Any = group) -> Any:
-                    return group.create_array(
-                        name, shape=shape, dtype="U64" if kind == "string" else kind, chunks=(rows, *shape[1:])
-                    )
+                def create(name: str, shape: tuple[int, ...], kind: str, group: Any = group) -> Any:
+                    return group.create_array(name, shape=shape, dtype="U64" if kind == "string" else kind)
 
                 _fill(part, create, group.attrs)
                 exchange_folder(hidden / "new", target, hidden / "before", ZARR_FILES)
@@ -104,29 +97,34 @@ def _parts(folder: Path) -> list[tuple[Path, str]]:
 
 
 def _fill(part: Path, create: Callable[..., Any], attributes: Any) -> None:
-    """Create all arrays with `create(name, shape, kind, rows of a chunk)` and fill them."""
+    """Create all arrays with `create(name, shape, kind)` and fill them."""
+    from pyarrow import parquet
+
     info = json.loads((part / "meta" / "info.json").read_text(encoding="utf-8"))
     attributes["fps"] = info["fps"]
     arrays, at = {}, 0
     for name, feature in info["features"].items():
-        shape = () if feature["shape"] == [1] else tuple(feature["shape"])
-        size = int(np.prod(shape)) * (8 if feature["dtype"] == "string" else np.dtype(feature["dtype"]).itemsize)
-        rows = int(np.clip(CHUNK_BYTES // size, 1, max(info["total_frames"], 1)))
-        arrays[name] = create(name, (info["total_frames"], *shape), feature["dtype"], rows)
+        arrays[name] = create(name, (info["total_frames"], *_shape(feature)), feature["dtype"])
         about = feature.get("palpate", {})
         words = {"names": feature.get("names"), "channels": about.get("channels")}
         arrays[name].attrs.update({"unit": about.get("unit", ""), "about": about.get("about", "")})
         arrays[name].attrs.update({key: list(value) for key, value in words.items() if value})
     for table in _row_groups(part / "data"):
         for name, feature in info["features"].items():
-            arrays[name][at : at + len(table)] = _dense(table.column(name), feature["shape"])
+            flat = table[name].combine_chunks()
+            for _ in _shape(feature):  # no Python object for each list
+                flat = flat.flatten()
+            arrays[name][at : at + len(table)] = flat.to_numpy(zero_copy_only=False).reshape(len(table), *_shape(feature))
         at += len(table)
-    episodes = [table.select(EPISODE_COLUMNS) for table in _row_groups(part / "meta" / "episodes")]
     for name in EPISODE_COLUMNS:
-        values = [value for table in episodes for value in table.column(name).to_pylist()]
-        kind = "string" if name == "digest" else "int64"
-        array = create(f"episodes/{name}", (len(values),), kind, max(1, len(values)))
-        array[:] = np.array(values, dtype=object if name == "digest" else np.int64)
+        column = parquet.read_table(part / "meta" / "episodes", columns=[name])[name]
+        array = create(f"episodes/{name}", (len(column),), "string" if name == "digest" else "int64")
+        array[:] = column.to_numpy()
+
+
+def _shape(feature: dict[str, Any]) -> tuple[int, ...]:
+    """Return the shape of a feature in one frame, () for a single number."""
+    return () if feature["shape"] == [1] else tuple(feature["shape"])
 
 
 def _row_groups(folder: Path) -> Iterator[Any]:
@@ -136,12 +134,3 @@ def _row_groups(folder: Path) -> Iterator[Any]:
         with parquet.ParquetFile(path) as file:
             for number in range(file.num_row_groups):
                 yield file.read_row_group(number)
-
-
-def _dense(column: Any, shape: list[int]) -> np.ndarray:
-    """Return a column of lists of lists as one array, without a Python object for each of them."""
-    array = column.combine_chunks()
-    for _ in shape if shape != [1] else ():
-        array = array.flatten()
-    dense: np.ndarray = array.to_numpy(zero_copy_only=False).reshape(len(column), *(shape if shape != [1] else ()))
-    return dense

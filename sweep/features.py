@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -22,11 +22,9 @@ from ..core.errors import FileError, PalpateError
 from ..core.geometry.grid_layout import GridLayout
 from ..core.geometry.texels import Texels
 from ..core.io.bake_folder import folder_names
-from ..core.io.bake_reader import Bake
 from ..core.io.file_writing import atomic_write
-from ..core.io.recording_npz import load_sensor, save_sensor
+from ..core.io.recording_npz import Sensors, load_sensor, save_sensor
 from ..core.model.recording import Recording, SensorRecording, digest_of
-from ..core.model.scenario import Scenario
 from ..core.model.sensor_parameters import Painted, SensorParameters
 from ..core.model.shared_results import SharedResults
 from ..core.study.study_file import Study
@@ -162,46 +160,28 @@ class RunFrames:
     columns: dict[str, np.ndarray]
 
 
-@dataclass(frozen=True)
-class _SensorRun:
-    """One sensor in one run."""
-
-    texels: Texels
-    painted: Painted
-    arrays: SensorRecording
-    parameters: SensorParameters
-
-
-def solved_frames(
-    scenario: Scenario, recording: Recording, shared: SharedResults, style: FrameStyle = PLAIN_STYLE
+def frames_of(
+    recording: Recording, sensors: Sensors, shared: SharedResults | None = None, style: FrameStyle = PLAIN_STYLE
 ) -> RunFrames:
-    """Return the frames of a run as it was solved; raise :class:`PalpateError` for a number that its bits cannot hold."""
-    names = folder_names(recording.sensors)  # unique and without a slash, which LeRobot does not allow in names
-    sensors = {
-        names[own.name]: _SensorRun(own.texels, own.painted, recording.sensors[own.name], own.parameters)
-        for own in scenario.sensors
-        if own.readout
-    }
-    return _frames(shared, recording, sensors, style)
+    """Return the frames of a run; raise :class:`PalpateError` for a number that its bits cannot hold.
 
-
-def bake_frames(bake: Bake) -> RunFrames:
-    """Return the frames of a bake; raise :class:`PalpateError` for a number that 32 bits cannot hold."""
-    names = folder_names(bake.texels)
-    sensors = {
-        names[name]: _SensorRun(texels, bake.painted[name], bake.recording.sensors[name], bake.parameters[name])
-        for name, texels in bake.texels.items()
-    }
-    return _frames(SharedResults(), bake.recording, sensors, PLAIN_STYLE)
-
-
-def _frames(shared: SharedResults, recording: Recording, sensors: dict[str, _SensorRun], style: FrameStyle) -> RunFrames:
+    Parameters
+    ----------
+    recording : Recording
+    sensors : mapping of str to (Texels, Painted, SensorParameters)
+        Of the recording.
+    shared : SharedResults, optional
+        Of the runs of this process.
+    style : FrameStyle
+    """
+    names = folder_names(sensors)  # unique and without a slash, which LeRobot does not allow in names
     features, columns = [TIMESTAMP], {TIMESTAMP.name: (recording.times - recording.times[0]).astype(TIMESTAMP.dtype)}
     with np.errstate(over="ignore"):  # what is too large is looked for where all is narrow
-        for feature, values in _all_features(recording, sensors, style):
+        for feature, values in _all_features(recording, sensors, names, style):
             features.append(feature)
             columns[feature.name] = _narrowed(feature, values)
-    fps, texels = _frame_rate(recording.times), {name: sensor.texels for name, sensor in sensors.items()}
+    fps, texels = _frame_rate(recording.times), {names[name]: own for name, (own, _, _) in sensors.items()}
+    shared = shared or SharedResults()
     digests = tuple(shared.of(digest_of, own) for own in texels.values())
     digest = _layout_digest(tuple(features), fps, tuple(texels), digests)
     return RunFrames(Layout(tuple(features), fps, texels, digest), columns)
@@ -229,15 +209,15 @@ def _narrowed(feature: Feature, values: np.ndarray) -> np.ndarray:
 
 
 def _all_features(
-    recording: Recording, sensors: dict[str, _SensorRun], style: FrameStyle
+    recording: Recording, sensors: Sensors, names: Mapping[str, str], style: FrameStyle
 ) -> Iterator[tuple[Feature, np.ndarray]]:
-    for name, sensor in sensors.items():
-        yield from _texel_features(name, sensor, style)
-        yield from _net_features(name, sensor.arrays)
+    for sensor, (texels, painted, parameters) in sensors.items():
+        yield from _texel_features(names[sensor], recording.sensors[sensor], texels, painted, parameters, style)
+        yield from _net_features(names[sensor], recording.sensors[sensor])
     count = len(recording.body_names)  # poses of all bodies as one list, which is how LeRobot keeps the state of a robot
-    names = tuple(f"{body}.{axis}" for body in recording.body_names for axis in POSE_AXES)
+    axes = tuple(f"{body}.{axis}" for body in recording.body_names for axis in POSE_AXES)
     about = "Poses of the bodies in the world: position, m, and quaternion."
-    yield Feature("observation.state", "float32", (7 * count,), names, "m, 1", about), recording.poses.reshape(-1, 7 * count)
+    yield Feature("observation.state", "float32", (7 * count,), axes, "m, 1", about), recording.poses.reshape(-1, 7 * count)
 
 
 def tactile_name(sensor: str) -> str:
@@ -264,9 +244,15 @@ def varied_feature(name: str, dtype: str) -> Feature:
     return Feature(f"varied.{name.replace('/', '_')}", dtype, (1,), (), "", about)
 
 
-def _texel_features(name: str, sensor: _SensorRun, style: FrameStyle) -> Iterator[tuple[Feature, np.ndarray]]:
+def _texel_features(
+    name: str,
+    arrays: SensorRecording,
+    texels: Texels,
+    painted: Painted,
+    parameters: SensorParameters,
+    style: FrameStyle,
+) -> Iterator[tuple[Feature, np.ndarray]]:
     """Yield what is recorded of each texel: forces, readings, and the truth about contact."""
-    texels, arrays = sensor.texels, sensor.arrays
     layout = None if style.points or not isinstance(texels.layout, GridLayout) else texels.layout
     shape: tuple[int, ...] = (len(texels),) if layout is None else layout.shape
     names = ("row", "column") if len(shape) == 2 else ("texel",)
@@ -285,10 +271,10 @@ def _texel_features(name: str, sensor: _SensorRun, style: FrameStyle) -> Iterato
     yield image, placed(style.dtype, arrays.normal_force, arrays.shear[:, :, 0], arrays.shear[:, :, 1])
     about = f"Readings of the texels, in the sensor's unit.{error}"
     readings = placed(style.dtype, arrays.reading)
-    yield Feature(f"observation.reading.{name}", style.dtype, shape, names, sensor.parameters.unit, about), readings
+    yield Feature(f"observation.reading.{name}", style.dtype, shape, names, parameters.unit, about), readings
     touch = placed("bool", arrays.contact)
     yield Feature(f"contact.touch.{name}", "bool", shape, names, "1", "Which texels touch something."), touch
-    slips = placed("bool", response.slipping(arrays, sensor.parameters, sensor.painted))
+    slips = placed("bool", response.slipping(arrays, parameters, painted))
     about = "Which texels touch, move, and are at the limit of friction."
     yield Feature(f"contact.slip.{name}", "bool", shape, names, "1", about), slips
 

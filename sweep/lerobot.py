@@ -33,6 +33,11 @@ EPISODES_OF_GROUP = 1000
 PLACE_COLUMNS = ("frame_index", "episode_index", "index", "task_index")
 """Whole numbers that LeRobot expects in every dataset, and that tell the place of a frame in it."""
 
+EPISODE_NUMBERS = ("episode_index", "length", "data/chunk_index", "data/file_index", "dataset_from_index", "dataset_to_index",
+                   "run")  # fmt: skip
+EPISODE_PLACE = ("meta/episodes/chunk_index", "meta/episodes/file_index")
+"""Columns of ``meta/episodes``: those of a run, and the place of its row."""
+
 
 class LeRobotWriter:
     """Writes one dataset.
@@ -66,10 +71,8 @@ class LeRobotWriter:
         kinds = [(name, pyarrow.int64()) for name in PLACE_COLUMNS]
         kinds += [(item.name, _arrow_type(item)) for item in (*layout.features, *self._varied)]
         self._frames = _FileSeries(root, DATA_PATH, pyarrow.schema(kinds), max(file_bytes, FILE_MEGABYTES << 20))
-        numbers = ("episode_index", "length", "data/chunk_index", "data/file_index", "dataset_from_index", "dataset_to_index",
-                   "run", "meta/episodes/chunk_index", "meta/episodes/file_index")  # fmt: skip
         texts = [("tasks", pyarrow.list_(pyarrow.string())), ("digest", pyarrow.string())]
-        schema = pyarrow.schema([*((name, pyarrow.int64()) for name in numbers), *texts])
+        schema = pyarrow.schema([*((name, pyarrow.int64()) for name in (*EPISODE_NUMBERS, *EPISODE_PLACE)), *texts])
         self._episodes = _FileSeries(root, EPISODES_PATH, schema, FILE_MEGABYTES << 20)
         self._statistics: dict[str, _Statistics] = {}
         self._waiting: list[dict[str, np.ndarray]] = []
@@ -93,20 +96,8 @@ class LeRobotWriter:
                     for item in self._varied}  # fmt: skip
         self._waiting.append({**places, **columns, **constant})
         self._waiting_bytes += sum(column.nbytes for column in columns.values())
-        chunk, file = self._frames.place
-        self._rows.append(
-            {
-                "episode_index": self._runs,
-                "tasks": [self._task],
-                "length": count,
-                "data/chunk_index": chunk,
-                "data/file_index": file,
-                "dataset_from_index": self._total,
-                "dataset_to_index": self._total + count,
-                "run": index,
-                "digest": digest,
-            }
-        )
+        numbers = (self._runs, count, *self._frames.place, self._total, self._total + count, index)
+        self._rows.append(dict(zip(EPISODE_NUMBERS, numbers)) | {"tasks": [self._task], "digest": digest})
         self._runs += 1
         self._total += count
         if self._waiting_bytes >= GROUP_BYTES:
@@ -129,8 +120,8 @@ class LeRobotWriter:
         """Write the rows about runs as one group, where there are so many."""
         import pyarrow
 
-        chunk, file = self._episodes.place
-        rows = [{**row, "meta/episodes/chunk_index": chunk, "meta/episodes/file_index": file} for row in self._rows]
+        place = dict(zip(EPISODE_PLACE, self._episodes.place))
+        rows = [row | place for row in self._rows]
         self._episode_tables.append(pyarrow.Table.from_pylist(rows, self._episodes.schema))  # a tenth of the memory
         self._rows = []
         if sum(map(len, self._episode_tables)) >= least:
@@ -283,7 +274,6 @@ def _described(feature: Feature) -> dict[str, Any]:
 
 def _write_card(path: Path, task: str, info: dict[str, Any]) -> None:
     """Write the dataset's card, whose first lines tell the library `datasets` which files are the frames."""
-    title = " ".join(task.replace("#", " ").split())
     lines = [
         "---",
         "tags: [LeRobot, tactile]",
@@ -292,19 +282,11 @@ def _write_card(path: Path, task: str, info: dict[str, Any]) -> None:
         "  data_files: data/*/*.parquet",
         "---",
         "",
-    ]
-    lines += [
-        f"# {title}",
+        f"# {' '.join(task.replace('#', ' ').split())}",
         "",
-        f"{info['total_frames']} frames of {info['total_episodes']} runs, simulated with Palpate, in the",
+        f"{info['total_frames']} frames of {info['total_episodes']} runs, simulated with Palpate, in the layout of LeRobot v3.",
+        "`meta/info.json` gives units and meanings of the features, `meta/texels.parquet` the places of the texels.",
     ]
-    lines += ["layout of LeRobot v3. `meta/texels.parquet` says where the texels are.", ""]
-    lines += ["| feature | type | shape | unit | meaning |", "| --- | --- | --- | --- | --- |"]
-    for name, feature in info["features"].items():
-        own = feature.get("palpate", {})
-        shape = " × ".join(map(str, feature["shape"]))
-        cells = (f"`{name}`", feature["dtype"], shape, own.get("unit", ""), own.get("about", "A column of LeRobot."))
-        lines.append("| " + " | ".join(cell.replace("|", "/") for cell in cells) + " |")
     path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
 
 
@@ -313,21 +295,15 @@ def _write_texels(path: Path, texels: dict[str, Texels]) -> None:
     import pyarrow
     from pyarrow import parquet
 
-    columns: dict[str, list[Any]] = {"sensor": [], "texel": [], "row": [], "column": [], "area": []}
-    columns |= {f"{what}_{axis}": [] for what in ("position", "normal", "tangent") for axis in AXES}
+    tables = []
     for name, own in texels.items():
-        grid = own.layout if isinstance(own.layout, GridLayout) else None
-        columns["sensor"] += [name] * len(own)
-        columns["texel"] += range(len(own))
-        columns["row"] += [None] * len(own) if grid is None else grid.row.tolist()
-        columns["column"] += [None] * len(own) if grid is None else grid.column.tolist()
-        columns["area"] += own.area.tolist()
+        none = pyarrow.nulls(len(own), pyarrow.int64())
+        rows, columns = (own.layout.row, own.layout.column) if isinstance(own.layout, GridLayout) else (none, none)
+        places = {"sensor": [name] * len(own), "texel": np.arange(len(own)), "row": rows, "column": columns, "area": own.area}
         for what in ("position", "normal", "tangent"):
-            for axis, values in zip(AXES, getattr(own, what).T):
-                columns[f"{what}_{axis}"] += values.tolist()
-    kinds = {"sensor": pyarrow.string(), "texel": pyarrow.int64(), "row": pyarrow.int64(), "column": pyarrow.int64()}
-    schema = pyarrow.schema([(name, kinds.get(name, pyarrow.float64())) for name in columns])
-    parquet.write_table(pyarrow.table(columns, schema), path, **COMPRESSION)
+            places |= {f"{what}_{axis}": values for axis, values in zip(AXES, getattr(own, what).T)}
+        tables.append(pyarrow.table(places))
+    parquet.write_table(pyarrow.concat_tables(tables, promote_options="permissive"), path, **COMPRESSION)
 
 
 def _write_tasks(path: Path, task: str) -> None:

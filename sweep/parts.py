@@ -8,7 +8,6 @@ each feature of a frame the numbers of all frames, one behind the other. All run
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -28,10 +27,8 @@ if TYPE_CHECKING:
 
 FORMAT = "palpate-parts/1"
 COMPRESSION: dict[str, Any] = {"compression": "zstd", "compression_level": 3}
-GROUP_BYTES = 8 << 20
-"""Numbers of frames from which on runs become a group of rows."""
-GROUPS_KEPT = 4
-"""Groups of rows that are in memory: neighbours of the design are in few parts, except after many interruptions."""
+PARTS_KEPT = 2
+"""Parts that are in memory: neighbours of the design are in few parts, except after many interruptions."""
 FINISHED, FAILED = "finished", "failed"
 
 
@@ -92,9 +89,8 @@ def write_part(folder: Path, results: Sequence[RunResult]) -> None:
         layout.save(folder / LAYOUTS)
     content = hashlib.sha256(repr([one.run.digest for one in results]).encode()).hexdigest()[:16]
     failed = sum(bool(one.message) for one in results)
-    rows = max(1, GROUP_BYTES * len(results) // max(1, sum(one.size for one in results)))
     with atomic_write(folder / PARTS / part_name(results[0].run.index, content, len(results) - failed, failed)) as fresh:
-        parquet.write_table(_table(results, layout), fresh, row_group_size=rows, **COMPRESSION)
+        parquet.write_table(_table(results, layout), fresh, **COMPRESSION)
 
 
 def _table(results: Sequence[RunResult], layout: Layout | None) -> pyarrow.Table:
@@ -142,29 +138,25 @@ class Parts:
         self._folder = folder
         self.files = part_files(folder)
         found = [self._places(number, path) for number, path in enumerate(self.files)]
-        rows = np.concatenate(found) if found else np.zeros((0, 5), np.int64)
+        rows = np.concatenate(found) if found else np.zeros((0, 4), np.int64)
         rows = rows[
             np.lexsort((-rows[:, 2], rows[:, 1], rows[:, 0]))
         ]  # of a run that is there twice, one that is done is first
-        is_first = np.ones(len(rows), bool)
-        is_first[1:] = rows[1:, 0] != rows[:-1, 0]
-        self._rows = rows[is_first]
-        self._group = lru_cache(maxsize=GROUPS_KEPT)(self._read_group)
-        self._layout = lru_cache(maxsize=GROUPS_KEPT)(Layout.load)
+        _, first = np.unique(rows[:, 0], return_index=True)
+        self._rows = rows[first]
+        self._read = lru_cache(maxsize=PARTS_KEPT)(self._read_part)
+        self._layout = lru_cache(maxsize=PARTS_KEPT)(Layout.load)
 
     def _places(self, number: int, path: Path) -> np.ndarray:
-        """Return (n, 5) int: index of each run of a part, 1 for one that failed, number of the part, group and row in it."""
+        """Return (n, 4) int: index of each run of a part, 1 for one that failed, number of the part and row in it."""
         from pyarrow import parquet
 
-        with _damage_as_sentence(path), parquet.ParquetFile(path) as file:
-            if (file.schema_arrow.metadata or {}).get(b"palpate") != FORMAT.encode():
+        with _damage_as_sentence(path):
+            table = parquet.read_table(path, columns=["run", "status"])
+            if (table.schema.metadata or {}).get(b"palpate") != FORMAT.encode():
                 raise FileError(f"'{path}' is not of the format {FORMAT}: give another folder with --out.")
-            sizes = [file.metadata.row_group(group).num_rows for group in range(file.num_row_groups)]
-            table = file.read(columns=["run", "status"])
         is_failed = np.array(table["status"].to_pylist(), object) == FAILED
-        row = np.concatenate([np.arange(size) for size in sizes])
-        part, group = np.full(len(row), number), np.repeat(np.arange(len(sizes)), sizes)
-        return np.stack([table["run"].to_numpy(), is_failed, part, group, row], axis=1).astype(np.int64)
+        return np.stack([table["run"].to_numpy(), is_failed, np.full(len(table), number), np.arange(len(table))], axis=1)
 
     @property
     def done(self) -> np.ndarray:
@@ -182,38 +174,38 @@ class Parts:
         import pyarrow
         from pyarrow import parquet
 
-        fields: dict[str, pyarrow.Field] = {}
+        schemas = []
         for path in self.files:
             with _damage_as_sentence(path):
-                schema = parquet.read_schema(path)
-            own = [item for item in schema if not pyarrow.types.is_large_list(item.type)]
-            fields = {item.name: item for item in own} | fields
-        return pyarrow.schema(sorted(fields.values(), key=lambda item: item.name if item.name.startswith("metric.") else ""))
+                own = [item for item in parquet.read_schema(path) if not pyarrow.types.is_large_list(item.type)]
+            schemas.append(pyarrow.schema(own))
+        fields = pyarrow.unify_schemas(schemas, promote_options="permissive")
+        return pyarrow.schema(sorted(fields, key=lambda item: item.name if item.name.startswith("metric.") else ""))
 
     def pieces(self) -> Iterator[pyarrow.Table]:
         """Yield all runs in the order of the design, as tables of runs that are neighbours in a part."""
         rows = self._rows
-        same = np.all(np.diff(rows[:, 2:], axis=0) == [0, 0, 1], axis=1)
+        same = np.all(np.diff(rows[:, 2:], axis=0) == [0, 1], axis=1)
         cuts = [0, *(np.flatnonzero(~same) + 1).tolist(), len(rows)]
         for begin, end in zip(cuts, cuts[1:]):
             if end > begin:
-                yield self._group(*rows[begin, 2:4].tolist()).slice(rows[begin, 4], end - begin)
+                yield self._read(rows[begin, 2]).slice(rows[begin, 3], end - begin)
 
     def run(self, index: int) -> pyarrow.Table:
         """Return a run as a table of one row."""
-        (_, _, part, group, row) = self._rows[np.searchsorted(self._rows[:, 0], index)].tolist()
-        return self._group(part, group).slice(row, 1)
+        (_, _, part, row) = self._rows[np.searchsorted(self._rows[:, 0], index)].tolist()
+        return self._read(part).slice(row, 1)
 
     def layout(self, table: pyarrow.Table) -> Layout | None:
         """Return the layout of the frames of a table; None where its runs have none."""
         digest = table.schema.metadata[b"layout"].decode()
         return self._layout(self._folder / LAYOUTS, digest) if digest else None
 
-    def _read_group(self, part: int, group: int) -> pyarrow.Table:
+    def _read_part(self, part: int) -> pyarrow.Table:
         from pyarrow import parquet
 
-        with _damage_as_sentence(self.files[part]), parquet.ParquetFile(self.files[part]) as file:
-            return file.read_row_group(group)
+        with _damage_as_sentence(self.files[part]):
+            return parquet.read_table(self.files[part])
 
 
 @contextmanager
@@ -240,7 +232,6 @@ def frames_in(table: pyarrow.Table, layout: Layout) -> tuple[np.ndarray, dict[st
 
 def remove_unfinished_parts(folder: Path) -> None:
     """Remove what killed processes have left of parts that they were writing."""
-    for name in os.listdir(folder / PARTS):
-        if name.startswith(".") and ".partial" in name:
-            with suppress(OSError):
-                (folder / PARTS / name).unlink()
+    for path in (folder / PARTS).glob(".*.partial*"):
+        with suppress(OSError):
+            path.unlink()

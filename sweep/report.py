@@ -18,7 +18,7 @@ from ..core.io.file_writing import atomic_write
 from ..core.io.hidden_folder import temporary_folder
 from ..core.study.study_file import Study
 from .dataset import TABLE_NAME, TIMINGS_NAME, UNNAMED_STUDY
-from .dependencies import LEAST_RUNS, RUNS_PER_NAME, Dependency, dependencies
+from .dependencies import LEAST_RUNS, RUNS_PER_GROUP, Dependency, dependencies
 from .features import by_texel, net_force_name, tactile_name
 from .parts import Parts, frames_in
 from .report_figures import MOST_METRICS, MOST_NAMES, MOST_PARAMETERS, RunImage, draw_image_sheet, draw_small_multiples
@@ -81,21 +81,24 @@ def write_report(folder: Path, study: Study) -> None:
     failures = [message for message in runs.messages if message]
     found = dependencies(runs.values, runs.metrics)
     failing = dependencies(runs.values, {"failing": 1.0 - runs.is_done}) if failures else []
+    drawn = _most_dependent(runs, found)
     with temporary_folder(folder, "report") as hidden:
         page = render_html(
             TEMPLATE,
             name=study.name or UNNAMED_STUDY,
             headline=_headline(runs, _seconds_of(folder / TIMINGS_NAME)),
-            strongest=_strongest_sentence(found, runs),
-            dependencies=[_dependency_row(one) for one in found[:MOST_DEPENDENCIES] if one.strength > 0],
-            left_off=sum(one.strength > 0 for one in found[MOST_DEPENDENCIES:]),
+            strongest=_strongest_sentence(found),
+            dependencies=[_dependency_row(one) for one in found[:MOST_DEPENDENCIES]],
+            left_off=len(found[MOST_DEPENDENCIES:]),
             ranges=[_range_row(name, values[runs.is_done].tolist()) for name, values in runs.values.items()],
             metrics=[_metric_row(name, values[np.isfinite(values)]) for name, values in runs.metrics.items()],
             messages=_message_rows(failures),
             failures=len(failures),
-            failed_dependencies=[_dependency_row(one)[1:] for one in failing if one.strength > 0],
-            pictures={path.stem: base64.b64encode(path.read_bytes()).decode() for path in _draw(hidden, folder, runs, found)},
-            shown=_shown_sentence(runs),
+            failed_dependencies=[_dependency_row(one)[1:] for one in failing],
+            pictures={
+                path.stem: base64.b64encode(path.read_bytes()).decode() for path in _draw(hidden, folder, runs, found, *drawn)
+            },
+            shown=_shown_sentence(runs, *drawn),
         )
         with atomic_write(folder / REPORT_NAME) as temporary:
             temporary.write_text(page, encoding="utf-8")
@@ -107,12 +110,13 @@ def _seconds_of(timings: Path) -> float:
     return float(sum(csv.read_csv(timings)["seconds"].to_pylist()))
 
 
-def _draw(hidden: Path, folder: Path, runs: StudyColumns, found: list[Dependency]) -> list[Path]:
+def _draw(
+    hidden: Path, folder: Path, runs: StudyColumns, found: list[Dependency], parameters: list[str], metrics: list[str]
+) -> list[Path]:
     """Draw the pictures that the study has something for, and return their files."""
     drawn = []
-    parameters, metrics = _most_dependent(runs, found)
     if parameters and metrics:
-        strong = {(one.parameter, one.metric) for one in found if one.strength > 0}
+        strong = {(one.parameter, one.metric) for one in found}
         values = {name: runs.values[name].tolist() for name in parameters}
         draw_small_multiples(hidden / "multiples.png", values, {name: runs.metrics[name] for name in metrics}, strong)
         drawn.append(hidden / "multiples.png")
@@ -126,9 +130,8 @@ def _draw(hidden: Path, folder: Path, runs: StudyColumns, found: list[Dependency
 def _most_dependent(runs: StudyColumns, found: list[Dependency]) -> tuple[list[str], list[str]]:
     """Return the parameters and metrics that are drawn: those in the strongest dependencies first, then in their order."""
     drawable = [name for name, own in runs.values.items() if _has_few_names(own)]
-    strong = [one for one in found if one.strength > 0]
-    parameters = dict.fromkeys([*(one.parameter for one in strong if one.parameter in drawable), *drawable])
-    metrics = dict.fromkeys([*(one.metric for one in strong), *runs.metrics])
+    parameters = dict.fromkeys([*(one.parameter for one in found if one.parameter in drawable), *drawable])
+    metrics = dict.fromkeys([*(one.metric for one in found), *runs.metrics])
     return list(parameters)[:MOST_PARAMETERS], list(metrics)[:MOST_METRICS]
 
 
@@ -170,19 +173,13 @@ def _duration(seconds: float) -> str:
     return f"{seconds / 60:.3g} min" if seconds < 7200 else f"{seconds / 3600:.3g} h"
 
 
-def _strongest_sentence(found: list[Dependency], runs: StudyColumns) -> str:
-    strong = [one for one in found if one.strength > 0]
+def _strongest_sentence(found: list[Dependency]) -> str:
     # Where a press was follows the numbers that chose it, and says nothing of the sensor.
-    measured = [one for one in strong if not one.metric.startswith(PLACE_OF_PRESS)]
-    strong = measured or strong
-    if strong:
-        return f"The strongest dependency is that of {strong[0].metric} on {strong[0].parameter}."
-    if not found:
-        least = f"{LEAST_RUNS} runs in which both vary, and {RUNS_PER_NAME} for each name of a choice"
-        return f"No dependency of a metric on a parameter was looked for, as that takes {least}."
-    judged = {one.parameter for one in found}
-    these = "any parameter" if judged >= set(runs.values) else " or ".join(sorted(judged))
-    return f"No metric depends on {these} as far as {counted(int(runs.is_done.sum()), 'run')} can tell."
+    measured = [one for one in found if not one.metric.startswith(PLACE_OF_PRESS)] or found
+    if measured:
+        return f"The strongest dependency is that of {measured[0].metric} on {measured[0].parameter}."
+    least = f"{LEAST_RUNS} runs in which both vary, and {RUNS_PER_GROUP} for each name of a choice"
+    return f"No dependency of a metric on a parameter was detected, which takes at least {least}."
 
 
 def _message_rows(sentences: list[str]) -> list[tuple[str, int]]:
@@ -195,23 +192,16 @@ def _message_rows(sentences: list[str]) -> list[tuple[str, int]]:
     return [(first[kind], count) for kind, count in counts.most_common(MOST_MESSAGES)]
 
 
-def _shown_sentence(runs: StudyColumns) -> str:
+def _shown_sentence(runs: StudyColumns, parameters: list[str], metrics: list[str]) -> str:
     """Say what the small multiples leave out."""
-    drawable = sum(map(_has_few_names, runs.values.values()))
-    left = max(0, drawable - MOST_PARAMETERS), max(0, len(runs.metrics) - MOST_METRICS)
-    named = len(runs.values) - drawable
-    parts = [counted(number, what) for number, what in zip(left, ("parameter", "metric")) if number]
-    weaker = [f"{' and '.join(parts)} with weaker dependencies"] if parts else []
-    crowded = [f"{counted(named, 'choice')} of more than {MOST_NAMES} names"] if named else []
-    if not weaker + crowded:
-        return ""
-    verb = "is" if sum(left) + named == 1 else "are"
-    return f"Not drawn {verb} {', and '.join(weaker + crowded)}; runs.parquet has all."
+    counts = [(len(parameters), len(runs.values), "parameter"), (len(metrics), len(runs.metrics), "metric")]
+    parts = [f"{drawn} of {counted(count, what)}" for drawn, count, what in counts if drawn < count]
+    return f"Drawn are {' and '.join(parts)}; runs.parquet has all." if parts else ""
 
 
 def _dependency_row(one: Dependency) -> list[str]:
     correlation = "–" if one.rank_correlation is None else f"{one.rank_correlation:+.2f}".replace("-", "−")
-    return [one.metric, one.parameter, correlation, f"{one.information:.2f}", f"{one.runs:,}"]
+    return [one.metric, one.parameter, correlation, f"{one.strength:.2f}", f"{one.runs:,}"]
 
 
 def _range_row(name: str, values: list[Any]) -> list[str]:

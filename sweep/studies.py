@@ -15,7 +15,7 @@ import numpy as np
 from ..core.compiled.thread_team import count_of_cores
 from ..core.errors import FileError, PalpateError
 from ..core.io.file_writing import writable_folder
-from ..core.io.hidden_folder import FolderLock
+from ..core.io.hidden_folder import PRIVATE_FOLDER, FolderLock
 from ..core.jobs import Progress
 from ..core.study.study_file import STUDY_NAME, read_study
 from . import driver, study_folder
@@ -62,39 +62,6 @@ def status_of(folder: Path) -> Status:
     return Status(total, len(parts.done), len(parts.failed))
 
 
-@dataclass(frozen=True)
-class Computing:
-    """How a study is computed.
-
-    Attributes
-    ----------
-    workers : int or None
-        Processes on this machine; None is one for each core.
-    scheduler : str or None
-        Address of a running Dask scheduler.
-    make_cluster : callable or None
-        Starts a cluster of Dask, as :func:`.slurm.slurm_cluster` does.
-    scripts : str
-        What is done about Python in scenes and jobs, one of :data:`.scene_evaluation.SCRIPTS`.
-    part : (int, int)
-        Number and count: which of so many parts of the runs is computed.
-    retry_failed : bool
-        Compute failed runs again.
-    """
-
-    workers: int | None = None
-    scheduler: str | None = None
-    make_cluster: Callable[[], Any] | None = None
-    scripts: str = REFUSE
-    part: tuple[int, int] = (1, 1)
-    retry_failed: bool = False
-
-    def indices_of(self, runs: int) -> range:
-        """Return the indices of the part, of so many runs."""
-        number, count = self.part
-        return range(runs * (number - 1) // count, runs * number // count)
-
-
 def output_folder(place: Path, out: Path | str | None) -> Path:
     """Return the absolute output folder of a study's file, or of the folder in which it goes on."""
     if place.is_dir():
@@ -113,14 +80,8 @@ def locked_folder(place: Path, folder: Path) -> Iterator[None]:
         yield
     finally:
         lock.release()
-        if is_new:
-            _remove_unless_begun(folder)
-
-
-def _remove_unless_begun(folder: Path) -> None:
-    """Remove the folder that was made for a study which was then refused, if nothing but its lock is in it."""
-    if [path.name for path in folder.iterdir()] == [".palpate"]:
-        shutil.rmtree(folder, ignore_errors=True)
+        if is_new and [path.name for path in folder.iterdir()] == [PRIVATE_FOLDER]:
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def open_study(place: Path, folder: Path, scripts: str, check: Callable[[], object] = lambda: None) -> OpenStudy:
@@ -138,31 +99,49 @@ def open_study(place: Path, folder: Path, scripts: str, check: Callable[[], obje
     return study_folder.begin_study(place, folder, read, scripts)
 
 
-def compute_runs(opened: OpenStudy, how: Computing, show: Callable[[Progress], object]) -> list[tuple[int, str]]:
+def compute_runs(
+    opened: OpenStudy,
+    show: Callable[[Progress], object],
+    workers: int | None = None,
+    scripts: str = REFUSE,
+    retry_failed: bool = False,
+    part: tuple[int, int] = (1, 1),
+    **cluster: Any,
+) -> list[tuple[int, str]]:
     """Compute the runs that are left, and return the indices and sentences of those that failed now.
 
     Parameters
     ----------
     opened : OpenStudy
-    how : Computing
     show : callable
         Called with the progress, and may raise to stop; what is done is kept.
+    workers : int, optional
+        Processes on this machine. Default: one for each core.
+    scripts : str
+        What is done about Python in scenes and jobs, one of :data:`.scene_evaluation.SCRIPTS`.
+    retry_failed : bool
+        Compute failed runs again.
+    part : (int, int)
+        Number and count: which of so many parts of the runs is computed.
+    **cluster
+        `scheduler` or `make_cluster` of :func:`.driver.dask_client`.
     """
-    indices, parts = how.indices_of(len(opened.runs)), Parts(opened.folder)
-    over = parts.done if how.retry_failed else np.concatenate([parts.done, parts.failed])
-    left = np.setdiff1d(np.arange(indices.start, indices.stop), over)
+    (number, count), total = part, len(opened.runs)
+    indices = np.arange(total * (number - 1) // count, total * number // count)
+    parts = Parts(opened.folder)
+    left = np.setdiff1d(indices, parts.done if retry_failed else np.concatenate([parts.done, parts.failed]))
     if not len(left):
         return []
-    require_allowed(opened.study, how.scripts)
+    require_allowed(opened.study, scripts)
 
     def show_tally(tally: BatchResult) -> None:
         stage = f"sweep, failed={tally.failed}" if tally.failed else "sweep"
         show(Progress(stage, len(indices) - len(left) + tally.finished, len(indices)))
 
     show_tally(BatchResult())
-    workers = min(how.workers or count_of_cores(), len(left))
-    with driver.dask_client(how.scheduler, workers, how.make_cluster, opened.study.run_memory) as client:
-        return driver.run_study(client, opened, left, show_tally, how.scripts).failures
+    workers = min(workers or count_of_cores(), len(left))
+    with driver.dask_client(workers=workers, memory=opened.study.run_memory, **cluster) as client:
+        return driver.run_study(client, opened, left, show_tally, scripts).failures
 
 
 def write_results(opened: OpenStudy, formats: Sequence[str] = ()) -> tuple[Status, list[Path]]:

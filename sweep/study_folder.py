@@ -141,13 +141,6 @@ def _whole_or_nothing(folder: Path) -> Iterator[None]:
         raise
 
 
-def forget_study(folder: Path) -> None:
-    """Remove a study from its folder, as where it was only frozen for a trial; other files of the folder stay."""
-    (folder / STUDY_NAME).unlink(missing_ok=True)  # first: without it the rest is no study
-    for name in MADE:
-        shutil.rmtree(folder / name, ignore_errors=True)
-
-
 def scenarios_of(place: Path, read_blend: ReadBlend) -> dict[str, Scenario | None]:
     """Return the names that may be varied, without beginning a study, whether or not the names that it varies are right.
 

@@ -34,7 +34,7 @@ from ..core.study.presses import Press, place_of
 from ..core.study.scene_property import is_scene_property, scene_values, write_overrides
 from ..core.study.study_file import RUNS, SCENE, SCENES, STUDY_NAME, Run, at_rate
 from ..core.study.variation import PRESS, varied_scenario
-from .features import FrameStyle, solved_frames
+from .features import FrameStyle, frames_of
 from .parts import RunResult, write_part
 from .program import Program, frozen_program, require_allowed
 from .scene_evaluation import REFUSE, read_blend
@@ -166,7 +166,7 @@ def write_run_folder(folder: Path, scenario: Scenario, recording: Recording, ima
         write_manifest(own, manifest_of(scenario, sensor, recording, write_arrays_of(own, sensor, recording)))
 
 
-PART_BYTES = 256 << 20
+PART_BYTES = 32 << 20
 """Numbers of frames from which on a batch writes what it has into a part and goes on with another, as they are in memory."""
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 
@@ -251,7 +251,8 @@ class RunComputer:
             }
             press = replace(press, **own)
         metrics = metrics_of(scenario, recording, press)
-        frames = solved_frames(scenario, recording, self._shared, self._style)
+        sensors = {own.name: (own.texels, own.painted, own.parameters) for own in scenario.sensors if own.readout}
+        frames = frames_of(recording, sensors, self._shared, self._style)
         if study.has_folders:
             with _run_folder(self.opened.folder, run) as folder:
                 write_run_folder(folder, scenario, recording, study.images)

@@ -18,11 +18,10 @@ from palpate.core.model.recording import Recording
 from palpate.core.model.scenario import Scenario
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import SensorParameters
-from palpate.core.model.shared_results import SharedResults
 from palpate.core.solver.simulation import run
 from palpate.core.study.study_file import Run, read_study
 from palpate.sweep.dataset import publish
-from palpate.sweep.features import FrameStyle, solved_frames
+from palpate.sweep.features import FrameStyle, RunFrames, frames_of
 from palpate.sweep.parts import RunResult, write_part
 
 FPS, SECONDS = 50.0, 0.3
@@ -68,9 +67,15 @@ def solved_press(index: int) -> tuple[RunResult, Recording]:
     scenario, values = press(index)
     recording = run(scenario)
     force = np.linalg.norm(recording.sensors["pad"].net_force, axis=1)
-    frames = solved_frames(scenario, recording, SharedResults())
+    frames = frames_by(scenario, recording)
     done = RunResult(run_of(index, values), metrics={"largest_force": float(force.max())}, seconds=0.01, frames=frames)
     return done, recording
+
+
+def frames_by(scenario: Scenario, recording: Recording, style: FrameStyle | None = None) -> RunFrames:
+    """The frames of a recording of a scenario."""
+    sensors = {own.name: (own.texels, own.painted, own.parameters) for own in scenario.sensors}
+    return frames_of(recording, sensors, style=style or FrameStyle())
 
 
 def made_up(index: int, values: dict[str, Any], texels: dict[str, Texels] | None = None, load: float = 1.0,
@@ -86,7 +91,7 @@ def made_up(index: int, values: dict[str, Any], texels: dict[str, Texels] | None
     recording = replace(recording_of(first, 5 + index % 10), sensors=arrays)
     sensors = tuple(Sensor(name, 0, own, SensorParameters()) for name, own in texels.items())
     scenario = replace(press(0)[0], sensors=sensors)
-    frames = solved_frames(scenario, recording, SharedResults(), style or FrameStyle())
+    frames = frames_by(scenario, recording, style)
     return RunResult(run_of(index, values), metrics={"load": load}, seconds=0.01, frames=frames)
 
 

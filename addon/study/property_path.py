@@ -9,6 +9,11 @@ from typing import Any
 _QUOTED = re.compile(r"""\['([^'"\\]*)'\]""")
 
 
+def double_quoted(path: str) -> str:
+    """Return a path with its keys in double quotation marks, as *Copy Full Data Path* writes it and Blender resolves it."""
+    return _QUOTED.sub(r'["\1"]', path)
+
+
 def path_of(pointer: Any, key: str, index: int = -1) -> str:
     """Return the path of a property that a button shows, as :func:`.find_property` reads it; "" if it has none.
 
@@ -27,7 +32,7 @@ def path_of(pointer: Any, key: str, index: int = -1) -> str:
         path = pointer.path_from_id(key)
     except ValueError:  # it does not belong to a data-block, as a setting of an operator
         return ""
-    start = _QUOTED.sub(lambda key: f'["{key[1]}"]', repr(block))  # as Copy Full Data Path writes it
+    start = double_quoted(repr(block))
     if not start.startswith("bpy.data."):
         return ""
     whole = f"{start}{'' if path.startswith('[') else '.'}{path}"

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Properties of the open file by their paths, as ``bpy.data.objects["Ball"].location[2]``: what they are, and other values.
 
-A path is walked step by step and never executed, so that a file of overrides from somebody else only sets properties.
+Blender itself resolves a path, and executes nothing, so that a file of overrides from somebody else only sets properties.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from math import inf
 from typing import Any
 
@@ -17,10 +17,14 @@ import bpy
 from ...core.errors import ParameterError, SceneError, did_you_mean
 from ...core.study.scene_property import CHOICE, NUMBER, PREFIX, SWITCH, WHOLE_NUMBER, SceneProperty
 from ..session import fcurves
+from .property_path import double_quoted
 
 LARGEST = 1e38
 """Bounds beyond it are those of the type, not of the property."""
-_STEP = re.compile(r"""\.(\w+)|\[(\d+)\]|\[("(?:[^"\\]|\\.)*"|'(?:[^'\\]|\\.)*')\]""")
+_KEY = r'\["((?:[^"\\]|\\.)*)"\]'
+_STEP = re.compile(rf"\.(\w+)|{_KEY}|\[(\d+)\]")
+_LAST_STEP = re.compile(rf"(.*)(?:\.(\w+)|{_KEY})(?:\[(\d+)\])?")
+"""The owner of a property, the property's name or key, and a component."""
 _UNITS = {
     "LENGTH": "Blender units",
     "ROTATION": "rad",
@@ -90,69 +94,36 @@ def find_property(path: str) -> Found:
     ParameterError
         There is none; the message has the name that is most like it.
     """
-    value, found, before = bpy.data, None, "bpy.data"
-    for step in _steps(path):
-        owner = value
-        if step.kind == ATTRIBUTE:
-            _require(step.name, owner.bl_rna.properties.keys() if hasattr(owner, "bl_rna") else (), before, path)
-            value, found = getattr(owner, step.name), Found(path, owner, step.name)
-        elif step.kind == KEY:
-            _require(step.name, owner.keys() if hasattr(owner, "keys") else (), before, path)
-            value = owner[step.name]
-            found = None if isinstance(owner, bpy.types.bpy_prop_collection) else Found(path, owner, step.name)
-        else:
-            count = len(owner) if hasattr(owner, "__len__") and not isinstance(owner, str) else 0
-            if not step.index < count:
-                raise ParameterError(f"There is no [{step.index}] in '{before}' of '{path}': it has {count} components.")
-            value = owner[step.index]
-            found = None if found is None or hasattr(value, "bl_rna") else replace(found, index=step.index)
-        before += step.text
-    if found is None or value is None or hasattr(value, "bl_rna") or isinstance(value, bpy.types.bpy_prop_collection):
-        raise ParameterError(f"'{path}' is not a number, switch or choice: add the name of one of its properties.")
-    return found
-
-
-ATTRIBUTE, KEY, INDEX = "attribute", "key", "index"
-
-
-@dataclass(frozen=True)
-class _Step:
-    """A step of a path: the name of an attribute, the text of a key, or an index; and how it is written."""
-
-    kind: str
-    text: str
-    name: str = ""
-    index: int = 0
-
-
-def _steps(path: str) -> Iterator[_Step]:
-    """Yield the steps of a path after ``bpy.data``."""
     if not path.startswith(PREFIX):
         raise ParameterError(
             f"'{path:.80}' is not the path of a property: begin it with {PREFIX}, as Copy Full Data Path does."
         )
-    at = len(PREFIX) - 1
-    while at < len(path):
-        step = _STEP.match(path, at)
-        if step is None:
-            raise ParameterError(f"'{path}' cannot be read at '{path[at : at + 20]}': copy it by Copy Full Data Path.")
-        at = step.end()
-        if step[1] is not None:
-            yield _Step(ATTRIBUTE, step[0], step[1])
-        elif step[2] is not None:
-            yield _Step(INDEX, step[0], index=int(step[2]))
-        else:
-            yield _Step(KEY, step[0], re.sub(r"\\(.)", r"\1", step[3][1:-1]))
+    inner = double_quoted(path.removeprefix(PREFIX))
+    last = _LAST_STEP.fullmatch(inner)
+    try:
+        value = bpy.data.path_resolve(inner)
+        owner = bpy.data.path_resolve(last[1]) if last and last[1] else None
+    except ValueError:
+        raise _unknown(path, inner) from None
+    if last is None or not hasattr(owner, "bl_rna") or value is None or hasattr(value, "bl_rna"):
+        raise ParameterError(f"'{path}' is not a number, switch or choice: add the name of one of its properties.")
+    key = last[2] or re.sub(r"\\(.)", r"\1", last[3])
+    return Found(path, owner, key, None if last[4] is None else int(last[4]))
 
 
-def _require(name: str, known: Iterable[str], where: str, path: str) -> None:
-    """Raise ParameterError for a name that is not there, with the name that is most like it."""
-    names = [one for one in known if one != "rna_type"]
-    if name in names:
-        return
-    advice = did_you_mean(name, names, "check its spelling, or copy it by Copy Full Data Path.", 0.5)
-    inside = "" if where == "bpy.data" else f" in '{where}'"
-    raise ParameterError(f"There is no '{name}'{inside}, which the study names as '{path}': {advice}")
+def _unknown(path: str, inner: str) -> ParameterError:
+    """Return the error of a path that Blender does not find, with the name that is most like the first that is not there."""
+    owner, before = bpy.data, "bpy.data"
+    for step in _STEP.finditer(f".{inner}"):
+        try:
+            found = bpy.data.path_resolve(inner[: step.end() - 1])
+        except ValueError:
+            names = owner.bl_rna.properties.keys() if step[1] and hasattr(owner, "bl_rna") else getattr(owner, "keys", list)()
+            name = next(word for word in step.groups() if word is not None)
+            advice = did_you_mean(name, names, "check its spelling, or copy it by Copy Full Data Path.", 0.5)
+            return ParameterError(f"There is no '{name}' in '{before}', which the study names as '{path}': {advice}")
+        owner, before = found, before + step[0]
+    return ParameterError(f"'{path}' cannot be read: copy it by Copy Full Data Path.")
 
 
 def describe(path: str) -> SceneProperty:

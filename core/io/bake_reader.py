@@ -20,7 +20,7 @@ from ..model.recording import Recording
 from ..model.sensor_parameters import Painted, SensorParameters, stated_parameters
 from .bake_folder import MANIFEST_NAME, RECORDING_NAME, Manifest, is_interrupted, read_manifest
 from .hidden_folder import PRIVATE_FOLDER
-from .recording_npz import SENSOR_NAME, load_recording, load_sensor
+from .recording_npz import SENSOR_NAME, Sensors, load_recording, load_sensor
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,11 @@ class Bake:
     parameters: dict[str, SensorParameters]
     folders: dict[str, Path]
     manifests: dict[str, Manifest]
+
+    @property
+    def sensors(self) -> Sensors:
+        """Texels, what is painted on them, and parameters of each sensor by its name."""
+        return {name: (texels, self.painted[name], self.parameters[name]) for name, texels in self.texels.items()}
 
     def select(self, names: Sequence[str]) -> Bake:
         """Return the bake of some of the sensors, in the order of `names`.

@@ -184,7 +184,7 @@ def test_two_commands_at_once(tmp_path):
         assert "300 runs: 300 done, 0 failed, 0 left" in first.communicate(timeout=LONGEST)[0]
 
 
-@pytest.mark.long("a run that ends its worker once for each half of its batch")
+@pytest.mark.long("a run that ends its worker three times")
 @pytest.mark.parametrize(("job", "more"), [(FATAL, ""), (HUNGRY, "run_memory = 600\n")])
 def test_a_run_that_ends_its_worker_fails_alone(tmp_path, job, more):
     (tmp_path / "job.py").write_text(job, encoding="utf-8")
