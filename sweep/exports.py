@@ -117,7 +117,7 @@ def _fill(part: Path, create: Callable[..., Any], attributes: Any) -> None:
             arrays[name][at : at + len(table)] = flat.to_numpy(zero_copy_only=False).reshape(len(table), *_shape(feature))
         at += len(table)
     for name in EPISODE_COLUMNS:
-        column = parquet.read_table(part / "meta" / "episodes", columns=[name])[name]
+        column = parquet.read_table(part / "meta" / "episodes", columns=[name], partitioning=None)[name]
         array = create(f"episodes/{name}", (len(column),), "string" if name == "digest" else "int64")
         array[:] = column.to_numpy()
 

@@ -139,9 +139,8 @@ class Parts:
         self.files = part_files(folder)
         found = [self._places(number, path) for number, path in enumerate(self.files)]
         rows = np.concatenate(found) if found else np.zeros((0, 4), np.int64)
-        rows = rows[
-            np.lexsort((-rows[:, 2], rows[:, 1], rows[:, 0]))
-        ]  # of a run that is there twice, one that is done is first
+        # Of a run that is there twice, one that is done is first.
+        rows = rows[np.lexsort((-rows[:, 2], rows[:, 1], rows[:, 0]))]
         _, first = np.unique(rows[:, 0], return_index=True)
         self._rows = rows[first]
         self._read = lru_cache(maxsize=PARTS_KEPT)(self._read_part)
@@ -152,7 +151,7 @@ class Parts:
         from pyarrow import parquet
 
         with _damage_as_sentence(path):
-            table = parquet.read_table(path, columns=["run", "status"])
+            table = parquet.read_table(path, columns=["run", "status"], partitioning=None)
             if (table.schema.metadata or {}).get(b"palpate") != FORMAT.encode():
                 raise FileError(f"'{path}' is not of the format {FORMAT}: give another folder with --out.")
         is_failed = np.array(table["status"].to_pylist(), object) == FAILED
@@ -205,7 +204,7 @@ class Parts:
         from pyarrow import parquet
 
         with _damage_as_sentence(self.files[part]):
-            return parquet.read_table(self.files[part])
+            return parquet.read_table(self.files[part], partitioning=None)  # a folder may be called a=b
 
 
 @contextmanager

@@ -133,15 +133,17 @@ class _Frame:
 
     @classmethod
     def at(cls, scenario: Scenario, sensor: Sensor, press: Press) -> _Frame:
+        from scipy.spatial.transform import Rotation
+
         texels = sensor.texels
         texel, place = _place_on(texels, press)
         normal, x_axis, y_axis = _axes_of(texels, texel)
         leaning = math.cos(press.tilt_direction) * x_axis + math.sin(press.tilt_direction) * y_axis
         # The object stands on the texel's frame and is turned about the axis that leans it.
-        lean = quaternions_from_vectors((press.tilt * _cross(normal, leaning))[None])[0]
+        lean = quaternions_from_vectors((press.tilt * np.cross(normal, leaning))[None])[0]
         axis = math.cos(press.tilt) * normal + math.sin(press.tilt) * leaning
         sideways = math.cos(press.slide_direction) * x_axis + math.sin(press.slide_direction) * y_axis
-        standing = _quaternion(x_axis, y_axis, normal)
+        standing = np.roll(Rotation.from_matrix(np.stack([x_axis, y_axis, normal], axis=1)).as_quat(), 1)
         return cls(place, axis, sideways, quaternion_product(lean[None], standing[None])[0])
 
 
@@ -158,32 +160,7 @@ def _place_on(texels: Texels, press: Press) -> tuple[int, np.ndarray]:
 def _axes_of(texels: Texels, texel: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return normal, x axis and y axis of a texel, (3,) each; :attr:`.Texels.bitangent` has the last one of all texels."""
     normal, x_axis = texels.normal[texel], texels.tangent[texel]
-    return normal, x_axis, _cross(normal, x_axis)
-
-
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the cross product of two (3,) vectors: numpy's bits in a tenth of its time."""
-    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
-    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
-
-
-def _quaternion(x_axis: np.ndarray, y_axis: np.ndarray, z_axis: np.ndarray) -> np.ndarray:
-    """Return the (4,) unit quaternion of the rotation that takes the coordinate axes to three (3,) orthogonal unit vectors.
-
-    Of four formulas, the one that divides by the largest number is taken (Shepperd, J. Guidance and Control 1, 1978).
-    """
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = x_axis.tolist(), y_axis.tolist(), z_axis.tolist()
-    trace = xx + yy + zz
-    largest = max(trace, xx, yy, zz)
-    if largest == trace:
-        found = (1.0 + trace, yz - zy, zx - xz, xy - yx)
-    elif largest == xx:
-        found = (yz - zy, 1.0 + xx - yy - zz, yx + xy, zx + xz)
-    elif largest == yy:
-        found = (zx - xz, yx + xy, 1.0 - xx + yy - zz, zy + yz)
-    else:
-        found = (xy - yx, zx + xz, zy + yz, 1.0 - xx - yy + zz)
-    return np.array(found) / math.sqrt(sum(one * one for one in found))
+    return normal, x_axis, np.cross(normal, x_axis)
 
 
 def _phases(press: Press) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -30,7 +30,7 @@ import json
 import math
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -309,29 +309,41 @@ def plan_for(
         raise ParameterError("The study varies numbers of a press and has no [press]: add that table.")
     known = variables_of(scenario, press is not None)
     known |= {name: item.variable() for name, item in (properties or {}).items()}
-    varied: dict[str, Distribution] = {}
-    fixed: dict[str, Value] = {}
-    tied: dict[str, tuple[str, float | None]] = {}
-    for name, entry in entries.items():
+
+    def find(name: str, _entry: Any) -> Variable:
         if is_scene_property(name) and name not in known:
             raise ParameterError(
                 f"'{name}' is a property of Blender, and '{scenario.name}' is no .blend: give the .blend itself."
             )
         found = variable(name, known, scenario)
         _check_acts(found, scenario, press)
+        return found
+
+    plan = _with_values(Plan(scenario, {}, {}, press, meshes), study, entries, find)
+    for name, (other, factor) in plan.tied.items():
+        own = plan.varied.get(other)
+        ends = own.words if own is not None and own.kind != NORMAL else (plan.fixed[other],) if own is None else ()
+        for end in ends:
+            variable(name, known, scenario).read(_times(end, factor))  # refuses what some run could not have
+    return plan
+
+
+def _with_values(plan: Plan, study: Study, entries: Mapping[str, Any], find: Callable[[str, Any], Variable]) -> Plan:
+    """Return a plan with the values that entries say; `find` returns the variable of a name and its entry."""
+    varied: dict[str, Distribution] = {}
+    fixed: dict[str, Value] = {}
+    tied: dict[str, tuple[str, float | None]] = {}
+    for name, entry in entries.items():
+        found = find(name, entry)
         if isinstance(entry, Mapping) and SAME in entry:
             tied[name] = _tie(found, entry, entries)
         elif isinstance(entry, Mapping):
-            varied[name] = _distribution(found, _with_files(found, entry, meshes))
+            varied[name] = _distribution(found, _with_files(found, entry, plan.meshes))
         else:
             fixed[name] = found.read(entry)
-    _check_varies(study, varied)
-    plan = Plan(scenario, varied, fixed, press, meshes, tied)
-    for name, (other, factor) in tied.items():
-        ends = varied[other].words if other in varied and varied[other].kind != NORMAL else (fixed.get(other),)
-        for end in ends if ends != (None,) else ():
-            variable(name, known, scenario).read(_times(end, factor))  # refuses what some run could not have
-    return plan
+    if not varied and study.design.kind == GRID:
+        raise ParameterError("The study varies nothing: give [vary] or [press] at least one distribution.")
+    return replace(plan, varied=varied, fixed=fixed, tied=tied)
 
 
 def _check_acts(found: Variable, scenario: Scenario, press: Press | None) -> None:
@@ -350,19 +362,7 @@ def plan_for_job(study: Study) -> Plan:
     ParameterError, FileError
         Its values are not possible.
     """
-    varied: dict[str, Distribution] = {}
-    fixed: dict[str, Value] = {}
-    tied: dict[str, tuple[str, float | None]] = {}
-    for name, entry in study.vary.items():
-        found = _free_variable(name, entry)
-        if isinstance(entry, Mapping) and SAME in entry:
-            tied[name] = _tie(found, entry, study.vary)
-        elif isinstance(entry, Mapping):
-            varied[name] = _distribution(found, entry)
-        else:
-            fixed[name] = found.read(entry)
-    _check_varies(study, varied)
-    return Plan(None, varied, fixed, None, {}, tied)
+    return _with_values(Plan(None, {}, {}, None), study, study.vary, _free_variable)
 
 
 def _free_variable(name: str, entry: Any) -> Variable:
@@ -375,11 +375,6 @@ def _free_variable(name: str, entry: Any) -> Variable:
     elif isinstance(first, str):
         specification = TextParameter(name, "", "Text of the job")
     return Variable(name, name, (JOB,), specification)
-
-
-def _check_varies(study: Study, varied: Mapping[str, Distribution]) -> None:
-    if not varied and study.design.kind == GRID:
-        raise ParameterError("The study varies nothing: give [vary] or [press] at least one distribution.")
 
 
 @dataclass(frozen=True)
@@ -553,21 +548,17 @@ def frozen_text(text: str, frozen: Mapping[str, Any]) -> str:
 
 def differences(before: Study, now: Study) -> list[str]:
     """Return the differences of two studies, one phrase each."""
-    found = []
+    old, new = _stated(before), _stated(now)
+    names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
+    return [f"{name} was {_shown(old.get(name))} and is {_shown(new.get(name))}" for name in names]
+
+
+def _stated(study: Study) -> dict[str, Any]:
+    """Return all that a study says about its results, by words."""
     words = ("name", "scenes", "fps", "images", "recordings", "points", "half_precision")
-    pairs = [(word, getattr(before, word), getattr(now, word)) for word in words]
-    pairs += [(word, getattr(before.design, word), getattr(now.design, word)) for word in ("kind", "samples", "seed")]
-    for name in dict.fromkeys([*before.vary, *now.vary]):
-        pairs.append((name, before.vary.get(name), now.vary.get(name)))
-    old, new = before.press or {}, now.press or {}
-    for name in dict.fromkeys([*old, *new]):
-        pairs.append((f"{PRESS}.{name}", old.get(name), new.get(name)))
-    if (before.press is None) != (now.press is None):
-        pairs.append(("[press]", before.press is not None, now.press is not None))
-    for name, was, now_is in pairs:
-        if was != now_is:
-            found.append(f"{'design' if name == 'kind' else name} was {_shown(was)} and is {_shown(now_is)}")
-    return found
+    design = {"design": study.design.kind, "samples": study.design.samples, "seed": study.design.seed}
+    press = {} if study.press is None else {"[press]": True} | {f"{PRESS}.{name}": value for name, value in study.press.items()}
+    return {word: getattr(study, word) for word in words} | design | dict(study.vary) | press
 
 
 def _shown(value: Any) -> str:
