@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -48,19 +49,12 @@ def publish(folder: Path, study: Study) -> None:
     parts = Parts(folder)
     require_own(folder / DATASET_FOLDER, DATASET_FILES)
     try:
+        _write_tables(folder, parts.table())
         with temporary_folder(folder, "dataset") as hidden, ExitStack() as files:
-            table = _RunTable(parts, files.enter_context(atomic_write(folder / TABLE_NAME)), files)
-            timings = files.enter_context(open(files.enter_context(atomic_write(folder / TIMINGS_NAME)), "w", encoding="utf-8"))
-            timings.write("run,digest,seconds\n")
             datasets = _Datasets(parts, hidden / "parts", study.name or UNNAMED_STUDY, files)
             for piece in parts.pieces():
-                table.add(piece)
                 datasets.add(piece)
-                for row in piece.select(["run", "digest", "status", "seconds"]).to_pylist():
-                    if row["status"] == FINISHED:
-                        timings.write(f"{row['run']},{row['digest']},{row['seconds']:.6g}\n")
-            table.flush()
-            exchange_folder(datasets.finish(), folder / DATASET_FOLDER, hidden / "before", DATASET_FILES)
+            replace_folder(datasets.finish(), folder / DATASET_FOLDER, DATASET_FILES)
     except OSError as error:
         raise FileError(
             f"The dataset in '{folder}' could not be written ({os_error_reason(error)}): free some space or check its "
@@ -68,37 +62,16 @@ def publish(folder: Path, study: Study) -> None:
         ) from error
 
 
-class _RunTable:
-    """Writes the columns of parts that say something of runs as a whole, but for their times."""
+def _write_tables(folder: Path, table: pyarrow.Table) -> None:
+    """Write the columns that say something of runs as a whole, and beside them the times, on which no result depends."""
+    from pyarrow import compute, csv, parquet
 
-    def __init__(self, parts: Parts, path: Path, files: ExitStack):
-        import pyarrow
-        from pyarrow import parquet
-
-        self._schema = pyarrow.schema([item for item in parts.run_schema if item.name != "seconds"])
-        self._writer = files.enter_context(parquet.ParquetWriter(path, self._schema, **COMPRESSION))
-        self._waiting: list[pyarrow.Table] = []
-
-    def add(self, piece: pyarrow.Table) -> None:
-        """Add runs."""
-        import pyarrow
-
-        known = set(piece.column_names)
-        columns = [piece[f.name] if f.name in known else pyarrow.nulls(len(piece), f.type) for f in self._schema]
-        self._waiting.append(pyarrow.table(columns, schema=self._schema))
-        if sum(map(len, self._waiting)) >= ROWS_OF_GROUP:
-            self.flush(is_end=False)
-
-    def flush(self, is_end: bool = True) -> None:
-        """Write the runs that wait, in groups of equal size; a rest that is smaller waits for the end."""
-        import pyarrow
-
-        if not self._waiting:
-            return
-        table = pyarrow.concat_tables(self._waiting).combine_chunks()
-        size = len(table) if is_end else len(table) // ROWS_OF_GROUP * ROWS_OF_GROUP
-        self._writer.write_table(table.slice(0, size), row_group_size=ROWS_OF_GROUP)
-        self._waiting = [table.slice(size)]
+    done = table.filter(compute.equal(table["status"], FINISHED)).select(["run", "digest", "seconds"])
+    with atomic_write(folder / TABLE_NAME) as fresh:
+        parquet.write_table(table.drop_columns("seconds"), fresh, row_group_size=ROWS_OF_GROUP, **COMPRESSION)
+    with atomic_write(folder / TIMINGS_NAME) as fresh, open(fresh, "wb") as file:
+        file.write(b"run,digest,seconds\n")  # pyarrow would put the names in quotation marks
+        csv.write_csv(done, file, csv.WriteOptions(include_header=False, quoting_style="none"))
 
 
 class _Datasets:
@@ -151,16 +124,14 @@ def require_own(target: Path, files: re.Pattern[str]) -> None:
             raise FileError(f"'{path}' was not written by `palpate sweep`: move it away, the folder '{target}' is replaced.")
 
 
-def exchange_folder(new: Path | None, target: Path, before: Path, files: re.Pattern[str]) -> None:
-    """Put a folder in its place, or remove the one there. A kill between the two renames leaves none.
+def replace_folder(new: Path | None, target: Path, files: re.Pattern[str]) -> None:
+    """Put a folder in the place of an earlier one, or remove that. A kill between the two leaves none: it can be made again.
 
     Parameters
     ----------
     new : Path or None
         None: there is to be no folder.
     target : Path
-    before : Path
-        Name in a temporary folder that takes the earlier folder.
     files : compiled regular expression
         Of the names that the earlier folder may hold.
 
@@ -169,16 +140,10 @@ def exchange_folder(new: Path | None, target: Path, before: Path, files: re.Patt
     FileError
         As :func:`require_own`.
     OSError
-        It cannot be renamed; the earlier folder is in its place then.
+        A folder cannot be removed or renamed.
     """
     require_own(target, files)
-    had_one = target.exists()
-    if had_one:
-        os.rename(target, before)
-    try:
-        if new is not None:
-            os.rename(new, target)
-    except OSError:
-        if had_one:
-            os.rename(before, target)
-        raise
+    if target.exists():
+        shutil.rmtree(target)
+    if new is not None:
+        os.rename(new, target)

@@ -17,7 +17,7 @@ from typing import Any
 from ..core.errors import FileError, os_error_reason
 from ..core.io.file_writing import atomic_write
 from ..core.io.hidden_folder import temporary_folder
-from .dataset import DATASET_FOLDER, exchange_folder
+from .dataset import DATASET_FOLDER, replace_folder
 
 EPISODE_COLUMNS = ("run", "length", "dataset_from_index", "dataset_to_index", "digest")
 ZARR_FILES = re.compile(r"(.+/)?(\.z(group|attrs|array|metadata)|[0-9.]+)")
@@ -78,7 +78,7 @@ def export_zarr(folder: Path) -> list[Path]:
                     return group.create_array(name, shape=shape, dtype="U64" if kind == "string" else kind)
 
                 _fill(part, create, group.attrs)
-                exchange_folder(hidden / "new", target, hidden / "before", ZARR_FILES)
+                replace_folder(hidden / "new", target, ZARR_FILES)
         except OSError as error:
             raise FileError(f"'{target}' could not be written ({os_error_reason(error)}): free some space.") from error
         written.append(target)

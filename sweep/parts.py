@@ -138,6 +138,7 @@ class Parts:
         self._folder = folder
         self.files = part_files(folder)
         found = [self._places(number, path) for number, path in enumerate(self.files)]
+        self._counts = [len(rows) for rows in found]
         rows = np.concatenate(found) if found else np.zeros((0, 4), np.int64)
         # Of a run that is there twice, one that is done is first.
         rows = rows[np.lexsort((-rows[:, 2], rows[:, 1], rows[:, 0]))]
@@ -180,6 +181,18 @@ class Parts:
             schemas.append(pyarrow.schema(own))
         fields = pyarrow.unify_schemas(schemas, promote_options="permissive")
         return pyarrow.schema(sorted(fields, key=lambda item: item.name if item.name.startswith("metric.") else ""))
+
+    def table(self) -> pyarrow.Table:
+        """Return the columns that say something of a run as a whole, a row for each run in the order of the design."""
+        import pyarrow
+        from pyarrow import dataset
+
+        schema = self.run_schema
+        names = list(map(str, self.files))
+        with _damage_as_sentence(self._folder / PARTS):
+            found = dataset.dataset(names, schema, format="parquet", partitioning=None).to_table()
+        starts = np.cumsum([0, *self._counts])[self._rows[:, 2]]
+        return found.take(pyarrow.array(starts + self._rows[:, 3])).combine_chunks()
 
     def pieces(self) -> Iterator[pyarrow.Table]:
         """Yield all runs in the order of the design, as tables of runs that are neighbours in a part."""

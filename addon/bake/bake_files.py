@@ -34,10 +34,10 @@ from ...core.io.bake_folder import (
     write_images,
     write_manifest,
 )
-from ...core.io.file_writing import bake_bytes, require_space, writable_folder
+from ...core.io.file_writing import require_space, writable_folder
 from ...core.io.hidden_folder import PRIVATE_FOLDER, FolderLock, is_private_folder
 from ...core.io.input_files import read_bytes
-from ...core.io.row_tables import FrameTable
+from ...core.io.row_tables import FrameTable, row_type
 from ...core.model.recording import Frame, Recording
 from ...core.model.scenario import Scenario
 from ...core.model.sensor import Sensor
@@ -48,6 +48,8 @@ from ...core.model.sensor import Sensor
 
 MAX_BATCH_IMAGES, MAX_BATCH_PIXELS = 16, 16384
 """Most images of one sensor that are written together, and most pixels in them: one call for many small images is faster."""
+IMAGE_BYTES, PIXEL_BYTES = 7000, 4
+"""Most bytes of an image apart from its pixels: header, line in the list, rest of a block. And of a channel of a pixel."""
 MAX_WAITING_BATCHES = 8
 """Batches that may wait. Each keeps its frames in memory, so that a slow disk has to slow the solver down."""
 
@@ -130,13 +132,16 @@ def writable_bake_folder(scene) -> Path:
 
 
 def check_space(folder: Path, scenario: Scenario, images: bool = True) -> None:
-    """Raise FileError if the disk cannot hold a new bake."""
+    """Raise FileError if the disk cannot hold a new bake: its frames as they grow, recordings and images, uncompressed."""
     read_out = [sensor for sensor in scenario.sensors if sensor.readout]
-    texels = [len(sensor.texels) for sensor in read_out]
-    shapes = [(0, 0, 0) if one.channels is None else one.channels.no_frames().values.shape for one in read_out]
-    pixels = [math.prod(one.texels.layout.shape) * (7 + own[2]) // 7 for one, own in zip(read_out, shapes, strict=True)]
-    channels = [count * each for _, count, each in shapes]
-    needed = bake_bytes(len(scenario.frames), len(scenario.bodies), texels, pixels if images else [], channels)
+    channels = {one.name: one.channels.no_frames() for one in read_out if one.channels is not None}
+    texels = {one.name: len(one.texels) for one in read_out}
+    tables = [texels, *({name: count} for name, count in texels.items())]
+    sizes = [row_type(len(scenario.bodies), table, channels).itemsize for table in tables]
+    for sensor in read_out if images else ():
+        layers = 7 + (len(channels[sensor.name].names) if sensor.name in channels else 0)
+        sizes.append(IMAGE_BYTES + PIXEL_BYTES * layers * math.prod(sensor.texels.layout.shape))
+    needed = float(len(scenario.frames) * sum(sizes))
     require_space(folder, needed, "The bake")
 
 

@@ -19,7 +19,7 @@ from ...core.figures.side_by_side import side_by_side
 from ...core.figures.tactile_strip import tactile_strip
 from ...core.figures.texel_numbers import texel_numbers, why_unreadable
 from ...core.figures.time_curves import time_curves
-from ...core.io.bake_folder import file_stems
+from ...core.io.bake_folder import folder_names
 from ...core.io.bake_reader import Bake, frame_index, read_sensors
 from ...core.io.file_writing import writable_folder
 from ...core.io.hidden_folder import FileList, temporary_folder
@@ -125,7 +125,7 @@ def draw_figures(
             time_curves(folder / f"curves.{ending}", *parts, bake.parameters, style=request.style)
             written["curves"].append(folder / f"curves.{ending}")
         if "numbers" in request.kinds:
-            for name, stem in file_stems(bake.texels).items():
+            for name, stem in folder_names(bake.texels, "_").items():
                 if why_unreadable(name, bake.texels[name]) and not request.sensors:
                     continue  # with a warning; a sensor that the request names raises an error instead
                 for number in frames:

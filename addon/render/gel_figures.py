@@ -10,7 +10,7 @@ from ...core import response
 from ...core.errors import SensorError
 from ...core.figures.gel_image import require_grid, write_gel_image
 from ...core.geometry.grid_layout import GridLayout
-from ...core.io.bake_folder import file_stems
+from ...core.io.bake_folder import folder_names
 from ...core.io.bake_reader import Bake, frame_index
 from ...core.jobs import Job, Progress
 from .figure_request import FigureRequest
@@ -52,7 +52,7 @@ def draw_gels(bake: Bake, folder: Path, request: FigureRequest, next_step: Calla
         Returns the progress for what is done and the frame.
     """
     written = []
-    style, stems = request.gel_style(), file_stems(bake.texels)
+    style, stems = request.gel_style(), folder_names(bake.texels, "_")
     names = gel_sensors(bake, request)
     for number in gel_frames(bake, request):
         yield next_step("Drawing the gel", number)

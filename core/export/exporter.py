@@ -15,7 +15,7 @@ from ..errors import PalpateError
 from ..figures.figure_style import FigureStyle
 from ..geometry.grid_layout import GridLayout
 from ..io.bake_reader import Bake
-from ..io.file_writing import CHANNEL_BYTES, recording_bytes, require_space, writable_folder
+from ..io.file_writing import writable_folder
 from ..io.hidden_folder import FileList
 from ..jobs import Job, Progress
 from ..model.recording import SENSOR_FIELDS, VectorReadings
@@ -43,15 +43,6 @@ CHANNEL_ARRAYS = {"channels": "values", "channels_clipped": "clipped", "channels
 Write = Callable[[Bake, Path, FigureStyle], Job[list[Path]]]
 
 
-def uncompressed_bytes(bake: Bake) -> float:
-    """Return how many bytes the arrays of a bake have."""
-    frames, bodies = len(bake.recording.frames), len(bake.recording.body_names)
-    channels = sum(
-        CHANNEL_BYTES * own.channels.values.size for own in bake.recording.sensors.values() if own.channels is not None
-    )
-    return channels + sum(recording_bytes(frames, bodies, [len(texels)]) for texels in bake.texels.values())
-
-
 @dataclass(frozen=True)
 class Exporter:
     """A format that a bake can be written in.
@@ -63,13 +54,10 @@ class Exporter:
     write : callable
         Takes the bake, a folder that exists, and a style for colours. It yields :func:`sensor_progress` before each sensor is
         written, and returns the files that it wrote, in that folder or in a folder in it.
-    size : callable
-        Returns an estimate from above of the bytes that it writes. Default: those of all arrays.
     """
 
     name: str
     write: Write
-    size: Callable[[Bake], float] = uncompressed_bytes
 
 
 def bake_arrays(bake: Bake, name: str) -> dict[str, np.ndarray]:
@@ -132,11 +120,9 @@ def export(bake: Bake, kind: str | Exporter, folder: str | os.PathLike, style: F
     Raises
     ------
     PalpateError
-        The format is unknown or needs a package that is not installed, the disk has too little space, or a file cannot be
-        written.
+        The format is unknown or needs a package that is not installed, or a file cannot be written, as on a full disk.
     """
     exporter = kind if isinstance(kind, Exporter) else exporter_for(kind)
-    require_space(folder, exporter.size(bake), "The export")
     folder = writable_folder(folder, create=True)
     files = FileList(folder)
     with files.new_files("export") as new:

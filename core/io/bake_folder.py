@@ -53,11 +53,12 @@ _RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{i}" for port in ("com", "lpt
 """Names that Windows reserves for devices."""
 
 
-def folder_names(names: Iterable[str]) -> dict[str, str]:
+def folder_names(names: Iterable[str], blank: str = " ") -> dict[str, str]:
     """Return a unique folder name for each sensor that every operating system accepts.
 
     A name of letters, digits, blanks, dots, hyphens and underscores is kept. In any other name the remaining characters
-    become ``_`` and a checksum of the name is appended. The same is done for names that differ only in case.
+    become ``_`` and a checksum of the name is appended. The same is done for names that differ only in case. A blank becomes
+    `blank`.
     """
     chosen: dict[str, str] = {}
     taken: set[str] = set()
@@ -66,23 +67,11 @@ def folder_names(names: Iterable[str]) -> dict[str, str]:
         if not clean or clean != name or clean.split(".")[0].lower() in _RESERVED or clean.casefold() in taken:
             base = f"{clean or 'sensor'}-{zlib.crc32(name.encode('utf-8', 'surrogatepass')):08x}"
             clean = base if clean.split(".")[0].lower() not in _RESERVED else f"_{base}"
+        clean = clean.replace(" ", blank)
         while clean.casefold() in taken:
             clean += "_"
         taken.add(clean.casefold())
         chosen[name] = clean
-    return chosen
-
-
-def file_stems(names: Iterable[str]) -> dict[str, str]:
-    """Return a unique part of a file name without blanks for each sensor."""
-    chosen: dict[str, str] = {}
-    taken: set[str] = set()
-    for name, folder in folder_names(names).items():
-        stem = folder.replace(" ", "_")
-        while stem.casefold() in taken:
-            stem += "_"
-        taken.add(stem.casefold())
-        chosen[name] = stem
     return chosen
 
 

@@ -15,7 +15,7 @@ import os
 import secrets
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -226,50 +226,6 @@ def _remedy(error: OSError) -> str:
     if error.errno == errno.ENAMETOOLONG:
         return "choose a shorter name"
     return "close programs that use it, check its permissions, or choose another folder"
-
-
-BLOCK = 4096
-"""Bytes that even the smallest file occupies on most file systems."""
-IMAGE_HEADER_BYTES = 2500
-IMAGE_PIXEL_BYTES = 28
-"""Bytes of a tactile image: its header, and seven channels of four bytes for each pixel."""
-LIST_LINE_BYTES = 100
-CHANNEL_BYTES = 9
-"""Bytes of a channel at a frame: its reading, and whether that is clipped."""
-_TEXEL_BYTES, _SENSOR_BYTES, _BODY_BYTES, _FRAME_BYTES = 57, 80, 104, 16
-"""Bytes of a frame of a recording: for each texel, sensor and body, and for the frame itself."""
-
-
-def recording_bytes(frames: int, bodies: int, texels: Iterable[int]) -> float:
-    """Return how many bytes a recording of sensors with so many texels occupies without compression."""
-    sensors = sum(_TEXEL_BYTES * count + _SENSOR_BYTES for count in texels)
-    return float(frames * (_FRAME_BYTES + _BODY_BYTES * bodies + sensors))
-
-
-def bake_bytes(frames: int, bodies: int, texels: Sequence[int], pixels: Sequence[int], channels: Sequence[int] = ()) -> float:
-    """Return an estimate from above of the bytes that a bake occupies while it is written.
-
-    Parameters
-    ----------
-    frames, bodies : int
-    texels : sequence of int
-        Of each sensor.
-    pixels : sequence of int
-        Of the images of each sensor, more by a seventh for each further channel; empty for a bake without images.
-    channels : sequence of int
-        Of each sensor that has several, all places together.
-
-    Returns
-    -------
-    float
-        The frames as they grow, the recording of each sensor, and the images, all of them as if nothing could be compressed.
-    """
-    grown = recording_bytes(frames, bodies, texels)
-    written = sum(recording_bytes(frames, bodies, [count]) for count in texels)
-    vectors = 2 * CHANNEL_BYTES * frames * sum(channels)
-    size = [IMAGE_HEADER_BYTES + IMAGE_PIXEL_BYTES * count for count in pixels]
-    images = sum(BLOCK * -(-one // BLOCK) + LIST_LINE_BYTES for one in size)
-    return grown + written + float(vectors + frames * images)
 
 
 def require_space(folder: str | os.PathLike, needed: float, what: str) -> None:

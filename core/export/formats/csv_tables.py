@@ -23,8 +23,6 @@ from ..exporter import Exporter, channel_labels, sensor_progress
 _QUANTITIES = ("normal_force", "shear_x", "shear_y", "depth", "slip", "contact", "reading")
 """Quantities of a texel; each gets a table of its own."""
 _SHEAR = ("shear_x", "shear_y")
-_NUMBER_BYTES = 16
-"""Bytes of a number with a sign, nine digits, a point, an exponent and a comma."""
 _DIGITS = 9
 """Significant digits: more than any measurement has, in about half the space of a full double."""
 
@@ -125,12 +123,4 @@ def _write_table(path: Path, header: Sequence[str], tables: Iterable[np.ndarray]
             writer.writerows([f"{value:.{_DIGITS}g}" for value in row] for row in table)
 
 
-def _csv_bytes(bake: Bake) -> float:
-    """Return an estimate from above of the bytes of all tables."""
-    per_frame = 7 * len(bake.recording.body_names) + sum(len(_QUANTITIES) * len(texels) + 32 for texels in bake.texels.values())
-    channels = [own.channels.values[0].size + 2 for own in bake.recording.sensors.values() if own.channels is not None]
-    per_frame += sum(channels)
-    return float(_NUMBER_BYTES * per_frame * len(bake.recording.frames))
-
-
-EXPORTER = Exporter("csv", write_csv, _csv_bytes)
+EXPORTER = Exporter("csv", write_csv)

@@ -17,10 +17,10 @@ from ...io.file_writing import write_file
 from ...jobs import Job
 from ..exporter import UNITS, Exporter, bake_arrays, sensor_progress
 
-_BLOCK_BYTES = 1 << 22
-"""Size of the rows of an array that are written at once; a whole number of the library's chunks."""
 _GROWTH_BYTES = 1 << 24
 """By which the file in memory grows."""
+SMALL = 4096
+"""Numbers of an array that is not compressed."""
 
 
 def write_hdf5(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Path]]:
@@ -66,17 +66,9 @@ def _hdf5_name(name: str, group: Any) -> str:
 
 
 def _dataset(group: Any, name: str, array: np.ndarray, unit: str) -> None:
-    """Write an array; a large one by blocks of rows, so that a long recording is in memory packed only."""
-    if array.size <= 4096:
-        group.create_dataset(name, data=array, track_times=False).attrs["unit"] = unit
-        return
-    packed = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
-    written = group.create_dataset(name, array.shape, array.dtype, track_times=False, **packed)
-    written.attrs["unit"] = unit
-    rows = written.chunks[0]
-    rows *= max(1, _BLOCK_BYTES * len(array) // (array.nbytes * rows))
-    for first in range(0, len(array), rows):
-        written[first : first + rows] = array[first : first + rows]
+    """Write an array, a large one compressed."""
+    packed = {"compression": "gzip", "compression_opts": 4, "shuffle": True} if array.size > SMALL else {}
+    group.create_dataset(name, data=array, track_times=False, **packed).attrs["unit"] = unit
 
 
 def _unit(bake: Bake, name: str, key: str) -> str:

@@ -22,7 +22,7 @@ from ...io.file_writing import write_file
 from ...io.recording_npz import described
 from ...jobs import Job
 from ...model.recording import Recording, VectorReadings
-from ..exporter import Exporter, sensor_progress, uncompressed_bytes
+from ..exporter import Exporter, sensor_progress
 
 POINT_CLOUD = "sensor_msgs/msg/PointCloud2"
 IMAGE = "sensor_msgs/msg/Image"
@@ -271,10 +271,4 @@ def _frame_names(bodies: Iterable[str]) -> dict[str, str]:
     return names
 
 
-def _mcap_bytes(bake: Bake) -> float:
-    """Return an estimate from above of the bytes of the file before it is packed."""
-    pixels = sum(4 * int(np.prod(texels.layout.shape)) + 2000 for texels in bake.texels.values())
-    return uncompressed_bytes(bake) + len(bake.recording.frames) * pixels
-
-
-EXPORTER = Exporter("mcap", write_mcap, _mcap_bytes)
+EXPORTER = Exporter("mcap", write_mcap)

@@ -13,7 +13,7 @@ from ...figures.figure_canvas import save_pixels
 from ...figures.figure_style import FigureStyle
 from ...io.bake_folder import folder_names
 from ...io.bake_reader import Bake
-from ...io.file_writing import BLOCK, atomic_write, writable_folder
+from ...io.file_writing import atomic_write, writable_folder
 from ...io.tactile_exr import channel_layout
 from ...jobs import Job
 from ...model.recording import row_blocks
@@ -86,12 +86,4 @@ def _write_channels(bake: Bake, name: str, folder: Path) -> list[Path]:
     return [*written, folder / "channels_scale.json"]
 
 
-def _png_bytes(bake: Bake) -> float:
-    """Return an estimate from above of the bytes of all pictures; magnified pixels are packed well."""
-    pixels = [int(np.prod(texels.layout.shape)) for texels in bake.texels.values()]
-    sensors = bake.recording.sensors
-    pixels += [own.channels.values.shape[2] * _LEAST_PIXELS**2 // 4 for own in sensors.values() if own.channels is not None]
-    return float(len(bake.recording.frames) * sum(2 * BLOCK + 4 * count for count in pixels))
-
-
-EXPORTER = Exporter("png", write_png, _png_bytes)
+EXPORTER = Exporter("png", write_png)

@@ -40,7 +40,7 @@ def write(files, folder, _style):
 @pytest.fixture
 def formats(monkeypatch):
     """A format of plain text; a "bake" is a dictionary of files."""
-    known = {name: Exporter(name, write, lambda _: 0.0) for name in ("text", "other")}
+    known = {name: Exporter(name, write) for name in ("text", "other")}
     monkeypatch.setattr(exporter, "exporter_for", known.__getitem__)
     return known
 

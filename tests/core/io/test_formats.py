@@ -31,7 +31,6 @@ from palpate.core.io import file_writing, recording_npz, tactile_exr
 from palpate.core.io.bake_folder import (
     OWN_DIGEST,
     Manifest,
-    file_stems,
     folder_names,
     read_manifest,
     write_manifest,
@@ -233,9 +232,9 @@ def test_kill_in_the_middle_leaves_the_old_file(tmp_path):
 
 
 def test_file_stems_have_no_blanks_and_are_unique():
-    assert file_stems(["Index finger", "Index_finger", "Thumb"]) == {
+    assert folder_names(["Index finger", "Index_finger", "Thumb"], "_") == {
         "Index finger": "Index_finger",
-        "Index_finger": "Index_finger_",
+        "Index_finger": "Index_finger-ca02aeb6",
         "Thumb": "Thumb",
     }
 

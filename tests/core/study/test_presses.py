@@ -13,7 +13,6 @@ from palpate.core.errors import PalpateError
 from palpate.core.geometry.rotations import rotation_matrices
 from palpate.core.model.body import Motion
 from palpate.core.solver.simulation import poses_at
-from palpate.core.study import presses
 from palpate.core.study.presses import Press, place_of, with_press
 
 
@@ -73,12 +72,3 @@ def test_what_cannot_press_is_refused():
     moved = replace(scene, bodies=(replace(scene.bodies[0], motion=moving), scene.bodies[1]))
     with pytest.raises(PalpateError, match="moves: a press needs a sensor that rests"):
         with_press(moved, Press("Pad", "Ball"))
-
-
-def test_the_object_stands_on_the_axes_of_the_texel():
-    """All four formulas of the quaternion, against the rotation matrices that it stands for."""
-    for axis, angle in (((1, 2, 3), 20), ((1, 0.1, 0.2), 175), ((0.1, 1, 0.2), 178), ((0.1, 0.2, 1), 180), ((1, 1, 1), 0)):
-        matrix = rotation_matrices(np.array(about(axis, angle))[None])[0]
-        found = presses._quaternion(*matrix.T)
-        np.testing.assert_allclose(rotation_matrices(found[None])[0], matrix, atol=1e-15)
-        assert np.linalg.norm(found) == pytest.approx(1.0, abs=1e-15)
