@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import gap_cases as cases
 import numpy as np
 import pytest
 
@@ -14,8 +15,8 @@ from palpate.core.model.sensor_parameters import SensorParameters
 
 
 @pytest.fixture(scope="module")
-def rig(repository):
-    return repository / "docs" / "sample-rig" / "rig.toml"
+def rig(tmp_path_factory):
+    return cases.write(cases.rig(contact=cases.relaxing(), seed=7, trials=4, seconds=9.0), tmp_path_factory.mktemp("rig"))
 
 
 @pytest.fixture(scope="module")
@@ -23,13 +24,12 @@ def gap(rig):
     return pp.find_gap(pp.read_rig(rig))
 
 
-@pytest.mark.slow("finds the gap of the sample rig, for all tests of this file")
+@pytest.mark.slow("finds the gap of a small rig, for all tests of this file")
 def test_a_gap_names_effects_with_intervals(gap):
-    """What tools/sample_rig.py has hidden is found."""
     assert gap.verdict == "explained"
     assert gap.error_after < 0.5 * gap.error_before
     names = [effect.name for effect in gap.effects]
-    assert names and all(0 < effect.confidence <= 1 for effect in gap.effects)
+    assert names == ["creep"] and all(0 < effect.confidence <= 1 for effect in gap.effects)
     for effect in gap.effects:
         assert repr(effect).startswith(f"<FoundEffect: {effect.name} (") and len(repr(effect)) < 200
         for one in effect.parameters.values():
@@ -40,12 +40,13 @@ def test_a_gap_names_effects_with_intervals(gap):
 
 def test_the_amended_sensor_is_simulated(gap):
     assert [effect.name for effect in gap.sensor.effects] == [effect.name for effect in gap.effects]
-    assert len(gap.sensor.texels) == 84
-    ball = pp.Body.sphere(0.015, path_of_motion=[[0, 0, 0.015], [0, 0, 0.013]])
+    assert len(gap.sensor.texels) == cases.ROWS * cases.COLUMNS
+    ball = pp.Body.sphere(cases.RADIUS, path_of_motion=[[0, 0, cases.RADIUS], [0, 0, cases.RADIUS - 2e-3]])
     found = pp.simulate(gap.sensor, ball, fps=10)
-    assert found.unit == "counts" and found.reading[-1].max() > found.reading[0].max()
+    assert found.unit == "N" and found.reading[-1].max() > found.reading[0].max()
 
 
+@pytest.mark.slow("draws every figure of a report")
 def test_a_report_is_written_and_its_sensor_read(gap, tmp_path):
     page = gap.report(tmp_path / "out")
     assert (tmp_path / "out" / "gap.json").is_file()
@@ -89,14 +90,15 @@ def test_figures_of_a_gap(gap):
         gap.plot("lops")
 
 
-@pytest.mark.slow("plans a recording for the sample rig")
+@pytest.mark.slow("plans a recording")
 def test_a_plan_is_written_and_can_be_simulated(rig, tmp_path):
     plan = pp.plan_experiment(rig, limits={"depth": 2e-3, "duration": 10.0})
     assert len(plan.rows) > 3 and repr(plan) == f"<Plan: {plan.sentence}>"
     assert {path.name for path in plan.report(tmp_path)} == {"plan.json", "plan.csv"}
     times, positions = plan.path_of_motion
     assert positions.shape == (len(times), 3) and times[-1] <= 10.0 + 1e-9
-    assert pp.Body.sphere(0.015, path_of_motion=tmp_path / "plan.csv").path.positions == pytest.approx(positions, abs=1e-8)
+    ball = pp.Body.sphere(cases.RADIUS, path_of_motion=tmp_path / "plan.csv")
+    assert ball.path.positions == pytest.approx(positions, abs=1e-8)
 
 
 def test_wrong_rigs_and_limits_are_refused(rig, tmp_path):
