@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 import random_rigs
 import tomli_w
+from exported_sensors import pad
 from hypothesis import strategies as st
 from sample_bake import grid_texels, recording_of, round_texels
 from small_study import STUDY, scenario
@@ -34,19 +35,14 @@ from palpate.core.gap.logs.answers import answers_of, read_answers
 from palpate.core.gap.logs.log_file import read_log
 from palpate.core.gap.logs.new_rig import write_rig
 from palpate.core.gap.logs.proposal import propose
-from palpate.core.geometry.mesh import TriangleMesh
-from palpate.core.geometry.texel_arrays import pad_array
-from palpate.core.geometry.texels import texels_from_region
 from palpate.core.io.csv_table import read_table
 from palpate.core.io.recording_npz import load_recording, load_sensor, save_recording, save_sensor
 from palpate.core.io.scenario_npz import load_scenario, save_scenario
 from palpate.core.io.sensor_toml import FORMAT, read_sensor
 from palpate.core.jobs import run_job
-from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
 from palpate.core.simulators.openrave_file import OpenRaveSensor, openrave_xml, read_openrave
 from palpate.core.simulators.sensor_format import FoundSensor, export_sensors, import_sensors
-from palpate.core.simulators.sensor_on_mesh import SensorOnMesh
 from palpate.core.study.study_file import Runs, plan_for, read_study
 
 Files = dict[str, bytes]
@@ -384,12 +380,7 @@ def texel_files() -> Files:
 
 def exported_sensor(kind: str) -> Files:
     """The files of a small pad exported for another program."""
-    array = pad_array(3, 2, (0.003, 0.003), 0.0)
-    faces = [(face[0], face[i], face[i + 1]) for face in array.faces for i in range(1, len(face) - 1)]
-    mesh = TriangleMesh(array.vertices, np.array(faces), np.array(array.faces))
-    texels = texels_from_region(mesh, np.ones(len(mesh.vertices), bool))
-    item = SensorOnMesh(Sensor("Pad", 0, texels, SensorParameters()), mesh)
-    return files_of(lambda folder: export_sensors([item], kind, folder))
+    return files_of(lambda folder: export_sensors([pad(3, 2)], kind, folder))
 
 
 def log_files(kind: str) -> Files:

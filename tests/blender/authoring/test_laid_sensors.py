@@ -93,11 +93,12 @@ def test_texels_laid_on_a_painted_region_take_its_place(role):
     """After *Paint Region* the mode is Weight Paint and the active group the sensor's own: nothing may be pressed twice."""
     obj = finger()
     bpy.ops.palpate.weight_paint()
-    obj.palpate.role = role
+    obj.palpate.role, obj.palpate.k = role, 300.0
     obj.vertex_groups.active.add(upper(obj), 1.0, "REPLACE")
     assert obj.mode == "WEIGHT_PAINT"
     assert bpy.ops.palpate.skin_add(method="NOISE", spacing=0.002) == {"FINISHED"}
     assert bpy.context.object.palpate.role == "SENSOR" and obj.palpate.role == "NONE"
+    assert bpy.context.object.palpate.k == 300.0
 
 
 @pytest.mark.parametrize("source", ["OWN", "GROUP"])
@@ -174,16 +175,6 @@ def test_spacing_is_in_metres_whatever_the_scale_of_the_object(scale):
     assert apart.min(axis=1) == pytest.approx(0.004, rel=1e-4)
     frame = transforms.rotation(transforms.decompose(np.array(skin.matrix_world, float))[1])
     assert texels.normal @ frame.T == pytest.approx(np.tile([0, 0, 1.0], (len(texels), 1)), abs=1e-6)
-
-
-def test_the_region_of_a_sensor_is_resampled_and_the_old_texels_go():
-    obj = grid("Plate", size=0.04)
-    bpy.ops.palpate.sensor_add()
-    obj.palpate.k = 300.0
-    assert bpy.ops.palpate.skin_add(method="NOISE", spacing=0.004) == {"FINISHED"}
-    skin = bpy.context.object
-    assert obj.palpate.role == "NONE"
-    assert skin.palpate.k == 300.0
 
 
 def test_a_skin_is_laid_anew_when_the_surface_has_changed():

@@ -197,20 +197,6 @@ def test_a_painted_map_that_cannot_be_used_says_so(name, value, text):
         scene_reader.read_start(scene, participants.depsgraph_of(scene))
 
 
-def test_a_soft_tip_feels_less_under_the_same_ball():
-    scene, pad, _ = press(4)
-    forces = []
-    for factor in (1.0, 0.5):
-        group = pad.vertex_groups.get("Soft") or pad.vertex_groups.new(name="Soft")
-        group.add(range(84), 1.0, "REPLACE")
-        pad.palpate.k_map, pad.palpate.k_factor = "Soft", factor
-        from palpate.core.jobs import run_job
-        from palpate.core.solver.simulation import run
-
-        forces.append(run(run_job(scene_reader.read_scene(scene)).scenario).sensors["Pad"].normal_force[-1].sum())
-    assert forces[1] == pytest.approx(0.5 * forces[0], rel=1e-6)
-
-
 def test_a_preset_may_be_toml_which_is_only_data(tmp_path):
     from palpate.operators import presets
 

@@ -158,11 +158,6 @@ def test_the_command_puts_the_amended_sensor_into_a_scene(scene, rig_file, tmp_p
     assert [item.kind for item in bpy.data.objects["Pad"].palpate.effects] == ["creep"]
 
 
-def test_the_command_says_what_is_wrong(tmp_path, capsys):
-    assert main(["gap", str(tmp_path / "none.toml"), "--out", str(tmp_path / "out")]) == 1
-    assert "There is no rig" in capsys.readouterr().err
-
-
 def test_the_command_says_that_it_compiles(rig_file, tmp_path, monkeypatch, capsys):
     def stop():
         raise SceneError("far enough.")

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from sample_bake import grid_texels, recording_of
 
+from palpate.api.recordings import Recording
 from palpate.commands import figure_options
 from palpate.core.errors import ParameterError
 from palpate.core.export.exporter import export
@@ -61,7 +62,7 @@ def test_strip_numbers_and_pictures_show_it(tmp_path, monkeypatch, recorded, nam
     kept = []
     monkeypatch.setattr(figure_canvas, "_write", lambda figure, *_: kept.append(figure))
     imsave(tmp_path / "scene.png", np.full((480, 640, 3), 0.4))
-    kept.append(strip_figure(recording, own, [5], style))
+    kept.append(Recording.of(recording, {"pad": (texels, Painted(), SensorParameters(unit="V"))}).show(name, [0.17]))
     side_by_side(tmp_path / "scene.png", tmp_path / "a.png", recording, own, 5, style)
     label_picture(tmp_path / "scene.png", tmp_path / "b.png", recording, own, 5, style=style)
     for figure in kept:
@@ -96,18 +97,6 @@ def test_exported_pictures_and_messages_show_it(tmp_path, recorded, name):
     pixels = picture[size // 2 :: size, size // 2 :: size, :3][::-1][texels.layout.row, texels.layout.column]
     share = (values[4] - about["first_colour"]) / (about["last_colour"] - about["first_colour"])
     assert pixels == pytest.approx(color_maps.colors(about["colour_map"], share), abs=0.003)
-
-
-@EVERY
-def test_a_script_shows_it(recorded, name):
-    from palpate.api.recordings import Recording
-
-    texels, recording = recorded
-    shown = Recording.of(recording, {"pad": (texels, Painted(), SensorParameters(unit="V"))}).show(name, [0.17])
-    values, unit = EXPECTED[name](recording.sensors["pad"], texels)
-    image = shown.axes[0].images[0]
-    assert image.get_array().data[texels.layout.row, texels.layout.column] == pytest.approx(values[4])
-    assert any(f"({unit})" in text for axes in shown.axes for text in (axes.get_ylabel(), axes.get_xlabel()))
 
 
 def test_scales_end_at_round_numbers_around_their_values():
