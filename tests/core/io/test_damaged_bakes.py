@@ -3,6 +3,7 @@
 
 import os
 import shutil
+import subprocess
 import zipfile
 
 import pytest
@@ -10,6 +11,7 @@ from sample_bake import write_bake
 
 from palpate.commands import main
 from palpate.core.errors import FileError
+from palpate.core.io.bake_folder import IMAGE_LIST_NAME, read_checksums
 from palpate.core.io.bake_reader import read_bake
 from palpate.core.io.recording_npz import load_recording, load_sensor
 
@@ -47,6 +49,30 @@ def test_a_file_that_is_none_is_refused(bake, file, kind):
     replaced_by(kind, bake / file)
     with pytest.raises(FileError, match="pad"):
         read_bake(bake)
+
+
+def test_the_damaged_file_is_named(bake):
+    """Also an image, and the list of images, which a manifest and this list vouch for."""
+    for name in ("recording.npz", "tactile_0002.exr", IMAGE_LIST_NAME):
+        path = bake / "pad" / name
+        whole = path.read_bytes()
+        path.write_bytes(whole.replace(b"tactile_0001", b"tactile_0009") if name == IMAGE_LIST_NAME else whole + b"?")
+        with pytest.raises(FileError, match=f"pad/{name}' is damaged .its content is not what was baked"):
+            read_bake(bake)
+        path.unlink()
+        with pytest.raises(FileError, match=f"pad/{name}' is missing from the bake: bake again"):
+            read_bake(bake)
+        path.write_bytes(whole)
+
+
+def test_other_programs_read_the_list_of_images(bake):
+    images = [name for name, _ in read_checksums(bake / "pad" / IMAGE_LIST_NAME)]
+    assert images == sorted(path.name for path in (bake / "pad").glob("*.exr")) != []
+    if shutil.which("sha256sum") is None:
+        pytest.skip("this system has no sha256sum")
+    command = ["sha256sum", "--check", "--strict", IMAGE_LIST_NAME]
+    done = subprocess.run(command, cwd=bake / "pad", capture_output=True, text=True)
+    assert done.returncode == 0 and done.stdout.count("OK") == len(images)
 
 
 def test_a_sensor_is_read_once(bake):

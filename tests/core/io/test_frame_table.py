@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The frames of a run come back bit for bit, and no length of a run fills the memory."""
 
+import errno
+import tempfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from palpate.core.errors import FileError
 from palpate.core.io import row_tables
 from palpate.core.io.recording_npz import save_recording
-from palpate.core.io.row_tables import FrameTable
+from palpate.core.io.row_tables import FrameTable, motion_table
 from palpate.core.model import recording as model
 from palpate.core.model.recording import SENSOR_FIELDS, Frame, Recording, SensorFrame
 
@@ -89,3 +92,14 @@ def test_a_number_that_is_not_finite_reaches_no_file(tmp_path):
     frame.sensors["pad"].slip[0] = np.nan
     with pytest.raises(ValueError, match=r"sensor_1/slip' of frame 7"):
         rows.append(frame)
+
+
+def test_a_full_temporary_folder_is_one_sentence(monkeypatch):
+    class Full:
+        def write(self, _content):
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(tempfile, "SpooledTemporaryFile", lambda *_, **_options: Full())
+    said = r"^The motion of a long scene could not be kept in .*\(no space left on device\): free"
+    with pytest.raises(FileError, match=said):
+        motion_table(np.zeros(3))

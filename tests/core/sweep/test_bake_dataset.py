@@ -40,15 +40,6 @@ def test_one_bake_is_one_episode(tmp_path):
     assert not [name for name in info["features"] if name.startswith("varied.")]
 
 
-def test_the_next_export_takes_its_place_as_a_whole(tmp_path):
-    _, found = exported(tmp_path)
-    before = {path for path in found.rglob("*") if path.is_file()}
-    (found / "data" / "mine.txt").write_text("mine")
-    exported(tmp_path, 6)
-    assert json.loads((found / "meta" / "info.json").read_text())["total_frames"] == 6
-    assert {path for path in found.rglob("*") if path.is_file()} == before | {found / "data" / "mine.txt"}
-
-
 def test_the_name_of_the_format_is_no_other_ones():
     from palpate.sweep.bake_dataset import EXPORTER
 

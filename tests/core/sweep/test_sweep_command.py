@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """``palpate sweep`` from the command line: what comes out, and mistakes that are one sentence."""
 
-import json
 import shutil
 import subprocess
 import sys
@@ -86,16 +85,6 @@ def test_a_run_holds_what_it_promises(undisturbed, tmp_path):
     assert {name: value for name, value in row.items() if name != "digest"} == {
         name: value for name, value in expected.items() if name != "digest"
     }
-
-
-def test_the_dataset_of_a_study_knows_units_and_slip(undisturbed):
-    info = json.loads((undisturbed / "dataset" / "meta" / "info.json").read_bytes())
-    assert info["features"]["observation.reading.Pad"]["palpate"]["unit"] == "N"
-    table = parquet.read_table(undisturbed / "dataset" / "data").to_pylist()
-    slips = [row["episode_index"] for row in table if np.any(row["contact.slip.Pad"])]
-    found = parquet.read_table(undisturbed / "runs.parquet").to_pylist()
-    assert sorted(set(slips)) == [row["run"] for row in found if row["metric.first_slip"] is not None] != []
-    assert parquet.read_table(undisturbed / "dataset" / "meta" / "tasks.parquet").to_pydict()["task"] == ["small presses"]
 
 
 @pytest.mark.long("exports a study from the command line")
