@@ -51,10 +51,8 @@ def publish(folder: Path, study: Study) -> None:
     try:
         _write_tables(folder, parts.table())
         with temporary_folder(folder, "dataset") as hidden, ExitStack() as files:
-            datasets = _Datasets(parts, hidden / "parts", study.name or UNNAMED_STUDY, files)
-            for piece in parts.pieces():
-                datasets.add(piece)
-            replace_folder(datasets.finish(), folder / DATASET_FOLDER, DATASET_FILES)
+            new = _write_datasets(parts, hidden / "parts", study.name or UNNAMED_STUDY, files)
+            replace_folder(new, folder / DATASET_FOLDER, DATASET_FILES)
     except OSError as error:
         raise FileError(
             f"The dataset in '{folder}' could not be written ({os_error_reason(error)}): free some space or check its "
@@ -74,43 +72,33 @@ def _write_tables(folder: Path, table: pyarrow.Table) -> None:
         csv.write_csv(done, file, csv.WriteOptions(include_header=False, quoting_style="none"))
 
 
-class _Datasets:
-    """A dataset for each layout of the runs of a study."""
-
-    def __init__(self, parts: Parts, folder: Path, task: str, files: ExitStack):
-        self._parts, self._folder, self._task, self._files = parts, folder, task, files
-        size = sum(path.stat().st_size for path in parts.files)
-        self._file_bytes = size // MOST_FILES
-        self._varied = {f.name.removeprefix("varied."): "string" if str(f.type) == "string" else "float64"
-                        for f in parts.run_schema if f.name.startswith("varied.")}  # fmt: skip
-        self._writers: dict[str, LeRobotWriter] = {}
-
-    def add(self, piece: pyarrow.Table) -> None:
-        """Add the frames of runs, those that failed have none."""
-        layout = self._parts.layout(piece)
+def _write_datasets(parts: Parts, folder: Path, task: str, files: ExitStack) -> Path | None:
+    """Write a dataset for each layout of the runs and return the folder that is to become the dataset; None without frames."""
+    file_bytes = sum(path.stat().st_size for path in parts.files) // MOST_FILES
+    varied = {f.name.removeprefix("varied."): "string" if str(f.type) == "string" else "float64"
+              for f in parts.run_schema if f.name.startswith("varied.")}  # fmt: skip
+    writers: dict[str, LeRobotWriter] = {}
+    for piece in parts.pieces():
+        layout = parts.layout(piece)
         if layout is None:
-            return
-        writer = self._writers.get(layout.digest)
-        if writer is None:
-            place = self._folder / f"part-{len(self._writers):03d}"
-            writer = LeRobotWriter(place, layout, self._task, self._varied, self._file_bytes)
-            self._files.callback(writer.close)
-            self._writers[layout.digest] = writer
-        rows = piece.select(["run", "digest", *(f"varied.{name}" for name in self._varied)]).to_pylist()
+            continue
+        if layout.digest not in writers:
+            writer = LeRobotWriter(folder / f"part-{len(writers):03d}", layout, task, varied, file_bytes)
+            files.callback(writer.close)
+            writers[layout.digest] = writer
+        rows = piece.select(["run", "digest", *(f"varied.{name}" for name in varied)]).to_pylist()
         lengths, columns = frames_in(piece, layout)
         ends = np.cumsum(lengths)
         for row, begin, end in zip(rows, ends - lengths, ends, strict=True):
-            if end > begin:
+            if end > begin:  # a run that failed has no frames
                 values = {name.replace("/", "_"): value for name, value in row.items()}
-                writer.add(row["run"], row["digest"], values, {name: column[begin:end] for name, column in columns.items()})
-
-    def finish(self) -> Path | None:
-        """Complete all and return the folder that is to become the dataset; None if no run has frames."""
-        for writer in self._writers.values():
-            writer.finish()
-        if len(self._writers) <= 1:
-            return self._folder / "part-000" if self._writers else None
-        return self._folder
+                numbers = {name: column[begin:end] for name, column in columns.items()}
+                writers[layout.digest].add(row["run"], row["digest"], values, numbers)
+    for writer in writers.values():
+        writer.finish()
+    if len(writers) == 1:
+        return folder / "part-000"
+    return folder if writers else None
 
 
 def require_own(target: Path, files: re.Pattern[str]) -> None:

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
+import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ..core.errors import FileError, PalpateError, SceneError
-from ..core.io.file_writing import atomic_write, file_sha256, os_error_reason
+from ..core.io.file_writing import file_sha256, os_error_reason
 from ..core.study.study_file import SCENES, Study
 from .scene_evaluation import ALLOW
 
@@ -70,11 +71,9 @@ def load_program(file: Path) -> Program:
 def freeze_program(source: Path, target: Path) -> str:
     """Copy the file of a program, and return the program's digest; raise :class:`PalpateError` where that is not possible."""
     try:
-        content = source.read_bytes()
+        shutil.copyfile(source, target)
     except OSError as error:
-        raise FileError(f"The job '{source}' could not be read ({os_error_reason(error)}): check it.") from error
-    with atomic_write(target) as fresh:
-        fresh.write_bytes(content)
+        raise FileError(f"The job '{source}' could not be copied ({os_error_reason(error)}): check it.") from error
     return load_program(target).digest
 
 

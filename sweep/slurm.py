@@ -7,12 +7,11 @@ with the command.
 
 from __future__ import annotations
 
-import difflib
 import shutil
 from collections.abc import Mapping
 from typing import Any
 
-from ..core.errors import PalpateError
+from ..core.errors import PalpateError, did_you_mean
 
 OPTIONS: dict[str, type] = {
     "queue": str,
@@ -41,8 +40,7 @@ def options_of(words: list[str]) -> dict[str, Any]:
     for word in words:
         name, separator, value = word.partition("=")
         if name not in OPTIONS or not separator or not value:
-            near = difflib.get_close_matches(name, list(OPTIONS), n=1)
-            advice = f"did you mean '{near[0]}=…'?" if near else f"write NAME=VALUE with {', '.join(OPTIONS)}."
+            advice = did_you_mean(name, OPTIONS, f"write NAME=VALUE with {', '.join(OPTIONS)}.")
             raise PalpateError(f"--slurm-option {word!r:.60} is not known: {advice}")
         if OPTIONS[name] is int and not (value.isdigit() and int(value) > 0):
             raise PalpateError(f"--slurm-option {word!r:.60} is not a whole number above zero: write {name}=4.")

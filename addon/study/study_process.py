@@ -78,10 +78,12 @@ def run_study(file: Path, workers: int = 0) -> Job[str]:
     command = [*sweep_command(), str(file), "--out", str(folder)]
     command += ["--workers", str(workers)] if workers else []
     with tempfile.TemporaryFile() as said, tempfile.TemporaryFile() as errors:
-        process = _started(command, said, errors)
+        process, looked = _started(command, said, errors), -LOOK
         try:
             while process.poll() is None:
-                yield _progress(folder)
+                if time.monotonic() - looked >= LOOK:
+                    progress, looked = _counted(folder), time.monotonic()
+                yield progress
                 time.sleep(0.01)  # a slice of a job lasts some of these
         finally:
             _stop(process)
@@ -122,18 +124,6 @@ def _outcome(status: int, said: str, errors: str) -> str:
 def _text(file) -> str:
     file.seek(0)
     return file.read().decode("utf-8", "replace")
-
-
-_last_look: dict[Path, tuple[float, Progress]] = {}
-
-
-def _progress(folder: Path) -> Progress:
-    """Return how far a study is, from its files; they are looked at twice a second."""
-    now = time.monotonic()
-    if folder not in _last_look or now - _last_look[folder][0] > LOOK:
-        _last_look.clear()
-        _last_look[folder] = now, _counted(folder)
-    return _last_look[folder][1]
 
 
 def _counted(folder: Path) -> Progress:

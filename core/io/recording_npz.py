@@ -13,10 +13,6 @@ from __future__ import annotations
 
 import json
 import os
-import struct
-import tokenize
-import zipfile
-import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, fields
@@ -25,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FileError, ParameterError, os_error_reason
+from ..errors import FileError, PalpateError, ParameterError, os_error_reason
 from ..geometry.grid_layout import GridLayout
 from ..geometry.texels import Texels
 from ..geometry.texture_maps import UVLayout
@@ -33,24 +29,6 @@ from ..model.recording import CLIPPED, SENSOR_FIELDS, VALUES, Recording, SensorR
 from ..model.sensor_parameters import Painted, SensorParameters, stated_parameters
 from .file_writing import write_file
 from .input_files import open_regular
-
-DAMAGED = (
-    ValueError,
-    KeyError,
-    TypeError,
-    AttributeError,
-    EOFError,
-    RuntimeError,
-    NotImplementedError,  # by zipfile, of a compression that it does not know
-    MemoryError,
-    OverflowError,
-    SyntaxError,
-    struct.error,
-    tokenize.TokenError,  # by numpy, of the header of an array
-    zipfile.BadZipFile,
-    zlib.error,
-)
-"""Exceptions that reading a damaged archive may raise."""
 
 
 def write_arrays(path: str | os.PathLike, arrays: Mapping[str, np.ndarray], atomic: bool = True) -> None:
@@ -88,7 +66,7 @@ def open_arrays(path: str | os.PathLike, what: str, advice: str) -> Iterator[Any
     Raises
     ------
     FileError
-        There is no such file, it cannot be read, or the body of the ``with`` statement meets damage (:data:`DAMAGED`).
+        There is no such file, it cannot be read, or the body of the ``with`` statement meets damage.
     """
     if not Path(path).exists():
         raise FileError(f"'{path}' does not exist: {advice}, or choose another file.")
@@ -97,7 +75,9 @@ def open_arrays(path: str | os.PathLike, what: str, advice: str) -> Iterator[Any
             yield members
     except OSError as error:
         raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): choose another file.") from error
-    except DAMAGED as error:
+    except PalpateError:
+        raise
+    except Exception as error:  # a reader meets anything in a damaged archive
         raise FileError(f"'{path}' is damaged or no {what} ({error}): {advice}.") from error
 
 
@@ -145,7 +125,7 @@ def load_sensor(path: str | os.PathLike) -> tuple[Texels, Painted]:
 
 
 def sensor_in(members: Any) -> tuple[Texels, Painted]:
-    """Return the sensor whose members an archive gives by name; raises what :data:`DAMAGED` lists."""
+    """Return the sensor whose members an archive gives by name; raises anything where these are damaged."""
     if str(members["format"]) != SENSOR_FORMAT:
         raise ValueError(f"its format is not '{SENSOR_FORMAT}'")
     cls = _LAYOUTS[str(members["layout"])]

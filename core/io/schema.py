@@ -25,7 +25,7 @@ from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin, get_t
 
 import msgspec
 
-from ..errors import FileError, did_you_mean, os_error_reason
+from ..errors import FileError, os_error_reason, suggestion
 from .input_files import checked_name, read_bytes
 
 T = TypeVar("T")
@@ -65,9 +65,9 @@ def known_words(table: Mapping[str, Any], words: Iterable[str], where: str, what
     known = sorted(words) if isinstance(words, set) else list(words)
     for key in table:
         if key not in known:
-            near = did_you_mean(key, known, "")
-            hint = f" ({near})" if near else ""
-            raise FileError(f"{key!r:.60} in {where} is not a word of {what}{hint}: it knows {', '.join(known)}.")
+            raise FileError(
+                f"{key!r:.60} in {where} is not a word of {what}{suggestion(key, known)}: it knows {', '.join(known)}."
+            )
 
 
 def read_words(
@@ -214,6 +214,5 @@ def _advice(hint: Any, value: Any) -> str:
     if meta is not None:
         return f"{meta.description}."
     choices = [choice for part in (hint, *get_args(hint)) if get_origin(part) is Literal for choice in get_args(part)]
-    near = did_you_mean(str(value), choices, "")
     listed = " or ".join(f'"{choice}"' for choice in choices) if len(choices) == 2 else f"one of {', '.join(choices)}"
-    return f"write {listed if choices else 'another value'}{f' ({near})' if near else ''}."
+    return f"write {listed if choices else 'another value'}{suggestion(str(value), choices)}."

@@ -10,6 +10,7 @@ from __future__ import annotations
 import glob
 import math
 import os
+import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -20,7 +21,7 @@ import numpy as np
 
 from ..errors import FileError, ParameterError, os_error_reason
 from ..geometry.mesh import TriangleMesh, outward_faces, turned_outwards
-from ..io.file_writing import atomic_write, file_sha256
+from ..io.file_writing import file_sha256
 from ..io.input_files import load_mesh
 from ..io.schema import WORD, wanted
 from .scene_property import is_scene_property
@@ -129,13 +130,11 @@ def freeze_meshes(files: Mapping[str, Path], folder: Path) -> list[dict[str, str
         entries.append(entry)
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            content = file.read_bytes()
+            shutil.copyfile(file, _copy_of(folder, name, entry["sha256"]))
         except OSError as error:
             raise FileError(
                 f"The mesh '{file}' could not be copied ({os_error_reason(error)}): check it and '{folder}'."
             ) from error
-        with atomic_write(_copy_of(folder, name, entry["sha256"])) as fresh:
-            fresh.write_bytes(content)
     return entries
 
 

@@ -30,7 +30,7 @@ def test_without_options_a_job_has_one_core():
 
 @pytest.mark.parametrize(
     ("word", "said"),
-    [("quue=short", "did you mean 'queue=…'"), ("cores=many", "not a whole number"), ("queue", "is not known")],
+    [("quue=short", "did you mean 'queue'"), ("cores=many", "not a whole number"), ("queue", "is not known")],
 )
 def test_what_is_misspelt_is_one_sentence(word, said):
     with pytest.raises(PalpateError, match=said):
