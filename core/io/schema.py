@@ -65,9 +65,8 @@ def known_words(table: Mapping[str, Any], words: Iterable[str], where: str, what
     known = sorted(words) if isinstance(words, set) else list(words)
     for key in table:
         if key not in known:
-            raise FileError(
-                f"{key!r:.60} in {where} is not a word of {what}{suggestion(key, known)}: it knows {', '.join(known)}."
-            )
+            hint = suggestion(key, known)
+            raise FileError(f"{key!r:.60} in {where} is not a word of {what}{hint}: it knows {', '.join(known)}.")
 
 
 def read_words(
