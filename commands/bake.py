@@ -263,11 +263,9 @@ def _frame_range(first: int, last: int) -> tuple[int, int]:
 
 def _read_out_only(scene: Any, wanted: list[str]) -> None:
     """Make all sensors but the wanted ones pads."""
-    sensors = {obj.name: obj for obj in scene.objects if obj.palpate.role == "SENSOR"}
-    for name in wanted:
-        if name not in sensors:
-            known = ", ".join(f"'{known}'" for known in sensors) or "none"
-            raise SceneError(f"There is no sensor '{name}' in '{scene.name}': choose from {known}.")
-    for name, obj in sensors.items():
-        if name not in wanted:
+    from ..addon.scene import participants
+
+    participants.sensors_called(scene, wanted)
+    for obj in scene.objects:
+        if obj.palpate.role == "SENSOR" and obj.name not in wanted:
             obj.palpate.role = "PAD"

@@ -101,16 +101,13 @@ def _export(arguments: argparse.Namespace) -> None:
     with console.blender_output_hidden():
         scene = blender.open_scene(arguments.scene, arguments.scripts)
         from ..addon.authoring import exchange
+        from ..addon.scene import participants
 
-        found = {obj.name: obj for obj in scene.objects if obj.palpate.role in {"SENSOR", "PAD"}}
-        wanted = arguments.sensor or [name for name, obj in found.items() if obj.palpate.role == "SENSOR"]
-        for name in wanted:
-            if name not in found:
-                known = ", ".join(f"'{known}'" for known in found) or "none"
-                raise SceneError(f"There is no sensor '{name}' in '{arguments.scene}': choose from {known}.")
-        if not wanted:
+        objects = participants.sensors_called(scene, arguments.sensor or (), "PAD")
+        objects = objects or [obj for obj in scene.objects if obj.palpate.role == "SENSOR"]
+        if not objects:
             raise SceneError(f"'{arguments.scene}' has no sensor: make one with Physics › Palpate › Make Sensor.")
-        sensors = [OpenRaveSensor(name, name, exchange.parameters_of(found[name])) for name in wanted]
+        sensors = [OpenRaveSensor(obj.name, obj.name, exchange.parameters_of(obj)) for obj in objects]
     if arguments.out:
         write_openrave(arguments.out, sensors, arguments.robot)
         print(f"{counted(len(sensors), 'sensor')}: {Path(arguments.out).absolute()}")

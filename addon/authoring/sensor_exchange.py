@@ -27,16 +27,12 @@ def sensors_on_meshes(scene, names=()) -> list[SensorOnMesh]:
     PalpateError
         A sensor's mesh or region makes no sensor.
     """
-    found = {obj.name: obj for obj in scene.objects if obj.palpate.role in {"SENSOR", "PAD"}}
+    objects = participants.sensors_called(scene, dict.fromkeys(names), "PAD")
     if not names:
-        names = [obj.name for obj in participants.find_participants(scene)[0] if obj.palpate.role == "SENSOR"]
-    for name in names:
-        if name not in found:
-            known = ", ".join(f"'{known}'" for known in found) or "none"
-            raise SceneError(f"There is no sensor '{name}' in '{scene.name}': choose from {known}.")
-    if not names:
+        objects = [obj for obj in participants.find_participants(scene)[0] if obj.palpate.role == "SENSOR"]
+    if not objects:
         raise SceneError(f"'{scene.name}' has no sensor: make one with Physics › Palpate › Make Sensor.")
-    return [_sensor_on_mesh(scene, found[name]) for name in dict.fromkeys(names)]
+    return [_sensor_on_mesh(scene, obj) for obj in objects]
 
 
 def _sensor_on_mesh(scene, obj) -> SensorOnMesh:

@@ -54,34 +54,18 @@ def make_sensor(obj, source: str, role: str = "SENSOR") -> int:
     """
     if obj.type != "MESH":
         raise SensorError(f"'{obj.name}' is not a mesh: convert it with Object › Convert › Mesh before it becomes a sensor.")
-    settings = obj.palpate
-    if source == "SELECTION":
-        chosen = selected_vertices(obj)
-    elif source == "GROUP":
-        group = obj.vertex_groups.active
-        if group is None:
-            raise SensorError(f"'{obj.name}' has no vertex group: paint one, or make the whole mesh a sensor.")
-        chosen = sensor_regions.vertex_weights(obj.data, group.index) >= max(settings.threshold, 1e-6)
-    elif source == "MATERIAL":
-        chosen, material = _active_material(obj)
-    elif source == "FACE_SET":
-        chosen, face_set = _active_face_set(obj)
-    else:
-        chosen = np.ones(len(obj.data.vertices), dtype=bool)
+    chosen, region = _region(obj, source)
     _check(obj, chosen, source)
     if source == "SELECTION":
         group = obj.vertex_groups.get(GROUP_NAME) or obj.vertex_groups.new(name=GROUP_NAME)
         group.remove(range(len(chosen)))
-        group.add(np.flatnonzero(chosen).tolist(), 1.0, "REPLACE")
+        region["vertex_group"] = _fill(group, chosen)
         obj.vertex_groups.active_index = group.index
-    if source == "MATERIAL":
-        settings.region, settings.material = source, material
-    elif source == "FACE_SET":
-        settings.region, settings.face_set = source, face_set
     elif source == "MESH":
-        settings.region, settings.made_vertices = source, len(chosen)
-    else:
-        settings.region, settings.vertex_group = "GROUP", group.name
+        region["made_vertices"] = len(chosen)
+    settings = obj.palpate
+    for name, value in region.items():
+        setattr(settings, name, value)
     settings.role = role
     return int(chosen.sum())
 
@@ -131,39 +115,45 @@ def describe_region(obj, source: str) -> dict:
             "material": own.material,
             "face_set": own.face_set,
         }
+    chosen, region = _region(obj, source)
     if source == "SELECTION":
-        chosen = selected_vertices(obj)
         _check(obj, chosen, source)
-        group = obj.vertex_groups.new(name=GROUP_NAME)  # a new group, because another laid sensor may have another selection
-        group.add(np.flatnonzero(chosen).tolist(), 1.0, "REPLACE")
-        return {"region": "GROUP", "vertex_group": group.name, "threshold": 1.0}
+        # a new group, because another laid sensor may have another selection
+        region |= {"vertex_group": _fill(obj.vertex_groups.new(name=GROUP_NAME), chosen), "threshold": 1.0}
+    elif source == "GROUP":
+        region["threshold"] = transforms.as_typed(own.threshold)
+    return region
+
+
+def _region(obj, source: str) -> tuple[np.ndarray, dict]:
+    """Return the vertices of a source, (nv,) bool, and the properties that name it; a selection has no group yet."""
+    if source == "SELECTION":
+        return selected_vertices(obj), {"region": "GROUP"}
     if source == "GROUP":
-        if obj.vertex_groups.active is None:
+        group = obj.vertex_groups.active
+        if group is None:
             raise SensorError(f"'{obj.name}' has no vertex group: paint one, or use the whole mesh.")
-        name = obj.vertex_groups.active.name
-        return {"region": "GROUP", "vertex_group": name, "threshold": transforms.as_typed(own.threshold)}
+        weights = sensor_regions.vertex_weights(obj.data, group.index)
+        return weights >= max(obj.palpate.threshold, 1e-6), {"region": source, "vertex_group": group.name}
     if source == "MATERIAL":
-        return {"region": "MATERIAL", "material": _active_material(obj)[1]}
+        material = obj.active_material
+        if material is None:
+            raise SensorError(f"'{obj.name}' has no active material: give the sensor's faces one in the Material tab.")
+        index = np.empty(len(obj.data.polygons), dtype=np.int32)
+        obj.data.polygons.foreach_get("material_index", index)
+        chosen = sensor_regions.vertices_of_faces(obj.data, index == obj.active_material_index)
+        return chosen, {"region": source, "material": material.name}
     if source == "FACE_SET":
-        return {"region": "FACE_SET", "face_set": _active_face_set(obj)[1]}
-    return {"region": "MESH"}
+        sets, active = sensor_regions.face_sets(obj.data), obj.data.polygons.active
+        number = int(sets[active]) if 0 <= active < len(sets) else obj.palpate.face_set
+        return sensor_regions.vertices_of_faces(obj.data, sets == number), {"region": source, "face_set": number}
+    return np.ones(len(obj.data.vertices), dtype=bool), {"region": "MESH"}
 
 
-def _active_material(obj) -> tuple[np.ndarray, str]:
-    """Return the vertices of the faces that have the active material, and its name."""
-    material = obj.active_material
-    if material is None:
-        raise SensorError(f"'{obj.name}' has no active material: give the sensor's faces one in the Material tab.")
-    index = np.empty(len(obj.data.polygons), dtype=np.int32)
-    obj.data.polygons.foreach_get("material_index", index)
-    return sensor_regions.vertices_of_faces(obj.data, index == obj.active_material_index), material.name
-
-
-def _active_face_set(obj) -> tuple[np.ndarray, int]:
-    """Return the vertices of the face set of the active face, and its number."""
-    sets, active = sensor_regions.face_sets(obj.data), obj.data.polygons.active
-    number = int(sets[active]) if 0 <= active < len(sets) else obj.palpate.face_set
-    return sensor_regions.vertices_of_faces(obj.data, sets == number), number
+def _fill(group, chosen: np.ndarray) -> str:
+    """Give the chosen vertices full weight in a vertex group; return its name."""
+    group.add(np.flatnonzero(chosen).tolist(), 1.0, "REPLACE")
+    return group.name
 
 
 def set_full_weight_brush(tools) -> None:

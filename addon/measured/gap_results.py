@@ -146,15 +146,13 @@ def put(obj, model) -> None:
 
 def sensor_called(scene, name: str | None, how: str = "name one with --sensor"):
     """Return a sensor of a scene by its name, or the only one; raises SceneError, which says `how` to name one of several."""
-    sensors = {obj.name: obj for obj in scene.objects if obj.palpate.role == "SENSOR"}
-    known = ", ".join(f"'{known}'" for known in sensors) or "none"
-    if name is None:
-        if len(sensors) != 1:
-            raise SceneError(f"'{scene.name}' has {len(sensors)} sensors ({known}): {how}.")
-        return next(iter(sensors.values()))
-    if name not in sensors:
-        raise SceneError(f"There is no sensor '{name}' in '{scene.name}': choose from {known}.")
-    return sensors[name]
+    if name is not None:
+        return participants.sensors_called(scene, [name])[0]
+    sensors = [obj for obj in scene.objects if obj.palpate.role == "SENSOR"]
+    if len(sensors) != 1:
+        known = ", ".join(f"'{obj.name}'" for obj in sensors) or "none"
+        raise SceneError(f"'{scene.name}' has {len(sensors)} sensors ({known}): {how}.")
+    return sensors[0]
 
 
 def show_on_sensor(context, obj, amended: bool) -> str:

@@ -7,6 +7,8 @@ Instances of collections never are.
 
 from __future__ import annotations
 
+from ...core.errors import SceneError
+
 OBJECT_TYPES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 """Types of objects that have a mesh or can be converted to one."""
 
@@ -34,6 +36,16 @@ def find_participants(scene) -> tuple[list, list[str]]:
         if obj.palpate.role != "NONE" and obj.type in OBJECT_TYPES:
             (found if obj.visible_get(view_layer=layer) else hidden).append(obj)
     return found, [f"'{obj.name}' is hidden and is not part of the simulation." for obj in hidden]
+
+
+def sensors_called(scene, names, *other_roles: str) -> list:
+    """Return the sensors of some names, or objects of `other_roles`; raises SceneError for a name that none of them has."""
+    found = {obj.name: obj for obj in scene.objects if obj.palpate.role in ("SENSOR", *other_roles)}
+    for name in names:
+        if name not in found:
+            known = ", ".join(f"'{known}'" for known in found) or "none"
+            raise SceneError(f"There is no sensor '{name}' in '{scene.name}': choose from {known}.")
+    return [found[name] for name in names]
 
 
 def why_left_out(scene) -> str:

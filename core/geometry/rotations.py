@@ -22,6 +22,13 @@ def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
     return rows.transpose(*range(2, rows.ndim), 0, 1)
 
 
+def quaternion_of(rotation: np.ndarray) -> np.ndarray:
+    """Return the unit quaternion (w, x, y, z) of a rotation matrix, (3, 3) or (9,)."""
+    from scipy.spatial.transform import Rotation
+
+    return np.roll(Rotation.from_matrix(np.reshape(rotation, (3, 3))).as_quat(), 1)
+
+
 def quaternion_product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Hamilton product of (…, 4) quaternions: first rotate by `b`, then by `a`."""
     parts = [own[..., i] for own in (np.asarray(a, float), np.asarray(b, float)) for i in range(4)]

@@ -19,7 +19,7 @@ import numpy as np
 from ...errors import FileError
 from ...geometry.mesh import TriangleMesh, checked_mesh, vertex_normals
 from ...geometry.point_surface import triangles_between
-from ...geometry.rotations import rotation_matrices
+from ...geometry.rotations import quaternion_of, rotation_matrices
 from ...io.bake_folder import folder_names
 from ...io.input_files import read_xml
 from ...io.sensor_toml import MOST_TEXELS
@@ -125,7 +125,7 @@ def _tactile(path: str | os.PathLike, root: ElementTree.Element, model: Any, dat
         normal, tangent = frames[:, 0], frames[:, 1]
     else:
         normal = stated if normals == count else vertex_normals(shape)
-    world = rotation_matrices(_quaternion(data.geom_xmat[geom])[None])[0] @ turn.T
+    world = rotation_matrices(quaternion_of(data.geom_xmat[geom])[None])[0] @ turn.T
     return FoundSensor(
         name,
         position,
@@ -133,7 +133,7 @@ def _tactile(path: str | os.PathLike, root: ElementTree.Element, model: Any, dat
         shape.triangles,
         tangent=tangent,
         frame_position=data.geom_xpos[geom] - world @ shift,
-        frame_quaternion=_quaternion(world),
+        frame_quaternion=quaternion_of(world),
     )
 
 
@@ -227,7 +227,7 @@ def _touch_grid(path: str | os.PathLike, model: Any, data: Any, number: int, nam
     grid = np.arange(len(row)).reshape(rows, columns)
     corners = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=-1).reshape(-1, 4)
     faces = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
-    place, turn = data.site_xpos[site].copy(), _quaternion(data.site_xmat[site])
+    place, turn = data.site_xpos[site].copy(), quaternion_of(data.site_xmat[site])
     return FoundSensor(
         name, radius * direction, direction, faces, row, column, frame_position=place, frame_quaternion=turn, notes=[note]
     )
@@ -245,13 +245,6 @@ def _bin_middles(count: int, limit: float, gamma: float) -> np.ndarray:
 def _require_count(path: str | os.PathLike, name: str, count: int) -> None:
     if not 3 <= count <= MOST_TEXELS:
         raise FileError(f"Sensor '{name}' in '{path}' has {count} texels: from 3 to {MOST_TEXELS} are read.")
-
-
-def _quaternion(matrix: np.ndarray) -> np.ndarray:
-    """Return the quaternion (w, x, y, z) of a rotation matrix, (3, 3) or (9,)."""
-    from scipy.spatial.transform import Rotation
-
-    return np.roll(Rotation.from_matrix(np.reshape(matrix, (3, 3))).as_quat(), 1)
 
 
 IMPEDANCE = 0.9

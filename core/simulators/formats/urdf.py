@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from ...errors import FileError, PalpateError
-from ...geometry.mesh import TriangleMesh, face_normals
+from ...geometry.mesh import TriangleMesh
 from ...geometry.point_surface import triangles_between
 from ...io.bake_folder import folder_names
 from ...io.file_writing import write_file
@@ -232,7 +232,7 @@ def write_urdf(sensors: Sequence[SensorOnMesh], folder: Path) -> Written:
         stem = stems[item.name].replace(" ", "_")
         names = [folder / f"{stem}{ending}" for ending in (".stl", ".urdf", ".xacro", ".probes.json")]
         mesh, robot, macro, probes = names
-        write_stl(mesh, item.surface or item.mesh)
+        _write_stl(mesh, item.surface or item.mesh)
         write_xml(robot, _robot(item, links[item.name], mesh.name))
         write_xml(macro, _macro(item, links[item.name], mesh.name, probes.name))
         write_probe_list(probes, item)
@@ -302,13 +302,12 @@ def roll_pitch_yaw(frames: np.ndarray) -> np.ndarray:
     return np.stack([roll, pitch, yaw], axis=1)
 
 
-def write_stl(path: Path, mesh: TriangleMesh) -> None:
+def _write_stl(path: Path, mesh: TriangleMesh) -> None:
     """Write a mesh as binary STL, in metres."""
-    record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-    facets = np.zeros(len(mesh.triangles), record)
-    facets["normal"], facets["corners"] = face_normals(mesh), mesh.vertices[mesh.triangles]
+    import trimesh
+
     with write_file(path, atomic=False) as place:
-        place.write_bytes(b"Palpate".ljust(80) + np.array(len(facets), "<u4").tobytes() + facets.tobytes())
+        place.write_bytes(trimesh.exchange.stl.export_stl(trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)))
 
 
 FORMAT = SensorFormat("urdf", "URDF", "A link with the mesh, and a fixed frame for each texel", write_urdf, read_urdf, is_urdf)

@@ -14,6 +14,7 @@ import numpy as np
 from ...errors import FileError
 from ...geometry.mesh import TriangleMesh
 from ...geometry.point_surface import triangles_between
+from ...geometry.rotations import quaternion_of
 from ...io.bake_folder import folder_names
 from ...io.file_writing import write_file
 from ...io.input_files import require_regular
@@ -66,6 +67,7 @@ def read_usd(path: str | os.PathLike) -> list[FoundSensor]:
 
 def _sensor(path: str | os.PathLike, prim: Any, position: np.ndarray, normal: np.ndarray, metres: float) -> FoundSensor:
     from pxr import UsdGeom
+    from scipy.linalg import polar
 
     owner = prim.GetParent()
     has_owner = owner.GetAttribute(f"{OWN}k").IsValid()
@@ -79,7 +81,9 @@ def _sensor(path: str | os.PathLike, prim: Any, position: np.ndarray, normal: np
     if not (np.isfinite(position).all() and np.isfinite(length).all()) or length.min() == 0.0:
         raise FileError(f"A point of '{name}' in '{path}' has no finite place or normal: export it again.")
     world = np.array(UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(0.0))  # of row vectors
-    turn, stretch = _rotation_and_stretch(world[:3, :3].T)
+    turn, stretch = polar(world[:3, :3].T)
+    if np.allclose(stretch, np.eye(3), rtol=0, atol=1e-12):
+        turn, stretch = world[:3, :3].T, np.eye(3)  # which leaves the texels to the bit
     normal = np.linalg.solve(stretch, (normal / length).T).T
     normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
     position = metres * position @ stretch.T
@@ -100,7 +104,7 @@ def _sensor(path: str | os.PathLike, prim: Any, position: np.ndarray, normal: np
         surface=None if not surface else _mesh(surface, metres),
         parameters=SensorParameters(**stated_parameters({k: v for k, v in words.items() if v is not None}, name)),
         frame_position=metres * world[3, :3],
-        frame_quaternion=_quaternion(turn),
+        frame_quaternion=quaternion_of(turn),
         notes=notes,
     )
 
@@ -120,21 +124,6 @@ def _mesh(prim: Any, metres: float) -> TriangleMesh | None:
         corners[[start, start + i, start + i + 1]] for start, n in zip(starts, counts, strict=False) for i in range(1, n - 1)
     ]
     return TriangleMesh(metres * np.asarray(points, float), np.array(fans))
-
-
-def _rotation_and_stretch(linear: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the rotation and the symmetric part of a linear map (3, 3): linear = rotation · stretch."""
-    u, sizes, v = np.linalg.svd(linear)
-    turn = u @ v
-    if np.allclose(sizes, 1.0, rtol=0, atol=1e-12):
-        return linear, np.eye(3)
-    return turn, v.T @ np.diag(sizes) @ v
-
-
-def _quaternion(matrix: np.ndarray) -> np.ndarray:
-    from scipy.spatial.transform import Rotation
-
-    return np.roll(Rotation.from_matrix(matrix).as_quat(), 1)
 
 
 DIGITS = 15
