@@ -185,10 +185,7 @@ def pad_array(rows: int, columns: int, pitch: tuple[float, float], radius: float
     SensorError
         The pad would be no grid, or would meet itself around its bend.
     """
-    if rows < 2 or columns < 2 or min(pitch) <= 0:
-        raise SensorError(
-            f"A pad of {rows} × {columns} texels has no face: use two rows and columns or more, and a pitch above 0."
-        )
+    _check_size(rows, columns, pitch)
     width = (columns - 1) * pitch[0]
     if radius and width >= 2 * math.pi * abs(radius):
         raise SensorError(

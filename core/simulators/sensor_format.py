@@ -18,7 +18,7 @@ import numpy as np
 from ..errors import FileError, PalpateError, SensorError
 from ..geometry.mesh import TriangleMesh, checked_mesh
 from ..geometry.texels import texels_with_normals
-from ..io.file_writing import require_space, writable_folder, write_file
+from ..io.file_writing import writable_folder, write_file
 from ..io.hidden_folder import FileList
 from ..io.input_files import require_xml_text
 from ..model.sensor import Effect, Sensor
@@ -222,9 +222,6 @@ class SensorFormat:
 
 FORMATS = f"{__package__}.formats"
 """The package of the formats."""
-BYTES_PER_VERTEX = 1000
-"""Estimate from above of what a vertex of a mesh, its share of the faces and a texel on it take in a text file; a URDF with a
-frame for each texel has 700."""
 
 
 @cache
@@ -261,7 +258,7 @@ def export_sensors(sensors: Sequence[SensorOnMesh], kind: str, folder: str | os.
     Raises
     ------
     PalpateError
-        The format is unknown, there is no sensor, the disk has too little space, or a file cannot be written.
+        The format is unknown, there is no sensor, or a file cannot be written.
     """
     known = written_formats()
     write = known[kind].write if kind in known else None
@@ -269,8 +266,6 @@ def export_sensors(sensors: Sequence[SensorOnMesh], kind: str, folder: str | os.
         raise PalpateError(f"Sensors are not written as '{kind}': choose from {', '.join(known)}.")
     if not sensors:
         raise PalpateError("There is no sensor to write: make one with Physics › Palpate › Make Sensor.")
-    vertices = sum(len(item.mesh.vertices) + len((item.surface or item.mesh).vertices) for item in sensors)
-    require_space(folder, BYTES_PER_VERTEX * vertices, "The export")
     folder = writable_folder(folder, create=True)
     files = FileList(folder)
     with files.new_files("sensor") as new:
