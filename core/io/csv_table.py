@@ -11,9 +11,10 @@ import math
 import os
 import re
 from array import array
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -66,29 +67,23 @@ def read_table(path: str | os.PathLike) -> Table:
     """
     path = Path(path)
     try:
-        with read_errors_said(path):
-            table = _read(path)
+        with read_errors_said(path), open_regular(path, "r", encoding="utf-8-sig", newline="") as file:
+            size = path.stat().st_size
+            if size > LARGEST_TABLE:
+                raise FileError(
+                    f"'{path.name}' holds {size / 1e9:.1f} GB and at most {LARGEST_TABLE / 1e9:.1f} GB are read: "
+                    "cut it into several files, or keep fewer samples per second."
+                )
+            lines = csv.reader(file, strict=True)
+            names = _header(next((cells for cells in lines if _is_filled(cells)), []), path)
+            values = _values(lines, names, path)
     except UnicodeDecodeError as error:
         raise FileError(f"'{path.name}' is not a text file in UTF-8: export the table as CSV.") from error
     except csv.Error as error:
         raise FileError(f"'{path.name}' is not a table ({error}): export it as CSV, with quotation marks closed.") from error
-    if len(table.values) == 0:
+    if len(values) == 0:
         raise FileError(f"'{path.name}' has a header and no data: there are no measurements below its header, add them.")
-    return table
-
-
-def _read(path: Path) -> Table:
-    size = path.stat().st_size
-    if size > LARGEST_TABLE:
-        raise FileError(
-            f"'{path.name}' holds {size / 1e9:.1f} GB and at most {LARGEST_TABLE / 1e9:.1f} GB are read: "
-            "cut it into several files, or keep fewer samples per second."
-        )
-    with open_regular(path, "r", encoding="utf-8-sig", newline="") as file:
-        lines = _lines(file)
-        names = _header(lines, path)
-        _check_names(names, path)
-        return Table(names, _values(lines, names, path))
+    return Table(names, values)
 
 
 def harmless_cell(text: str) -> str:
@@ -101,33 +96,24 @@ def harmless_cell(text: str) -> str:
     return re.sub(r"(^|[;|\t\r\n])(\s*)(?=[=+\-@\uff1d\uff0b\uff0d\uff20])", r"\1'\2", text)
 
 
-def _lines(file: Iterable[str]) -> Iterator[tuple[int, str]]:
-    """Yield the lines that hold cells, with their numbers in the file."""
-    for number, line in enumerate(file, start=1):
-        text = line.rstrip("\r\n")
-        if text.strip():
-            yield number, text
+def _is_filled(cells: list[str]) -> bool:
+    """Return False for the cells of an empty line."""
+    return len(cells) > 1 or any(map(str.strip, cells))
 
 
-def _header(lines: Iterator[tuple[int, str]], path: Path) -> list[str]:
-    """Return the names of the columns."""
-    _, line = next(lines, (0, ""))
-    names = [name.strip() for name in next(csv.reader([line]), [])]
+def _header(cells: list[str], path: Path) -> list[str]:
+    """Return the names of the columns that the first line has."""
+    names = [name.strip() for name in cells]
     if not any(names):
         raise FileError(f"'{path.name}' is empty: it needs a first line that names its columns, and numbers below.")
     if len(names) == 1 and any(mark in names[0] for mark in ";\t"):
         raise FileError(f"The columns of '{path.name}' are not separated by commas: export it with a comma as separator.")
-    return names
-
-
-def _check_names(names: list[str], path: Path) -> None:
     if all(is_number(name) for name in names):
         raise FileError(f"'{path.name}' begins with numbers, not with column names: write `time` and the others in line 1.")
-    seen: set[str] = set()
-    for name in names:
-        if name in seen:
-            raise FileError(f"Column '{name}' is twice in the header of '{path.name}': rename or remove one of them.")
-        seen.add(name)
+    twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
+    if twice is not None:
+        raise FileError(f"Column '{twice}' is twice in the header of '{path.name}': rename or remove one of them.")
+    return names
 
 
 def is_number(text: str) -> bool:
@@ -150,21 +136,20 @@ def _complain(path: Path, line: int, names: Sequence[str], cells: Sequence[str])
         raise FileError(f"Line {line} of '{path.name}' has {what} for {name}{which}: write a number, or leave the cell empty.")
 
 
-def _values(lines: Iterator[tuple[int, str]], names: list[str], path: Path) -> np.ndarray:
-    """(rows, columns) float: the cells of all lines."""
+def _values(lines: Any, names: list[str], path: Path) -> np.ndarray:
+    """(rows, columns) float: the cells of the lines that a reader of :mod:`csv` has left."""
     values, width = array("d"), len(names)
-    for number, line in lines:
-        cells = line.split(",") if '"' not in line else next(csv.reader([line]))
+    for cells in filter(_is_filled, lines):
         if len(cells) != width:
             raise FileError(
-                f"Line {number} of '{path.name}' has {len(cells)} cells and the header has {width}: "
+                f"Line {lines.line_num} of '{path.name}' has {len(cells)} cells and the header has {width}: "
                 "leave a missing value's cell empty, but keep its comma."
             )
         try:
             row = [float(cell) if cell and not cell.isspace() else math.nan for cell in cells]
         except ValueError:
-            _complain(path, number, names, cells)
+            _complain(path, lines.line_num, names, cells)
         if not all(-LARGEST_NUMBER <= value <= LARGEST_NUMBER for value in row):  # false for NaN, too
-            _complain(path, number, names, cells)
+            _complain(path, lines.line_num, names, cells)
         values.extend(row)
     return np.frombuffer(values, float).reshape(-1, width) if values else np.zeros((0, width))
