@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.errors import FileError, PalpateError
+from ..core.errors import FileError, PalpateError, imported
 from ..core.io import bake_reader, recording_npz
 from ..core.model import recording as model
 from ..core.model.recording import SENSOR_FIELDS
@@ -167,7 +167,7 @@ class Recording:
         PalpateError
             There are several sensors, or xarray is not installed.
         """
-        xarray = _package("xarray")
+        xarray = imported("xarray", "This")
         recorded, shared = self.bake.recording.sensors[self.name], {3: "xyz", 2: "xy"}
         data = {}
         for name in SENSOR_FIELDS:
@@ -192,7 +192,7 @@ class Recording:
         PalpateError
             pandas is not installed.
         """
-        pandas = _package("pandas")
+        pandas = imported("pandas", "This")
         tables = []
         for name, recorded in self.bake.recording.sensors.items():
             frames, texels = recorded.normal_force.shape
@@ -322,13 +322,3 @@ def read_bake(folder: str | os.PathLike[str]) -> Recording:
         There is no bake, or a file of it is damaged.
     """
     return Recording(bake_reader.read_bake(folder))
-
-
-def _package(name: str) -> Any:
-    """Return an optional package; raise :class:`PalpateError`, which says how to install it, where it is missing."""
-    import importlib
-
-    try:
-        return importlib.import_module(name)
-    except ImportError as error:
-        raise PalpateError(f"This needs the package {name}: install it with 'pip install {name}'.") from error

@@ -8,9 +8,11 @@ Every message is one sentence that says what is wrong, where, and what to do abo
 from __future__ import annotations
 
 import difflib
+import importlib
 import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from types import ModuleType
 
 
 class PalpateError(Exception):
@@ -85,6 +87,24 @@ def read_errors_said(path: str | os.PathLike, what: str = "file") -> Iterator[No
 def os_error_reason(error: OSError) -> str:
     """Return the operating system's words for an error, in lower case, as they stand inside our sentences."""
     return (error.strerror or str(error) or type(error).__name__).lower()
+
+
+def imported(module: str, who: str, how: str = "") -> ModuleType:
+    """Return an optional module; raise :class:`PalpateError` where it is missing.
+
+    Parameters
+    ----------
+    module : str
+    who : str
+        What needs it, as "HDF5".
+    how : str
+        How to get it. Default: ``run 'pip install MODULE'``.
+    """
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        advice = how or f"run 'pip install {module}'"
+        raise PalpateError(f"{who} needs the package {error.name or module}, which is not installed: {advice}.") from error
 
 
 def counted(number: int, noun: str) -> str:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import PalpateError
+from ..core.errors import PalpateError, imported
 from .parts import RunResult, write_part
 from .scene_evaluation import REFUSE
 from .study_folder import OpenStudy
@@ -52,12 +52,7 @@ SETTINGS = {
 
 def require_dask() -> None:
     """Raise :class:`PalpateError` where Dask is missing."""
-    try:
-        import distributed  # noqa: F401
-    except ImportError as error:
-        raise PalpateError(
-            f"palpate sweep needs Dask ({error}): run 'pip install .[sweep]' in a checkout of Palpate."
-        ) from error
+    imported("distributed", "palpate sweep", "run 'pip install .[sweep]' in a checkout of Palpate")
 
 
 def dask_setup(_worker: Any) -> None:

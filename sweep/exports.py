@@ -7,14 +7,13 @@ attributes. They are made group of rows by group of rows, so that memory does no
 
 from __future__ import annotations
 
-import importlib
 import json
 import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import FileError, os_error_reason
+from ..core.errors import FileError, imported, os_error_reason
 from ..core.io.file_writing import atomic_write
 from ..core.io.hidden_folder import temporary_folder
 from .dataset import DATASET_FOLDER, replace_folder
@@ -27,14 +26,9 @@ PACKAGES = {"hdf5": "h5py", "zarr": "zarr"}
 
 
 def require_packages(formats: Sequence[str]) -> None:
-    """Raise FileError where a package for one of the formats is not installed."""
+    """Raise PalpateError where a package for one of the formats is not installed."""
     for name in formats:
-        try:
-            importlib.import_module(PACKAGES[name])
-        except ImportError as error:
-            raise FileError(
-                f"--format {name} needs the package {PACKAGES[name]}: install it with 'pip install {PACKAGES[name]}'."
-            ) from error
+        imported(PACKAGES[name], f"--format {name}")
 
 
 def export_hdf5(folder: Path) -> list[Path]:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.errors import FileError
+from ..core.errors import FileError, imported
 from ..core.io.file_writing import atomic_write
 from ..core.study.study_file import LAYOUTS, PARTS, Run, part_files, part_name
 from .features import Layout, RunFrames
@@ -33,13 +33,8 @@ FINISHED, FAILED = "finished", "failed"
 
 
 def require_pyarrow() -> None:
-    """Raise FileError where pyarrow is not installed."""
-    try:
-        import pyarrow  # noqa: F401
-    except ImportError as error:
-        raise FileError(
-            "Datasets need the package pyarrow: run \"pip install '.[sweep]'\" in a checkout of Palpate."
-        ) from error
+    """Raise PalpateError where pyarrow is not installed."""
+    imported("pyarrow", "A dataset", "run \"pip install '.[sweep]'\" in a checkout of Palpate")
 
 
 @dataclass(frozen=True)

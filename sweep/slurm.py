@@ -11,7 +11,7 @@ import shutil
 from collections.abc import Mapping
 from typing import Any
 
-from ..core.errors import PalpateError, did_you_mean
+from ..core.errors import PalpateError, did_you_mean, imported
 
 OPTIONS: dict[str, type] = {
     "queue": str,
@@ -84,9 +84,4 @@ def _words(options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _require() -> None:
-    try:
-        import dask_jobqueue  # noqa: F401
-    except ImportError as error:
-        raise PalpateError(
-            "--slurm needs the package dask-jobqueue: run 'pip install .[slurm]' in a checkout of Palpate."
-        ) from error
+    imported("dask_jobqueue", "--slurm", "run 'pip install .[slurm]' in a checkout of Palpate")

@@ -196,10 +196,6 @@ class BatchResult:
         return self.done + self.failed
 
 
-class TimeLimit(PalpateError):
-    """A run has reached its limit of time."""
-
-
 class RunComputer:
     """Computes runs of a study one after the other, in one thread.
 
@@ -286,7 +282,9 @@ class RunComputer:
 
         def ask(_progress: object) -> None:
             if time.monotonic() > until:
-                raise TimeLimit(f"Run {index} was ended after its limit of {limit:g} s: raise run_limit, or vary less widely.")
+                raise PalpateError(
+                    f"Run {index} was ended after its limit of {limit:g} s: raise run_limit, or vary less widely."
+                )
 
         return run_job(solve(scenario, simulation), ask)
 
@@ -299,7 +297,7 @@ class RunComputer:
         with _run_folder(self.opened.folder, run) as folder:
             metrics = _checked_metrics(_called(program.run, values, folder), run)
             if self._limit is not None and time.monotonic() - began > self._limit:
-                raise TimeLimit(f"Run {run.index} took longer than its limit of {self._limit:g} s: raise run_limit.")
+                raise PalpateError(f"Run {run.index} took longer than its limit of {self._limit:g} s: raise run_limit.")
         return RunResult(run, metrics=metrics)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import PalpateError
+from ...errors import imported
 from ...figures.figure_style import FigureStyle
 from ...io.bake_reader import Bake
 from ...io.file_writing import write_file
@@ -25,10 +25,7 @@ SMALL = 4096
 
 def write_hdf5(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Path]]:
     """Write ``palpate.h5``. The library makes it in memory, because it crashes on a write that fails, as on a full disk."""
-    try:
-        import h5py
-    except ImportError as error:
-        raise PalpateError("HDF5 needs the package h5py, which is not installed: run 'pip install h5py'.") from error
+    h5py = imported("h5py", "HDF5")
     recording, path = bake.recording, folder / "palpate.h5"
     with h5py.File(path.name, "w", driver="core", backing_store=False, block_size=_GROWTH_BYTES) as file:
         file.attrs.update({"format": "palpate-hdf5/1", "digest": recording.digest, "dt": recording.dt})

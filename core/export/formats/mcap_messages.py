@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import PalpateError
+from ...errors import imported
 from ...figures.figure_style import FigureStyle
 from ...figures.quantities import Quantity
 from ...geometry.grid_layout import GridLayout
@@ -120,14 +120,10 @@ _CHUNK_BYTES = 1 << 20
 
 def write_mcap(bake: Bake, folder: Path, style: FigureStyle) -> Job[list[Path]]:
     """Write ``palpate.mcap``, whose tactile images show the quantity of the style."""
-    try:
-        import rosbags  # noqa: F401 of the messages
-        from mcap.writer import CompressionType, Writer
-    except ImportError as error:
-        raise PalpateError(
-            f"MCAP needs the package {error.name}, which is not installed: run 'pip install mcap rosbags'."
-        ) from error
+    for package in ("mcap.writer", "rosbags"):
+        imported(package, "MCAP", "run 'pip install mcap rosbags'")
     from mcap.well_known import Profile
+    from mcap.writer import CompressionType, Writer
 
     path = folder / "palpate.mcap"
     with write_file(path) as temporary, open(temporary, "wb") as file:

@@ -73,7 +73,7 @@ def test_a_missing_package_is_named(recording, monkeypatch):
         return plain(name, *rest)
 
     monkeypatch.setattr(importlib, "import_module", without)
-    with pytest.raises(pp.PalpateError, match="install it with 'pip install xarray'"):
+    with pytest.raises(pp.PalpateError, match="run 'pip install xarray'"):
         recording["left"].to_xarray()
 
 
