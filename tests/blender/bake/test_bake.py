@@ -141,6 +141,7 @@ def test_clearing_brings_everything_back(tmp_path):
     bpy.ops.palpate.reset()
     scene.palpate.use_live = False
     scene.palpate.overlays = {"FORCE", "TORQUE", "CENTRE", "SLIP", "NORMALS", "SHEARS"}
+    scene.palpate.quantity = "PRESSURE"  # which is in no image of the bake
     cube("Tip", (0.0, 0.3, 0.0), size=0.02).palpate.role = "SENSOR"  # its heat map has geometry nodes
     pad.data.materials.append(bpy.data.materials.new("Rubber"))
     free.keyframe_insert("hide_render", frame=1)  # an animation of its own stays

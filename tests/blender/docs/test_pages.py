@@ -138,19 +138,8 @@ def bake_folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("pages")
     shutil.copytree(ROOT / "docs" / "sample-rig", folder, dirs_exist_ok=True)
     scene = shutil.copy(ROOT / "sample_blends" / "demo.blend", folder)
-    command = [
-        sys.executable,
-        "-m",
-        "palpate.commands",
-        "bake",
-        str(scene),
-        "--frames",
-        "71",
-        "72",
-        "--out",
-        str(folder / "palpate-bake"),
-    ]
-    subprocess.run(command, check=True, capture_output=True, timeout=300)
+    command = [sys.executable, "-m", "palpate.commands", "bake", str(scene), "--frames", "71", "72"]
+    subprocess.run([*command, "--out", str(folder / "palpate-bake")], check=True, capture_output=True, timeout=300)
     for target in ("probes", "mjcf"):
         scene = str(ROOT / "sample_blends" / "weighing.blend")
         assert main(["sensor", "export", scene, "--to", target, "--sensor", "Finger", "--out", str(folder / "sensors")]) == 0

@@ -42,18 +42,6 @@ def test_a_bake_is_out_of_date_at_once(tmp_path):
     assert "The scene has changed since this bake" in frame_status.status_of(scene).text and scene.frame_current == 2
 
 
-def test_a_baked_file_that_was_opened_shows_its_numbers_at_once(tmp_path):
-    scene, pad, _ = press(frames=4)
-    save(tmp_path)
-    run_job(bake(scene))
-    bpy.ops.wm.save_mainfile()
-    bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
-    scene = bpy.context.scene
-    second_look.look_again(scene)
-    status = frame_status.status_of(scene)
-    assert status.text == f"Frame {scene.frame_current} of the bake." and "Pad" in status.frame.sensors
-
-
 def test_a_renamed_sensor_takes_numbers_and_arrows_along(tmp_path):
     scene, pad, _ = press(frames=4)
     save(tmp_path)
@@ -93,7 +81,7 @@ def test_a_duplicate_of_a_baked_sensor_is_not_baked(tmp_path, linked):
     assert copy.palpate.is_baked and set(frame_status.status_of(scene).frame.sensors) == {"Pad", "Pad.001"}
 
 
-def test_warnings_of_a_bake_stay_in_its_status(tmp_path):
+def test_a_baked_file_that_was_opened_shows_its_numbers_and_warnings_at_once(tmp_path):
     scene, pad, _ = press(frames=8)
     pad.palpate.max_penetration = 0.0003
     save(tmp_path)
@@ -103,7 +91,9 @@ def test_warnings_of_a_bake_stay_in_its_status(tmp_path):
     bpy.ops.wm.save_mainfile()
     bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
     second_look.look_again(bpy.context.scene)
-    assert "maximum penetration" in frame_status.status_of(bpy.context.scene).warnings
+    status = frame_status.status_of(bpy.context.scene)
+    assert status.text == "Frame 2 of the bake." and "Pad" in status.frame.sensors
+    assert "maximum penetration" in status.warnings
 
 
 def test_a_slider_gives_the_numbers_of_playing_anew():

@@ -29,11 +29,6 @@ def test_nan_vertex_is_named():
         checked_mesh(vertices, [[0, 1, 2]], "ball")
 
 
-def test_no_faces():
-    with pytest.raises(MeshError, match="'ball' has no faces"):
-        checked_mesh(TRIANGLE, np.empty((0, 3), int), "ball")
-
-
 def test_zero_area_everywhere_is_refused_and_somewhere_is_repaired():
     line = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]])
     with pytest.raises(MeshError, match="zero area"):
@@ -41,11 +36,6 @@ def test_zero_area_everywhere_is_refused_and_somewhere_is_repaired():
     mesh, warnings = checked_mesh(line, [[0, 1, 2], [0, 1, 3]], "ball")
     assert len(mesh.triangles) == 1
     assert warnings == ["1 faces of 'ball' have zero area and were left out."]
-
-
-def test_face_of_a_missing_vertex():
-    with pytest.raises(MeshError, match="does not exist"):
-        checked_mesh(TRIANGLE, [[0, 1, 3]], "ball")
 
 
 def test_non_manifold_is_used_with_a_warning():
