@@ -184,5 +184,5 @@ KIND = Kind(
     ),
     experiment="hold one depth for at least a minute, then release and wait as long",
     known_from=("timing",),
-    families=("late", "moving"),
+    families=("late",),
 )

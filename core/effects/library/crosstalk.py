@@ -134,5 +134,4 @@ KIND = Kind(
         },
     ),
     known_from=("places",),
-    families=("spreading",),
 )

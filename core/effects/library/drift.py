@@ -114,6 +114,4 @@ KIND = Kind(
         values={"linear": {"rate": 4e-4}, "random-walk": {"spread": 0.004}},
     ),
     known_from=("timing", "rest"),
-    families=("moving",),
-    gain_falls_with="clock",
 )

@@ -5,9 +5,8 @@ The fit takes Levenberg–Marquardt steps on normal equations that are summed pe
 own texel only. Its column of the Jacobian therefore costs one evaluation for all texels together, and its block of the
 equations is block-diagonal: the common parameters are solved for first (Schur complement).
 
-For cross-validation a trial is left out by taking its equations out of the sum. One Newton step from the common fit gives the
-fit without that trial (Beirami et al., "On optimal generalizability in parametric learning", NeurIPS 2017), and only the trial
-left out has to be predicted again.
+For cross-validation stretches are left out by taking their equations out of the sum. One Newton step from the common fit gives
+the fit without them (Beirami et al., "On optimal generalizability in parametric learning", NeurIPS 2017).
 """
 
 from __future__ import annotations
@@ -549,55 +548,53 @@ def _information_shares(a: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, n
     return share, inverse.T @ turned
 
 
-def held_out_squares(views: Sequence[TrialView], found: Fit) -> np.ndarray:
-    """Return the sum of squares of each trial, of readings and of forces, under fits that have not seen it, (trials, 2) float.
+def cross_fitted(found: Fit, views: Sequence[TrialView], seen: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Return residuals of every stretch under a fit that has not seen it: of two folds of alternating ones, that to the other.
 
-    Whole trials are left out one after the other. If the other trials have too little information about a parameter (about
-    friction if only one trial slides, or about single texels), or if there is only one trial, stretches of a trial are left out
-    instead. Parameters about which the rest still has too little information keep their values. If the Newton step does not
-    even fit the rest better, it is shortened, at last to nothing.
+    Parameters about which a fold has too little information keep their values. If the Newton step does not even fit the other
+    fold better, it is shortened, at last to nothing.
+
+    Parameters
+    ----------
+    found : Fit
+        With equations.
+    views : sequence of TrialView
+        To which it was fitted.
+    seen : sequence of (T, c + 3) float
+        Its residuals.
     """
-    if found.equations is None:
-        return found.sse.copy()
+    if found.equations is None or not found.free:
+        return list(seen)
     free, at = found.free, [item.to_coordinate(value_of(found.model, item)) for item in found.free]
     known, *_ = _reduced_equations(all_equations(found.equations), free, at, 0.0)
-    local = any(item.per_texel for item in free)
-    errors = np.zeros((len(views), 2))
-    for left, view in enumerate(views):
-        others = [one for i, trial in enumerate(found.equations) for one in trial if i != left]
-        whole = (
-            bool(others)
-            and not local
-            and _information_shares(_reduced_equations(others, free, at, 0.0)[0], known)[0].min(initial=1.0) > LEAST_INFORMATION
-        )
-        for parts in [list(range(view.stretch_count))] if whole else [[part] for part in range(view.stretch_count)]:
-            errors[left] += _squares_left_out(views, found, left, parts, known)
-    return errors
+    out = [residual.copy() for residual in seen]
+    for fold in (0, 1):
+        sums = [one for trial in found.equations for i, one in enumerate(trial) if i % 2 != fold]
+        before = sum(one.sse for one in sums) + _prior_penalty(free, at)
+        tried, damping = list(seen), 1e-6
+        for _ in range(3):
+            moved = _point_after(at, free, _solved_step(sums, free, at, damping, known))
+            model = with_values(found.model, free, [item.from_coordinate(x) for item, x in zip(free, moved, strict=True)])
+            residuals = [view.residual(model) for view in views]
+            if _squares_of_fold(views, residuals, 1 - fold) + _prior_penalty(free, moved) <= before * (1.0 + 1e-9):
+                tried = residuals
+                break
+            damping = max(1e-2, 30.0 * damping)
+        for view, r, whole in zip(views, tried, out, strict=True):
+            for i, part in enumerate(view.stretches(r)):
+                if i % 2 == fold:
+                    whole[part] = r[part]
+    return out
 
 
-def _squares_left_out(views: Sequence[TrialView], found: Fit, left: int, parts: list[int], known: np.ndarray) -> np.ndarray:
-    """Sum of squares of some stretches of one trial under the fit to everything else, (2,) float."""
-    assert found.equations is not None
-    free, at = found.free, [item.to_coordinate(value_of(found.model, item)) for item in found.free]
-
-    def of_left(residual: np.ndarray) -> np.ndarray:
-        rows = views[left].stretches(residual)
-        squares: np.ndarray = np.sum([views[left].squares(residual[rows[part]]) for part in parts], axis=0)
-        return squares
-
-    sums = [one for i, trial in enumerate(found.equations) for j, one in enumerate(trial) if i != left or j not in parts]
-    if not sums:
-        return of_left(views[left].residual(found.model))
-    before, damping = sum(one.sse for one in sums) + _prior_penalty(free, at), 1e-6
-    for _ in range(3):
-        moved = _point_after(at, free, _solved_step(sums, free, at, damping, known))
-        tried = with_values(found.model, free, [item.from_coordinate(x) for item, x in zip(free, moved, strict=True)])
-        residuals = [view.residual(tried) for view in views]
-        own = of_left(residuals[left])
-        if sum(map(_sum_of_squares, residuals)) - own.sum() + _prior_penalty(free, moved) <= before * (1.0 + 1e-9):
-            return own
-        damping = max(1e-2, 30.0 * damping)
-    return of_left(views[left].residual(found.model))
+def _squares_of_fold(views: Sequence[TrialView], residuals: Sequence[np.ndarray], fold: int) -> float:
+    """Sum of squares of every other stretch, beginning with the first or the second."""
+    return sum(
+        _sum_of_squares(r[part])
+        for view, r in zip(views, residuals, strict=True)
+        for i, part in enumerate(view.stretches(r))
+        if i % 2 == fold
+    )
 
 
 def _sum_of_squares(residual: np.ndarray) -> float:

@@ -6,9 +6,9 @@ import pytest
 from palpate.benchmarks._hidden import cases
 from palpate.core.effects.engine.registry import effect
 from palpate.core.gap.dataset.rig import read_rig
-from palpate.core.gap.selection.confidence import SURE
 from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.gap.selection.gap_sizes import FORCES, READINGS, quantities_changed_by
+from palpate.core.gap.selection.quantities import FORCES, READINGS, quantities_changed_by
+from palpate.core.gap.selection.rule_numbers import SURE
 from palpate.core.jobs import run_job
 
 

@@ -7,8 +7,8 @@ import gap_cases as cases
 import numpy as np
 import pytest
 
-from palpate.core.gap.selection.confidence import SURE
 from palpate.core.gap.selection.diagnosis import diagnose
+from palpate.core.gap.selection.rule_numbers import SURE
 from palpate.core.jobs import run_job
 
 
