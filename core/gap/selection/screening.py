@@ -23,14 +23,14 @@ from .score import OWN_NUMBERS, Hypothesis
 from .starting_points import starting_points
 from .view_set import ViewSet
 
-LATER_STARTS = 3
+LATER_STARTS = 1
 """Points of the search ranges that are tried on top of an effect, beside the values that a form has alone: for speed."""
 FIRST_STARTS, TRIAL_STEPS, FIRST_STEPS, FIRST_TOLERANCE = 2, 3, 8, 1e-3
 """A first fit takes some steps from each of the best starting points, and goes on from the best of these: for speed."""
 FINAL_STEPS, FINAL_TOLERANCE = 10, 3e-4
 """Of the fits to everything."""
-REFITTED_KINDS = 5
-"""Kinds that are fitted to everything on top of an effect: for speed."""
+TRIED_KINDS, REFITTED_KINDS = 8, 5
+"""Kinds that are fitted to a part of the data on top of an effect, and to everything: for speed."""
 ALL_FORMS = 2
 """Kinds of which all forms are fitted to everything, so that a kind is judged by its whole library: for speed."""
 
@@ -122,7 +122,7 @@ class Screening:
         for one in promises:
             by_kind.setdefault(one.candidate.name, []).append(one)
         first_fits = []
-        for own in by_kind.values():
+        for own in list(by_kind.values())[: None if is_first else TRIED_KINDS]:
             for one in own if is_first else own[:1]:
                 yield f"fitting {one.candidate.name}"
                 first_fits.append(self._first_fit(one, tests))

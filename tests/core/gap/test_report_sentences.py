@@ -14,6 +14,7 @@ from palpate.core.gap.report.comparison import gap_errors
 from palpate.core.gap.report.plots import CAPTIONS
 from palpate.core.gap.report.sentences import headline
 from palpate.core.gap.report.summary import summary
+from palpate.core.gap.selection.base_model import base_fit, prepared
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.recording_differences import RecordingDifferences
 from palpate.core.gap.selection.silenced_texels import silenced_texels
