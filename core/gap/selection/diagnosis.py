@@ -66,11 +66,6 @@ def diagnose(rig: Rig) -> Job[Diagnosis]:
     return _concluded(begun, search, with_best_forms(search, with_best_kinds(search, chosen)))
 
 
-def fit_base(rig: Rig) -> Job[Diagnosis]:
-    """Fit the base model as :func:`diagnose` does before it looks for effects; the result names none."""
-    return (yield from _begin(rig)).result
-
-
 @dataclass
 class _Begun:
     """A diagnosis that has the fitted base model alone, and the views of its fitted recordings."""
@@ -87,7 +82,7 @@ class _Begun:
 def _begin(rig: Rig) -> Generator[Progress, None, _Begun]:
     """Prepare recordings and fit the base model."""
     yield Progress("contacts of every trial", 0, TOTAL_WORK)
-    rig, predictors, faults = _without_faults(with_starting_heights(rig))
+    rig, predictors, faults = _with_checked_data(with_starting_heights(rig))
     noise, full = prepared(rig, predictors)
     yield Progress("base model", BASE_MODEL_BEGINS, TOTAL_WORK)
     begun = _begun_with(rig, predictors, noise, full)
@@ -221,7 +216,7 @@ def _relative_error(result: Diagnosis) -> float:
     return float(np.sqrt((result.base.sse.sum(axis=0) * scale**2).sum() / max(float(result.base.count.sum()), 1.0)))
 
 
-def _without_faults(rig: Rig) -> tuple[Rig, list[Predictor], list[DataFault]]:
+def _with_checked_data(rig: Rig) -> tuple[Rig, list[Predictor], list[DataFault]]:
     """The rig with those faults of its data put right for which it asks, predictors of its trials, and all faults."""
     predictors = predictors_of(rig.trials, rig)
     faults = find_faults(rig, [predictor.stimulus for predictor in predictors])
@@ -243,7 +238,10 @@ def _stages(result: Diagnosis, view_set: ViewSet) -> list[Model]:
 
 
 def _structure(view_set: ViewSet, found: Fit) -> ResidualStructure:
-    """What the residual of a fit depends on. Without readings the largest component of the net force stands for all texels."""
+    """Dependence of a fit's residual on what is known of each sample.
+
+    Without readings the largest component of the net force stands for all texels.
+    """
     width = len(view_set.whole[0].predictor.rig.texels)
     predictors = [view.predictor for view in view_set.whole]
     residuals = [view.residual(found.model) for view in view_set.whole]

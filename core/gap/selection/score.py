@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from scipy.optimize import brentq
 
 from ...effects.engine.registry import form_of, kind_of
 from ..fitting.least_squares import BASE, Fit
@@ -213,6 +214,22 @@ class Score:
         excess, allowed = self.parts(one)
         rest = allowed[0] + self.noise.error
         return float(0.5 * STRETCHES * np.log1p(excess[0] / rest)[self.measured].sum()) - self.price
+
+    def most_left(self, one: Hypothesis, least: float, names: int = 1) -> float:
+        """Return which share of its excess a model may leave, with so many names more, to reach a score of `least`.
+
+        It is negative where that is out of reach, and 1 where nothing need close.
+        """
+        excess, allowed = self.parts(one)
+        rest, measured = allowed[0] + self.noise.error, self.measured
+
+        def lead(left: float) -> float:
+            gain = 0.5 * STRETCHES * np.log((excess[0] + rest) / (left * excess[0] + rest))[measured].sum()
+            return float(self.value(one) + gain - names * self.price) - least
+
+        if lead(1.0) >= 0.0:
+            return 1.0
+        return float(brentq(lead, 0.0, 1.0)) if lead(0.0) >= 0.0 else -1.0
 
 
 def _stated_error(label: str) -> float:

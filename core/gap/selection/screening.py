@@ -30,7 +30,7 @@ FIRST_STARTS, TRIAL_STEPS, FIRST_STEPS, FIRST_TOLERANCE = 2, 3, 8, 1e-3
 FINAL_STEPS, FINAL_TOLERANCE = 10, 3e-4
 """Of the fits to everything."""
 TRIED_KINDS, REFITTED_KINDS = 8, 5
-"""Kinds that are fitted to a part of the data on top of an effect, and to everything: for speed."""
+"""Kinds that are fitted to a part of the data on top of an effect, and to everything at most: for speed."""
 ALL_FORMS = 2
 """Kinds of which all forms are fitted to everything, so that a kind is judged by its whole library: for speed."""
 
@@ -104,7 +104,7 @@ class Screening:
         """Return the candidates that could show in the fitted recordings."""
         return candidates([view.predictor for view in self.view_set.whole], model)
 
-    def with_one_more(self, parent: Hypothesis, kinds: set[str] | None = None) -> Making:
+    def with_one_more(self, parent: Hypothesis, kinds: set[str] | None = None, most_left: float = 1.0) -> Making:
         """Return the parent with one effect more, for the kinds that promise most, in one form of each.
 
         Alone, the best kinds come in all their forms.
@@ -114,6 +114,8 @@ class Screening:
         parent : Hypothesis
         kinds : set of str, optional
             Only these.
+        most_left : float
+            Share of the parent's gap that a fit to a part of the data may leave at most, for one to everything to follow.
         """
         is_first = not parent.names
         tests = _Tests(self.view_set, parent.fit)
@@ -126,7 +128,7 @@ class Screening:
             for one in own if is_first else own[:1]:
                 yield f"fitting {one.candidate.name}"
                 first_fits.append(self._first_fit(one, tests))
-        first_fits.sort(key=lambda one: one.left)
+        first_fits = sorted((one for one in first_fits if one.left <= most_left), key=lambda one: one.left)
         best: dict[str, FirstFit] = {}
         for fitted in first_fits:
             best.setdefault(fitted.candidate.name, fitted)
@@ -138,11 +140,15 @@ class Screening:
             made += yield from self.other_forms(parent, name, [one.forms[-1] for one in made])
         return made
 
-    def other_forms(self, parent: Hypothesis, name: str, done: Sequence[str]) -> Making:
-        """Return the parent with the forms of a kind that were not fitted yet, so that it is judged by its whole library."""
+    def other_forms(self, parent: Hypothesis, name: str, done: Sequence[str], most_left: float = 1.0) -> Making:
+        """Return the parent with the forms of a kind that were not fitted yet, so that it is judged by its whole library.
+
+        Forms that leave more than `most_left` of the gap in a part of the data are left out, as in :meth:`with_one_more`.
+        """
         tests = _Tests(self.view_set, parent.fit)
         own = [one for one in self.promises[parent.key] if one.candidate.name == name and one.candidate.label not in done]
-        return (yield from self._final_fits([self._first_fit(one, tests) for one in own], parent))
+        fitted = [self._first_fit(one, tests) for one in own]
+        return (yield from self._final_fits([one for one in fitted if one.left <= most_left], parent))
 
     def without(self, one: Hypothesis, index: int) -> Hypothesis:
         """Return a model without one of its effects, fitted again."""
@@ -191,8 +197,7 @@ class Screening:
         tried = [self._fitted_from(start, one.candidate, test, TRIAL_STEPS) for start in starts]
         best = min(tried, key=lambda found: found.mean)
         best = self._fitted_from(best.model, one.candidate, test, FIRST_STEPS)
-        count, square = float(best.count.sum()), float(best.sse.sum())
-        return FirstFit(max(square - count, 0.0) / max(test.total - count, 0.01 * count), one.candidate, best)
+        return FirstFit(share_left(best, test), one.candidate, best)
 
     def _fitted_from(self, start: Model, candidate: Candidate, test: ScoreTest, steps: int) -> Fit:
         return fit(
@@ -239,6 +244,12 @@ def free_with(free: Sequence[FreeParameter], model: Model, candidate: Candidate,
     if candidate.name in DIRECTLY_ESTIMATED:
         return tuple(free)
     return (*free, *candidate.free_parameters(len(model.effects), scales, abs(model.parameters.gain)))
+
+
+def share_left(found: Fit, test: ScoreTest) -> float:
+    """Return which share of the gap of a test's model a fit leaves there."""
+    count = float(found.count.sum())
+    return max(float(found.sse.sum()) - count, 0.0) / max(test.total - count, 0.01 * count)
 
 
 def _left(one: Hypothesis) -> float:

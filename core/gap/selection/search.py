@@ -52,6 +52,7 @@ class Search:
     repeat_error: float | None = None
     tried: list[Hypothesis] = field(default_factory=list)
     _longer: dict[object, list[Hypothesis]] = field(default_factory=dict)
+    _whole: set[tuple[object, str]] = field(default_factory=set)
     _made: dict[str, tuple[Screening, Hypothesis]] = field(default_factory=dict)
 
     def run(self) -> Generator[tuple[str, float], None, Hypothesis]:
@@ -66,7 +67,8 @@ class Search:
         self._weigh(is_noise_measured=True)
         if self.is_open(self.best()):
             yield from _in_stage("differing recordings", self._assume_differences())
-            self.tried += yield from _in_stage("differing recordings", best_pairs(plain, self.base))
+            most_left = self._most_left(self.base, names=2)
+            self.tried += yield from _in_stage("differing recordings", best_pairs(plain, self.base, most_left))
         for size in range(1, MOST_EFFECTS):
             self._weigh()
             if not self.is_open(self.best()):
@@ -108,9 +110,12 @@ class Search:
         best = {name: max(map(self.score.value, forms)) for name, forms in found.items()}
         screening = self.under(one.assumed)[0]
         for name in sorted(best, key=lambda name: -best[name])[:ALL_FORMS]:
-            done = [form for other in found[name] for form in other.forms]
-            found[name] += _finished(screening.other_forms(parent, name, done))
-            self._longer[parent.key] += [other for other in found[name] if other not in self._longer[parent.key]]
+            if (parent.key, name) not in self._whole:
+                self._whole.add((parent.key, name))
+                done = [form for other in found[name] for form in other.forms]
+                made = _finished(screening.other_forms(parent, name, done, self._most_left(parent)))
+                found[name] += made
+                self._longer[parent.key] += made
         return parent, found
 
     # --- stages
@@ -129,7 +134,7 @@ class Search:
 
     def _try_session(self, screening: Screening, base: Hypothesis) -> Steps:
         """Kinds that explain no more in a session than in recordings that begin untouched are left out of it."""
-        made = yield from screening.with_one_more(base, self._remembering(screening))
+        made = yield from screening.with_one_more(base, self._remembering(screening), self._most_left(base))
         for one in made:
             alone = [other for other in self._longer[self.base.key] if other.names == one.names]
             leads = [self.score.lead(one, other) for other in alone]
@@ -184,9 +189,18 @@ class Search:
     def _grow(self, parent: Hypothesis) -> Steps:
         """Try one effect more on top of a model."""
         if parent.key not in self._longer:
-            made = yield from self.under(parent.assumed)[0].with_one_more(parent)
+            screening = self.under(parent.assumed)[0]
+            made = yield from screening.with_one_more(parent, most_left=self._most_left(parent) if parent.names else 1.0)
             self._longer[parent.key] = made
             self.tried += made
+
+    def _most_left(self, parent: Hypothesis, names: int = 1) -> float:
+        """Share of the parent's gap that more effects may leave if they are to matter.
+
+        They must pay for their names, and come as near to the best model as one name costs.
+        """
+        least = max(self.score.value(parent), self.score.value(self.best()) - self.score.price)
+        return self.score.most_left(parent, least, names)
 
     def _weigh(self, is_noise_measured: bool = False) -> None:
         """Set the score by the noise as the models tried so far leave it without load, or as it was measured before."""
