@@ -17,7 +17,7 @@ from ..fitting.least_squares import Fit, fit
 from .candidates import DIRECTLY_ESTIMATED, Candidate, is_free_already
 from .rao_score import ScoreTest
 from .score import Hypothesis
-from .screening import Making, Screening, free_with, share_left
+from .screening import Making, Screening, free_with
 from .starting_points import LONGEST_STEP, SHORTEST_STEP
 
 PAIRS = 4
@@ -37,11 +37,8 @@ class _Entry:
     length: float = 1.0
 
 
-def best_pairs(screening: Screening, base: Hypothesis, most_left: float = 1.0) -> Making:
-    """Fit the best pairs of effects on top of the base model.
-
-    Pairs that leave more than `most_left` of the gap in a part of the data are not fitted to everything.
-    """
+def best_pairs(screening: Screening, base: Hypothesis) -> Making:
+    """Fit the best pairs of effects on top of the base model."""
     yield "pairs of effects"
     test = ScoreTest(screening.view_set.few_samples, base.fit)
     pairs = [(one, _change(test, one.effect)) for one in _dictionary(screening, base)]
@@ -57,7 +54,7 @@ def best_pairs(screening: Screening, base: Hypothesis, most_left: float = 1.0) -
     made = []
     for pair in _ranked(entries, (table @ table.T).astype(float), (table @ residual).astype(float))[:PAIRS]:
         yield f"fitting {pair[0].candidate.name} and {pair[1].candidate.name}"
-        made += _fitted(screening, base, pair, test, most_left)
+        made += _fitted(screening, base, pair)
     return made
 
 
@@ -112,18 +109,14 @@ def _is_signed(one: Candidate) -> bool:
     return any(q.name == name and q.low < 0.0 for q in one.form.parameters)
 
 
-def _fitted(
-    screening: Screening, base: Hypothesis, pair: tuple[_Entry, _Entry], test: ScoreTest, most_left: float
-) -> list[Hypothesis]:
-    """Two effects fitted together, first to a part of the data; empty if that leaves much, or a signature is not there."""
+def _fitted(screening: Screening, base: Hypothesis, pair: tuple[_Entry, _Entry]) -> list[Hypothesis]:
+    """Two effects fitted together, first to a part of the data; empty if the signature of one of them is not there."""
     model, free = base.fit.model, tuple(base.fit.free)
     for one in pair:
         free = free_with(free, model, one.candidate, screening.scales)
         model = model.with_effect(_scaled(one))
     views = screening.view_set.few_samples
     quick = fit(views, model, free, max_steps=10, tolerance=1e-3, with_equations=False)
-    if share_left(quick, test) > most_left:
-        return []
     found = screening.final_fit(quick.model, free, len(base.fit.free))
     for index, one in enumerate(pair):
         if not screening.shows_signature(one.candidate, with_effect_last(found, index)):

@@ -215,8 +215,8 @@ class Score:
         rest = allowed[0] + self.noise.error
         return float(0.5 * STRETCHES * np.log1p(excess[0] / rest)[self.measured].sum()) - self.price
 
-    def most_left(self, one: Hypothesis, least: float, names: int = 1) -> float:
-        """Return which share of its excess a model may leave, with so many names more, to reach a score of `least`.
+    def most_left(self, one: Hypothesis, least: float) -> float:
+        """Return which share of its excess a model may leave, with one effect more, to reach a score of `least`.
 
         It is negative where that is out of reach, and 1 where nothing need close.
         """
@@ -225,7 +225,7 @@ class Score:
 
         def lead(left: float) -> float:
             gain = 0.5 * STRETCHES * np.log((excess[0] + rest) / (left * excess[0] + rest))[measured].sum()
-            return float(self.value(one) + gain - names * self.price) - least
+            return float(self.value(one) + gain - self.price) - least
 
         if lead(1.0) >= 0.0:
             return 1.0

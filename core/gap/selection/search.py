@@ -67,8 +67,7 @@ class Search:
         self._weigh(is_noise_measured=True)
         if self.is_open(self.best()):
             yield from _in_stage("differing recordings", self._assume_differences())
-            most_left = self._most_left(self.base, names=2)
-            self.tried += yield from _in_stage("differing recordings", best_pairs(plain, self.base, most_left))
+            self.tried += yield from _in_stage("differing recordings", best_pairs(plain, self.base))
         for size in range(1, MOST_EFFECTS):
             self._weigh()
             if not self.is_open(self.best()):
@@ -134,7 +133,7 @@ class Search:
 
     def _try_session(self, screening: Screening, base: Hypothesis) -> Steps:
         """Kinds that explain no more in a session than in recordings that begin untouched are left out of it."""
-        made = yield from screening.with_one_more(base, self._remembering(screening), self._most_left(base))
+        made = yield from screening.with_one_more(base, self._remembering(screening))
         for one in made:
             alone = [other for other in self._longer[self.base.key] if other.names == one.names]
             leads = [self.score.lead(one, other) for other in alone]
@@ -194,13 +193,13 @@ class Search:
             self._longer[parent.key] = made
             self.tried += made
 
-    def _most_left(self, parent: Hypothesis, names: int = 1) -> float:
-        """Share of the parent's gap that more effects may leave if they are to matter.
+    def _most_left(self, parent: Hypothesis) -> float:
+        """Share of the parent's gap that one effect more may leave if it is to matter.
 
-        They must pay for their names, and come as near to the best model as one name costs.
+        It must pay for its name, and come as near to the best model as a name costs.
         """
         least = max(self.score.value(parent), self.score.value(self.best()) - self.score.price)
-        return self.score.most_left(parent, least, names)
+        return self.score.most_left(parent, least)
 
     def _weigh(self, is_noise_measured: bool = False) -> None:
         """Set the score by the noise as the models tried so far leave it without load, or as it was measured before."""
