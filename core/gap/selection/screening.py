@@ -107,7 +107,8 @@ class Screening:
     def with_one_more(self, parent: Hypothesis, kinds: set[str] | None = None, most_left: float = 1.0) -> Making:
         """Return the parent with one effect more, for the kinds that promise most, in one form of each.
 
-        Alone, the best kinds come in all their forms.
+        It is the form that is free to follow any law, if the kind has one, so that kinds compete at equal freedom. Alone, the
+        best kinds come in all their forms.
 
         Parameters
         ----------
@@ -125,7 +126,7 @@ class Screening:
             by_kind.setdefault(one.candidate.name, []).append(one)
         first_fits = []
         for own in list(by_kind.values())[: None if is_first else TRIED_KINDS]:
-            for one in own if is_first else own[:1]:
+            for one in own if is_first else [min(own, key=_is_textbook)]:
                 yield f"fitting {one.candidate.name}"
                 first_fits.append(self._first_fit(one, tests))
         first_fits = sorted((one for one in first_fits if one.left <= most_left), key=lambda one: one.left)
@@ -250,6 +251,11 @@ def share_left(found: Fit, test: ScoreTest) -> float:
     """Return which share of the gap of a test's model a fit leaves there."""
     count = float(found.count.sum())
     return max(float(found.sse.sum()) - count, 0.0) / max(test.total - count, 0.01 * count)
+
+
+def _is_textbook(one: Promise) -> bool:
+    """True unless the form is free to follow any law of its kind."""
+    return one.candidate.form.error is None
 
 
 def _left(one: Hypothesis) -> float:
