@@ -83,20 +83,26 @@ def leaves_gap(score: Score, one: Hypothesis) -> bool:
 
 
 def _judged(search: Search, best: Hypothesis, index: int, result: Diagnosis) -> tuple[Finding, tuple[str, ...]]:
-    """An effect with its confidence, and its rivals: kinds that explain as much in its place by all their forms."""
+    """An effect with its confidence, and its rivals in its place.
+
+    These are kinds that explain as much by all their forms, and those of which a form leaves no more than noise and its own
+    error account for: then the recordings do not refute it, however much less another leaves.
+    """
     score, name, form = search.score, best.names[index], best.forms[index].split("/")[1]
     parent, others = search.in_place_of(best, index)
     own = score.values_of_kind(others[name], search.library[name])
     rivals, kept = [], [own, score.values(parent)]
+    is_needed = leaves_gap(score, parent)
     for other, forms in others.items():
         if other == name:
             continue
         value = score.values_of_kind(forms, search.library[other])
         apart, error = float((own - value)[0]), float((own - value)[1:].std())
-        if apart > -error and _contains(max(forms, key=score.value), best, index):
+        explains = is_needed and any(not leaves_gap(score, one) for one in forms if not _contains(one, best, index))
+        if not explains and apart > -error and _contains(max(forms, key=score.value), best, index):
             continue
         kept.append(value)
-        if apart < RIVAL_ERRORS * error:
+        if explains or apart < RIVAL_ERRORS * error:
             rivals.append(other)
     curvature = curvature_ratio(result.of("fit"), best.fit.model)
     known = set(best.names) | set(rivals)
