@@ -82,32 +82,38 @@ def leaves_gap(score: Score, one: Hypothesis) -> bool:
     return bool((excess[0] > np.maximum(RIVAL_ERRORS * score.noise.error, allowed[0]))[score.measured].any())
 
 
-def _judged(search: Search, best: Hypothesis, index: int, result: Diagnosis) -> tuple[Finding, tuple[str, ...]]:
-    """An effect with its confidence, and its rivals in its place.
+def weighed_kinds(search: Search, best: Hypothesis, index: int) -> tuple[float, list[str]]:
+    """Return the confidence of an effect's kind, and its rivals in its place.
 
-    These are kinds that explain as much by all their forms, and those of which a form leaves no more than noise and its own
+    Rivals are kinds that explain as much by all their forms, and those of which a form leaves no more than noise and its own
     error account for: then the recordings do not refute it, however much less another leaves.
     """
-    score, name, form = search.score, best.names[index], best.forms[index].split("/")[1]
+    score, name = search.score, best.names[index]
     parent, others = search.in_place_of(best, index)
     own = score.values_of_kind(others[name], search.library[name])
-    rivals, kept = [], [own, score.values(parent)]
-    is_needed = leaves_gap(score, parent)
+    rivals, kept, is_needed = [], [own, score.values(parent)], leaves_gap(score, parent)
     for other, forms in others.items():
         if other == name:
             continue
         value = score.values_of_kind(forms, search.library[other])
         apart, error = float((own - value)[0]), float((own - value)[1:].std())
-        explains = is_needed and any(not leaves_gap(score, one) for one in forms if not _contains(one, best, index))
+        explains = is_needed and any(not (leaves_gap(score, one) or _contains(one, best, index)) for one in forms)
         if not explains and apart > -error and _contains(max(forms, key=score.value), best, index):
             continue
         kept.append(value)
         if explains or apart < RIVAL_ERRORS * error:
             rivals.append(other)
+    return float(score.weights_of(kept)[0]), rivals
+
+
+def _judged(search: Search, best: Hypothesis, index: int, result: Diagnosis) -> tuple[Finding, tuple[str, ...]]:
+    """An effect with its confidence, and its rivals in its place."""
+    score, name, form = search.score, best.names[index], best.forms[index].split("/")[1]
+    parent, others = search.in_place_of(best, index)
+    confidence, rivals = weighed_kinds(search, best, index)
     curvature = curvature_ratio(result.of("fit"), best.fit.model)
     known = set(best.names) | set(rivals)
     rivals += [one for one in indistinguishable(result.coverage, name, curvature) if one not in known]
-    confidence = float(score.weights_of(kept)[0])
     doubts = () if confidence >= SURE or rivals else (NEARLY_WITHOUT,)
     confidence = min(confidence, JUST_UNSURE) if rivals else confidence
     left = {other: min(_excess(score, one) for one in forms) for other, forms in others.items() if other != name}

@@ -66,6 +66,23 @@ def test_an_effect_joins_if_it_pays_its_name(left, joins):
     assert (rule().most_to_gain(base) > 0.0) is joins
 
 
+@pytest.mark.parametrize("least", [-5.0, -1.0, 1.0])
+def test_an_effect_more_reaches_a_score_where_it_leaves_no_more_than_this(least):
+    base, share = model(3.0), rule().most_left(model(3.0), least)
+    assert rule().value(model(1.0 + 2.0 * share, "creep/power")) == pytest.approx(least)
+    assert rule().most_left(base, 1e3) < 0.0 and rule().most_left(base, -1e3) == 1.0
+
+
+@pytest.mark.parametrize(("left", "rivals"), [(1.15, ["lag"]), (1.4, [])])
+def test_a_kind_whose_remainder_its_formula_accounts_for_is_a_rival(left, rivals):
+    """It may leave 0.05 of a change of four variances. The other kind leaves nothing, and less by two standard errors."""
+    best, other = model(1.0, "creep/power", changes=(4.0,)), model(left, "lag/first-order", changes=(4.0,))
+    found = search.Search({})
+    found.score, found.library = rule(), Counter(creep=4, lag=4)
+    found.in_place_of = lambda *_: (model(4.0), {"creep": [best], "lag": [other]})
+    assert verdict.weighed_kinds(found, best, 0)[1] == rivals
+
+
 def test_of_models_within_a_standard_error_the_smallest_wins():
     rng = np.random.default_rng(0)
     one, other = 1.0 + rng.gamma(1.0, 0.2, size=(2, BLOCKS))
