@@ -18,7 +18,6 @@ from .search import Search
 JUST_UNSURE = SURE - 0.01
 """Highest confidence of a name that has rivals, or that faults of the data may have brought about."""
 FAULTY = "the data have faults that were not put right"
-REFUTED = "the amended model fails on a check recording"
 NEARLY_WITHOUT = "the model without it does nearly as well, for one name less"
 """Why a name is not sure, in words."""
 

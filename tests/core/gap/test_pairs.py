@@ -4,10 +4,8 @@
 import pytest
 
 from palpate.benchmarks._hidden import cases
-from palpate.core.effects.engine.registry import effect
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.gap.selection.quantities import FORCES, READINGS, quantities_changed_by
 from palpate.core.gap.selection.rule_numbers import SURE
 from palpate.core.jobs import run_job
 
@@ -17,18 +15,6 @@ def named(number, folder):
     result = run_job(diagnose(read_rig(cases.write(cases.draw("two", number), folder))))
     sure = {one.name for one in result.findings if one.confidence >= SURE}
     return sure, result.verdict, {one.name: one for one in result.findings}
-
-
-@pytest.mark.parametrize(("one", "changes"), [
-    (effect("saturation"), (READINGS,)),
-    (effect("stribeck"), (FORCES,)),
-    (effect("stiffening"), (READINGS, FORCES)),
-    (effect("hysteresis", "preisach"), (READINGS,)),
-    (effect("hysteresis", "duhem"), (READINGS, FORCES)),
-    (effect("misalignment"), (READINGS, FORCES)),
-])  # fmt: skip
-def test_a_check_refutes_only_what_can_change_what_it_measures(one, changes):
-    assert quantities_changed_by(one) == changes
 
 
 @pytest.mark.long("a whole diagnosis with net forces")
