@@ -66,7 +66,7 @@ KIND = Kind(
         Form(
             "knee",
             "r = (fᵖ + Tᵖ)^(1/p) − T",
-            "Tao and Kokotović, Adaptive Control of Systems with Actuator and Sensor Nonlinearities (1996), 2.1, with a knee",
+            "Tao and Kokotović, Adaptive Control of Systems with Actuator and Sensor Nonlinearities (1996), section 2.1; rounded",
             (
                 _THRESHOLD,
                 Parameter(
