@@ -66,8 +66,8 @@ KIND = Kind(
         Form(
             "knee",
             "r = (fᵖ + Tᵖ)^(1/p) − T",
-            "Tao and Kokotović, Adaptive Control of Systems with Actuator and Sensor Nonlinearities (1996), section 2.1, with a "
-            "rounded corner",
+            "Tao and Kokotović, Adaptive Control of Systems with Actuator and Sensor Nonlinearities (1996), section 2.1, with "
+            "a rounded corner",
             (
                 _THRESHOLD,
                 Parameter(
