@@ -51,9 +51,12 @@ def _contains(other: Hypothesis, best: Hypothesis, index: int) -> bool:
 
 
 def judge(search: Search, best: Hypothesis, result: Diagnosis) -> None:
-    """Write verdict, findings, ambiguous groups and ruled-out kinds into a result that has its models."""
-    result.closed = closed_shares(search, best)
-    for index in range(len(best.names)):
+    """Write verdict, findings, ambiguous groups and ruled-out kinds into a result that has its models.
+
+    Findings are in the order in which effects act.
+    """
+    result.closed, order = closed_shares(search, best), list(library())
+    for index in sorted(range(len(best.names)), key=lambda index: order.index(best.names[index])):
         finding, rivals = _judged(search, best, index, result)
         result.findings.append(finding)
         if rivals:
