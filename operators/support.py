@@ -16,8 +16,8 @@ from ..addon.scene import participants
 from ..addon.session import session_state
 from ..core.errors import PalpateError
 
-STUDY = "PALPATE_OT_study_run"
-"""The operator that computes a study, among the jobs of the session."""
+BAKE, STUDY = "PALPATE_OT_bake", "PALPATE_OT_study_run"
+"""The operators that compute a bake and a study, among the jobs of the session."""
 
 
 class Condition(NamedTuple):
@@ -115,7 +115,7 @@ ANY_SENSOR = Condition(
     "There is no sensor in this scene: use Make Sensor first",
 )
 IDLE = Condition(
-    lambda _context: not (session_state.session.suspension_depth or session_state.session.catching_up),
+    lambda _context: BAKE not in session_state.session.jobs and not session_state.session.catching_up,
     "Frames are being computed",
 )
 """No bake and no computation of missing frames is running."""
