@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -52,7 +51,7 @@ def publish(folder: Path, study: Study) -> None:
         _write_tables(folder, parts.table())
         with temporary_folder(folder, "dataset") as hidden, ExitStack() as files:
             new = _write_datasets(parts, hidden / "parts", study.name or UNNAMED_STUDY, files)
-            replace_folder(new, folder / DATASET_FOLDER, DATASET_FILES)
+            replace_folder(new, folder / DATASET_FOLDER, hidden, DATASET_FILES)
     except OSError as error:
         raise FileError(
             f"The dataset in '{folder}' could not be written ({os_error_reason(error)}): free some space or check its "
@@ -112,14 +111,19 @@ def require_own(target: Path, files: re.Pattern[str]) -> None:
             raise FileError(f"'{path}' was not written by `palpate sweep`: move it away, the folder '{target}' is replaced.")
 
 
-def replace_folder(new: Path | None, target: Path, files: re.Pattern[str]) -> None:
-    """Put a folder in the place of an earlier one, or remove that. A kill between the two leaves none: it can be made again.
+def replace_folder(new: Path | None, target: Path, hidden: Path, files: re.Pattern[str]) -> None:
+    """Put a folder in the place of an earlier one, or remove that.
+
+    The earlier one is moved away whole, so that none with some of its files stands there. A kill between the two renames
+    leaves none, which can be made again.
 
     Parameters
     ----------
     new : Path or None
         None: there is to be no folder.
     target : Path
+    hidden : Path
+        Temporary folder beside it, with which the earlier folder is removed.
     files : compiled regular expression
         Of the names that the earlier folder may hold.
 
@@ -128,10 +132,16 @@ def replace_folder(new: Path | None, target: Path, files: re.Pattern[str]) -> No
     FileError
         As :func:`require_own`.
     OSError
-        A folder cannot be removed or renamed.
+        A folder cannot be renamed; the earlier one is in its place then.
     """
     require_own(target, files)
+    earlier = hidden / "earlier"
     if target.exists():
-        shutil.rmtree(target)
-    if new is not None:
-        os.rename(new, target)
+        os.rename(target, earlier)
+    try:
+        if new is not None:
+            os.rename(new, target)
+    except OSError:
+        if earlier.exists():
+            os.rename(earlier, target)
+        raise

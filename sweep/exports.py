@@ -72,7 +72,7 @@ def export_zarr(folder: Path) -> list[Path]:
                     return group.create_array(name, shape=shape, dtype="U64" if kind == "string" else kind)
 
                 _fill(part, create, group.attrs)
-                replace_folder(hidden / "new", target, ZARR_FILES)
+                replace_folder(hidden / "new", target, hidden, ZARR_FILES)
         except OSError as error:
             raise FileError(f"'{target}' could not be written ({os_error_reason(error)}): free some space.") from error
         written.append(target)

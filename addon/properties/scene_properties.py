@@ -73,7 +73,7 @@ class PALPATE_PG_study(bpy.types.PropertyGroup):
 
     file: StringProperty(
         name="Study File",
-        description="Path of the study; its results are written to a folder of the same name beside it. "
+        description="Path of the study file. The results are written to a folder of the same name in the same directory. "
         "// is the folder of the .blend",
         default="//study.toml",
         subtype="FILE_PATH",

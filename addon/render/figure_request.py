@@ -38,7 +38,7 @@ class FigureRequest:
     formats : tuple of str
         File formats of the figures that are not renders.
     exports : tuple of str
-        Names from :data:`.export.FORMATS`; each is written into a folder of its own.
+        Names from :data:`.format_table.FORMATS`; each is written into a folder of its own.
     engine, view, transparent, own_camera, own_light
         See :class:`.render_setup.RenderOptions`.
     see_through : bool

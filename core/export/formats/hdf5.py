@@ -19,8 +19,6 @@ from ..exporter import UNITS, Exporter, bake_arrays, sensor_progress
 
 _GROWTH_BYTES = 1 << 24
 """By which the file in memory grows."""
-SMALL = 4096
-"""Numbers of an array that is not compressed."""
 
 
 def write_hdf5(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Path]]:
@@ -63,8 +61,8 @@ def _hdf5_name(name: str, group: Any) -> str:
 
 
 def _dataset(group: Any, name: str, array: np.ndarray, unit: str) -> None:
-    """Write an array, a large one compressed."""
-    packed = {"compression": "gzip", "compression_opts": 4, "shuffle": True} if array.size > SMALL else {}
+    """Write an array, compressed unless it is empty."""
+    packed = {"compression": "gzip", "compression_opts": 4, "shuffle": True} if array.size else {}
     group.create_dataset(name, data=array, track_times=False, **packed).attrs["unit"] = unit
 
 

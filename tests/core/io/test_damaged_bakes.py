@@ -68,8 +68,6 @@ def test_the_damaged_file_is_named(bake):
 def test_other_programs_read_the_list_of_images(bake):
     images = [name for name, _ in read_checksums(bake / "pad" / IMAGE_LIST_NAME)]
     assert images == sorted(path.name for path in (bake / "pad").glob("*.exr")) != []
-    if shutil.which("sha256sum") is None:
-        pytest.skip("this system has no sha256sum")
     command = ["sha256sum", "--check", "--strict", IMAGE_LIST_NAME]
     done = subprocess.run(command, cwd=bake / "pad", capture_output=True, text=True)
     assert done.returncode == 0 and done.stdout.count("OK") == len(images)

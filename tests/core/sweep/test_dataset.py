@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -185,6 +188,21 @@ def test_a_file_of_the_users_in_the_dataset_is_named_and_stays(tmp_path):
     (study / "dataset" / "data" / "thesis.txt").write_text("mine")
     before = tree(study / "dataset")
     with pytest.raises(FileError, match=r"thesis.txt' was not written by `palpate sweep`.*move it away"):
+        published(study, [])
+    assert tree(study / "dataset") == before
+
+
+def test_a_dataset_that_cannot_take_its_place_leaves_the_earlier_one(tmp_path, monkeypatch):
+    study = published(new_study(tmp_path / "study"), loads(2))
+    before, rename = tree(study / "dataset"), os.rename
+
+    def refuse(source, target):
+        if Path(target) == study / "dataset" and Path(source).name != "earlier":
+            raise OSError(errno.EIO, "input/output error")
+        rename(source, target)
+
+    monkeypatch.setattr(os, "rename", refuse)
+    with pytest.raises(FileError, match="could not be written"):
         published(study, [])
     assert tree(study / "dataset") == before
 
