@@ -69,13 +69,14 @@ def test_progress_reaches_its_end(tmp_path):
     assert not session_state.session.suspension_depth
 
 
-def test_bake_is_grey_while_frames_are_computed_and_not_while_the_scene_is_read(monkeypatch):
-    """A panel that is drawn in a pause of reading is not drawn again after it: its button would stay grey."""
+def test_bake_and_compute_to_here_exclude_each_other(monkeypatch):
     press(frames=4)
-    with session_state.suspended():
-        assert bpy.ops.palpate.bake.poll()
+    assert bpy.ops.palpate.bake.poll()
     monkeypatch.setitem(session_state.session.jobs, "PALPATE_OT_bake", None)
     assert not bpy.ops.palpate.bake.poll() and not bpy.ops.palpate.catch_up.poll()
+    monkeypatch.delitem(session_state.session.jobs, "PALPATE_OT_bake")
+    monkeypatch.setattr(session_state.session, "catching_up", True)
+    assert not bpy.ops.palpate.bake.poll()
 
 
 @pytest.mark.parametrize("mode", ["XYZ", "ZXY", "QUATERNION", "AXIS_ANGLE"])
