@@ -54,11 +54,10 @@ def results_in(path: Path) -> list[dict]:
 
 
 def sure_names(result: Any) -> set[str]:
-    """Return the effects that a diagnosis names for sure, differences between recordings included."""
-    from palpate.core.gap.selection.confidence import SURE
+    """Return the effects that a diagnosis names for sure."""
+    from palpate.core.gap.selection.rule_numbers import SURE
 
-    between = [result.between] if result.between is not None else []
-    return {one.name for one in (*result.findings, *between) if one.confidence >= SURE}
+    return {one.name for one in result.findings if one.confidence >= SURE}
 
 
 def outcome(answer: list[str], sure: list[str], verdict: str, ambiguous: bool) -> str:

@@ -71,7 +71,7 @@ def _examined(kind: str, clock: str, number: int) -> tuple[str, bool]:
     said = outcome(case.answer, named, result.verdict, bool(result.ambiguous))
     before, after = errors.base["check"] or 0.0, errors.amended["check"] or 0.0
     words = [f"{one.name}/{one.form} {one.confidence}" for one in result.findings]
-    words += [f"{result.between.name} between {result.between.confidence}"] if result.between is not None else []
+    words += [f"recordings differ {result.between.confidence}"] if result.between is not None else []
     line = (
         f"{kind} {clock} {number}: {said}: {', '.join(words) or 'nothing'}; {result.verdict}; check {before:.4f} to {after:.4f}"
     )

@@ -54,12 +54,9 @@ FEATURES = {
 }
 """Features of recordings by which an effect is known. Recordings without them do not identify it, however well it fits."""
 FAMILIES = {
-    "spreading": "passes a part of a texel's load on to its neighbours, in a pattern that each sensor has of its own",
     "nonlinear": "bends the curve of reading over load",
     "loop": "opens a loop between loading and unloading at any speed; the loading curve of the loop is bent as well",
     "late": "answers late, so that it lowers the unloading curve of a single cycle",
-    "moving": "lets a reading move while nothing else does",
-    "losing": "loses force with what was pressed; how fast the loss dies away is a matter of the formula",
 }
 """Families of effects that resemble each other, so that a better fit says little which of them acts."""
 
@@ -85,8 +82,6 @@ NEEDS = {
     "axes": "the same, with a number of channels that is a multiple of three",
 }
 """Contents of recordings without which an effect, or a form of it, is no candidate."""
-GAIN_FALLS_WITH = {"use": "what the sensor was pressed", "clock": "the time"}
-"""With what the gain falls from recording to recording."""
 DRAWINGS = {
     "time": "reading over time, for a course of depths",
     "depth": "force over depth, for a course of depths",
@@ -259,6 +254,9 @@ class Form:
         Parameter of the base model that does the same; the form is no candidate where that is free.
     needs : str
         What recordings must hold for this form, one of :data:`NEEDS`, if it differs from the kind's.
+    error : float or None
+        φ of a form that is free to follow any law of its kind: the share of the mean square of the kind's change that it leaves
+        of other laws, measured on laws that the library does not have. None for formulas of textbooks.
     """
 
     name: str
@@ -283,6 +281,7 @@ class Form:
     over_within: dict[str, float] = field(default_factory=dict)
     same_as: str = ""
     needs: str = ""
+    error: float | None = None
 
     @cached_property
     def mechanism(self) -> str:
@@ -331,9 +330,6 @@ class Kind:
         What recordings must hold, one of :data:`NEEDS`; empty if nothing more is asked.
     known_parameters : tuple of str
         Parameters that a fit leaves at their neutral values, because the recordings hold them.
-    gain_falls_with : str
-        With what it lowers the gain from recording to recording, one of :data:`GAIN_FALLS_WITH`; at most one
-        kind for each. Empty if it does not, or not alone.
     """
 
     name: str
@@ -351,7 +347,6 @@ class Kind:
     signature: str = ""
     needs: str = ""
     known_parameters: tuple[str, ...] = ()
-    gain_falls_with: str = ""
 
     def __post_init__(self) -> None:
         stated = (
@@ -360,7 +355,6 @@ class Kind:
             ("found_by", (self.found_by,), FOUND_BY),
             ("signature", (self.signature,), SIGNATURES),
             ("needs", (self.needs, *(form.needs for form in self.forms)), NEEDS),
-            ("gain_falls_with", (self.gain_falls_with,), GAIN_FALLS_WITH),
             ("drawing", (self.drawing.over,), DRAWINGS),
         )
         for attribute, words, known in stated:

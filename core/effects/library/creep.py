@@ -136,6 +136,7 @@ KIND = Kind(
             law=settling,
             constants=_constants(prony, -1.0),
             state_size=3,
+            error=0.005,  # of the other forms that relax it leaves 0.0034 at most
         ),
         Form(
             "logarithmic",
@@ -184,5 +185,5 @@ KIND = Kind(
     ),
     experiment="hold one depth for at least a minute, then release and wait as long",
     known_from=("timing",),
-    families=("late", "moving"),
+    families=("late",),
 )

@@ -63,6 +63,7 @@ KIND = Kind(
             (_DEAD,),
             neutral={"dead": 0.0},
             memoryless=listed,
+            error=0.005,  # every texel that is silent is one of these
         ),
         Form(
             "held",

@@ -26,6 +26,17 @@ def step(signal: np.ndarray, time: np.ndarray, values: Values, transducers: Tran
     return np.where(np.abs(signal) > scalar(values, "threshold"), signal, 0.0)
 
 
+def knee(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Grow with a power at first; under large loads the threshold is subtracted. A large exponent is a sharp knee."""
+    threshold, sharpness = scalar(values, "threshold"), scalar(values, "sharpness")
+    if threshold == 0.0:
+        return signal
+    ratio = np.abs(signal) / threshold
+    larger = np.maximum(ratio, 1.0)
+    grown = larger * ((ratio / larger) ** sharpness + larger**-sharpness) ** (1.0 / sharpness)
+    return np.sign(signal) * threshold * (grown - 1.0)
+
+
 _THRESHOLD = Parameter("threshold", "N", 0.01, 0.0, 100.0, "Largest force T that is not measured.")
 
 
@@ -51,6 +62,21 @@ KIND = Kind(
             (_THRESHOLD,),
             neutral={"threshold": 0.0},
             memoryless=soft,
+        ),
+        Form(
+            "knee",
+            "r = (fᵖ + Tᵖ)^(1/p) − T",
+            "Tao and Kokotović, Adaptive Control of Systems with Actuator and Sensor Nonlinearities (1996), section 2.1, with "
+            "a rounded corner",
+            (
+                _THRESHOLD,
+                Parameter(
+                    "sharpness", "1", 3.0, 1.2, 20.0, "Exponent p: 2 is a hyperbola, a large one a sharp knee.", log=True
+                ),
+            ),
+            neutral={"threshold": 0.0},
+            memoryless=knee,
+            error=0.005,  # of hard and soft it leaves 0.0002 at most
         ),
         Form(
             "step",

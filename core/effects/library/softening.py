@@ -114,6 +114,5 @@ KIND = Kind(
         values={"peak": {"depth": 0.001}},
     ),
     known_from=("unloading", "cycles"),
-    families=("losing",),
     signature="end",
 )

@@ -135,6 +135,4 @@ KIND = Kind(
     experiment="repeat one cycle several hundred times on the same texels",
     drawing=Drawing("pressings", values={"archard": {"rate": 2e-4}, "work": {"life": 5.0}}),
     known_from=("unloading", "cycles"),
-    families=("losing",),
-    gain_falls_with="use",
 )

@@ -193,8 +193,6 @@ def check_free_heights(trials: Sequence[Trial], path: Path) -> None:
 
 ONE_CLOCK = "one clock"
 """Name of the session of recordings whose time stamps go on."""
-COMMON = "all recordings"
-"""Name of what all recordings share; of a session that no rig names, because nothing says how long its pauses were."""
 UNKNOWN_PAUSE = 1.0
 """Seconds between two recordings of a session if nothing says how long the pause was."""
 LONGEST_TIME = 1e10

@@ -5,9 +5,8 @@ The fit takes Levenberg–Marquardt steps on normal equations that are summed pe
 own texel only. Its column of the Jacobian therefore costs one evaluation for all texels together, and its block of the
 equations is block-diagonal: the common parameters are solved for first (Schur complement).
 
-For cross-validation a trial is left out by taking its equations out of the sum. One Newton step from the common fit gives the
-fit without that trial (Beirami et al., "On optimal generalizability in parametric learning", NeurIPS 2017), and only the trial
-left out has to be predicted again.
+For cross-validation stretches are left out by taking their equations out of the sum. One Newton step from the common fit gives
+the fit without them (Beirami et al., "On optimal generalizability in parametric learning", NeurIPS 2017).
 """
 
 from __future__ import annotations
@@ -482,9 +481,16 @@ def summed_equations(sums: Sequence[NormalEquations]) -> NormalEquations:
 
 
 def _reduced_equations(
-    sums: Sequence[NormalEquations], free: tuple[FreeParameter, ...], at: list[np.ndarray], damping: float
+    sums: Sequence[NormalEquations],
+    free: tuple[FreeParameter, ...],
+    at: list[np.ndarray],
+    damping: float,
+    held: np.ndarray | None = None,
 ) -> tuple[np.ndarray, ...]:
     """Eliminate the parameters of single texels from damped normal equations (Schur complement).
+
+    With `held`, (n, m) bool, those of some texels keep their values, and the prior of the others is about where they are:
+    what a part of the trials says nothing about stays as the whole of them and the prior have it.
 
     Returns the matrix (p, p) and right-hand side (p,) of the common parameters. Of the parameters of single texels it returns
     how they follow the common ones (n, m, p), and their step if these stay (n, m).
@@ -497,11 +503,15 @@ def _reduced_equations(
     loads = np.einsum("nmm->nm", t.texel)
     local = [(item, x) for item, x in zip(free, at, strict=True) if item.per_texel]
     h = t.texel_gradient - TEXEL_PRECISION * np.stack([x - item.to_coordinate(item.resting_value) for item, x in local], axis=1)
-    c = t.texel + np.einsum("nm,mk->nmk", damping * loads + TEXEL_PRECISION, np.eye(m))
-    follow, alone = np.linalg.solve(c, t.coupling), np.linalg.solve(c, h[:, :, None])[:, :, 0]
+    c, coupling = t.texel + np.einsum("nm,mk->nmk", damping * loads + TEXEL_PRECISION, np.eye(m)), t.coupling
+    if held is not None:
+        moves = ~held
+        h, coupling = t.texel_gradient * moves, coupling * moves[:, :, None]
+        c = np.where(moves[:, :, None] & moves[:, None], c, np.eye(m))
+    follow, alone = np.linalg.solve(c, coupling), np.linalg.solve(c, h[:, :, None])[:, :, 0]
     return (
-        a - np.einsum("nmp,nmq->pq", t.coupling, follow),
-        t.common_gradient - np.einsum("nmp,nm->p", t.coupling, alone),
+        a - np.einsum("nmp,nmq->pq", coupling, follow),
+        t.common_gradient - np.einsum("nmp,nm->p", coupling, alone),
         follow,
         alone,
     )
@@ -512,18 +522,19 @@ def _solved_step(
     free: tuple[FreeParameter, ...],
     at: list[np.ndarray],
     damping: float,
-    known: np.ndarray | None = None,
+    whole: NormalEquations | None = None,
 ) -> list[np.ndarray]:
     """Solve damped normal equations; a step for each free parameter, in its coordinate.
 
-    With `known` (p, p), the matrix of all trials, there is no step in directions about which these equations have too little
-    information.
+    With the equations of the `whole` of the trials there is no step in directions, and of parameters of single texels, about
+    which these equations have too little information.
     """
-    a, rhs, follow, alone = _reduced_equations(sums, free, at, damping)
-    if known is None:
+    held = None if whole is None else _texel_information(sums) <= LEAST_INFORMATION * _texel_information([whole])
+    a, rhs, follow, alone = _reduced_equations(sums, free, at, damping, held)
+    if whole is None:
         common = np.linalg.lstsq(a, rhs, rcond=1e-13)[0]
     else:
-        share, along = _information_shares(a, known)
+        share, along = _information_shares(a, _reduced_equations([whole], free, at, 0.0, held)[0])
         weight = np.where(share > LEAST_INFORMATION, 1.0 / np.maximum(share, LEAST_INFORMATION), 0.0)
         common = along @ (weight * (along.T @ rhs))
     own = alone - follow @ common
@@ -539,6 +550,12 @@ def _solved_step(
     return step
 
 
+def _texel_information(sums: Sequence[NormalEquations]) -> np.ndarray:
+    """Information about each parameter of each texel, (n, m) float."""
+    found: np.ndarray = np.einsum("nmm->nm", sum(one.texel for one in sums))
+    return found
+
+
 def _information_shares(a: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Share of the information of all trials, `known`, that `a` has in each of p directions, and the directions as columns.
 
@@ -549,55 +566,53 @@ def _information_shares(a: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, n
     return share, inverse.T @ turned
 
 
-def held_out_squares(views: Sequence[TrialView], found: Fit) -> np.ndarray:
-    """Return the sum of squares of each trial, of readings and of forces, under fits that have not seen it, (trials, 2) float.
+def cross_fitted(found: Fit, views: Sequence[TrialView], seen: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Return residuals of every stretch under a fit that has not seen it: of two folds of alternating ones, that to the other.
 
-    Whole trials are left out one after the other. If the other trials have too little information about a parameter (about
-    friction if only one trial slides, or about single texels), or if there is only one trial, stretches of a trial are left out
-    instead. Parameters about which the rest still has too little information keep their values. If the Newton step does not
-    even fit the rest better, it is shortened, at last to nothing.
+    Parameters about which a fold has too little information keep their values. If the Newton step does not even fit the other
+    fold better, it is shortened, at last to nothing.
+
+    Parameters
+    ----------
+    found : Fit
+        With equations.
+    views : sequence of TrialView
+        To which it was fitted.
+    seen : sequence of (T, c + 3) float
+        Its residuals.
     """
-    if found.equations is None:
-        return found.sse.copy()
+    if found.equations is None or not found.free:
+        return list(seen)
     free, at = found.free, [item.to_coordinate(value_of(found.model, item)) for item in found.free]
-    known, *_ = _reduced_equations(all_equations(found.equations), free, at, 0.0)
-    local = any(item.per_texel for item in free)
-    errors = np.zeros((len(views), 2))
-    for left, view in enumerate(views):
-        others = [one for i, trial in enumerate(found.equations) for one in trial if i != left]
-        whole = (
-            bool(others)
-            and not local
-            and _information_shares(_reduced_equations(others, free, at, 0.0)[0], known)[0].min(initial=1.0) > LEAST_INFORMATION
-        )
-        for parts in [list(range(view.stretch_count))] if whole else [[part] for part in range(view.stretch_count)]:
-            errors[left] += _squares_left_out(views, found, left, parts, known)
-    return errors
+    whole_sum = summed_equations(all_equations(found.equations))
+    out = [residual.copy() for residual in seen]
+    for fold in (0, 1):
+        sums = [one for trial in found.equations for i, one in enumerate(trial) if i % 2 != fold]
+        before = sum(one.sse for one in sums) + _prior_penalty(free, at)
+        tried, damping = list(seen), 1e-6
+        for _ in range(3):
+            moved = _point_after(at, free, _solved_step(sums, free, at, damping, whole_sum))
+            model = with_values(found.model, free, [item.from_coordinate(x) for item, x in zip(free, moved, strict=True)])
+            residuals = [view.residual(model) for view in views]
+            if _squares_of_fold(views, residuals, 1 - fold) + _prior_penalty(free, moved) <= before * (1.0 + 1e-9):
+                tried = residuals
+                break
+            damping = max(1e-2, 30.0 * damping)
+        for view, r, whole in zip(views, tried, out, strict=True):
+            for i, part in enumerate(view.stretches(r)):
+                if i % 2 == fold:
+                    whole[part] = r[part]
+    return out
 
 
-def _squares_left_out(views: Sequence[TrialView], found: Fit, left: int, parts: list[int], known: np.ndarray) -> np.ndarray:
-    """Sum of squares of some stretches of one trial under the fit to everything else, (2,) float."""
-    assert found.equations is not None
-    free, at = found.free, [item.to_coordinate(value_of(found.model, item)) for item in found.free]
-
-    def of_left(residual: np.ndarray) -> np.ndarray:
-        rows = views[left].stretches(residual)
-        squares: np.ndarray = np.sum([views[left].squares(residual[rows[part]]) for part in parts], axis=0)
-        return squares
-
-    sums = [one for i, trial in enumerate(found.equations) for j, one in enumerate(trial) if i != left or j not in parts]
-    if not sums:
-        return of_left(views[left].residual(found.model))
-    before, damping = sum(one.sse for one in sums) + _prior_penalty(free, at), 1e-6
-    for _ in range(3):
-        moved = _point_after(at, free, _solved_step(sums, free, at, damping, known))
-        tried = with_values(found.model, free, [item.from_coordinate(x) for item, x in zip(free, moved, strict=True)])
-        residuals = [view.residual(tried) for view in views]
-        own = of_left(residuals[left])
-        if sum(map(_sum_of_squares, residuals)) - own.sum() + _prior_penalty(free, moved) <= before * (1.0 + 1e-9):
-            return own
-        damping = max(1e-2, 30.0 * damping)
-    return of_left(views[left].residual(found.model))
+def _squares_of_fold(views: Sequence[TrialView], residuals: Sequence[np.ndarray], fold: int) -> float:
+    """Sum of squares of every other stretch, beginning with the first or the second."""
+    return sum(
+        _sum_of_squares(r[part])
+        for view, r in zip(views, residuals, strict=True)
+        for i, part in enumerate(view.stretches(r))
+        if i % 2 == fold
+    )
 
 
 def _sum_of_squares(residual: np.ndarray) -> float:

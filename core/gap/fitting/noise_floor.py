@@ -377,25 +377,6 @@ def with_repeats(noise: ChannelNoise, predictors: Sequence[Predictor], part: str
     return ChannelNoise(deviation, integral_time([curve]), MEASURED_REPEATS)
 
 
-def is_scatter_of_repeats(noise: Sequence[ChannelNoise], sse: np.ndarray, count: np.ndarray) -> bool:
-    """Return whether a fit leaves no more than measured repeats differ by.
-
-    Structure is then no evidence of an effect: what shifts or scales a whole recording is shared by its texels and samples, and
-    stretches that are left out of a fit differ from the others by it.
-
-    Parameters
-    ----------
-    noise : pair of ChannelNoise
-        Of readings and of net forces.
-    sse, count : (trials, 2) float
-        Sum of squares of the residual of each recording, in units of the noise's variance, and number of its values.
-    """
-    values = count.sum(axis=0)
-    main = int(np.argmax(values > 0))  # readings if there are any
-    mean = sse.sum(axis=0) / np.maximum(values, 1.0)
-    return noise[main].source == MEASURED_REPEATS and bool((mean[values > 0] < MOST_SQUARE).all())
-
-
 def _scatter(members: Sequence[Predictor], part: str, name: str) -> np.ndarray:
     """Differences of repeats from their mean at equal times, scaled to the deviation of one recording, (members, T, c)."""
     first = members[0]

@@ -345,10 +345,10 @@ class Predictor:
             if trial.reading is not None:
                 rest = 0.0 if trial.tared else model.parameters.zero
                 measured = trial.reading if subset is None else trial.reading[:, subset]
-                factor, zero = self._numbers(model, reading - rest, measured - rest)
+                factor, zero = self.numbers(model, reading - rest, measured - rest)
                 reading = rest + zero + factor * (reading - rest)
             elif force is not None and trial.force is not None:
-                force = self._numbers(model, force, trial.force)[0] * force
+                force = self.numbers(model, force, trial.force)[0] * force
         if force is not None:
             force = self._with_force_zero(model, force)
         return Prediction(reading, force)
@@ -366,8 +366,8 @@ class Predictor:
                     given[i] = float((measured[good, i] - force[good, i]).mean())
         return force + np.array([0.0 if value is None else value for value in given])
 
-    def _numbers(self, model: Model, predicted: np.ndarray, measured: np.ndarray) -> tuple[float, float]:
-        """Factor and zero of the recording.
+    def numbers(self, model: Model, predicted: np.ndarray, measured: np.ndarray) -> tuple[float, float]:
+        """Return factor and zero of the recording.
 
         Free numbers that the model does not have are those of a specimen of which no recording was fitted. They are computed
         from the recording itself, by least squares.

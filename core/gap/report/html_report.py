@@ -24,7 +24,7 @@ TEMPLATE = Path(__file__).parent / "templates" / "report.html"
 
 CLOSED_FROM = 0.2
 """A closed share is shown if the gap, noise removed, is at least this share of the noise floor. Which effects join is decided
-in :mod:`..selection.forward_selection`."""
+in :mod:`..selection.search`."""
 AS_MUCH = 1.05
 """Up to this ratio the next best effect leaves "as much"."""
 WHITE_MEMORY = 1.5

@@ -9,11 +9,10 @@ from ..dataset.trial import FAULT_KINDS
 from ..fitting.intervals import ParameterInterval
 from ..fitting.residual_tests import LEAST_STRUCTURE
 from ..forward.contact_phases import FEATURES
-from ..selection.check_recordings import CHECK_CLOSED
-from ..selection.confidence import SURE
 from ..selection.findings import Diagnosis, Finding
-from ..selection.gap_sizes import FORCES, READINGS, friction_kinds
 from ..selection.identifiability import LEAST_CYCLES
+from ..selection.quantities import FORCES, READINGS, friction_kinds
+from ..selection.rule_numbers import SURE
 from ..selection.silenced_texels import silenced_texels
 from .comparison import LEAST_GAIN, LEAST_LEVEL, GapErrors, nrmse, recording_differences
 
@@ -110,12 +109,6 @@ MANY_FLOORS = 3.0
 LEAST_SHARE = 0.01
 """Smallest share of the residual that a quantity must predict to be named."""
 ASSUMED_SESSION = "If they were recorded in another order or with pauses that matter, name their session and its times."
-NO_WEAR = " All texels change alike, whatever their load: this is not wear of single texels."
-NOT_TOLD = (
-    "The gains fall, and the recordings do not show whether with the accumulated load or with time: name their session and "
-    "when they started, and load the sensor far more in some recordings than in others."
-)
-CHANGED_ONCE = "Check what was done to the sensor or its electronics before."
 FRICTION_MATTERS = 1.5
 """The headline mentions the base model's friction if without it the error would be at least this many times as large."""
 
@@ -138,17 +131,9 @@ def _outcome(result: Diagnosis, errors: GapErrors) -> str:
     if result.between is None:
         return _effects(result, errors)
     own, after = result.between, errors.amended["fit"] or 0.0
-    shrinks = f"the error shrinks from {own.before:.2%} to {after:.2%} of the range"
-    if own.changed_from:
-        said = f"Between recordings the gain changes once, by {own.change_of_gain:+.0%} from '{own.changed_from}' on"
-        said += f" ({shrinks}). {CHANGED_ONCE}"
-    elif own.rival:
-        said = f"Indistinguishable between recordings (each with its own level and gain): {own.name} or {own.rival}"
-        said += f" ({shrinks}). {NOT_TOLD}"
-    else:
-        said = f"Missing: {own.name} between recordings (each with its own level and gain); {shrinks}."
-        said += f"{NO_WEAR if own.evidence else ''}{_odd_one(result)} Name their session to learn more."
-    return f"{said} Also: {_effects(result, errors)}" if result.findings else said
+    said = f"Recordings differ by a gain and a level of their own; the error shrinks from {own.before:.2%} to {after:.2%} "
+    said += f"of the range.{_odd_one(result)} Name their session to learn more."
+    return f"{said} Also: {_effects(result, errors)}" if result.findings or result.verdict == "unexplained" else said
 
 
 def _odd_one(result: Diagnosis) -> str:
@@ -171,14 +156,14 @@ def _effects(result: Diagnosis, errors: GapErrors) -> str:
     sure = [one for one in findings if one.confidence >= SURE]
     if result.verdict == "no gap":
         return f"No gap: the base model with its own parameters refitted leaves {before:.2%} of the range, which is noise."
-    if result.verdict == "unexplained":
-        return _unexplained(result, errors, sure)
     shrink = f"the error shrinks from {before:.2%} to {after:.2%} of the range{_closed_of_forces(result)}"
     stays = _what_stays(result, errors)
     with_rivals = {names[0]: " or ".join(names) for names in result.ambiguous}
-    if not sure and findings and all(one.name in with_rivals for one in findings):
+    if not sure and findings and all(one.name in with_rivals for one in findings) and not result.check.is_refuted:
         choices = "; ".join(with_rivals[one.name] for one in findings)
         return f"Indistinguishable in these recordings: {choices} ({shrink}).{stays}"
+    if result.verdict == "unexplained":
+        return _unexplained(result, errors, sure)
     unsure = _listed([with_rivals.get(one.name, one.name) for one in findings if one not in sure])
     open_names = " (indistinguishable)" if with_rivals else ""
     if not sure:
@@ -221,14 +206,7 @@ def check_failure(result: Diagnosis) -> str:
     quantity = next(q for q in (READINGS, FORCES) if result.check.refutes(q) and worst.count[q])
     before, after = ((float(x[quantity]) ** 0.5) * _noise_share(result, quantity) for x in (worst.before, worst.after))
     what = "" if quantity == READINGS else " of the net force"
-    if worst.is_worse(quantity):
-        said = f"in the check recording '{worst.name}' the error{what} rises from {before:.2%} to {after:.2%} of the range"
-    else:
-        share = max(result.check.closed[quantity] or 0.0, 0.0)
-        said = (
-            f"in the check recordings only {share:.0%} of the squared gap{what} closes (at least {CHECK_CLOSED:.0%} is "
-            f"required), in '{worst.name}' from {before:.2%} to {after:.2%} of the range"
-        )
+    said = f"in the check recording '{worst.name}' the error{what} rises from {before:.2%} to {after:.2%} of the range"
     return f"{said}; {'; '.join(recording_differences(result, worst.name))}"
 
 
@@ -256,14 +234,6 @@ def _unexplained(result: Diagnosis, errors: GapErrors, sure: list[Finding]) -> s
         fitted = _listed([one.name for one in by_share_closed(result)])
         many = len(result.findings) > 1
         return f"Unexplained: {fitted} {'fit' if many else 'fits'} the fitted recordings, but {failure}.{part}"
-    is_quiet = result.structure.total < LEAST_STRUCTURE and result.line is None
-    if result.unlike_fitted and not result.findings and is_quiet:
-        apart = max(result.unlike_fitted, key=lambda one: float(one.before.max())).name
-        left, other = errors.base["fit"] or 0.0, errors.base["check"] or 0.0
-        return (
-            f"Unexplained: the base model fits the fitted recordings ({left:.2%} of the range) and not the check recording "
-            f"'{apart}' (all of them: {other:.2%}); {'; '.join(recording_differences(result, apart))}."
-        )
     if result.line is not None:
         line, unit = result.line, result.rig.parameters.unit
         said = f"a line at {line.frequency:.3g} Hz of {line.amplitude:.3g} {unit}, also present without load"
@@ -340,11 +310,6 @@ def noise_sentence(share: float, left: float | None) -> str:
 def warnings(result: Diagnosis) -> list[str]:
     """Return warnings about the recordings, without those of the rig."""
     said = [fault.sentence for fault in result.faults] + [text for text in (caution(result),) if text]
-    for one in result.outlying:
-        said.append(
-            f"Texel {one.texel} of the check recording '{one.recording}' has {one.times:.0f} times the squared error of any "
-            "texel in the fitted recordings, and the amended sensor leaves most of it: it counts in the errors only."
-        )
     for silenced in silenced_texels(result.predictors, result.base.model, result.noise[READINGS].deviation):
         said.append(
             f"Texel {silenced.texel} does not respond to load from {silenced.seconds:.3g} s of '{silenced.recording}' on: "

@@ -19,7 +19,7 @@ from ..forward.predictor import Model
 from ..planning.experiment_plan import PlannedExperiment, plan_after
 from ..selection.check_recordings import CheckedRecording
 from ..selection.findings import Diagnosis, Finding
-from ..selection.gap_sizes import FORCES, READINGS, friction_kinds
+from ..selection.quantities import FORCES, READINGS, friction_kinds
 from .amended_sensor import amended_sensor, with_mean_gain_moved
 from .comparison import USES, GapErrors, closed_share, error_location, gap_errors, recording_differences, recording_errors
 from .html_report import html_report
@@ -92,16 +92,13 @@ def _between(result: Diagnosis) -> dict[str, Any] | None:
     if own is None:
         return None
     return {
-        "effect": own.name,
-        "form": "between recordings",
+        "effect": None,
+        "form": "a factor and a zero of each recording",
         "factors": own.factors,
         "zeros": own.zeros,
         "closes": round(own.closes, 4),
         "gap_before": own.before,
         "confidence": own.confidence,
-        "evidence": own.evidence or None,
-        "rival": own.rival or None,
-        "changed_from": own.changed_from or None,
     }
 
 
@@ -132,11 +129,9 @@ def _checked(one: CheckedRecording, result: Diagnosis) -> dict[str, Any]:
         if one.count[quantity]:
             share = result.noise[quantity].deviation / result.full[quantity]
             errors[name] = [float(x[quantity]) ** 0.5 * share for x in (one.before, one.after)]
-    against = one.is_worse(READINGS) or one.is_worse(FORCES) or one is result.check.worst
+    against = one.is_worse(READINGS) or one.is_worse(FORCES)
     differs = recording_differences(result, one.name) if against and result.findings else []
-    outlying = [channel.texel for channel in result.outlying if channel.recording == one.name]
-    worse = one.is_worse(READINGS) or one.is_worse(FORCES)
-    return {"trial": one.name, "errors": errors, "worse": worse, "differs": differs, "outlying_texels": outlying}
+    return {"trial": one.name, "errors": errors, "worse": against, "differs": differs}
 
 
 def _found(one: Finding, model: Model, result: Diagnosis, errors: GapErrors) -> dict[str, Any]:

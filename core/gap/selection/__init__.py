@@ -1,19 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Forward selection of the effects that a base model misses, and the verdict on them.
+"""One rule names the effects that a base model misses.
 
-``diagnosis`` runs it all. Candidates are screened by score tests, fitted, and judged on stretches of the recordings that no fit
-has seen. ``findings`` holds the result.
+``diagnosis`` shows the whole road. ``search`` tries sets of effects, ``score`` weighs them by what they leave on stretches of
+the recordings that no fit has seen, ``verdict`` names them; the rule's numbers stand in ``rule_numbers``. ``findings`` holds
+the result.
 """
 
 __all__ = [
     "base_model",
     "candidates",
     "check_recordings",
-    "confidence",
     "diagnosis",
     "findings",
-    "gap_sizes",
     "identifiability",
+    "quantities",
+    "rule_numbers",
     "silenced_texels",
     "unfitted",
 ]

@@ -15,7 +15,6 @@ from ...errors import EffectError
 from ...geometry.grid_layout import GridLayout
 from ...model.parameter import Parameter
 from ...model.sensor import Effect
-from ..dataset.trial import COMMON
 from ..fitting.least_squares import Fit, FreeParameter, value_of
 from ..fitting.noise_floor import coverage
 from ..forward.predictor import Model, Predictor
@@ -254,33 +253,12 @@ def _halton_points(dimensions: int, count: int) -> np.ndarray:
     return points
 
 
-@dataclass
+@dataclass(frozen=True)
 class FittedCandidate:
-    """A candidate that was fitted on top of a model.
-
-    Attributes
-    ----------
-    candidate : Candidate
-    fit : Fit
-    held_out : (trials, 2) float
-        Sum of squares of each trial, of readings and of forces, under fits that have not seen it, in units of the noise.
-    """
+    """A candidate that was fitted on top of a model: the last effect of `fit`."""
 
     candidate: Candidate
     fit: Fit
-    held_out: np.ndarray
-
-    @property
-    def mean(self) -> float:
-        """Mean square on unseen stretches."""
-        return float(self.held_out.sum() / self.fit.count.sum())
-
-    @property
-    def parameter_count(self) -> int:
-        """Number of parameters of the candidate."""
-        n = len(self.fit.model.effects)
-        values = self.fit.model.effects[n - 1].values
-        return sum(len(v) if isinstance(v, tuple) else 1 for v in values.values())
 
 
 def parameters_at_bounds(model: Model, free: Sequence[FreeParameter], index: int) -> dict[str, float]:
@@ -316,7 +294,7 @@ def parameters_at_bounds(model: Model, free: Sequence[FreeParameter], index: int
 def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]:
     """Return the candidates that could show in these recordings at all.
 
-    A gain that changes by itself is a warm-up where a session says how the time went on from recording to recording. Elsewhere
+    A gain that changes by itself is a warm-up in a session, in which the time goes on from recording to recording. Elsewhere
     each recording begins with an untouched sensor, and such a gain is a form of drift.
     """
     posed = any(p.trial.stimulus == "pose" for p in predictors)
@@ -326,7 +304,7 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
     in_rows = isinstance(predictors[0].rig.texels.layout, GridLayout)
     loaded = all(p.trial.stimulus == "force" for p in predictors)
     cannot = unidentifiable(coverage(predictors))
-    on_clock = all(p.session is not None and p.trial.session != COMMON for p in predictors)
+    on_clock = all(p.session is not None for p in predictors)
     warmed = _warmth(predictors) >= LEAST_WARMTH
     heights_open = all(isinstance(p.trial.contact_height, str) for p in predictors if p.trial.stimulus == "pose")
     signed = has_signed_channels(predictors, model)
@@ -359,6 +337,12 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
                 continue
             found.append(one)
     return found
+
+
+def is_free_already(candidate: Candidate, free: Sequence[FreeParameter]) -> bool:
+    """Return whether the base model has a candidate as a free parameter: a common offset is its `zero`."""
+    same = candidate.form.same_as
+    return bool(same) and any(item.effect < 0 and item.name == same for item in free)
 
 
 def has_signed_channels(predictors: Sequence[Predictor], model: Model) -> bool:

@@ -13,7 +13,6 @@ from ..fitting.least_squares import TrialView
 from ..forward.contact_phases import relative_load
 from ..forward.predictor import Model
 from .candidates import Candidate
-from .changing_readings import moving_readings
 from .companded_steps import CHARACTERISTIC_NOISE, LEAST_CHARACTERISTIC, companded_steps
 
 MOST_LEVELS = 48
@@ -206,12 +205,6 @@ def _nearest_lattice(lattice: np.ndarray, above: np.ndarray) -> tuple[float, int
     scale = lattice @ above / (lattice * lattice).sum(axis=1)
     best = int(np.argmin(((above - scale[:, None] * lattice) ** 2).sum(axis=1)))
     return float(scale[best]), best
-
-
-def coarsest_step(views: Sequence[TrialView], model: Model) -> float:
-    """Return the largest quantization step, in the sensor's unit; 0 if none is seen."""
-    levels = few_levels(moving_readings(views, model))
-    return 0.0 if levels is None else float(np.diff(levels).max())
 
 
 def unloaded_reading(views: Sequence[TrialView]) -> float:

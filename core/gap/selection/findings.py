@@ -14,10 +14,9 @@ from ..fitting.least_squares import Fit
 from ..fitting.noise_floor import ChannelNoise, Coverage
 from ..fitting.residual_tests import ResidualStructure, SpectralLine
 from ..forward.predictor import Model, Predictor
-from .between_recordings import LOAD_HISTORY, RecordingDifferences
 from .candidates import Scales
-from .check_recordings import CheckedRecording, CheckOutcome
-from .outlying_channels import OutlyingChannel
+from .check_recordings import CheckOutcome
+from .recording_differences import RecordingDifferences
 
 
 @dataclass(frozen=True)
@@ -33,15 +32,15 @@ class Finding:
     confidence : float
         Between 0 and 1.
     rivals : tuple of str
-        Other kinds of effects that explain the recordings as well.
+        Other kinds of effects that explain the recordings as well in its place.
     next_best : str
         The other kind that came nearest to this one; empty if none was fitted.
     leaves : float
         How many times as much of the gap `next_best` leaves.
     closes : float
-        Share of the whole gap that it closed when it joined.
+        Share of the whole gap that is open without it.
     unsettled : tuple of str
-        What is wrong with its parameters, in words: those at a bound, and those that the recordings leave open.
+        What is wrong with its parameters, in words: those at a bound.
     doubts : tuple of str
         Why else its name is not sure, in words; rivals and `unsettled` say their own.
     """
@@ -118,19 +117,15 @@ class Diagnosis:
     faults : list of DataFault
         Faults of the data, whether they were put right or not.
     between : RecordingDifferences or None
-        Levels and gains by which the recordings differ, if the search was better with them; they are part of both models.
+        Levels and gains by which the recordings differ, if the rule chose them; they are part of both models.
     alike : Diagnosis or None
         The same recordings without levels and gains of their own, if `between` is given: what the gap was before them.
     assumed_session : bool
         True if the recordings, of which the rig names no session, are explained as one session in their order.
     check : CheckOutcome
-        What the check recordings say of the amended model, or of the base model if there are no effects.
-    outlying : list of OutlyingChannel
-        Channels of check recordings that jump: they do not count against the amended model.
+        How the amended model does in each check recording.
     closed : ClosedShares
         How much of the gaps the amended model closes.
-    unlike_fitted : list of CheckedRecording
-        Check recordings that the base model fits far worse than the fitted ones.
     """
 
     rig: Rig
@@ -155,14 +150,12 @@ class Diagnosis:
     alike: Diagnosis | None = None
     assumed_session: bool = False
     check: CheckOutcome = field(default_factory=CheckOutcome)
-    outlying: list[OutlyingChannel] = field(default_factory=list)
     closed: ClosedShares = field(default_factory=ClosedShares)
-    unlike_fitted: list[CheckedRecording] = field(default_factory=list)
 
     @property
     def carried_over(self) -> Finding | None:
-        """States that go on from recording to recording in an assumed session; None without one."""
-        return next((one for one in self.findings if self.assumed_session and one.name in LOAD_HISTORY), None)
+        """What goes on from recording to recording in an assumed session; None without one."""
+        return next(iter(self.findings), None) if self.assumed_session else None
 
     @property
     def misleading_faults(self) -> list[DataFault]:

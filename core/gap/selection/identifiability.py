@@ -3,16 +3,13 @@
 fitted.
 
 Each effect shows in one feature of the recordings, its signature: hysteresis, for example, in readings that differ after
-unloading. Recordings without this feature do not identify the effect, however well its formula fits. Four functions tell
-this, from the strictest to the mildest:
+unloading. Recordings without this feature do not identify the effect, however well its formula fits. Two functions say this:
 
 ============================  =================================================  ==========================================
 function                      what the recordings lack                           what follows
 ============================  =================================================  ==========================================
 `unidentifiable`              the signature of the effect                        the effect is no candidate
-`confounded`                  anything that separates time from depth            the effect does not join a nonlinear spring
 `indistinguishable`           what separates the effect from certain others      these are rivals, however well each fits
-`hardly_distinguishable`      a clear difference from certain others             these are rivals unless they fit far worse
 ============================  =================================================  ==========================================
 """
 
@@ -31,8 +28,7 @@ KNOWN_FROM_UNLOADING, KNOWN_FROM_TIMING = names_known_from("unloading"), names_k
 KNOWN_FROM_REST, KNOWN_FROM_PLACES = names_known_from("rest"), names_known_from("places")
 KNOWN_FROM_CYCLES = names_known_from("cycles")
 """Effects that are known from a feature of recordings (see :data:`...effects.engine.specification.FEATURES`)."""
-SPREADING, NONLINEAR, LOSING = names_in_family("spreading"), names_in_family("nonlinear"), names_in_family("losing")
-MOVING_BY_THEMSELVES, LATE, LOOPS = names_in_family("moving"), names_in_family("late"), names_in_family("loop")
+NONLINEAR, LATE, LOOPS = names_in_family("nonlinear"), names_in_family("late"), names_in_family("loop")
 """Effects that resemble each other (see :data:`...effects.engine.specification.FAMILIES`)."""
 SINGLE_SPEED_RATIO = 1.5
 """Ratio of fast to slow loading below which all loading was at one speed."""
@@ -61,17 +57,6 @@ def unidentifiable(coverage: Coverage) -> dict[str, str]:
     return said
 
 
-def confounded(coverage: Coverage) -> tuple[str, ...]:
-    """Return the kinds that recordings cannot distinguish from a nonlinear spring.
-
-    If the load only grew, at one speed and without a hold, time and depth are proportional. A bent curve may then come from an
-    effect of time or from a nonlinear spring. The spring is the simpler explanation: effects of time are its rivals, and are
-    not added to a model that has it.
-    """
-    one = not coverage.unloading and coverage.speed_ratio < SINGLE_SPEED_RATIO and coverage.longest_hold == 0.0
-    return KNOWN_FROM_TIMING if one else ()
-
-
 def indistinguishable(coverage: Coverage, name: str, curvature: float = np.inf) -> tuple[str, ...]:
     """Return the kinds that recordings cannot distinguish from one of this name, however much better one of them fits.
 
@@ -87,22 +72,16 @@ def indistinguishable(coverage: Coverage, name: str, curvature: float = np.inf) 
     groups: list[tuple[str, ...]] = []
     if not coverage.unloading and name in NONLINEAR and curvature < LOOP_CURVATURE:
         groups.append((name, *LOOPS))
+    if not coverage.unloading and coverage.speed_ratio < SINGLE_SPEED_RATIO and coverage.longest_hold == 0.0:
+        groups.append(
+            (*(NONLINEAR if name not in NONLINEAR else (name,)), *KNOWN_FROM_TIMING)
+        )  # time and depth are proportional
     if not coverage.load_moves:
         groups.append(KNOWN_FROM_PLACES)
     if coverage.unloading and coverage.cycles < LEAST_CYCLES:
         still = coverage.speed_ratio < SINGLE_SPEED_RATIO and coverage.longest_hold < SHORT_HOLD
         groups.append((*KNOWN_FROM_CYCLES, *LATE) if still else KNOWN_FROM_CYCLES)
     return tuple(dict.fromkeys(other for group in groups if name in group for other in group if other != name))
-
-
-def hardly_distinguishable(coverage: Coverage, name: str) -> tuple[str, ...]:
-    """Return the kinds that must fit far worse than one of this name to be distinguished from it.
-
-    Load spreading and crosstalk both pass a part of the load on to neighbours. In recordings without unloaded time, creep and
-    drift differ only in how they depend on the load.
-    """
-    groups = [SPREADING, *([MOVING_BY_THEMSELVES] if coverage.unloaded_share < LEAST_UNLOADED_SHARE else [])]
-    return tuple(other for group in groups if name in group for other in group if other != name)
 
 
 def curvature_ratio(predictors: Sequence[Predictor], model: Model) -> float:

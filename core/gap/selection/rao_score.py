@@ -73,7 +73,7 @@ class ScoreTest:
         self.tables = [np.empty((len(common), *r.shape)) for r in self.residual]
         for view, r, table in zip(views, self.residual, self.tables, strict=True):
             derivatives(view, found.model, common, at, r, table, 0)
-        self.derivatives = [table.reshape(len(common), -1) for table in self.tables]
+        self.derivatives = [table.reshape(len(common), r.size) for table, r in zip(self.tables, self.residual, strict=True)]
         self.gram = ridged(np.sum([c @ c.T for c in self.derivatives], axis=0))
         self.along = sum(c @ r.ravel() for c, r in zip(self.derivatives, self.residual, strict=True))
 

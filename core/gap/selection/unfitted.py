@@ -12,8 +12,8 @@ from ..forward.predictor import Model, Predictor, predictors_of
 from .base_model import identified_base_parameters, prepared, start_model, with_recording_numbers
 from .candidates import DIRECTLY_ESTIMATED, NOT_FITTED, candidates
 from .contact_heights import with_starting_heights
-from .gap_sizes import friction_kinds
 from .identifiability import unidentifiable
+from .quantities import friction_kinds
 
 
 @dataclass(frozen=True)

@@ -58,5 +58,5 @@ def test_friction_is_judged_by_the_forces_where_the_readings_leave_noise(name, c
     assert [one.name for one in result.findings] == [name] and result.findings[0].confidence > 0.5
     errors = gap_errors(result)
     said, closed = sentences.headline(result, errors), summary(result, errors)["gap"]["closed"]
-    assert result.verdict == "explained" and said.startswith(f"Missing: {name}") and "The base model has friction" not in said
+    assert name in said and "The base model has friction" not in said
     assert closed["fit"] > 0.8 and closed["check"] > 0.8

@@ -20,8 +20,9 @@ def found_in(folder, logs, **answers):
 
 
 def value(found, parameter):
-    """The value of a parameter of the first effect that was found."""
-    return found.best.model.effects[found.findings[0].effect].values[parameter]
+    """The value of a parameter of the effect that is most sure."""
+    surest = max(found.findings, key=lambda one: one.confidence)
+    return found.best.model.effects[surest.effect].values[parameter]
 
 
 def sure_names(found):

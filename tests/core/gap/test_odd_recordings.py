@@ -2,7 +2,6 @@
 """Whatever a user records is either used or refused in one sentence; no recording ends in a traceback or in NaN."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from palpate.core.errors import PalpateError
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.report.comparison import gap_errors
 from palpate.core.gap.report.summary import summary
-from palpate.core.gap.selection import screening
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.jobs import run_job
 
@@ -72,16 +70,8 @@ def rig_with(folder, fault, where):
     return Recording("odd", "grid = { rows = 1, columns = 2, pitch = 0.004 }\nk = 70.0", made).write(folder)
 
 
-@pytest.fixture
-def short_search(monkeypatch):
-    """A search that fits a few candidates: what is tested are the steps around it."""
-    few = replace(screening.QUICK, most_first_fits=2, max_steps=4, kinds=1, forms=1)
-    monkeypatch.setattr(screening, "THOROUGH", few)
-
-
 @pytest.mark.slow("a whole diagnosis of a rig with one odd recording")
 @pytest.mark.filterwarnings("error")
-@pytest.mark.usefixtures("short_search")
 @pytest.mark.parametrize(("name", "where"), [*((name, "a") for name in FAULTS), ("no contact", "c"), ("stuck", "c")])
 def test_one_odd_recording_is_used(tmp_path, name, where):
     result = run_job(diagnose(read_rig(rig_with(tmp_path, FAULTS[name], where))))

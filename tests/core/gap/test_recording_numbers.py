@@ -10,7 +10,7 @@ from rig_files import RIG, write
 
 from palpate.core.errors import PalpateError
 from palpate.core.gap.dataset.rig import read_rig
-from palpate.core.gap.fitting.least_squares import TrialView, fit, free_base_parameters, held_out_squares
+from palpate.core.gap.fitting.least_squares import TrialView, cross_fitted, fit, free_base_parameters
 from palpate.core.gap.forward.predictor import predictors_of
 from palpate.core.gap.selection.base_model import (
     base_parameters_to_search,
@@ -56,8 +56,8 @@ def test_specimens_differ_by_a_factor(net):
     assert found.mean < 1.2
     assert found.model.parameters.k == pytest.approx(80.0, rel=0.01)
     assert found.model.recordings == {"factor of A": 1.0, "factor of B": pytest.approx(1.6, rel=0.01)}
-    unseen = held_out_squares(views, found)
-    assert unseen.sum() < 1.3 * found.count.sum()  # halves of the only recording of B are judged against each other
+    unseen = cross_fitted(found, views, [view.residual(found.model) for view in views])
+    assert sum((r**2).sum() for r in unseen) < 1.3 * found.count.sum()  # halves of the only recording of B judge each other
 
 
 def test_each_recording_has_a_zero_of_its_own():

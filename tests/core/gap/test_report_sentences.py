@@ -14,24 +14,16 @@ from palpate.core.gap.report.comparison import gap_errors
 from palpate.core.gap.report.plots import CAPTIONS
 from palpate.core.gap.report.sentences import headline
 from palpate.core.gap.report.summary import summary
-from palpate.core.gap.selection import screening
 from palpate.core.gap.selection.base_model import base_fit, prepared
-from palpate.core.gap.selection.between_recordings import RecordingDifferences
 from palpate.core.gap.selection.diagnosis import diagnose
+from palpate.core.gap.selection.recording_differences import RecordingDifferences
 from palpate.core.gap.selection.silenced_texels import silenced_texels
 from palpate.core.gap.selection.view_set import view_set_of
 from palpate.core.jobs import run_job
 
 
-@pytest.fixture
-def quick_search(monkeypatch):
-    """A search with few starting points."""
-    monkeypatch.setattr(screening, "THOROUGH", replace(screening.QUICK, most_first_fits=4, kinds=2, forms=1))
-
-
-def test_the_page_says_that_check_trials_choose_no_effect():
-    """As they do (``test_check_recordings.py`` changes one, and the model stays)."""
-    assert "choose no effect" in CAPTIONS["gap"] and "decide the verdict" in CAPTIONS["gap"]
+def test_the_page_says_that_check_trials_are_never_fitted():
+    assert "never fitted" in CAPTIONS["gap"]
 
 
 def shifted(gains, levels):
@@ -52,7 +44,6 @@ def test_one_odd_recording_is_told_from_several(gains, levels, odd):
 
 
 @pytest.mark.long("a whole diagnosis of recordings of which one is shifted")
-@pytest.mark.usefixtures("quick_search")
 def test_a_shifted_recording_is_named_and_its_gap_is_that_before_it_was_shifted_back():
     count = iter(range(5))
     rig = cases.rig(lambda force, time: force + (0.01 if next(count) == 2 else 0.0), seed=1, trials=5, seconds=6.0)

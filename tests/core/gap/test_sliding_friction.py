@@ -13,8 +13,8 @@ from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.report import sentences, summary
 from palpate.core.gap.report.comparison import gap_errors
 from palpate.core.gap.selection.base_model import base_fit
-from palpate.core.gap.selection.confidence import SURE
 from palpate.core.gap.selection.diagnosis import diagnose
+from palpate.core.gap.selection.rule_numbers import SURE
 from palpate.core.jobs import run_job
 from palpate.core.model.sensor_parameters import SensorParameters
 

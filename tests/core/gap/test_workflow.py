@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
 from palpate.core.effects.engine.registry import effect, kind_of
-from palpate.core.gap.fitting.least_squares import FreeParameter, TrialView, fit, free_base_parameters, held_out_squares
+from palpate.core.gap.fitting.least_squares import FreeParameter, TrialView, cross_fitted, fit, free_base_parameters
 from palpate.core.gap.fitting.noise_floor import reading_noise
 from palpate.core.gap.fitting.residual_tests import residual_structure
 from palpate.core.gap.forward.predictor import Model, Predictor
@@ -24,7 +24,7 @@ from palpate.core.gap.selection.candidates import Candidate, scales_of
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.findings import Diagnosis
 from palpate.core.gap.selection.rao_score import ScoreTest
-from palpate.core.gap.selection.screening import starting_points
+from palpate.core.gap.selection.starting_points import starting_points
 from palpate.core.io.sensor_toml import read_sensor
 from palpate.core.jobs import run_job
 
@@ -79,15 +79,23 @@ def test_a_gain_per_texel_is_found_with_the_common_numbers():
     np.testing.assert_allclose(factor[touched], gains[touched], rtol=0.02)
 
 
-def test_leaving_a_trial_out_is_nearly_fitting_without_it():
+def test_cross_fitting_is_nearly_fitting_without_every_other_stretch():
     rig = cases.rig(contact=cases.relaxing(), seed=2, trials=4, seconds=8.0)
-    views = views_of(rig)
+    views = [replace(view, stretch_count=4) for view in views_of(rig)]
     free = free_base_parameters(rig.parameters, ("k", "cn"), 1.0)
-    unseen = held_out_squares(views, fit(views, Model(rig.parameters), free, max_steps=30, tolerance=1e-9))
-    for i, view in enumerate(views):
-        without = fit([s for s in views if s is not view], Model(rig.parameters), free, max_steps=30, tolerance=1e-9)
-        r = view.residual(without.model)
-        assert unseen[i].sum() == pytest.approx(float((r * r).sum()), rel=0.05)
+    found = fit(views, Model(rig.parameters), free, max_steps=30, tolerance=1e-9)
+    unseen = cross_fitted(found, views, [view.residual(found.model) for view in views])
+    for fold in (0, 1):
+        parts = [
+            (view, part) for view in views for i, part in enumerate(view.stretches(view.residual(found.model))) if i % 2 != fold
+        ]
+        without = fit(
+            [replace(v, samples=part) for v, part in parts], Model(rig.parameters), free, max_steps=30, tolerance=1e-9
+        )
+        for view, own in zip(views, unseen, strict=True):
+            r = view.residual(without.model)
+            for part in view.stretches(r)[fold::2]:
+                assert (own[part] ** 2).sum() == pytest.approx(float((r[part] ** 2).sum()), rel=0.05)
 
 
 @pytest.mark.parametrize("colour", [0.0, 0.9])

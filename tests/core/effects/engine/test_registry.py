@@ -8,6 +8,7 @@ import pytest
 
 from palpate.core.effects import library as library_package
 from palpate.core.effects.engine.registry import effect, from_dict, kind_of, library, names_where, only_name_where
+from palpate.core.effects.engine.specification import SCATTER
 from palpate.core.errors import EffectError
 
 MODULE = """
@@ -71,7 +72,7 @@ def test_a_kind_states_what_others_know(words, said):
 
 
 def test_what_one_effect_alone_states_is_asked_for_by_it():
-    assert only_name_where(lambda kind: kind.gain_falls_with == "clock") == "drift"
+    assert only_name_where(lambda kind: kind.found_by == SCATTER) == "noise"
     assert names_where(lambda kind: kind.site == "nowhere") == ()
     with pytest.raises(EffectError, match="no effect states"):
         only_name_where(lambda kind: kind.site == "nowhere")

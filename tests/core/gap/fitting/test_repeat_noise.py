@@ -11,11 +11,9 @@ from scipy.signal import lfilter
 
 from palpate.core.errors import FileError
 from palpate.core.gap.dataset.rig import read_rig
-from palpate.core.gap.fitting.noise_floor import ChannelNoise, is_scatter_of_repeats, with_repeats
+from palpate.core.gap.fitting.noise_floor import ChannelNoise, with_repeats
 from palpate.core.gap.forward.predictor import predictors_of
-from palpate.core.gap.selection.base_model import base_fit, prepared
 from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.gap.selection.view_set import view_set_of
 from palpate.core.jobs import run_job
 
 QUIET = ChannelNoise(0.001, 1.0, "stretches without load")
@@ -86,11 +84,8 @@ def test_repeats_that_differ_in_other_ways_are_no_gap_either(scatter):
 def test_an_effect_larger_than_the_scatter_is_a_gap():
     rig = repeated(factors=(1.0, 1.02, 0.98))
     trials = [replace(one, reading=one.reading + one.reading**2 / one.reading.max()) for one in rig.trials]
-    predictors = predictors_of(trials, replace(rig, trials=tuple(trials)))
-    noise, _ = prepared(rig, predictors)
-    assert noise[0].source == "measured repeats"
-    result = base_fit(rig, view_set_of(predictors, (noise[0].deviation, noise[1].deviation)).whole, 1.0)
-    assert not is_scatter_of_repeats(noise, result.sse, result.count)
+    found = run_job(diagnose(replace(rig, trials=tuple(trials))))
+    assert found.noise[0].source == "measured repeats" and found.verdict != "no gap"
 
 
 def test_recordings_with_other_loads_are_no_repeats():

@@ -18,9 +18,7 @@ from palpate.core.gap.selection.identifiability import (
     KNOWN_FROM_TIMING,
     KNOWN_FROM_UNLOADING,
     LOOP_CURVATURE,
-    confounded,
     curvature_ratio,
-    hardly_distinguishable,
     indistinguishable,
     unidentifiable,
 )
@@ -56,18 +54,12 @@ def test_unloading_is_seen_at_any_pace(programme, unloads, seconds):
     assert seen.held_load_ratio == pytest.approx(2.0 if programme == "stairs" else 1.0, rel=0.05)
 
 
-def test_without_rest_settling_and_drift_are_told_by_the_load_alone():
-    stairs, press = (coverage([predictor(programme, 20.0)]) for programme in ("stairs", "press"))
-    assert hardly_distinguishable(stairs, "creep") == ("drift",) and hardly_distinguishable(stairs, "drift") == ("creep",)
-    assert hardly_distinguishable(press, "drift") == () == hardly_distinguishable(stairs, "lag")
-    assert hardly_distinguishable(press, "crosstalk") == ("load-spreading",)
-
-
 def test_time_and_depth_are_one_in_a_single_ramp():
-    assert confounded(coverage([predictor("ramp", 60.0)])) == KNOWN_FROM_TIMING
+    assert set(KNOWN_FROM_TIMING) <= set(indistinguishable(coverage([predictor("ramp", 60.0)]), "stiffening"))
     for programme in ("press", "held", "stairs"):
-        assert not confounded(coverage([predictor(programme, 60.0)]))
-    assert not confounded(coverage([predictor("ramp", 60.0), predictor("ramp", 6.0)]))
+        assert not set(KNOWN_FROM_TIMING) & set(indistinguishable(coverage([predictor(programme, 60.0)]), "stiffening"))
+    both = coverage([predictor("ramp", 60.0), predictor("ramp", 6.0)])
+    assert not set(KNOWN_FROM_TIMING) & set(indistinguishable(both, "stiffening"))
 
 
 @pytest.mark.parametrize("seconds", [20.0, 4000.0])
@@ -130,7 +122,7 @@ def test_the_way_in_alone_may_be_that_of_a_loop(depth):
     slopes = np.diff(at * (1 + at))
     found = curvature_ratio([up], model)
     assert found == pytest.approx(slopes[-1] / slopes[0], rel=0.02)
-    assert indistinguishable(coverage([up]), "stiffening", found) == (("hysteresis",) if found < LOOP_CURVATURE else ())
+    assert ("hysteresis" in indistinguishable(coverage([up]), "stiffening", found)) == (found < LOOP_CURVATURE)
     assert indistinguishable(coverage([back]), "stiffening", found) == ()
 
 

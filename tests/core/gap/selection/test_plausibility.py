@@ -28,7 +28,7 @@ def offset_each(rig):
     free = free_base_parameters(rig.parameters, ("k", "cn"), full[0])
     free += candidate.free_parameters(0, scales_of(predictors, Model(rig.parameters)), 1.0)
     found = fit(view_set.whole, Model(rig.parameters, (effect("offset", "listed", offset=none),)), free)
-    return FittedCandidate(candidate, found, found.sse), view_set
+    return FittedCandidate(candidate, found), view_set
 
 
 def always(reading, _time):
@@ -74,4 +74,4 @@ def test_a_softening_comes_to_its_end_within_its_session(share_of_way, is_one):
     start = effect("softening", "path", share=0.3, path=share_of_way * scales.travel)
     view_set = view_set_of(predictors, (noise[0].deviation, 1.0))
     found = fit(view_set.whole, Model(rig.parameters, (start,)), free, max_steps=0)
-    assert is_plausible(FittedCandidate(candidate, found, found.sse), view_set) == is_one
+    assert is_plausible(FittedCandidate(candidate, found), view_set) == is_one

@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blocks: recordings cut into stretches of time, and what a model leaves on blocks that its fit has not seen.
+
+The fitted recordings are cross-fitted in two folds of alternating blocks: one Newton step from the common fit gives the fit to
+the other fold. Check recordings are never fitted. They are read at texels that a fitted recording touches and at texels that
+they do not touch themselves, because nothing is known of the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..fitting.least_squares import Fit, TrialView, cross_fitted
+from ..forward.predictor import Model, Predictor
+from .rule_numbers import BLOCKS, MEMORIES
+
+
+@dataclass(frozen=True)
+class Views:
+    """The recordings of a rig, cut into blocks.
+
+    Attributes
+    ----------
+    fitted, check : list of TrialView
+        All texels, all samples, readings and net forces.
+    """
+
+    fitted: list[TrialView]
+    check: list[TrialView]
+
+    @property
+    def all(self) -> list[TrialView]:
+        """Those of fitted recordings, then those of check recordings."""
+        return [*self.fitted, *self.check]
+
+    def with_predictors(self, predictors: Sequence[Predictor]) -> Views:
+        """Return the same views of recordings about which something else is assumed."""
+        by_name = {one.trial.name: one for one in predictors}
+        fitted, check = (
+            [replace(view, predictor=by_name[view.predictor.trial.name]) for view in views]
+            for views in (self.fitted, self.check)
+        )
+        return Views(fitted, check)
+
+
+def views_of(predictors: Sequence[Predictor], noise: tuple[float, float], memory: tuple[float, float]) -> Views:
+    """Return the views of recordings.
+
+    Parameters
+    ----------
+    predictors : sequence of Predictor
+        Of all trials.
+    noise : (float, float)
+        Standard deviation of readings and of forces, in their units.
+    memory : (float, float)
+        Correlation time of their noise, in samples.
+    """
+    made = {
+        use: [
+            TrialView(one, noise=noise, stretch_count=_block_count(one, max(memory)))
+            for one in predictors
+            if one.trial.use == use
+        ]
+        for use in ("fit", "check")
+    }
+    return Views(made["fit"], made["check"])
+
+
+def _block_count(predictor: Predictor, memory: float) -> int:
+    return int(np.clip(len(predictor.trial.time) / (MEMORIES * max(memory, 1.0)), 2, BLOCKS))
+
+
+@dataclass(frozen=True)
+class Sums:
+    """Sums over each of b blocks, for readings and net forces, in units of the noise's variance: (b, 2) float each.
+
+    Attributes
+    ----------
+    left, count : (b, 2) float
+        Squares that a model leaves on unseen blocks, and the number of values.
+    rest, rest_count : (2, b, 2) float
+        The same of values without load: while nothing touches the sensor, and of texels that nothing touches.
+    changes : (components, b, 2) float
+        Squares of the change of the prediction that each component of the model makes.
+    """
+
+    left: np.ndarray
+    count: np.ndarray
+    rest: np.ndarray
+    rest_count: np.ndarray
+    changes: np.ndarray
+
+
+class Blocks:
+    """Reads models on blocks.
+
+    Parameters
+    ----------
+    views : Views
+    base : Model
+        From which changes of the prediction are counted.
+
+    Attributes
+    ----------
+    recording : (b,) int
+        To which of `views.all` each block belongs.
+    count, rest_count
+        See :class:`Sums`.
+    """
+
+    def __init__(self, views: Views, base: Model):
+        self.views = views
+        touched = np.any([_touched(view.predictor) for view in views.fitted], axis=0)
+        self._masks = [_measured(view) for view in views.fitted]
+        self._masks += [
+            _measured(view) & np.append(touched | ~_touched(view.predictor), [True] * 3)[None] for view in views.check
+        ]
+        self._rests = [[rest & mask for rest in _without_load(view)] for view, mask in zip(views.all, self._masks, strict=True)]
+        self.recording = np.repeat(np.arange(len(views.all)), [view.stretch_count for view in views.all])
+        self.count = self._summed([mask.astype(float) for mask in self._masks])
+        self.rest_count = np.stack([self._summed([rest[way].astype(float) for rest in self._rests]) for way in (0, 1)])
+        self._base = [view.residual(base) for view in views.all]
+
+    def sums(self, found: Fit, views: Views, has_own_numbers: bool, parent: tuple[Model, Sums] | None) -> Sums:
+        """Return what a fit leaves on unseen blocks.
+
+        Parameters
+        ----------
+        found : Fit
+        views : Views
+            Of the recordings as they are assumed to differ.
+        has_own_numbers : bool
+            True if recordings have numbers of their own, the first component.
+        parent : (Model, Sums) or None
+            The model without its last effect. Without it, the change from the base model is divided among the effects.
+        """
+        model = found.model
+        seen = [view.residual(model) for view in views.fitted]
+        outside = [view.residual(model) for view in views.check]
+        unseen = cross_fitted(found, views.fitted, seen)
+        squares = [r**2 * mask for r, mask in zip([*unseen, *outside], self._masks, strict=True)]
+        rest = [self._summed([s * rest[way] for s, rest in zip(squares, self._rests, strict=True)]) for way in (0, 1)]
+        before = self._base if parent is None else [view.residual(parent[0]) for view in views.all]
+        change = self._summed([(a - b) ** 2 * m for a, b, m in zip([*seen, *outside], before, self._masks, strict=True)])
+        if parent is not None:
+            changes = np.concatenate([parent[1].changes, change[None]])
+        elif model.effects:
+            changes = self._shares(model, views, seen)[:, None, :] * change
+            changes = np.concatenate([0.0 * change[None], changes]) if has_own_numbers else changes
+        else:
+            changes = change[None] if has_own_numbers else np.zeros((0, *change.shape))
+        return Sums(self._summed(squares), self.count, np.stack(rest), self.rest_count, changes)
+
+    def _shares(self, model: Model, views: Views, whole: Sequence[np.ndarray]) -> np.ndarray:
+        """The part of each effect in the change, by what leaving it away changes in the fitted recordings, (effects, 2)."""
+        if len(model.effects) == 1:
+            return np.ones((1, 2))
+        parts = np.zeros((len(model.effects), 2))
+        for index in range(len(model.effects)):
+            without = model.without(index)
+            for view, mask, residual in zip(views.fitted, self._masks, whole, strict=False):
+                square = (view.residual(without) - residual) ** 2 * mask
+                parts[index] += square[:, :-3].sum(), square[:, -3:].sum()
+        return parts / np.maximum(parts.sum(axis=0), 1e-300)
+
+    def _summed(self, tables: Sequence[np.ndarray]) -> np.ndarray:
+        """Sums of tables (T, n + 3) over blocks, of readings and of forces."""
+        rows = []
+        for view, table in zip(self.views.all, tables, strict=True):
+            rows += [[table[part, :-3].sum(), table[part, -3:].sum()] for part in view.stretches(table)]
+        return np.array(rows)
+
+
+def _touched(predictor: Predictor) -> np.ndarray:
+    """Texels that are loaded in a recording, (n,) bool."""
+    loaded: np.ndarray = (predictor.stimulus.load > 0).any(axis=0)
+    return loaded
+
+
+def _measured(view: TrialView) -> np.ndarray:
+    """Where values were measured, (T, n + 3) bool."""
+    trial, n = view.predictor.trial, len(view.texels)
+    mask = np.zeros((len(trial.time), n + 3), bool)
+    if trial.reading is not None:
+        mask[:, :n] = np.isfinite(trial.reading)
+    if trial.force is not None and view.with_forces:
+        mask[:, n:] = np.isfinite(trial.force)
+    return mask
+
+
+def _without_load(view: TrialView) -> tuple[np.ndarray, np.ndarray]:
+    """Values without load, (T, n + 3) bool: all while nothing touches the sensor, and of texels that nothing touches."""
+    load = view.predictor.stimulus.load > 0
+    free, never = ~load.any(axis=1), ~load.any(axis=0)
+    shape = len(load), load.shape[1] + 3
+    return np.broadcast_to(free[:, None], shape), np.broadcast_to(np.append(never, [False] * 3)[None], shape)

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pairs of effects of which neither explains much alone, from a dictionary of changes that each form can make.
+
+At the base model every form makes a few changes of the prediction: with the numbers that it has alone, and with a few others.
+For each two of them least squares say by how much they lower the squares together. The best pairs of kinds are then fitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...model.sensor import Effect
+from ..fitting.least_squares import Fit, fit
+from .candidates import DIRECTLY_ESTIMATED, Candidate, is_free_already
+from .rao_score import ScoreTest
+from .score import Hypothesis
+from .screening import Making, Screening, free_with
+from .starting_points import LONGEST_STEP, SHORTEST_STEP
+
+PAIRS = 4
+"""Pairs of kinds that are fitted: for speed."""
+PAIR_STARTS = 3
+"""Changes of each form beside that which it makes alone: for speed."""
+SAME_CHANGE = 0.999
+"""Cosine of two changes from which on they are one."""
+
+
+@dataclass(frozen=True)
+class _Entry:
+    """A form with numbers at which it makes a change, and the length of the change in a pair."""
+
+    candidate: Candidate
+    effect: Effect
+    length: float = 1.0
+
+
+def best_pairs(screening: Screening, base: Hypothesis) -> Making:
+    """Fit the best pairs of effects on top of the base model."""
+    yield "pairs of effects"
+    test = ScoreTest(screening.view_set.few_samples, base.fit)
+    pairs = [(one, _change(test, one.effect)) for one in _dictionary(screening, base)]
+    entries = [one for one, change in pairs if change is not None]
+    if len(entries) < 2:
+        return []
+    table = np.array([change for _, change in pairs if change is not None])
+    residual = np.concatenate([r.ravel() for r in test.residual]).astype(np.float32)
+    own = np.concatenate(test.derivatives, axis=1).astype(np.float32)
+    if len(own):
+        q, _ = np.linalg.qr(own.T)
+        residual, table = residual - q @ (q.T @ residual), table - (table @ q) @ q.T
+    made = []
+    for pair in _ranked(entries, (table @ table.T).astype(float), (table @ residual).astype(float))[:PAIRS]:
+        yield f"fitting {pair[0].candidate.name} and {pair[1].candidate.name}"
+        made += _fitted(screening, base, pair)
+    return made
+
+
+def _dictionary(screening: Screening, base: Hypothesis) -> Iterator[_Entry]:
+    """Forms with numbers at which they make a change."""
+    gain = abs(base.fit.model.parameters.gain)
+    for one in screening.candidates(base.fit.model):
+        on_friction = one.form.friction_law is not None
+        if is_free_already(one, base.fit.free) or one.name in DIRECTLY_ESTIMATED or on_friction:
+            continue
+        if one.label in screening.alone:
+            yield _Entry(one, screening.alone[one.label])
+        if not one.has_texel_parameters and one.form.placement is None:
+            for values in one.starting_values(screening.scales, gain, PAIR_STARTS):
+                yield _Entry(one, one.effect(values, screening.scales.texels, gain))
+
+
+def _change(test: ScoreTest, effect: Effect) -> np.ndarray | None:
+    """By how much an effect lowers the residual, in one row; None if it does nothing."""
+    model = test.model.with_effect(effect)
+    rows = [r - view.residual(model) for view, r in zip(test.views, test.residual, strict=True)]
+    row = np.concatenate([one.ravel() for one in rows]).astype(np.float32)
+    return row if np.isfinite(row).all() and row.any() else None
+
+
+def _ranked(entries: list[_Entry], gram: np.ndarray, along: np.ndarray) -> list[tuple[_Entry, _Entry]]:
+    """The best pair of forms of each two kinds, best first, with their lengths."""
+    square = np.maximum(np.diag(gram), 1e-12)
+    cosine = gram / np.sqrt(np.outer(square, square))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        determinant = np.outer(square, square) - gram**2
+        first = (along[:, None] * square[None] - along[None] * gram) / determinant
+        gained = first * along[:, None] + first.T * along[None]
+    signed = np.array([_is_signed(one.candidate) for one in entries])
+    good = ((first > 0) | signed[:, None]) & ((first.T > 0) | signed[None])
+    good &= (np.abs(cosine) < SAME_CHANGE) & np.isfinite(gained)
+    kinds = np.unique([one.candidate.name for one in entries], return_inverse=True)[1]
+    gained = np.where(np.triu(good & (kinds[:, None] != kinds[None])), gained, -np.inf)
+    best: dict[frozenset[str], tuple[int, int]] = {}
+    order = np.argsort(-gained, axis=None)[: int(np.isfinite(gained).sum())]
+    for i, j in zip(*np.unravel_index(order, gained.shape), strict=True):
+        best.setdefault(frozenset((entries[i].candidate.name, entries[j].candidate.name)), (int(i), int(j)))
+    return [
+        (replace(entries[i], length=float(first[i, j])), replace(entries[j], length=float(first[j, i])))
+        for i, j in best.values()
+    ]
+
+
+def _is_signed(one: Candidate) -> bool:
+    """True if the strength of a form may be negative."""
+    name = one.strength_parameter()
+    return any(q.name == name and q.low < 0.0 for q in one.form.parameters)
+
+
+def _fitted(screening: Screening, base: Hypothesis, pair: tuple[_Entry, _Entry]) -> list[Hypothesis]:
+    """Two effects fitted together, first to a part of the data; empty if the signature of one of them is not there."""
+    model, free = base.fit.model, tuple(base.fit.free)
+    for one in pair:
+        free = free_with(free, model, one.candidate, screening.scales)
+        model = model.with_effect(_scaled(one))
+    views = screening.view_set.few_samples
+    quick = fit(views, model, free, max_steps=10, tolerance=1e-3, with_equations=False)
+    found = screening.final_fit(quick.model, free, len(base.fit.free))
+    for index, one in enumerate(pair):
+        if not screening.shows_signature(one.candidate, with_effect_last(found, index)):
+            return []
+    return [screening.hypothesis(found, tuple(x.candidate.name for x in pair), tuple(x.candidate.label for x in pair))]
+
+
+def with_effect_last(found: Fit, index: int) -> Fit:
+    """Return the same fit with one of its effects at the end of the stack."""
+    order = [*(i for i in range(len(found.model.effects)) if i != index), index]
+    effects = tuple(found.model.effects[i] for i in order)
+    free = tuple(item if item.effect < 0 else replace(item, effect=order.index(item.effect)) for item in found.free)
+    return replace(found, model=replace(found.model, effects=effects), free=free)
+
+
+def _scaled(one: _Entry) -> Effect:
+    """An effect at its length along its change, if it has a strength."""
+    for name, power in ((one.candidate.strength_parameter(), 1.0), (one.candidate.inverse_strength_parameter(), -1.0)):
+        value = one.effect.values.get(name) if name else None
+        if name and isinstance(value, float) and one.length > 0:
+            parameter = next((q for q in one.candidate.form.parameters if q.name == name), None)
+            scaled = value * float(np.clip(one.length, SHORTEST_STEP, LONGEST_STEP)) ** power
+            low, high = (parameter.low, parameter.high) if parameter else (-np.inf, np.inf)
+            return replace(one.effect, values={**one.effect.values, name: float(np.clip(scaled, low, high))})
+    return one.effect

@@ -1,0 +1,272 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The score of a model of effects, and by how much the scores of two models may differ by chance.
+
+``S = - M/2 · Σ_q log(E_q + B_q + e_q) - price · names`` over the measured quantities q, readings and net forces:
+
+- E: mean square that a fit leaves on stretches that it has not seen, less the noise's, never below zero;
+- B: what the error of formulas may leave: φ times the mean square of the change that an effect makes to the prediction. A
+  formula of the library is never nature's, so an effect of size A may leave √φ·A and still be the right name;
+- e: standard error of the noise's level;
+- M: number of independent stretches.
+
+The price of a name is the logarithm of the number of kinds tried. Standard errors come from a Bayesian bootstrap of the blocks
+(Rubin, Ann. Stat. 9, 1981), confidences are pseudo-BMA+ weights (Yao, Vehtari, Simpson, Gelman, Bayesian Anal. 13, 2018).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from scipy.optimize import brentq
+
+from ...effects.engine.registry import form_of, kind_of
+from ..fitting.least_squares import BASE, Fit
+from .blocks import Sums
+from .candidates import parameters_at_bounds
+from .noise_level import NoiseLevel
+from .rule_numbers import (
+    DRAWS,
+    FEWER_NUMBERS,
+    FORMULA_ERROR,
+    FREE_FORM_ERROR,
+    LARGEST_FORMULA_ERROR,
+    NEAR_ERRORS,
+    RIVAL_ERRORS,
+    STRETCHES,
+)
+
+OWN_NUMBERS, ONE_SESSION = "own numbers", "one session"
+"""How recordings may be assumed to differ: by a factor and a zero each, or as one session in their order."""
+
+
+@dataclass(eq=False)
+class Hypothesis:
+    """A fitted model of the sensor, and what it leaves.
+
+    Attributes
+    ----------
+    fit : Fit
+    names, forms : tuple of str
+        Kinds of its effects in the order of the stack, and the labels of their forms.
+    sums : Sums
+    assumed : str
+        How recordings differ: :data:`OWN_NUMBERS`, :data:`ONE_SESSION` or not at all (empty).
+    """
+
+    fit: Fit
+    names: tuple[str, ...]
+    forms: tuple[str, ...]
+    sums: Sums
+    assumed: str = ""
+
+    @cached_property
+    def is_bent(self) -> bool:
+        """True if a number of an effect is at a bound: its formula is bent as far as it goes, and imitates another."""
+        model, free = self.fit.model, self.fit.free
+        return any(parameters_at_bounds(model, free, index) for index in range(len(self.names)))
+
+    @property
+    def price_count(self) -> int:
+        """Number of names to pay for: numbers of recordings are one, the order of a session is none."""
+        return len(self.names) + (self.assumed == OWN_NUMBERS)
+
+    @property
+    def number_count(self) -> int:
+        """Number of fitted values of effects and recordings; one for each texel where each has its own."""
+        texels = max([len(v) for e in self.fit.model.effects for v in e.values.values() if isinstance(v, tuple)] + [1])
+        return sum(texels if item.per_texel else 1 for item in self.fit.free if item.effect != BASE)
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """What changes the prediction: numbers of recordings, and forms of effects."""
+        return (*([OWN_NUMBERS] if self.assumed == OWN_NUMBERS else []), *self.forms)
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """What it consists of."""
+        return (*sorted(self.forms), self.assumed)
+
+    def has_texel_numbers(self, index: int) -> bool:
+        """Return whether an effect has a fitted number for each texel."""
+        return any(item.effect == index and item.per_texel for item in self.fit.free)
+
+
+@dataclass
+class Score:
+    """The rule for one rig; it needs the noise, which is known when models have been tried.
+
+    Attributes
+    ----------
+    noise : NoiseLevel
+    measured : (2,) bool
+        Of readings and net forces.
+    price : float
+        Of a name, in units of S.
+    weights : (draws, b) float
+        Weights of the blocks, of mean one; the first draw has equal ones.
+    formula_errors : dict of str to (2,) float
+        φ of the forms that were tried, by their labels.
+    """
+
+    noise: NoiseLevel
+    measured: np.ndarray
+    price: float
+    weights: np.ndarray
+    formula_errors: dict[str, np.ndarray] = field(default_factory=dict)
+    _kept: dict[int, tuple[Hypothesis, np.ndarray]] = field(default_factory=dict)
+
+    def parts(self, one: Hypothesis) -> tuple[np.ndarray, np.ndarray]:
+        """Return E and B under each draw, (draws, 2) each."""
+        s = one.sums
+        count = np.maximum(self.weights @ s.count, 1e-9)
+        excess = np.maximum(self.weights @ s.left / count - self.noise.under(self.weights), 0.0)
+        allowed = np.zeros(s.count.shape)
+        for name, change in zip(one.components, s.changes, strict=True):
+            allowed = allowed + self.formula_error(name) * change
+        return excess, self.weights @ allowed / count
+
+    def formula_error(self, label: str) -> np.ndarray:
+        """Return φ of a form for readings and forces, (2,)."""
+        return self.formula_errors.get(label, np.full(2, _stated_error(label)))
+
+    def measure_formula_errors(self, base: Hypothesis, singles: Sequence[Hypothesis]) -> None:
+        """Measure φ on these recordings by leaving one form out, for kinds of which two forms or more explain something alone.
+
+        The second best form leaves so much more than the best, as a share of the change that the best one makes. Forms of a
+        kind may be alike, so φ is at least that of textbooks; a form that states its φ keeps it.
+        """
+        least, found = self.value(base), dict[str, list[Hypothesis]]()
+        for one in sorted(singles, key=self.value, reverse=True):
+            own = found.setdefault(one.names[0], [])
+            if self.value(one) > least and all(one.forms != other.forms for other in own):
+                own.append(one)
+        errors: dict[str, np.ndarray] = {}
+        for own in found.values():
+            if len(own) > 1:
+                (first, allowed), (second, _) = self.parts(own[0]), self.parts(own[1])
+                share = (second[0] - first[0]) / np.maximum(allowed[0] / self.formula_error(own[0].forms[0]), 1e-12)
+                share = np.clip(share, FORMULA_ERROR, LARGEST_FORMULA_ERROR)
+                kind = kind_of(own[0].names[0])
+                errors |= {f"{kind.name}/{form.name}": share for form in kind.forms if form.error is None}
+        self.formula_errors = errors
+        self._kept.clear()
+
+    def values(self, one: Hypothesis) -> np.ndarray:
+        """Return S under each draw, (draws,)."""
+        kept = self._kept.get(id(one))
+        if kept is None or kept[0] is not one:
+            excess, allowed = self.parts(one)
+            total = np.log(excess + allowed + self.noise.error)[:, self.measured].sum(axis=1)
+            kept = self._kept[id(one)] = one, -0.5 * STRETCHES * total - self.price * one.price_count
+        return kept[1]
+
+    def prediction(self, one: Hypothesis) -> float:
+        """Return S without prices and allowances: how well a model predicts stretches that it has not seen."""
+        excess, _ = self.parts(one)
+        return float(-0.5 * STRETCHES * np.log(excess[0] + self.noise.error)[self.measured].sum())
+
+    def leaves_gap(self, one: Hypothesis) -> bool:
+        """Return whether a model leaves more than noise and the error of its formulas account for."""
+        excess, allowed = self.parts(one)
+        return bool((excess[0] > np.maximum(RIVAL_ERRORS * self.noise.error, allowed[0]))[self.measured].any())
+
+    def value(self, one: Hypothesis) -> float:
+        """Return S."""
+        return float(self.values(one)[0])
+
+    def lead(self, one: Hypothesis, other: Hypothesis) -> tuple[float, float]:
+        """Return by how much S of one model is above another's, and the standard error of that."""
+        apart = self.values(one) - self.values(other)
+        return float(apart[0]), float(apart[1:].std())
+
+    def is_near(self, best: Hypothesis, one: Hypothesis) -> bool:
+        """Return whether a model does as well as a better one, as far as chance goes."""
+        apart, error = self.lead(best, one)
+        return apart < NEAR_ERRORS * error
+
+    @staticmethod
+    def is_simpler(one: Hypothesis, other: Hypothesis) -> bool:
+        """Return whether a model has far fewer numbers than another, or none at a bound where the other has."""
+        return FEWER_NUMBERS * one.number_count < other.number_count or (other.is_bent and not one.is_bent)
+
+    def best_form(self, forms: Sequence[Hypothesis]) -> Hypothesis:
+        """Return the form of a kind that leaves least on unseen blocks, or one with fewer numbers within a standard error.
+
+        They share the allowance for an imperfect formula, so it does not count here.
+        """
+
+        def left(one: Hypothesis) -> np.ndarray:
+            s = one.sums
+            return np.asarray((self.weights @ s.left / np.maximum(self.weights @ s.count, 1e-9))[:, self.measured].sum(axis=1))
+
+        least = {id(one): left(one) for one in forms}
+        top = min(forms, key=lambda one: float(least[id(one)][0]))
+        apart = {key: values - least[id(top)] for key, values in least.items()}
+        near = [one for one in forms if one is top or apart[id(one)][0] < NEAR_ERRORS * apart[id(one)][1:].std()]
+        return min(near, key=lambda one: (one.is_bent, one.number_count, float(least[id(one)][0])))
+
+    def values_of_kind(self, forms: Sequence[Hypothesis], library: int) -> np.ndarray:
+        """Return S of a kind by all its forms under each draw: the logarithm of the mean of exp(S).
+
+        Parameters
+        ----------
+        forms : sequence of Hypothesis
+            Those that were fitted; forms that promised nothing count as nothing.
+        library : int
+            Number of forms of the kind.
+        """
+        table = np.array([self.values(one) for one in forms])
+        most = table.max(axis=0)
+        return np.asarray(most + np.log(np.exp(table - most).sum(axis=0) / max(library, len(forms))))
+
+    def weights_of(self, values: Sequence[np.ndarray]) -> np.ndarray:
+        """Return pseudo-BMA+ weights: the mean over the draws of the softmax of S."""
+        table = np.array([one[1:] for one in values])
+        table = np.exp(table - table.max(axis=0))
+        return np.asarray((table / table.sum(axis=0)).mean(axis=1))
+
+    def weight(self, one: Hypothesis, other: Hypothesis) -> float:
+        """Return the pseudo-BMA+ weight of a model against another."""
+        return float(self.weights_of([self.values(one), self.values(other)])[0])
+
+    def most_to_gain(self, one: Hypothesis) -> float:
+        """Return by how much one more effect could raise S at most: if nothing remained beyond the allowance."""
+        excess, allowed = self.parts(one)
+        rest = allowed[0] + self.noise.error
+        return float(0.5 * STRETCHES * np.log1p(excess[0] / rest)[self.measured].sum()) - self.price
+
+    def most_left(self, one: Hypothesis, least: float) -> float:
+        """Return which share of its excess a model may leave, with one effect more, to reach a score of `least`.
+
+        It is negative where that is out of reach, and 1 where nothing need close.
+        """
+        excess, allowed = self.parts(one)
+        rest, measured = allowed[0] + self.noise.error, self.measured
+
+        def lead(left: float) -> float:
+            gain = 0.5 * STRETCHES * np.log((excess[0] + rest) / (left * excess[0] + rest))[measured].sum()
+            return float(self.value(one) + gain - self.price) - least
+
+        if lead(1.0) >= 0.0:
+            return 1.0
+        return float(brentq(lead, 0.0, 1.0)) if lead(0.0) >= 0.0 else -1.0
+
+
+def _stated_error(label: str) -> float:
+    """φ of a form where these recordings do not measure it."""
+    if label == OWN_NUMBERS:
+        return FREE_FORM_ERROR
+    stated = form_of(*label.split("/")).error
+    return FORMULA_ERROR if stated is None else stated
+
+
+def drawn_weights(blocks: int) -> np.ndarray:
+    """Return equal weights, and :data:`.rule_numbers.DRAWS` draws from a Dirichlet distribution, (DRAWS + 1, blocks).
+
+    It is that of a bootstrap of so many stretches as are independent, because the blocks of a programme are not.
+    """
+    drawn = np.random.default_rng(0).gamma(min(STRETCHES / blocks, 1.0), size=(DRAWS, blocks)) + 1e-12
+    return np.vstack([np.ones(blocks), drawn / drawn.mean(axis=1, keepdims=True)])

@@ -1,0 +1,255 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Search for sets of effects: all alone, pairs on top of the best kinds, triples on top of the best pairs, then exchanges.
+
+Two assumptions about how recordings differ are candidates like any effect: a factor and a zero of each (which costs a name),
+and one session in their order (what the sensor remembers goes on, which costs none).
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+import numpy as np
+
+from .noise_level import measured_noise, noise_level
+from .pairs import best_pairs
+from .rule_numbers import LEAST_WEIGHT
+from .score import ONE_SESSION, Hypothesis, Score, drawn_weights
+from .screening import ALL_FORMS, Screening
+
+BEAMS = {1: 3, 2: 2}
+"""Models on top of which a further effect is looked for, by their number of names: for speed."""
+MOST_EFFECTS = 3
+LEAST_REMEMBERED = 1e-6
+"""Change of a prediction, in deviations of the noise, that is more than rounding."""
+STAGES = {"alone": 0.0, "differing recordings": 0.3, "further effects": 0.5, "reconsidered": 0.8, "prediction": 0.9}
+"""Share of the work at which each stage begins."""
+
+Start = Callable[[], tuple[Screening, Hypothesis]]
+"""Prepares recordings under an assumption and fits the base model to them."""
+Steps = Generator[str, None, None]
+"""Work that yields what is being done."""
+Outcome = TypeVar("Outcome")
+
+
+@dataclass
+class Search:
+    """What was tried on one rig.
+
+    Attributes
+    ----------
+    starts : dict of str to callable
+        By what is assumed of how recordings differ, "" first.
+    repeat_error : float or None
+        Standard error of noise that repeats measured, so that no model says more of it; None without repeats.
+    tried : list of Hypothesis
+    score : Score
+    """
+
+    starts: dict[str, Start]
+    repeat_error: float | None = None
+    tried: list[Hypothesis] = field(default_factory=list)
+    _longer: dict[object, list[Hypothesis]] = field(default_factory=dict)
+    _whole: set[tuple[object, str]] = field(default_factory=set)
+    _made: dict[str, tuple[Screening, Hypothesis]] = field(default_factory=dict)
+
+    def run(self) -> Generator[tuple[str, float], None, Hypothesis]:
+        """Return the model that the rule chooses; yield what is being done, and which share of the work is done."""
+        plain, self.base = self.under("")
+        self.library = Counter(one.name for one in plain.candidates(self.base.fit.model))
+        self.tried.append(self.base)
+        self._weigh(is_noise_measured=True)
+        if not self.is_open(self.base):
+            return self.base
+        yield from _in_stage("alone", self._grow(self.base))
+        self._weigh(is_noise_measured=True)
+        if self.is_open(self.best()):
+            yield from _in_stage("differing recordings", self._assume_differences())
+            self.tried += yield from _in_stage("differing recordings", best_pairs(plain, self.base))
+        for size in range(1, MOST_EFFECTS):
+            self._weigh()
+            if not self.is_open(self.best()):
+                break
+            yield from _in_stage("further effects", self._extend(size))
+        self._weigh()
+        yield from _in_stage("reconsidered", self._reconsider(self.best()))
+        return self.best()
+
+    def is_open(self, one: Hypothesis) -> bool:
+        """Return whether one effect more could raise the score of a model."""
+        return self.score.most_to_gain(one) > 0.0
+
+    def best(self) -> Hypothesis:
+        """Return the smallest model within one standard error of the best.
+
+        Of those with as many names, one with far fewer numbers, or with none at a bound, is taken if it does as well.
+        """
+        top = max(self.tried, key=self.score.value)
+        near = [one for one in self.tried if one is top or self.score.is_near(top, one)]
+        near = [one for one in near if one.price_count == min(one.price_count for one in near)]
+        best = max(near, key=self.score.value)
+        simpler = [one for one in near if self.score.is_near(best, one) and self.score.is_simpler(one, best)]
+        return max(simpler, key=self.score.value) if simpler else best
+
+    def predicting(self, named: Hypothesis) -> Generator[tuple[str, float], None, Hypothesis]:
+        """Return the model that predicts best of all that hold the effects of the chosen one, while it leaves a gap.
+
+        What is added need not pay for a name: users get the better prediction, and are told that its name is a guess.
+        """
+        best = named
+        while self.score.leaves_gap(best) and best.components and len(best.names) < MOST_EFFECTS:
+            yield from _in_stage("prediction", self._grow(best))
+            longer = [one for one in self.tried if _holds(one, best) and self.score.weight(one, best) > LEAST_WEIGHT]
+            top = max(longer, key=self.score.prediction, default=best)
+            if self.score.prediction(top) <= self.score.prediction(best):
+                break
+            best = top
+        return best
+
+    def under(self, assumed: str) -> tuple[Screening, Hypothesis]:
+        """Return the screening under an assumption, and the base model with it."""
+        if assumed not in self._made:
+            self._made[assumed] = self.starts[assumed]()
+        return self._made[assumed]
+
+    def in_place_of(self, one: Hypothesis, index: int) -> tuple[Hypothesis, dict[str, list[Hypothesis]]]:
+        """Return a model without one of its effects, and the fitted forms of each kind in its place, itself included."""
+        parent = _finished(self._grown_without(one, index))
+        found: dict[str, list[Hypothesis]] = {one.names[index]: [one]}
+        for other in self._longer[parent.key]:
+            if other.key != one.key:
+                found.setdefault(other.names[-1], []).append(other)
+        best = {name: max(map(self.score.value, forms)) for name, forms in found.items()}
+        screening = self.under(one.assumed)[0]
+        for name in sorted(best, key=lambda name: -best[name])[:ALL_FORMS]:
+            if (parent.key, name) not in self._whole:
+                self._whole.add((parent.key, name))
+                done = [form for other in found[name] for form in other.forms]
+                made = _finished(screening.other_forms(parent, name, done, self._most_left(parent)))
+                found[name] += made
+                self._longer[parent.key] += made
+        return parent, found
+
+    # --- stages
+
+    def _assume_differences(self) -> Steps:
+        """Try recordings that remember each other, and numbers of their own."""
+        for assumed in self.starts:
+            if not assumed:
+                continue
+            yield "how recordings differ"
+            screening, base = self.under(assumed)
+            if assumed == ONE_SESSION:
+                yield from self._try_session(screening, base)
+            else:
+                self.tried.append(base)
+
+    def _try_session(self, screening: Screening, base: Hypothesis) -> Steps:
+        """Kinds that explain no more in a session than in recordings that begin untouched are left out of it."""
+        made = yield from screening.with_one_more(base, self._remembering(screening))
+        for one in made:
+            alone = [other for other in self._longer[self.base.key] if other.names == one.names]
+            leads = [self.score.lead(one, other) for other in alone]
+            if all(apart > error for apart, error in leads):
+                self.tried.append(one)
+                self._longer.setdefault(base.key, []).append(one)
+
+    def _remembering(self, screening: Screening) -> set[str]:
+        """Kinds whose effects go on from recording to recording: they predict something else in a session."""
+        kinds = {one.name for one in screening.candidates(self.base.fit.model)} - set(self.library)
+        for one in self._longer[self.base.key]:
+            alone = [view.residual(one.fit.model) for view in self.under("")[0].views.fitted]
+            joined = [view.residual(one.fit.model) for view in screening.views.fitted]
+            if any(np.abs(a - b).max() > LEAST_REMEMBERED for a, b in zip(alone, joined, strict=True)):
+                kinds.add(one.names[-1])
+        return kinds
+
+    def _extend(self, size: int) -> Steps:
+        """Try one effect more on top of the best models of a size that could still become the best."""
+        best = self.best()
+        for parent in self._beam(size):
+            lacks = self.score.value(best) - self.score.value(parent)
+            if self.score.most_to_gain(parent) > max(0.0, lacks):
+                yield from self._grow(parent)
+
+    def _beam(self, size: int) -> list[Hypothesis]:
+        """The best models of a number of names, of different kinds."""
+        chosen: dict[object, Hypothesis] = {}
+        for one in sorted(self.tried, key=self.score.value, reverse=True):
+            if one.price_count == size:
+                chosen.setdefault((frozenset(one.names), one.assumed), one)
+        return list(chosen.values())[: BEAMS[size]]
+
+    def _reconsider(self, best: Hypothesis) -> Steps:
+        """Try the best model without each of its effects, and with each other kind in its place."""
+        for index in range(len(best.names)):
+            yield from self._grown_without(best, index)
+        self._weigh()
+
+    def _grown_without(self, one: Hypothesis, index: int) -> Generator[str, None, Hypothesis]:
+        """The model without one of its effects, on top of which every kind was tried."""
+        forms = tuple(form for i, form in enumerate(one.forms) if i != index)
+        key = (*sorted(forms), one.assumed)
+        screening, base = self.under(one.assumed)
+        known = [other for other in [*self.tried, base] if other.key == key]
+        parent = known[0] if known else screening.without(one, index)
+        if not known:
+            self.tried.append(parent)
+        yield from self._grow(parent)
+        return parent
+
+    def _grow(self, parent: Hypothesis) -> Steps:
+        """Try one effect more on top of a model."""
+        if parent.key not in self._longer:
+            screening = self.under(parent.assumed)[0]
+            made = yield from screening.with_one_more(parent, most_left=self._most_left(parent) if parent.names else 1.0)
+            self._longer[parent.key] = made
+            self.tried += made
+
+    def _most_left(self, parent: Hypothesis) -> float:
+        """Share of the parent's gap that one effect more may leave if it is to matter.
+
+        It must pay for its name, and come as near to the best model as a name costs.
+        """
+        least = max(self.score.value(parent), self.score.value(self.best()) - self.score.price)
+        return self.score.most_left(parent, least)
+
+    def _weigh(self, is_noise_measured: bool = False) -> None:
+        """Set the score by the noise as the models tried so far leave it without load, or as it was measured before."""
+        count = self.base.sums.count
+        if self.repeat_error is not None:
+            noise = measured_noise(count, self.repeat_error)
+        else:
+            noise = measured_noise(count) if is_noise_measured else noise_level([one.sums for one in self.tried])
+        price = float(np.log(max(len(self.library) + len(self.starts) - 1, 1)))
+        self.score = Score(noise, count.sum(axis=0) > 0, price, drawn_weights(len(count)))
+        self.score.measure_formula_errors(self.base, [one for one in self.tried if len(one.names) == one.price_count == 1])
+
+
+def _holds(one: Hypothesis, best: Hypothesis) -> bool:
+    """True if a model has the kinds of another, and at most one more."""
+    return one.assumed == best.assumed and set(one.names) >= set(best.names) and len(one.names) <= len(best.names) + 1
+
+
+def _in_stage(stage: str, work: Generator[str, None, Outcome]) -> Generator[tuple[str, float], None, Outcome]:
+    """Progress of a stage."""
+    while True:
+        try:
+            what = next(work)
+        except StopIteration as stop:
+            outcome: Outcome = stop.value
+            return outcome
+        yield what, STAGES[stage]
+
+
+def _finished(work: Generator[str, None, Outcome]) -> Outcome:
+    """Outcome of a work whose progress is not shown."""
+    while True:
+        try:
+            next(work)
+        except StopIteration as stop:
+            outcome: Outcome = stop.value
+            return outcome

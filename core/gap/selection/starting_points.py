@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where the fit of a candidate starts: points of its search ranges, scaled along its strength by a score test."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...effects.engine.specification import SILENT_TEXELS, STEPS
+from ...model.sensor import Effect
+from .candidates import START_COUNT, Candidate, Scales
+from .direct_estimates import few_levels, quantization_starts, unresponsive_texels
+from .rao_score import ScoreTest
+from .view_set import ViewSet
+
+VISIBLE_STEPS_PROMISE = 0.5
+"""Promise of quantization whose steps are seen in the readings, as a share of the squares: it is always fitted."""
+LONGEST_STEP = 20.0
+"""A starting point is moved along a candidate's strength by at most this factor."""
+SHORTEST_STEP = 0.01
+SMALL_SHIFT, SMALL_TURN = 0.02, 2e-3
+"""Test steps of displaced texels: a share of the pitch, and an angle in rad."""
+LARGEST_SHIFT, LARGEST_TURN = 0.5, 0.1
+"""Bounds of their starting points, in the same units."""
+LARGE_SHIFTS = (0.3, 0.7)
+"""Shifts, as shares of the pitch, that are tried as they are under a flat indenter."""
+DIRECTIONS = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1))
+TEXEL_STEP = 0.01
+"""Test step of parameters of single texels, as a share of their scale."""
+
+
+def starting_points(
+    candidate: Candidate, score_test: ScoreTest, view_set: ViewSet, scales: Scales, count: int = START_COUNT
+) -> list[tuple[float, Effect]]:
+    """Return starting points of a candidate's fit, best first, each with the decrease of the squares that it promises.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    score_test : ScoreTest
+        Of the fit to which the candidate is added.
+    view_set : ViewSet
+        For direct estimates.
+    scales : Scales
+    count : int
+        Number of points of the search ranges that are tried.
+    """
+    if candidate.kind.found_by == SILENT_TEXELS:
+        effect = unresponsive_texels(view_set.whole, score_test.model, candidate, scales.texels)
+        return [] if effect is None else [(score_test.score(score_test.model.with_effect(effect))[0], effect)]
+    if candidate.kind.found_by == STEPS:
+        return _quantization_starts(candidate, score_test, view_set)
+    if candidate.has_texel_parameters:
+        return _texel_parameter_starts(candidate, score_test, scales)
+    if candidate.form.placement is not None:
+        starts = [_displacement_start(candidate, score_test, scales), *_large_displacements(candidate, score_test, scales)]
+        return sorted(starts, key=lambda entry: -entry[0])
+    starts = _scaled_starts(candidate, score_test, scales, count)
+    return _by_decrease(starts, score_test) if candidate.form.coupling is not None else starts
+
+
+def _by_decrease(starts: list[tuple[float, Effect]], score_test: ScoreTest) -> list[tuple[float, Effect]]:
+    """Starting points in the order of what they decrease as they are; promises stay in their own order."""
+    effects = sorted((effect for _, effect in starts), key=lambda one: -score_test.decrease(score_test.model.with_effect(one)))
+    return [(promise, effect) for (promise, _), effect in zip(starts, effects, strict=True)]
+
+
+def _scaled_starts(candidate: Candidate, score_test: ScoreTest, scales: Scales, count: int) -> list[tuple[float, Effect]]:
+    """Points of the search ranges, each scaled along the candidate's strength to the best length of its score test."""
+    model, gain = score_test.model, abs(score_test.model.parameters.gain)
+    strength, inverse, tried = candidate.strength_parameter(), candidate.inverse_strength_parameter(), []
+    for values in candidate.starting_values(scales, gain, count):
+        effect = candidate.effect(values, scales.texels, gain)
+        promise, length = score_test.score(model.with_effect(effect))
+        if strength is not None:
+            parameter = next(q.scaled(gain) for q in candidate.form.parameters if q.name == strength)
+            if parameter.low >= 0.0 and length <= 0.0:
+                continue
+            longer = values[strength] * np.clip(length, -LONGEST_STEP, LONGEST_STEP)
+            scaled = float(np.clip(longer, parameter.low, parameter.high))
+            other = candidate.effect({**values, strength: scaled}, scales.texels, gain)
+            # How far loads spread is not linear in a width: near zero it does nothing. Take the one that fits better as it is.
+            is_width = candidate.form.coupling is not None and parameter.unit == "m"
+            near = (effect, other) if is_width else (other,)
+            effect = near[0] if len(near) == 1 else max(near, key=lambda one: score_test.decrease(model.with_effect(one)))
+        elif length <= 0.0:
+            continue
+        elif inverse is not None:
+            parameter = next(q.scaled(gain) for q in candidate.form.parameters if q.name == inverse)
+            nearer = values[inverse] / np.clip(length, SHORTEST_STEP, LONGEST_STEP)
+            scaled = float(np.clip(nearer, parameter.low, parameter.high))
+            other = candidate.effect({**values, inverse: scaled}, scales.texels, gain)
+            # The score test is linear and the inverse strength is not: take the one that fits better as it is.
+            effect = max((effect, other), key=lambda one: score_test.decrease(model.with_effect(one)))
+        tried.append((promise, effect))
+    return sorted(tried, key=lambda entry: -entry[0])
+
+
+def _quantization_starts(candidate: Candidate, score_test: ScoreTest, view_set: ViewSet) -> list[tuple[float, Effect]]:
+    """Steps that are estimated from the readings. If they are seen in the readings, they promise enough to be fitted."""
+    model = score_test.model
+    values = view_set.moving_readings(model)
+    visible = few_levels(values) is not None
+    least = VISIBLE_STEPS_PROMISE * score_test.total if visible else 0.0
+    starts = quantization_starts(values, view_set.whole, candidate)
+    decreases = [(score_test.decrease(model.with_effect(effect)), effect) for effect in starts]
+    return [(max(decrease, least), effect) for decrease, effect in sorted(decreases, key=lambda entry: -entry[0])]
+
+
+def _texel_parameter_starts(candidate: Candidate, score_test: ScoreTest, scales: Scales) -> list[tuple[float, Effect]]:
+    """The neutral values, with the promise of a small step of each texel by a length of its own."""
+    gain = abs(score_test.model.parameters.gain)
+    parameter = next(q.scaled(gain) for q in candidate.form.parameters if q.per_texel)
+    scale = scales.reading if parameter.unit == "unit" else 1.0
+    step = float(parameter.default) + TEXEL_STEP * scale
+    moved = candidate.effect({parameter.name: step}, scales.texels, gain)
+    promise = score_test.score_of_texels(score_test.model.with_effect(moved))
+    return [(promise, candidate.effect({}, scales.texels, gain))]
+
+
+def _displacement_start(candidate: Candidate, score_test: ScoreTest, scales: Scales) -> tuple[float, Effect]:
+    """The best small displacement of the texels: a joint score test of a small step of each parameter."""
+    gain = abs(score_test.model.parameters.gain)
+    parameters = candidate.form.parameters
+    neutral = {name: 0.0 for name in candidate.form.neutral}
+    steps = [SMALL_SHIFT * scales.pitch if q.unit == "m" else SMALL_TURN for q in parameters]
+    models = [
+        score_test.model.with_effect(candidate.effect({**neutral, q.name: step}, scales.texels, gain))
+        for q, step in zip(parameters, steps, strict=True)
+    ]
+    promise, best = score_test.joint_score(models)
+    limits = [LARGEST_SHIFT * scales.pitch if q.unit == "m" else LARGEST_TURN for q in parameters]
+    lengths = [float(np.clip(b * s, -m, m)) for b, s, m in zip(best, steps, limits, strict=True)]
+    values = {q.name: length for q, length in zip(parameters, lengths, strict=True)}
+    return promise, candidate.effect(values, scales.texels, gain)
+
+
+def _large_displacements(candidate: Candidate, score_test: ScoreTest, scales: Scales) -> list[tuple[float, Effect]]:
+    """Shifts by a good part of the pitch, for indenters other than spheres.
+
+    Under a flat indenter small shifts change nothing, and large ones add and remove texels.
+    """
+    gain = abs(score_test.model.parameters.gain)
+    names = {q.name for q in candidate.form.parameters}
+    first = score_test.views[0].predictor
+    indenter = first.rig.indenter_of(first.trial)
+    if not {"x", "y"} <= names or indenter is None or indenter.radius is not None:
+        return []
+    tried = []
+    for step in LARGE_SHIFTS:
+        for x, y in DIRECTIONS:
+            values = {**dict.fromkeys(names, 0.0), "x": step * x * scales.pitch, "y": step * y * scales.pitch}
+            effect = candidate.effect(values, scales.texels, gain)
+            tried.append((score_test.decrease(score_test.model.with_effect(effect)), effect))
+    return tried

@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The rule that names what is missing, held against closed forms, and each of its numbers against models of three sensors."""
+
+import contextlib
+from collections import Counter
+from types import SimpleNamespace
+
+import gap_cases as cases
+import numpy as np
+import pytest
+
+from palpate.core.effects.engine.registry import library
+from palpate.core.gap.selection import blocks, diagnosis, noise_level, rule_numbers, score, search, verdict
+from palpate.core.gap.selection.blocks import Sums
+from palpate.core.gap.selection.noise_level import NoiseLevel
+from palpate.core.gap.selection.score import OWN_NUMBERS, Hypothesis, Score, drawn_weights
+from palpate.core.jobs import run_job
+
+BLOCKS, COUNT = 16, 100.0
+MEASURED = np.array([True, False])
+PRICE = 3.0
+
+
+def sums(left, changes=()):
+    """Sums of a model that leaves these mean squares of readings in every block, a number or one each."""
+    count = np.tile([COUNT, 0.0], (BLOCKS, 1))
+    return Sums(
+        count * np.broadcast_to(left, BLOCKS)[:, None],
+        count,
+        np.stack([count, count]),
+        np.stack([count, count]),
+        np.array([count * change for change in changes]).reshape(len(changes), BLOCKS, 2),
+    )
+
+
+def model(left, *labels, changes=None, assumed="", numbers=1):
+    """A model of some forms that leaves this much; its effects change the prediction by `changes`."""
+    names = tuple(label.split("/")[0] for label in labels)
+    free = tuple(SimpleNamespace(effect=0, per_texel=False) for _ in range(numbers)) if labels else ()
+    fit = SimpleNamespace(free=free, model=SimpleNamespace(effects=()))
+    one = Hypothesis(fit, names, labels, sums(left, (0.0,) * len(labels) if changes is None else changes), assumed)
+    one.__dict__["is_bent"] = False
+    return one
+
+
+def rule(error=0.01):
+    """A rule for white noise of mean square one."""
+    count = np.tile([COUNT, 0.0], (BLOCKS, 1))
+    return Score(NoiseLevel(count, count, np.full(2, error)), MEASURED, PRICE, drawn_weights(BLOCKS))
+
+
+def test_the_score_is_the_logarithm_of_what_is_left_and_allowed():
+    one = model(3.0, "creep/power", changes=(4.0,))
+    expected = -0.5 * rule_numbers.STRETCHES * np.log(2.0 + rule_numbers.FORMULA_ERROR * 4.0 + 0.01) - PRICE
+    assert rule().value(one) == pytest.approx(expected)
+    own = model(3.0, assumed=OWN_NUMBERS, changes=(4.0,))
+    assert rule().value(own) == pytest.approx(expected)  # numbers of recordings cost a name
+    assert rule().value(model(0.5)) == pytest.approx(-0.5 * rule_numbers.STRETCHES * np.log(0.01))  # never below the noise
+
+
+@pytest.mark.parametrize(("left", "joins"), [(1.01, False), (1.2, True)])
+def test_an_effect_joins_if_it_pays_its_name(left, joins):
+    """A gap of 0.2 closes; one of 0.01 is no more than the error of the noise."""
+    base, one = model(left), model(1.0, "creep/power")
+    assert (rule().value(one) > rule().value(base)) is joins
+    assert (rule().most_to_gain(base) > 0.0) is joins
+
+
+@pytest.mark.parametrize("least", [-5.0, -1.0, 1.0])
+def test_an_effect_more_reaches_a_score_where_it_leaves_no_more_than_this(least):
+    base, share = model(3.0), rule().most_left(model(3.0), least)
+    assert rule().value(model(1.0 + 2.0 * share, "creep/power")) == pytest.approx(least)
+    assert rule().most_left(base, 1e3) < 0.0 and rule().most_left(base, -1e3) == 1.0
+
+
+@pytest.mark.parametrize(("left", "rivals"), [(1.15, ["lag"]), (1.4, [])])
+def test_a_kind_whose_remainder_its_formula_accounts_for_is_a_rival(left, rivals):
+    """It may leave 0.05 of a change of four variances. The other kind leaves nothing, and less by two standard errors."""
+    best, other = model(1.0, "creep/power", changes=(4.0,)), model(left, "lag/first-order", changes=(4.0,))
+    found = search.Search({})
+    found.score, found.library = rule(), Counter(creep=4, lag=4)
+    found.in_place_of = lambda *_: (model(4.0), {"creep": [best], "lag": [other]})
+    assert verdict.weighed_kinds(found, best, 0)[1] == rivals
+
+
+def test_of_models_within_a_standard_error_the_smallest_wins():
+    rng = np.random.default_rng(0)
+    one, other = 1.0 + rng.gamma(1.0, 0.2, size=(2, BLOCKS))
+    found = search.Search({})
+    found.score = rule()
+    small, large = model(one, "creep/power"), model(other - other.mean() + 0.98 * one.mean(), "creep/power", "lag/first-order")
+    found.tried = [model(3.0), small, large]
+    found.score.price = 0.0
+    assert found.score.value(large) > found.score.value(small) and found.best() is small
+    few, many = model(one, "creep/power"), model(other - other.mean() + 0.99 * one.mean(), "drift/listed", numbers=84)
+    found.tried = [model(3.0), few, many]
+    assert found.best() is few
+    bent = model(other - other.mean() + 0.99 * one.mean(), "stiffening/foam")
+    bent.__dict__["is_bent"] = True
+    found.tried = [model(3.0), few, bent]
+    assert found.best() is few
+
+
+@pytest.mark.parametrize(("left", "helps"), [(2.9, False), (1.8, True)])
+def test_an_effect_may_help_to_predict_without_paying_for_its_name(left, helps):
+    """A gap of two variances shrinks to 0.8, or hardly; the allowance of the first effect hides either."""
+    named = model(3.0, "lag/first-order", changes=(20.0,))
+    more = model(left, "lag/first-order", "drift/sensitivity", changes=(20.0, 1.0))
+    twice = model(1.0, "lag/first-order", "drift/sensitivity", "creep/power", changes=(20.0, 1.0, 1.0))
+    found = search.Search({})
+    found.score, found.tried, found._longer = rule(), [named, more, twice], {one.key: [] for one in (named, more, twice)}
+    assert found.score.value(more) < found.score.value(named)
+    work = found.predicting(named)
+    with pytest.raises(StopIteration) as stop:
+        next(work)
+    assert stop.value.value is ((twice if found.score.leaves_gap(more) else more) if helps else named)
+
+
+def test_a_form_left_out_shows_the_error_of_formulas():
+    """The second best form leaves a tenth of the change more: so may nature's. A form of its own statement keeps that."""
+    found = rule()
+    singles = [model(1.0, "hysteresis/play", changes=(10.0,)), model(2.0, "hysteresis/duhem", changes=(9.0,))]
+    found.measure_formula_errors(model(20.0), singles)
+    assert found.formula_error("hysteresis/play")[0] == pytest.approx(0.1)
+    assert found.formula_error("creep/power")[0] == rule_numbers.FORMULA_ERROR
+    stated = {f"{kind.name}/{form.name}": form.error for kind in library().values() for form in kind.forms if form.error}
+    assert stated and all(
+        found.formula_error(label)[0] == error < rule_numbers.FORMULA_ERROR for label, error in stated.items()
+    )
+
+
+def test_a_kind_counts_by_all_its_forms_and_confidence_is_a_weight():
+    found = rule()
+    good, poor = model(1.1, "creep/power"), model(3.0, "creep/exponential")
+    alone = found.values_of_kind([good], 1)
+    assert found.values_of_kind([good, poor], 4)[0] == pytest.approx(
+        np.log(np.mean([*np.exp([found.value(good), found.value(poor)]), 0, 0]))
+    )
+    weights = found.weights_of([alone, found.values(model(3.0))])
+    assert weights.sum() == pytest.approx(1.0) and weights[0] > 0.99
+    np.testing.assert_allclose(found.weights_of([alone, alone]), 0.5)
+
+
+def test_the_noise_is_what_the_best_model_leaves_without_load():
+    drifting, settled = model(2.0).sums, model(1.0).sums
+    drifting.rest[:] *= 4.0
+    assert noise_level.noise_level([drifting, settled]).under(np.ones(BLOCKS))[0] == pytest.approx(1.0)
+    slow = model(1.0).sums
+    slow.rest[:, : BLOCKS // 2] *= 3.0
+    assert noise_level.noise_level([slow]).error[0] > 5 * noise_level.noise_level([settled]).error[0]
+    white = np.sqrt(2 * noise_level.WHITE / (BLOCKS * COUNT))  # all blocks are alike: the error of white noise, twice
+    assert noise_level.noise_level([settled]).error[0] == pytest.approx(white)
+    many = noise_level.measured_noise(np.full((BLOCKS, 2), 1e9))
+    assert many.error[0] == pytest.approx(rule_numbers.LEAST_NOISE_ERROR, rel=1e-3)
+
+
+def test_noise_of_hardly_any_value_without_load_is_that_which_was_measured():
+    few = model(1.0).sums
+    few.rest[:] *= 300.0
+    few.rest_count[:] *= 0.01
+    assert noise_level.noise_level([few]).under(np.ones(BLOCKS))[0] == 1.0
+
+
+# --- each number of the rule, on models that were fitted once
+
+SENSORS = {
+    "creep": {"contact": cases.relaxing(), "seed": 7},
+    "gain-mismatch": {
+        "change": lambda force, time: force * (1.0 + 0.25 * np.sin(2.3 * np.arange(cases.ROWS * cases.COLUMNS))),
+        "seed": 1,
+    },
+    "": {"seed": 6},
+}
+
+
+@pytest.fixture(scope="module")
+def searches():
+    """Searches on development sensors, with all models that they tried."""
+    found = {}
+    concluded = diagnosis._concluded
+    with pytest.MonkeyPatch.context() as patch:
+        for name, words in SENSORS.items():
+            patch.setattr(
+                diagnosis,
+                "_concluded",
+                lambda begun, one, *models, name=name: found.setdefault(name, (begun, one)) and concluded(begun, one, *models),
+            )
+            run_job(diagnosis.diagnose(cases.rig(trials=4, seconds=6.0, **words)))
+    return found
+
+
+@contextlib.contextmanager
+def number(name, value):
+    """The rule with another number."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (rule_numbers, blocks, noise_level, score, search, verdict):
+            if hasattr(module, name):
+                patch.setattr(module, name, value)
+        yield
+
+
+def decided(one):
+    """Names and scores by the models that a search tried, without another fit."""
+    one._weigh()
+    best = one.best()
+    values = [one.score.value(other) for other in one.tried] + [one.score.lead(best, other)[1] for other in one.tried]
+    return best.names, np.array(values)
+
+
+CONTINUOUS = ("STRETCHES", "FORMULA_ERROR", "DRAWS")
+"""Numbers of which every value gives other scores."""
+
+
+@pytest.mark.slow("whole diagnoses of three sensors")
+def test_names_hold_and_no_number_is_idle_or_a_cliff(searches):
+    """Half and twice each number: scores or their errors change somewhere, and the names of these sensors nowhere."""
+    before = {name: decided(one) for name, (_, one) in searches.items()}
+    assert {name: Counter(names) for name, (names, _) in before.items()} == {
+        name: Counter([name] if name else []) for name in SENSORS
+    }
+    for name in (
+        "STRETCHES",
+        "FORMULA_ERROR",
+        "LARGEST_FORMULA_ERROR",
+        "LEAST_NOISE_ERROR",
+        "NEAR_ERRORS",
+        "FEWER_NUMBERS",
+        "DRAWS",
+    ):
+        kind = type(getattr(rule_numbers, name))
+        for times in (0.5, 2.0):
+            with number(name, kind(times * getattr(rule_numbers, name))):
+                after = {sensor: decided(one) for sensor, (_, one) in searches.items()}
+            assert {sensor: names for sensor, (names, _) in after.items()} == {
+                sensor: names for sensor, (names, _) in before.items()
+            }, (name, times)
+            if name in CONTINUOUS:
+                changed = any(
+                    not np.allclose(after[sensor][1], before[sensor][1]) for sensor in SENSORS if len(before[sensor][1]) > 2
+                )
+                assert changed, name

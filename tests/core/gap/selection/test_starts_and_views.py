@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where fits of candidates start, and on which views: steps that are seen, friction that is held, and forces."""
+
+from dataclasses import replace
+
+import gap_cases as cases
+import numpy as np
+import pytest
+
+from palpate.core.effects.engine.registry import effect, form_of, kind_of
+from palpate.core.gap.fitting.least_squares import FRICTION_LEVEL, free_base_parameters, with_values
+from palpate.core.gap.forward.predictor import Model, Predictor
+from palpate.core.gap.selection.base_model import friction_parameters_to_search
+from palpate.core.gap.selection.candidates import Candidate
+from palpate.core.gap.selection.direct_estimates import companding_starts, few_levels
+from palpate.core.gap.selection.quantities import friction_kinds
+from palpate.core.gap.selection.view_set import view_set_of
+from palpate.core.model.sensor_parameters import SensorParameters
+
+
+def test_a_handful_of_values_is_seen():
+    rng = np.random.default_rng(1)
+    smooth = rng.uniform(0, 1, 4000)
+    np.testing.assert_allclose(few_levels(0.25 * np.round(smooth / 0.25)), [0, 0.25, 0.5, 0.75, 1])
+    uneven = np.floor(4 * np.sqrt(smooth)) ** 2
+    assert list(few_levels(uneven)) == [0, 1, 4, 9]
+    assert few_levels(smooth) is None
+    assert few_levels(np.round(smooth, 2)) is None  # a hundred values: no step is seen by eye
+    assert few_levels(np.ones(4000)) is None
+
+
+def test_steps_that_grow_are_read_off():
+    scale, growth = 0.02, 0.3
+    levels = 7.0 + scale * np.expm1(growth * np.arange(-1, 12))
+    found, other = companding_starts(levels, 7.0, Candidate(kind_of("quantization"), form_of("quantization", "companding")))
+    assert (found.values["rounding"], other.values["rounding"]) == (0.0, 0.5)
+    assert found.values["growth"] == pytest.approx(growth, rel=0.02) and found.values["scale"] == pytest.approx(scale, rel=0.05)
+    assert not companding_starts(levels[:3], 7.0, Candidate(kind_of("quantization"), form_of("quantization", "companding")))
+
+
+def test_a_stated_fall_of_friction_is_held_and_its_level_free():
+    parameters = SensorParameters(k=50.0, mus=0.6, mud=0.45, x0=0.02, ct=0.01)
+
+    def stating(*names):
+        return cases.grid_rig(1, 2, 3e-3, parameters, given=names)
+
+    assert friction_parameters_to_search(stating("k", "mus", "mud", "x0", "ct")) == [FRICTION_LEVEL, "sigma0"]
+    assert set(friction_parameters_to_search(stating("k", "mus", "mud", "ct"))) == {"mus", "mud", "sigma0", "x0"}
+    assert "ct" in friction_parameters_to_search(stating("mus", "mud", "x0"))
+    level = free_base_parameters(parameters, [FRICTION_LEVEL], 1.0)
+    moved = with_values(Model(parameters), level, [0.9]).parameters
+    assert (moved.mus, moved.mud) == pytest.approx((0.9, 0.675))
+
+
+@pytest.mark.parametrize(
+    "beside", [("load-spreading", "gaussian"), ("crosstalk", "neighbours"), ("misalignment", "shift"), None]
+)
+def test_friction_is_looked_for_where_forces_are(beside):
+    """What texels feel of each other is looked at without net forces, in which alone friction shows."""
+    rig = cases.rig(trials=2, seconds=4.0)
+    trials = [replace(trial, force=np.zeros((len(trial.time), 3))) for trial in rig.trials]
+    views = view_set_of([Predictor(trial, rig) for trial in trials], (1.0, 1.0))
+    model = Model(SensorParameters(), (effect(*beside),) if beside else ())
+    for name in friction_kinds():
+        kind = kind_of(name)
+        seen = views.quick(Candidate(kind, kind.forms[0]), model)
+        assert seen is (views.whole if beside else views.few_texels_with_forces)
+        assert all(view.with_forces for view in seen)
+    creep = kind_of("creep")
+    seen = views.quick(Candidate(creep, creep.forms[0]), model)
+    assert seen is (views.few_samples if beside else views.few_texels)
+    assert not any(view.with_forces for view in seen)
