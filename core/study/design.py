@@ -263,8 +263,14 @@ def points_of(design: Design, varied: Mapping[str, Distribution]) -> Points:
     ----------
     design : Design
     varied : mapping of str to Distribution
+
+    Raises
+    ------
+    ParameterError
+        There are too many points.
     """
     count = design.count(varied)
+    check_count(count)
     columns: dict[str, np.ndarray] = {}
     if varied and design.kind == GRID:
         repeat = count
