@@ -86,7 +86,7 @@ def begun(folder: Path, hold: float, texels: int, count: int) -> OpenStudy:
         f"[press]\ndepth = {{ uniform = [{DEPTH / 2}, {DEPTH}] }}\nspeed = {SPEED}\nhold = {hold}\n",
         encoding="utf-8",
     )
-    return begin_study(folder / "study.toml", folder / "out", lambda blend, target: None)
+    return begin_study(folder / "study.toml", folder / "out")
 
 
 def in_turn(*works: Callable[[range], object], count: int) -> list[float]:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core.errors import SceneError
-from ..core.io.file_writing import require_space, writable_folder
+from ..core.io.file_writing import writable_folder
 from . import blender, checks, console
 
 if TYPE_CHECKING:
@@ -53,7 +53,6 @@ def run(arguments: argparse.Namespace) -> int:
 
     dependencies.choose_numba_cache()
     from ..api.gap import find_gap, read_rig
-    from ..core.gap.report import summary
     from ..core.gap.report.amended_sensor import amended_sensor
 
     _check(arguments)
@@ -65,7 +64,6 @@ def run(arguments: argparse.Namespace) -> int:
         rig = read_rig(arguments.rig)
         folder = writable_folder(arguments.out, create=True)
         checks.outputs_are_no_inputs((folder / name for name in OUTPUTS), (arguments.rig,))
-        require_space(folder, summary.report_bytes(rig), "The report")
     if arguments.blend:
         _sensor_in_scene(arguments)  # wrong names and read-only files are found before the work
     with console.Interrupt.raised_at_once(), console.shown_progress("gap") as show:

@@ -136,13 +136,8 @@ def _print_names(place: Path, arguments: argparse.Namespace) -> None:
     from ..core.study.scene_property import PREFIX
     from ..core.study.variation import owners_text
     from ..sweep import study_folder
-    from ..sweep.scene_evaluation import read_blend
 
-    def read(blend: Path, target: Path) -> None:
-        read_blend(blend, target, arguments.scripts)
-        console.Interrupt.check()
-
-    for name, scenario in study_folder.scenarios_of(place, read).items():
+    for name, scenario in study_folder.scenarios_of(place, arguments.scripts, console.Interrupt.check).items():
         print(f"{name}:")
         if scenario is None:
             print("  any name that the job knows, for a number, a text, or true and false")

@@ -10,7 +10,6 @@ import os
 import re
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,9 +19,6 @@ from ..core.io.hidden_folder import temporary_folder
 from ..core.study.study_file import Study
 from .lerobot import LeRobotWriter
 from .parts import COMPRESSION, FINISHED, Parts, frames_in
-
-if TYPE_CHECKING:
-    import pyarrow
 
 DATASET_FOLDER, TABLE_NAME, TIMINGS_NAME = "dataset", "runs.parquet", "timings.csv"
 DATASET_FILES = re.compile(r"(part-\d{3,}/)?(README\.md|data/chunk-\d{3,}/file-\d{3,}\.parquet|meta/.+\.(parquet|json))")
@@ -48,7 +44,7 @@ def publish(folder: Path, study: Study) -> None:
     parts = Parts(folder)
     require_own(folder / DATASET_FOLDER, DATASET_FILES)
     try:
-        _write_tables(folder, parts.table())
+        _write_tables(folder, parts)
         with temporary_folder(folder, "dataset") as hidden, ExitStack() as files:
             new = _write_datasets(parts, hidden / "parts", study.name or UNNAMED_STUDY, files)
             replace_folder(new, folder / DATASET_FOLDER, hidden, DATASET_FILES)
@@ -59,16 +55,22 @@ def publish(folder: Path, study: Study) -> None:
         ) from error
 
 
-def _write_tables(folder: Path, table: pyarrow.Table) -> None:
+def _write_tables(folder: Path, parts: Parts) -> None:
     """Write the columns that say something of runs as a whole, and beside them the times, on which no result depends."""
     from pyarrow import compute, csv, parquet
 
-    done = table.filter(compute.equal(table["status"], FINISHED)).select(["run", "digest", "seconds"])
-    with atomic_write(folder / TABLE_NAME) as fresh:
-        parquet.write_table(table.drop_columns("seconds"), fresh, row_group_size=ROWS_OF_GROUP, **COMPRESSION)
-    with atomic_write(folder / TIMINGS_NAME) as fresh, open(fresh, "wb") as file:
+    schema = parts.run_schema.empty_table().drop_columns("seconds").schema
+    with (
+        atomic_write(folder / TABLE_NAME) as runs,
+        parquet.ParquetWriter(runs, schema, **COMPRESSION) as writer,
+        atomic_write(folder / TIMINGS_NAME) as timings,
+        open(timings, "wb") as file,
+    ):
         file.write(b"run,digest,seconds\n")  # pyarrow would put the names in quotation marks
-        csv.write_csv(done, file, csv.WriteOptions(include_header=False, quoting_style="none"))
+        for table in parts.run_tables(ROWS_OF_GROUP):
+            writer.write_table(table.select(schema.names))
+            done = table.filter(compute.equal(table["status"], FINISHED)).select(["run", "digest", "seconds"])
+            csv.write_csv(done, file, csv.WriteOptions(include_header=False, quoting_style="none"))
 
 
 def _write_datasets(parts: Parts, folder: Path, task: str, files: ExitStack) -> Path | None:

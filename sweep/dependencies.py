@@ -44,6 +44,13 @@ class Dependency:
     runs: int
 
 
+def is_known(values: np.ndarray) -> np.ndarray:
+    """Return where (n,) numbers are finite, or where texts are not None: (n,) bool."""
+    if values.dtype == object:
+        return np.array([value is not None for value in values], bool)
+    return np.isfinite(values)
+
+
 def dependencies(values: Mapping[str, Sequence[Any] | np.ndarray], metrics: Mapping[str, np.ndarray]) -> list[Dependency]:
     """Return the dependencies of metrics on parameters that are detected, the strongest first.
 
@@ -58,10 +65,9 @@ def dependencies(values: Mapping[str, Sequence[Any] | np.ndarray], metrics: Mapp
     for parameter, given in values.items():
         is_choice = any(isinstance(value, str) for value in given)
         column = np.asarray(given, object if is_choice else float)
-        has_value = np.array([value is not None for value in column]) if is_choice else np.isfinite(column)
         for metric, numbers in metrics.items():
-            known = np.isfinite(numbers) & has_value
-            kinds = len(set(column[known]))
+            known = np.isfinite(numbers) & is_known(column)
+            kinds = len(np.unique(column[known]))
             is_repeated = not is_choice or RUNS_PER_GROUP * kinds <= known.sum()  # else names come too seldom for a test
             if known.sum() >= LEAST_RUNS and is_repeated and kinds > 1 and np.ptp(numbers[known]) > 0:
                 correlation, strength, probability = _tests(column[known], numbers[known])
@@ -75,7 +81,7 @@ def _tests(column: np.ndarray, numbers: np.ndarray) -> tuple[float | None, float
     from scipy.stats import kruskal, rankdata, spearmanr
 
     if column.dtype == object:
-        _, place = np.unique(column.astype(str), return_inverse=True)
+        _, place = np.unique(column, return_inverse=True)
     else:
         groups = np.clip(len(column) // RUNS_PER_GROUP, 2, MOST_GROUPS)
         place = ((rankdata(column) - 0.5) / len(column) * groups).astype(int)  # equal numbers share a group

@@ -16,7 +16,6 @@ import numpy as np
 
 from ..core.errors import PalpateError, imported
 from .parts import RunResult, write_part
-from .scene_evaluation import REFUSE
 from .study_folder import OpenStudy
 from .worker import BatchResult, compute_batch
 
@@ -179,14 +178,23 @@ class Dispatch:
         PalpateError
             The scheduler is lost.
         """
-        workers = max(1, len(self.client.scheduler_info(n_workers=-1)["workers"]))
-        first, rest = indices[:workers], indices[workers:]
-        lost = self._compute([[index] for index in first.tolist()])  # nobody knows how long a run takes before
-        seconds = self.over.seconds / max(1, self.over.finished)
-        lost += self._compute(batches_of(rest, len(self.opened.runs), seconds, workers))
-        for index in self._compute([[index] for index in lost]):
-            if self._compute([[index]]):
-                self._note_fatal(index)
+        from concurrent.futures import CancelledError
+
+        from distributed.comm import CommClosedError
+
+        try:
+            workers = max(1, len(self.client.scheduler_info(n_workers=-1)["workers"]))
+            first, rest = indices[:workers], indices[workers:]
+            lost = self._compute([[index] for index in first.tolist()])  # nobody knows how long a run takes before
+            seconds = self.over.seconds / max(1, self.over.finished)
+            lost += self._compute(batches_of(rest, len(self.opened.runs), seconds, workers))
+            for index in self._compute([[index] for index in lost]):
+                if self._compute([[index]]):
+                    self._note_fatal(index)
+        except (CommClosedError, CancelledError, RuntimeError) as error:
+            if isinstance(error, RuntimeError) and self.client.status == "running":  # a fault, not a lost connection
+                raise
+            raise _scheduler_gone() from error
         return self.over
 
     def _compute(self, batches: Sequence[Sequence[int]]) -> list[int]:
@@ -251,19 +259,3 @@ def _scheduler_gone() -> PalpateError:
         "The connection to the Dask scheduler is lost: start it again if it has ended, and give the same command again; what "
         "is done is kept."
     )
-
-
-def run_study(
-    client: Any, opened: OpenStudy, indices: np.ndarray, on_progress: Callable[[BatchResult], object], scripts: str = REFUSE
-) -> BatchResult:
-    """Compute runs of a study; parameters and errors as of :class:`Dispatch`."""
-    from concurrent.futures import CancelledError
-
-    from distributed.comm import CommClosedError
-
-    try:
-        return Dispatch(client, opened, scripts, on_progress).run(indices)
-    except (CommClosedError, CancelledError, RuntimeError) as error:
-        if isinstance(error, RuntimeError) and client.status == "running":  # a fault, not a lost connection
-            raise
-        raise _scheduler_gone() from error

@@ -7,14 +7,13 @@ other gives lists in the order of its texels, whose places are in ``meta/texels.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
+import msgspec
 import numpy as np
 
 from ..core import response
@@ -27,7 +26,6 @@ from ..core.io.recording_npz import Sensors, load_sensor, save_sensor
 from ..core.model.recording import Recording, SensorRecording, digest_of
 from ..core.model.sensor_parameters import Painted, SensorParameters
 from ..core.model.shared_results import SharedResults
-from ..core.study.study_file import Study
 
 POSE_AXES = ("x", "y", "z", "qw", "qx", "qy", "qz")
 CHANNELS = ("normal_force", "shear_x", "shear_y")
@@ -65,12 +63,6 @@ class Feature:
     channels: tuple[str, ...] = ()
 
 
-def _feature_of(row: dict[str, Any]) -> Feature:
-    """Return the feature that a row of JSON describes."""
-    words: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in row.items()}
-    return Feature(**words)
-
-
 TIMESTAMP = Feature("timestamp", "float32", (1,), (), "s", "Time since the first frame.")
 """A column that LeRobot expects in every dataset."""
 
@@ -89,11 +81,6 @@ class FrameStyle:
 
     points: bool = False
     dtype: str = "float32"
-
-    @classmethod
-    def of(cls, study: Study) -> FrameStyle:
-        """Return the style of frames that a study asks for."""
-        return cls(study.points, "float16" if study.half_precision else "float32")
 
 
 PLAIN_STYLE = FrameStyle()
@@ -129,20 +116,27 @@ class Layout:
         own.mkdir(parents=True, exist_ok=True)
         for name, texels in self.texels.items():
             save_sensor(own / f"{name}.npz", texels)
-        content = {"fps": self.fps, "sensors": list(self.texels), "features": [asdict(item) for item in self.features]}
+        content = _LayoutFile(self.features, self.fps, list(self.texels))
         with atomic_write(own / FEATURES_NAME) as fresh:  # last: it says that all is there
-            fresh.write_text(json.dumps(content), encoding="utf-8")
+            fresh.write_bytes(msgspec.json.encode(content))
 
     @classmethod
     def load(cls, folder: Path, digest: str) -> Layout:
         """Return the layout that :meth:`save` wrote; raise FileError where it is missing or damaged."""
         path = folder / digest / FEATURES_NAME
         try:
-            content = json.loads(path.read_text(encoding="utf-8"))
-            features, fps, names = tuple(map(_feature_of, content["features"])), content["fps"], content["sensors"]
-        except (OSError, ValueError, KeyError, TypeError) as error:
+            found = msgspec.json.decode(path.read_bytes(), type=_LayoutFile)
+        except (OSError, msgspec.MsgspecError) as error:
             raise FileError(f"'{path}' is missing or damaged ({error}): give another folder with --out.") from error
-        return cls(features, fps, {name: load_sensor(folder / digest / f"{name}.npz")[0] for name in names}, digest)
+        texels = {name: load_sensor(folder / digest / f"{name}.npz")[0] for name in found.sensors}
+        return cls(found.features, found.fps, texels, digest)
+
+
+@dataclass(frozen=True)
+class _LayoutFile:
+    features: tuple[Feature, ...]
+    fps: float
+    sensors: list[str]
 
 
 @dataclass(frozen=True)

@@ -78,7 +78,6 @@ class LeRobotWriter:
         self._waiting: list[dict[str, np.ndarray]] = []
         self._waiting_bytes = 0
         self._rows: list[dict[str, Any]] = []
-        self._episode_tables: list[pyarrow.Table] = []
         self._runs = self._total = 0
         (root / "meta").mkdir(parents=True, exist_ok=True)
         _write_texels(root / "meta" / "texels.parquet", layout.texels)
@@ -120,13 +119,11 @@ class LeRobotWriter:
         """Write the rows about runs as one group, where there are so many."""
         import pyarrow
 
-        place = dict(zip(EPISODE_PLACE, self._episodes.place))
-        rows = [row | place for row in self._rows]
-        self._episode_tables.append(pyarrow.Table.from_pylist(rows, self._episodes.schema))  # a tenth of the memory
-        self._rows = []
-        if sum(map(len, self._episode_tables)) >= least:
-            self._episodes.write(pyarrow.concat_tables(self._episode_tables).combine_chunks())
-            self._episode_tables = []
+        if len(self._rows) >= least:
+            place = dict(zip(EPISODE_PLACE, self._episodes.place))
+            rows = [row | place for row in self._rows]
+            self._episodes.write(pyarrow.Table.from_pylist(rows, self._episodes.schema))
+            self._rows = []
 
     def finish(self) -> None:
         """Write what still waits, and the files that describe the dataset."""

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 FORMAT = "palpate-parts/1"
 COMPRESSION: dict[str, Any] = {"compression": "zstd", "compression_level": 3}
+READING: dict[str, Any] = {"partitioning": None, "use_threads": False, "pre_buffer": False}
+"""A folder may be called a=b. Threads of pyarrow each keep memory that they have used, so many parts would take more."""
 PARTS_KEPT = 2
 """Parts that are in memory: neighbours of the design are in few parts, except after many interruptions."""
 FINISHED, FAILED = "finished", "failed"
@@ -133,8 +135,7 @@ class Parts:
         self._folder = folder
         self.files = part_files(folder)
         found = [self._places(number, path) for number, path in enumerate(self.files)]
-        self._counts = [len(rows) for rows in found]
-        rows = np.concatenate(found) if found else np.zeros((0, 4), np.int64)
+        rows = np.concatenate([np.zeros((0, 4), np.int32), *found])
         # Of a run that is there twice, one that is done is first.
         rows = rows[np.lexsort((-rows[:, 2], rows[:, 1], rows[:, 0]))]
         _, first = np.unique(rows[:, 0], return_index=True)
@@ -144,14 +145,15 @@ class Parts:
 
     def _places(self, number: int, path: Path) -> np.ndarray:
         """Return (n, 4) int: index of each run of a part, 1 for one that failed, number of the part and row in it."""
-        from pyarrow import parquet
+        from pyarrow import compute, parquet
 
         with _damage_as_sentence(path):
-            table = parquet.read_table(path, columns=["run", "status"], partitioning=None)
+            table = parquet.read_table(path, columns=["run", "status"], **READING)
             if (table.schema.metadata or {}).get(b"palpate") != FORMAT.encode():
                 raise FileError(f"'{path}' is not of the format {FORMAT}: give another folder with --out.")
-        is_failed = np.array(table["status"].to_pylist(), object) == FAILED
-        return np.stack([table["run"].to_numpy(), is_failed, np.full(len(table), number), np.arange(len(table))], axis=1)
+        is_failed = compute.equal(table["status"], FAILED).to_numpy()
+        columns = table["run"].to_numpy(), is_failed, np.full(len(table), number), np.arange(len(table))
+        return np.stack(columns, axis=1, dtype=np.int32, casting="unsafe")
 
     @property
     def done(self) -> np.ndarray:
@@ -177,42 +179,44 @@ class Parts:
         fields = pyarrow.unify_schemas(schemas, promote_options="permissive")
         return pyarrow.schema(sorted(fields, key=lambda item: item.name if item.name.startswith("metric.") else ""))
 
-    def table(self) -> pyarrow.Table:
-        """Return the columns that say something of a run as a whole, a row for each run in the order of the design."""
+    def run_tables(self, size: int) -> Iterator[pyarrow.Table]:
+        """Yield the columns of :attr:`run_schema` in the order of the design, in tables of so many runs."""
         import pyarrow
-        from pyarrow import dataset
 
-        schema = self.run_schema
-        names = list(map(str, self.files))
-        with _damage_as_sentence(self._folder / PARTS):
-            found = dataset.dataset(names, schema, format="parquet", partitioning=None).to_table()
-        starts = np.cumsum([0, *self._counts])[self._rows[:, 2]]
-        return found.take(pyarrow.array(starts + self._rows[:, 3])).combine_chunks()
+        for at in range(0, len(self._rows), size):
+            yield pyarrow.concat_tables(self.pieces(slice(at, at + size), self.run_schema)).combine_chunks()
 
-    def pieces(self) -> Iterator[pyarrow.Table]:
-        """Yield all runs in the order of the design, as tables of runs that are neighbours in a part."""
-        rows = self._rows
+    def pieces(self, which: slice = slice(None), schema: pyarrow.Schema | None = None) -> Iterator[pyarrow.Table]:
+        """Yield runs in the order of the design, as tables of runs that are neighbours in a part.
+
+        Parameters
+        ----------
+        which : slice
+            Of all runs in this order.
+        schema : pyarrow.Schema, optional
+            The columns that are read. Default: all that a part has.
+        """
+        rows = self._rows[which]
         same = np.all(np.diff(rows[:, 2:], axis=0) == [0, 1], axis=1)
-        cuts = [0, *(np.flatnonzero(~same) + 1).tolist(), len(rows)]
-        for begin, end in zip(cuts, cuts[1:]):
-            if end > begin:
-                yield self._read(rows[begin, 2]).slice(rows[begin, 3], end - begin)
+        for own in np.split(rows, np.flatnonzero(~same) + 1):
+            if len(own):
+                yield self._read(own[0, 2], schema).slice(own[0, 3], len(own))
 
     def run(self, index: int) -> pyarrow.Table:
         """Return a run as a table of one row."""
-        (_, _, part, row) = self._rows[np.searchsorted(self._rows[:, 0], index)].tolist()
-        return self._read(part).slice(row, 1)
+        at = int(np.searchsorted(self._rows[:, 0], index))
+        return next(self.pieces(slice(at, at + 1)))
 
     def layout(self, table: pyarrow.Table) -> Layout | None:
         """Return the layout of the frames of a table; None where its runs have none."""
         digest = table.schema.metadata[b"layout"].decode()
         return self._layout(self._folder / LAYOUTS, digest) if digest else None
 
-    def _read_part(self, part: int) -> pyarrow.Table:
+    def _read_part(self, part: int, schema: pyarrow.Schema | None) -> pyarrow.Table:
         from pyarrow import parquet
 
         with _damage_as_sentence(self.files[part]):
-            return parquet.read_table(self.files[part], partitioning=None)  # a folder may be called a=b
+            return parquet.read_table(self.files[part], schema=schema, **READING)
 
 
 @contextmanager

@@ -86,8 +86,7 @@ def frozen_program(study: Study, folder: Path, name: str) -> Program:
         It is no longer the one that the study began with, or cannot be run.
     """
     program = load_program(folder / SCENES / f"{name}{SUFFIX}")
-    entries = study.frozen.get("scenes", [])
-    if program.digest not in [entry.get("digest") for entry in entries if entry.get("name") == name]:
+    if program.digest not in [one.digest for one in (study.frozen.scenes if study.frozen else ()) if one.name == name]:
         raise FileError(
             f"What the job '{study.scenes[0]}' computes with is not what the study in '{folder}' began with: go on with that, "
             "or give another folder with --out."

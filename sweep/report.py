@@ -6,9 +6,8 @@ from __future__ import annotations
 import base64
 import re
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -18,9 +17,9 @@ from ..core.io.file_writing import atomic_write
 from ..core.io.hidden_folder import temporary_folder
 from ..core.study.study_file import Study
 from .dataset import TABLE_NAME, TIMINGS_NAME, UNNAMED_STUDY
-from .dependencies import LEAST_RUNS, RUNS_PER_GROUP, Dependency, dependencies
+from .dependencies import LEAST_RUNS, RUNS_PER_GROUP, Dependency, dependencies, is_known
 from .features import by_texel, net_force_name, tactile_name
-from .parts import Parts, frames_in
+from .parts import FINISHED, READING, Parts, frames_in
 from .report_figures import MOST_METRICS, MOST_NAMES, MOST_PARAMETERS, RunImage, draw_image_sheet, draw_small_multiples
 
 REPORT_NAME = "report.html"
@@ -31,42 +30,39 @@ PLACE_OF_PRESS = "press."
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(\.\d+)?(e[-+]?\d+)?(?!\w)", re.IGNORECASE)
 
 
-@dataclass(frozen=True)
-class StudyColumns:
-    """The runs of a study as columns.
+class Columns(Mapping[str, np.ndarray]):
+    """Columns of ``runs.parquet``, (n,) float or object; each is read when it is needed, so memory does not hold all of them.
 
-    Attributes
+    A number that a run lacks is NaN, as all metrics of one that failed; a text is None.
+
+    Parameters
     ----------
-    values : dict of str to (n,) float or object ndarray
-        Names and values of the varied parameters, in all runs.
-    metrics : dict of str to (n,) float
-        NaN where a run lacks it, as one that failed.
-    messages : list of str
-        Why runs failed; empty texts for the others.
+    path : Path
+    start : str
+        "varied." or "metric."; the keys are the names of the columns without it.
     """
 
-    values: dict[str, np.ndarray]
-    metrics: dict[str, np.ndarray]
-    messages: list[str]
-
-    @property
-    def is_done(self) -> np.ndarray:
-        """(n,) bool."""
-        return np.array([not message for message in self.messages], bool)
-
-    @classmethod
-    def read(cls, path: Path) -> StudyColumns:
-        """Read ``runs.parquet``."""
+    def __init__(self, path: Path, start: str):
         from pyarrow import parquet
 
-        table = parquet.read_table(path)
+        self._path, self._start = path, start
+        self._keys = [name.removeprefix(start) for name in parquet.read_schema(path).names if name.startswith(start)]
 
-        def named(start: str) -> dict[str, Any]:
-            return {name.removeprefix(start): table[name] for name in table.column_names if name.startswith(start)}
+    def __getitem__(self, key: str) -> np.ndarray:
+        from pyarrow import parquet
 
-        values = {name: column.to_numpy(zero_copy_only=False) for name, column in named("varied.").items()}
-        metrics = {name: column.to_numpy(zero_copy_only=False).astype(float) for name, column in named("metric.").items()}
-        return cls(values, metrics, table["message"].to_pylist())
+        column = parquet.read_table(self._path, columns=[f"{self._start}{key}"], **READING)[0].combine_chunks()
+        if column.type != "string":
+            found: np.ndarray = column.to_numpy(zero_copy_only=False)
+            return found
+        words = column.dictionary_encode()  # one object for equal texts
+        return np.array([*words.dictionary.to_pylist(), None], object)[words.indices.fill_null(-1).to_numpy()]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._keys)
+
+    def __len__(self) -> int:
+        return len(self._keys)
 
 
 def write_report(folder: Path, study: Study) -> None:
@@ -77,67 +73,49 @@ def write_report(folder: Path, study: Study) -> None:
     FileError
         A part is damaged, or the page cannot be written.
     """
-    runs = StudyColumns.read(folder / TABLE_NAME)
-    failures = [message for message in runs.messages if message]
-    found = dependencies(runs.values, runs.metrics)
-    failing = dependencies(runs.values, {"failing": 1.0 - runs.is_done}) if failures else []
-    drawn = _most_dependent(runs, found)
+    table = folder / TABLE_NAME
+    values, metrics, is_done = Columns(table, "varied."), Columns(table, "metric."), Columns(table, "")["status"] == FINISHED
+    found = dependencies(values, metrics)
+    failing = [] if is_done.all() else dependencies(values, {"failing": 1.0 - is_done})
+    drawn, images = _most_dependent(values, metrics, found), _images(Parts(folder))
     with temporary_folder(folder, "report") as hidden:
-        page = render_html(
-            TEMPLATE,
-            name=study.name or UNNAMED_STUDY,
-            headline=_headline(runs, _seconds_of(folder / TIMINGS_NAME)),
-            strongest=_strongest_sentence(found),
-            dependencies=[_dependency_row(one) for one in found[:MOST_DEPENDENCIES]],
-            left_off=len(found[MOST_DEPENDENCIES:]),
-            ranges=[_range_row(name, values[runs.is_done].tolist()) for name, values in runs.values.items()],
-            metrics=[_metric_row(name, values[np.isfinite(values)]) for name, values in runs.metrics.items()],
-            messages=_message_rows(failures),
-            failures=len(failures),
-            failed_dependencies=[_dependency_row(one)[1:] for one in failing],
-            pictures={
-                path.stem: base64.b64encode(path.read_bytes()).decode() for path in _draw(hidden, folder, runs, found, *drawn)
-            },
-            shown=_shown_sentence(runs, *drawn),
-        )
-        with atomic_write(folder / REPORT_NAME) as temporary:
-            temporary.write_text(page, encoding="utf-8")
+        if all(drawn):
+            strong = {(one.parameter, one.metric) for one in found}
+            draw_small_multiples(hidden / "multiples.png", values, metrics, *drawn, strong)
+        if images:
+            draw_image_sheet(hidden / "images.png", images)
+        pictures = {path.stem: base64.b64encode(path.read_bytes()).decode() for path in hidden.iterdir()}
+    page = render_html(
+        TEMPLATE,
+        name=study.name or UNNAMED_STUDY,
+        headline=_headline(is_done, len(values), _seconds_of(folder / TIMINGS_NAME)),
+        strongest=_strongest_sentence(found),
+        dependencies=[_dependency_row(one) for one in found[:MOST_DEPENDENCIES]],
+        left_off=len(found[MOST_DEPENDENCIES:]),
+        ranges=[_range_row(name, own[is_done & is_known(own)]) for name, own in values.items()],
+        metrics=[_metric_row(name, own[is_known(own)]) for name, own in metrics.items()],
+        messages=_message_rows(table),
+        failures=int(np.sum(~is_done)),
+        failed_dependencies=[_dependency_row(one)[1:] for one in failing],
+        pictures=pictures,
+        shown=_shown_sentence(values, metrics, *drawn),
+    )
+    with atomic_write(folder / REPORT_NAME) as temporary:
+        temporary.write_text(page, encoding="utf-8")
 
 
 def _seconds_of(timings: Path) -> float:
     from pyarrow import csv
 
-    return float(sum(csv.read_csv(timings)["seconds"].to_pylist()))
+    return float(np.sum(csv.read_csv(timings, convert_options=csv.ConvertOptions(include_columns=["seconds"]))["seconds"]))
 
 
-def _draw(
-    hidden: Path, folder: Path, runs: StudyColumns, found: list[Dependency], parameters: list[str], metrics: list[str]
-) -> list[Path]:
-    """Draw the pictures that the study has something for, and return their files."""
-    drawn = []
-    if parameters and metrics:
-        strong = {(one.parameter, one.metric) for one in found}
-        values = {name: runs.values[name].tolist() for name in parameters}
-        draw_small_multiples(hidden / "multiples.png", values, {name: runs.metrics[name] for name in metrics}, strong)
-        drawn.append(hidden / "multiples.png")
-    images = _images(Parts(folder))
-    if images:
-        draw_image_sheet(hidden / "images.png", images)
-        drawn.append(hidden / "images.png")
-    return drawn
-
-
-def _most_dependent(runs: StudyColumns, found: list[Dependency]) -> tuple[list[str], list[str]]:
+def _most_dependent(values: Columns, metrics: Columns, found: list[Dependency]) -> tuple[list[str], list[str]]:
     """Return the parameters and metrics that are drawn: those in the strongest dependencies first, then in their order."""
-    drawable = [name for name, own in runs.values.items() if _has_few_names(own)]
+    drawable = [name for name, own in values.items() if own.dtype != object or len(set(own)) <= MOST_NAMES]
     parameters = dict.fromkeys([*(one.parameter for one in found if one.parameter in drawable), *drawable])
-    metrics = dict.fromkeys([*(one.metric for one in found), *runs.metrics])
-    return list(parameters)[:MOST_PARAMETERS], list(metrics)[:MOST_METRICS]
-
-
-def _has_few_names(values: np.ndarray) -> bool:
-    """Return False for a choice of more names than a picture has room for."""
-    return values.dtype != object or len(set(values)) <= MOST_NAMES
+    measured = dict.fromkeys([*(one.metric for one in found), *metrics])
+    return list(parameters)[:MOST_PARAMETERS], list(measured)[:MOST_METRICS]
 
 
 def _images(parts: Parts) -> list[RunImage]:
@@ -158,12 +136,12 @@ def _images(parts: Parts) -> list[RunImage]:
     return images
 
 
-def _headline(runs: StudyColumns, seconds: float) -> str:
-    done = int(runs.is_done.sum())
-    failed = len(runs.messages) - done
+def _headline(is_done: np.ndarray, parameters: int, seconds: float) -> str:
+    done = int(is_done.sum())
+    failed = len(is_done) - done
     text = f"{counted(done, 'run') if done else 'No run'} finished, {f'{failed:,}' if failed else 'none'} failed."
-    if runs.values:
-        text += f" {counted(len(runs.values), 'parameter')} varied."
+    if parameters:
+        text += f" {counted(parameters, 'parameter')} varied."
     return f"{text} Computing took {_duration(seconds)} of processor time."
 
 
@@ -182,19 +160,23 @@ def _strongest_sentence(found: list[Dependency]) -> str:
     return f"No dependency of a metric on a parameter was detected, which takes at least {least}."
 
 
-def _message_rows(sentences: list[str]) -> list[tuple[str, int]]:
-    """Return the most frequent sentences with their numbers of runs; those that differ in numbers alone are one, the first."""
+def _message_rows(table: Path) -> list[tuple[str, int]]:
+    """Return why most runs failed, with their numbers; sentences that differ in numbers alone are one, the first."""
+    from pyarrow import parquet
+
     counts, first = Counter[str](), dict[str, str]()
-    for sentence in sentences:
-        kind = _NUMBER.sub("0", sentence)
-        counts[kind] += 1
-        first.setdefault(kind, sentence)
+    with parquet.ParquetFile(table) as file:
+        for batch in file.iter_batches(columns=["message"]):
+            for sentence in filter(None, batch["message"].to_pylist()):
+                kind = _NUMBER.sub("0", sentence)
+                counts[kind] += 1
+                first.setdefault(kind, sentence)
     return [(first[kind], count) for kind, count in counts.most_common(MOST_MESSAGES)]
 
 
-def _shown_sentence(runs: StudyColumns, parameters: list[str], metrics: list[str]) -> str:
+def _shown_sentence(values: Columns, metrics: Columns, parameters: list[str], measured: list[str]) -> str:
     """Say what the small multiples leave out."""
-    counts = [(len(parameters), len(runs.values), "parameter"), (len(metrics), len(runs.metrics), "metric")]
+    counts = [(len(parameters), len(values), "parameter"), (len(measured), len(metrics), "metric")]
     parts = [f"{drawn} of {counted(count, what)}" for drawn, count, what in counts if drawn < count]
     return f"Drawn are {' and '.join(parts)}; runs.parquet has all." if parts else ""
 
@@ -204,19 +186,18 @@ def _dependency_row(one: Dependency) -> list[str]:
     return [one.metric, one.parameter, correlation, f"{one.strength:.2f}", f"{one.runs:,}"]
 
 
-def _range_row(name: str, values: list[Any]) -> list[str]:
+def _range_row(name: str, known: np.ndarray) -> list[str]:
     """Return name, smallest, median and largest value, and how many runs have one; for names, how many there are."""
-    known = [value for value in values if value is not None]
-    if any(isinstance(value, str) for value in known):
-        names = sorted(set(known))
+    if known.dtype == object:
+        names = np.unique(known).tolist()
         return [name, ", ".join(names[:6]) + (" …" if len(names) > 6 else ""), "", "", f"{len(known):,}"]
-    ends = (min(known), float(np.median(known)), max(known)) if known else ()
+    ends = (known.min(), np.median(known), known.max()) if len(known) else ()
     return [name, *map(_digits, ends), *[""] * (3 - len(ends)), f"{len(known):,}"]
 
 
 def _metric_row(name: str, known: np.ndarray) -> list[str]:
     """Return name, mean, smallest, median and largest value, and how many runs have one."""
-    return [name, _digits(float(known.mean())) if len(known) else "", *_range_row(name, known.tolist())[1:]]
+    return [name, _digits(float(known.mean())) if len(known) else "", *_range_row(name, known)[1:]]
 
 
 def _digits(number: float) -> str:

@@ -15,6 +15,7 @@ from ..core.figures.figure_style import FONT, GREY, INK, NORMAL_COLOUR, SHEAR_CO
 from ..core.figures.quantities import Extent
 from ..core.figures.tactile_image import SensorView, draw_colour_bar
 from ..core.geometry.texels import Texels
+from .dependencies import is_known
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,7 +42,12 @@ class RunImage:
 
 
 def draw_small_multiples(
-    path: Path, values: Mapping[str, Sequence[Any]], metrics: Mapping[str, np.ndarray], strong: set[tuple[str, str]]
+    path: Path,
+    values: Mapping[str, np.ndarray],
+    metrics: Mapping[str, np.ndarray],
+    parameters: Sequence[str],
+    measured: Sequence[str],
+    strong: set[tuple[str, str]],
 ) -> None:
     """Draw each metric over each parameter: a point for each run, and the median where there are enough of them.
 
@@ -50,27 +56,28 @@ def draw_small_multiples(
     path : Path
         PNG.
     values, metrics
-        As for :func:`.dependencies.dependencies`; one column and one row of axes each.
+        As for :func:`.dependencies.dependencies`.
+    parameters, measured : sequence of str
+        Those that get a column and a row of axes.
     strong : set of (parameter, metric)
         Pairs whose median is drawn in colour, because a dependency was detected.
     """
-    figure = new_figure(1.2 + 1.75 * len(values), 0.8 + 1.3 * len(metrics))
+    figure = new_figure(1.2 + 1.75 * len(parameters), 0.8 + 1.3 * len(measured))
     figure.set_layout_engine("constrained")
-    grid = figure.subplots(len(metrics), len(values), sharex="col", sharey="row", squeeze=False)
-    for column, (parameter, own) in enumerate(values.items()):
-        for row, (metric, numbers) in enumerate(metrics.items()):
-            axes = grid[row, column]
+    grid = figure.subplots(len(measured), len(parameters), sharex="col", sharey="row", squeeze=False)
+    for column, parameter in enumerate(parameters):
+        own = values[parameter]
+        for row, metric in enumerate(measured):
+            axes, numbers = grid[row, column], metrics[metric]
             tidy_axes(axes)
             axes.locator_params(axis="y", nbins=3)
-            known = np.flatnonzero(np.isfinite(numbers) & np.array([value is not None for value in own], bool))
+            known = np.isfinite(numbers) & is_known(own)
             colour = SHEAR_COLOUR if (parameter, metric) in strong else GREY
-            if len(known) and any(isinstance(value, str) for value in own):
-                _draw_choices(axes, np.array(own, object)[known], numbers[known], colour)
-            elif len(known):
-                _draw_numbers(axes, np.array(own, object)[known].astype(float), numbers[known], colour)
+            if known.any():
+                (_draw_choices if own.dtype == object else _draw_numbers)(axes, own[known], numbers[known], colour)
             if column == 0:
                 axes.set_ylabel(_wrapped(metric), fontsize=FONT, color=INK)
-            if row == len(metrics) - 1:
+            if row == len(measured) - 1:
                 axes.set_xlabel(_wrapped(parameter), fontsize=FONT, color=INK)
     save_figure(figure, path, DPI)
 

@@ -21,7 +21,7 @@ from ..core.study.study_file import STUDY_NAME, read_study
 from . import driver, study_folder
 from .parts import Parts, remove_unfinished_parts
 from .program import require_allowed
-from .scene_evaluation import REFUSE, read_blend
+from .scene_evaluation import REFUSE
 from .study_folder import OpenStudy
 from .worker import BatchResult
 
@@ -53,13 +53,8 @@ def status_of(folder: Path) -> Status:
     """
     if not (folder / STUDY_NAME).is_file():
         raise FileError(f"There is no study in '{folder}': give the folder that a study was run in.")
-    study = read_study(folder / STUDY_NAME)
-    study_folder.frozen_entries(study, folder)
-    total = study.frozen.get("runs")
-    if not isinstance(total, int):
-        raise FileError(f"'{folder / STUDY_NAME}' is damaged: its table [frozen] does not say how many runs there are.")
     parts = Parts(folder)
-    return Status(total, len(parts.done), len(parts.failed))
+    return Status(study_folder.frozen_of(read_study(folder / STUDY_NAME), folder).runs, len(parts.done), len(parts.failed))
 
 
 def output_folder(place: Path, out: Path | str | None) -> Path:
@@ -90,13 +85,7 @@ def open_study(place: Path, folder: Path, scripts: str, check: Callable[[], obje
     `check` is called after each scene, and may raise to stop.
     """
 
-    def read(blend: Path, target: Path) -> None:
-        read_blend(blend, target, scripts, "--study", str(place))
-        check()
-
-    if place.is_dir():
-        return study_folder.resume_study(folder)
-    return study_folder.begin_study(place, folder, read, scripts)
+    return study_folder.resume_study(folder) if place.is_dir() else study_folder.begin_study(place, folder, scripts, check)
 
 
 def compute_runs(
@@ -141,7 +130,7 @@ def compute_runs(
     show_tally(BatchResult())
     workers = min(workers or count_of_cores(), len(left))
     with driver.dask_client(workers=workers, memory=opened.study.run_memory, **cluster) as client:
-        return driver.run_study(client, opened, left, show_tally, scripts).failures
+        return driver.Dispatch(client, opened, scripts, show_tally).run(left).failures
 
 
 def write_results(opened: OpenStudy, formats: Sequence[str] = ()) -> tuple[Status, list[Path]]:

@@ -11,11 +11,10 @@ from __future__ import annotations
 import glob
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from ..core.errors import FileError
 from ..core.io.bake_folder import folder_names
@@ -30,6 +29,8 @@ from ..core.study.study_file import (
     RUNS,
     SCENES,
     STUDY_NAME,
+    Frozen,
+    FrozenFile,
     Plan,
     Runs,
     Study,
@@ -42,16 +43,14 @@ from ..core.study.study_file import (
 from ..core.version import VERSION
 from . import program
 from .parts import FORMAT as PARTS_FORMAT
-from .scene_evaluation import REFUSE
+from .scene_evaluation import REFUSE, read_blend
 
 BLEND, SCENARIO = ".blend", ".npz"
 ReadBlend = Callable[[Path, Path], None]
-"""``read_blend(blend, scenario)`` writes what a .blend says to the solver into a file, and beside it what is
-needed to read the scene again where the study asks for that."""
+"""Writes what a .blend says to the solver into a file, and beside it what is needed to read the scene again where the study
+asks for that."""
 MADE = (PARTS, LAYOUTS, RUNS, SCENES)
 """Folders of a study, beside its results."""
-FROZEN_MESHES = "meshes"
-"""Key of the meshes in the table [frozen]."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +72,7 @@ class OpenStudy:
     runs: Runs
 
 
-def begin_study(file: Path, folder: Path, read_blend: ReadBlend, scripts: str = REFUSE) -> OpenStudy:
+def begin_study(file: Path, folder: Path, scripts: str = REFUSE, check: Callable[[], object] = lambda: None) -> OpenStudy:
     """Open a study by its file: freeze it in an empty folder, or go on in the folder of the same study.
 
     Parameters
@@ -81,9 +80,10 @@ def begin_study(file: Path, folder: Path, read_blend: ReadBlend, scripts: str = 
     file : Path
     folder : Path
         Made if it is missing.
-    read_blend : callable
     scripts : str
-        What is done about the Python of a program, one of :data:`.scene_evaluation.SCRIPTS`.
+        What is done about the Python of a .blend or a program, one of :data:`.scene_evaluation.SCRIPTS`.
+    check : callable
+        Called after each .blend, and may raise to stop.
 
     Raises
     ------
@@ -91,38 +91,45 @@ def begin_study(file: Path, folder: Path, read_blend: ReadBlend, scripts: str = 
         The file or a scene cannot be read, a program is not allowed, the folder holds something else, or another study, or this
         one with another scene.
     """
-    study = read_study(file)
+    study, read = read_study(file), _blend_reader(scripts, check, "--study", str(file))
     sources = _sources(study, file.parent)
     if (folder / STUDY_NAME).exists():
         opened = resume_study(folder)
         changed = differences(opened.study, study)
         if changed:
             raise FileError(f"'{folder}' belongs to another study ({'; '.join(changed)}): give another folder with --out.")
-        _check_sources(opened, sources, file.parent, read_blend)
+        _check_sources(opened, sources, file.parent, read)
         # No result depends on the limits.
         return replace(opened, study=replace(opened.study, run_limit=study.run_limit, run_memory=study.run_memory))
     if folder.exists() and (not folder.is_dir() or {path.name for path in folder.iterdir()} - {*MADE, STUDY_NAME, ".palpate"}):
         raise FileError(f"'{folder}' holds other files and no study: give a new or empty folder with --out.")
     program.require_allowed(study, scripts)
     with _whole_or_nothing(folder):
-        return _frozen(study, file, folder, sources, read_blend)
+        return _frozen(study, file, folder, sources, read)
 
 
-def _frozen(study: Study, file: Path, folder: Path, sources: Mapping[str, Path], read_blend: ReadBlend) -> OpenStudy:
+def _blend_reader(scripts: str, check: Callable[[], object], *words: str) -> ReadBlend:
+    def read(blend: Path, target: Path) -> None:
+        read_blend(blend, target, scripts, *words)
+        check()
+
+    return read
+
+
+def _frozen(study: Study, file: Path, folder: Path, sources: Mapping[str, Path], read: ReadBlend) -> OpenStudy:
     """Freeze a study with its scenes and meshes in a folder; its own file comes last."""
     mesh_files = find_meshes(study.vary, file.parent)
     for name in (SCENES, PARTS):
         writable_folder(folder / name, create=True)
-    meshes = StudyMeshes(folder / SCENES / MESHES, freeze_meshes(mesh_files, folder / SCENES / MESHES))
+    meshes = freeze_meshes(mesh_files, folder / SCENES / MESHES)
     plans, entries = {}, []
     for name, source in sources.items():
-        digest = _freeze_scene(source, folder / SCENES / name, read_blend)
+        digest = _freeze_scene(source, folder / SCENES / name, read)
         plans[name] = plan_of(study, folder, name, meshes)
-        entries.append({"name": name, "file": source.name, "sha256": file_sha256(source), "digest": digest})
+        entries.append(FrozenFile(source.name, file_sha256(source), name, digest))
     runs = Runs(study, plans, _digests(plans, entries))
-    frozen: dict[str, Any] = {"version": VERSION, "parts": PARTS_FORMAT, "runs": len(runs), "scenes": entries}
-    if meshes:
-        frozen[FROZEN_MESHES] = [{"file": name, "sha256": sha256} for name, sha256 in meshes.digests.items()]
+    mesh_entries = tuple(FrozenFile(name, sha256) for name, sha256 in meshes.digests.items())
+    frozen = Frozen(VERSION, len(runs), tuple(entries), mesh_entries, PARTS_FORMAT)
     text = frozen_text(file.read_text(encoding="utf-8"), frozen)
     with atomic_write(folder / STUDY_NAME) as fresh:
         fresh.write_text(text, encoding="utf-8", newline="\n")
@@ -141,14 +148,15 @@ def _whole_or_nothing(folder: Path) -> Iterator[None]:
         raise
 
 
-def scenarios_of(place: Path, read_blend: ReadBlend) -> dict[str, Scenario | None]:
+def scenarios_of(place: Path, scripts: str, check: Callable[[], object]) -> dict[str, Scenario | None]:
     """Return the names that may be varied, without beginning a study, whether or not the names that it varies are right.
 
     Parameters
     ----------
     place : Path
         The file of a study, the folder of one, or a scene.
-    read_blend : callable
+    scripts, check
+        As of :func:`begin_study`.
 
     Returns
     -------
@@ -162,6 +170,7 @@ def scenarios_of(place: Path, read_blend: ReadBlend) -> dict[str, Scenario | Non
     """
     if place.is_dir():
         return {name: plan.scenario for name, plan in resume_study(place).plans.items()}
+    read = _blend_reader(scripts, check)
     if place.suffix in (BLEND, SCENARIO):
         sources = {place.stem: place}
     else:
@@ -175,7 +184,7 @@ def scenarios_of(place: Path, read_blend: ReadBlend) -> dict[str, Scenario | Non
             scenario = source
             if source.suffix == BLEND:
                 scenario = Path(folder) / f"{number}{SCENARIO}"
-                read_blend(source, scenario)
+                read(source, scenario)
             found[name] = load_scenario(scenario)
     return found
 
@@ -191,23 +200,23 @@ def resume_study(folder: Path) -> OpenStudy:
     if not (folder / STUDY_NAME).is_file():
         raise FileError(f"There is no study in '{folder}': give the file of a study, or the folder that it was run in.")
     study = read_study(folder / STUDY_NAME)
-    version, entries = frozen_entries(study, folder)
-    if study.frozen.get("parts") != PARTS_FORMAT:
+    frozen = frozen_of(study, folder)
+    if frozen.parts != PARTS_FORMAT:
         raise FileError(
-            f"The runs in '{folder}' are in files of an earlier version, Palpate {version}, which this one does not read: go "
-            "on with that one, or give another folder with --out."
+            f"The runs in '{folder}' are in files of an earlier version, Palpate {frozen.version}, which this one does not "
+            "read: go on with that one, or give another folder with --out."
         )
-    if version != VERSION:
+    if frozen.version != VERSION:
         raise FileError(
-            f"The study in '{folder}' was begun with Palpate {version}, and this is {VERSION}, which may compute other "
+            f"The study in '{folder}' was begun with Palpate {frozen.version}, and this is {VERSION}, which may compute other "
             "numbers: go on with that version, or give another folder with --out."
         )
     plans, meshes = {}, frozen_meshes(study, folder)
-    for entry in entries:
-        if not _is_as_frozen(study, folder, entry):
-            raise FileError(f"The scene '{entry['name']}' in '{folder}' is not the one that the study began with: start again.")
-        plans[entry["name"]] = plan_of(study, folder, entry["name"], meshes)
-    return OpenStudy(folder, study, plans, Runs(study, plans, _digests(plans, entries)))
+    for scene in frozen.scenes:
+        if not _is_as_frozen(study, folder, scene):
+            raise FileError(f"The scene '{scene.name}' in '{folder}' is not the one that the study began with: start again.")
+        plans[scene.name] = plan_of(study, folder, scene.name, meshes)
+    return OpenStudy(folder, study, plans, Runs(study, plans, _digests(plans, frozen.scenes)))
 
 
 def plan_of(study: Study, folder: Path, scene: str, meshes: StudyMeshes) -> Plan:
@@ -220,47 +229,32 @@ def plan_of(study: Study, folder: Path, scene: str, meshes: StudyMeshes) -> Plan
 
 
 def frozen_meshes(study: Study, folder: Path) -> StudyMeshes:
-    """Return the meshes of a frozen study; raise :class:`FileError` where its file is damaged."""
-    entries = study.frozen.get(FROZEN_MESHES, [])
-    _check_entries(entries, ("file", "sha256"), folder)
-    return StudyMeshes(folder / SCENES / MESHES, entries)
+    """Return the meshes of a frozen study."""
+    return StudyMeshes(folder / SCENES / MESHES, {one.file: one.sha256 for one in frozen_of(study, folder).meshes})
 
 
-def _check_entries(entries: Any, words: tuple[str, ...], folder: Path) -> None:
-    if not isinstance(entries, list) or not all(
-        isinstance(entry, dict) and all(isinstance(entry.get(word), str) for word in words) for entry in entries
-    ):
-        raise FileError(f"'{folder / STUDY_NAME}' is damaged: its table [frozen] is cut; start again.")
-
-
-def _is_as_frozen(study: Study, folder: Path, entry: Mapping[str, str]) -> bool:
+def _is_as_frozen(study: Study, folder: Path, scene: FrozenFile) -> bool:
     """Whether a scene or the program in a study's folder is the one that the study began with."""
-    start = folder / SCENES / entry["name"]
+    start = folder / SCENES / scene.name
     if study.is_job:
-        return file_sha256(_with(start, program.SUFFIX)) == entry["sha256"]  # the processes that run it look at the rest
-    return load_scenario(_with(start, SCENARIO)).digest() == entry["digest"]
+        return file_sha256(_with(start, program.SUFFIX)) == scene.sha256  # the processes that run it look at the rest
+    return load_scenario(_with(start, SCENARIO)).digest() == scene.digest
 
 
 def _with(start: Path, suffix: str) -> Path:
     return start.parent / f"{start.name}{suffix}"
 
 
-def _digests(plans: Mapping[str, Plan], entries: list[dict[str, Any]]) -> dict[str, str]:
+def _digests(plans: Mapping[str, Plan], scenes: Iterable[FrozenFile]) -> dict[str, str]:
     """Return the inputs of the runs of each scene: its scenario, and its file where each run is read from it."""
-    digests = {}
-    for entry in entries:
-        name = entry["name"]
-        digests[name] = f"{entry['digest']} {entry['sha256']}" if plans[name].scene_properties else entry["digest"]
-    return digests
+    return {one.name: f"{one.digest} {one.sha256}" if plans[one.name].scene_properties else one.digest for one in scenes}
 
 
-def frozen_entries(study: Study, folder: Path) -> tuple[str, list[dict[str, Any]]]:
-    """Return version and scenes of a frozen study; raise :class:`FileError` when they are missing."""
-    version, entries = study.frozen.get("version"), study.frozen.get("scenes")
-    if not isinstance(version, str) or not isinstance(entries, list) or not entries:
-        raise FileError(f"'{folder / STUDY_NAME}' is not the study of an output folder: its table [frozen] is missing or cut.")
-    _check_entries(entries, ("name", "file", "sha256", "digest"), folder)
-    return version, entries
+def frozen_of(study: Study, folder: Path) -> Frozen:
+    """Return the table [frozen] of a study; raise :class:`FileError` where it has none."""
+    if study.frozen is None:
+        raise FileError(f"'{folder / STUDY_NAME}' is not the study of an output folder: its table [frozen] is missing.")
+    return study.frozen
 
 
 def _sources(study: Study, base: Path) -> dict[str, Path]:
@@ -288,37 +282,36 @@ def _sources(study: Study, base: Path) -> dict[str, Path]:
     return {names[stem]: file for stem, file in stems.items()}
 
 
-def _freeze_scene(source: Path, start: Path, read_blend: ReadBlend) -> str:
+def _freeze_scene(source: Path, start: Path, read: ReadBlend) -> str:
     """Write a scene, or a program, into a study's folder, under a name that begins with `start`, and return its digest."""
     if source.suffix == program.SUFFIX:
         return program.freeze_program(source, _with(start, program.SUFFIX))
     target = _with(start, SCENARIO)
     if source.suffix == BLEND:
-        read_blend(source, target)
+        read(source, target)
     else:
         save_scenario(target, load_scenario(source))
     return load_scenario(target).digest()
 
 
-def _check_sources(opened: OpenStudy, sources: Mapping[str, Path], base: Path, read_blend: ReadBlend) -> None:
+def _check_sources(opened: OpenStudy, sources: Mapping[str, Path], base: Path, read: ReadBlend) -> None:
     """Raise FileError if the scenes are no longer those that the study began with; a .blend is read only if it has changed."""
-    _, entries = frozen_entries(opened.study, opened.folder)
-    before, now = {entry["name"]: entry for entry in entries}, set(sources)
+    before, now = {one.name: one for one in frozen_of(opened.study, opened.folder).scenes}, set(sources)
     if set(before) != now:
         odd = sorted(set(before) ^ now)[0]
         what = "is new" if odd in now else "is missing"
         raise FileError(f"The scene '{odd}' {what} since the study in '{opened.folder}' began: give another folder with --out.")
     for name, source in sources.items():
-        if file_sha256(source) == before[name]["sha256"]:
+        if file_sha256(source) == before[name].sha256:
             continue
         if opened.study.is_job or opened.plans[name].scene_properties:
             raise _changed(source, opened)
         start = opened.folder / SCENES / f"now-{name}"
         try:
-            digest = _freeze_scene(source, start, read_blend)
+            digest = _freeze_scene(source, start, read)
         finally:
             _with(start, SCENARIO).unlink(missing_ok=True)
-        if digest != before[name]["digest"]:
+        if digest != before[name].digest:
             raise _changed(source, opened)
     for name, file in find_meshes(opened.study.vary, base).items():
         if file_sha256(file) != frozen_meshes(opened.study, opened.folder).digests.get(name):

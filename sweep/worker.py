@@ -31,12 +31,12 @@ from ..core.model.sensor import Sensor
 from ..core.model.shared_results import SharedResults
 from ..core.response import net_shear, share_on, slipping
 from ..core.study.presses import Press, place_of
-from ..core.study.scene_property import is_scene_property, scene_values, write_overrides
+from ..core.study.scene_property import is_scene_property, write_overrides
 from ..core.study.study_file import RUNS, SCENE, SCENES, STUDY_NAME, Run, at_rate
 from ..core.study.variation import PRESS, varied_scenario
 from .features import FrameStyle, frames_of
 from .parts import RunResult, write_part
-from .program import Program, frozen_program, require_allowed
+from .program import frozen_program, require_allowed
 from .scene_evaluation import REFUSE, read_blend
 from .study_folder import OpenStudy, resume_study
 
@@ -214,8 +214,8 @@ class RunComputer:
         require_allowed(opened.study, scripts)
         self.opened, self._scripts, self._limit = opened, scripts, limit
         self._read = lru_cache(maxsize=MOST_SCENES_KEPT)(self._read_scene)
-        self._programs: dict[str, Program] = {}
-        self._style = FrameStyle.of(opened.study)
+        self._program = lru_cache(lambda name: frozen_program(opened.study, opened.folder, name))
+        self._style = FrameStyle(opened.study.points, "float16" if opened.study.half_precision else "float32")
         self._shared = SharedResults()
         if not opened.study.is_job:
             precompile.compile_solver()  # loads what was compiled, so that the first run is as fast as the others
@@ -256,10 +256,10 @@ class RunComputer:
 
     def _scenario(self, scene: str, values: Mapping[str, Any]) -> Scenario:
         """Return the scenario of a scene with the values of a run; it is read again where they have properties of the scene."""
-        plan, read_with = self.opened.plans[scene], scene_values(values)
+        plan, of_scene = self.opened.plans[scene], [name for name in values if is_scene_property(name)]
         assert plan.scenario is not None  # but for a program
-        scenario = self._read(scene, tuple(sorted(read_with.items()))) if read_with else plan.scenario
-        rest = {name: value for name, value in values.items() if not is_scene_property(name)}
+        scenario = self._read(scene, tuple((name, values[name]) for name in sorted(of_scene))) if of_scene else plan.scenario
+        rest = {name: value for name, value in values.items() if name not in of_scene}
         return varied_scenario(scenario, rest, plan.press, plan.meshes, self._shared)
 
     def _read_scene(self, scene: str, values: tuple[tuple[str, Any], ...]) -> Scenario:
@@ -290,9 +290,7 @@ class RunComputer:
 
     def _by_program(self, run: Run) -> RunResult:
         """Compute a run by the program of a study that has no scene; nothing can end it before it returns."""
-        if run.scene not in self._programs:
-            self._programs[run.scene] = frozen_program(self.opened.study, self.opened.folder, run.scene)
-        began, program = time.monotonic(), self._programs[run.scene]
+        program, began = self._program(run.scene), time.monotonic()
         values = {**self.opened.plans[run.scene].fixed, **run.values}
         with _run_folder(self.opened.folder, run) as folder:
             metrics = _checked_metrics(_called(program.run, values, folder), run)

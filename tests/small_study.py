@@ -60,7 +60,7 @@ def write_study(folder: Path, runs: int, seed: int = 1, fails: bool = False, mor
 
 def begun(file: Path) -> OpenStudy:
     """Open a study in the folder ``out`` beside its file."""
-    return begin_study(file, file.parent / "out", lambda blend, target: None, ALLOW)
+    return begin_study(file, file.parent / "out", ALLOW)
 
 
 def rows_of(folder: Path) -> list[dict[str, Any]]:

@@ -45,13 +45,12 @@ class StudyMeshes(Mapping[str, TriangleMesh]):
     ----------
     folder : Path
         Of the copies.
-    entries : iterable of mapping
-        ``file``, the name, and ``sha256``.
+    digests : mapping of str to str
+        SHA-256 of the files by name.
     """
 
-    def __init__(self, folder: Path, entries: Iterable[Mapping[str, str]] = ()):
-        self._folder = folder
-        self.digests = {entry["file"]: entry["sha256"] for entry in entries}
+    def __init__(self, folder: Path, digests: Mapping[str, str]):
+        self._folder, self.digests = folder, dict(digests)
         self._load = lru_cache(maxsize=MOST_MESHES_KEPT)(_target_of)
 
     def __getitem__(self, name: str) -> TriangleMesh:
@@ -122,20 +121,18 @@ def _target_of(kept: Path) -> TriangleMesh:
     return outward_faces(load_mesh(kept), kept.name)[0]
 
 
-def freeze_meshes(files: Mapping[str, Path], folder: Path) -> list[dict[str, str]]:
-    """Copy mesh files into a folder, which is made, and return the entries of :class:`StudyMeshes`; raises FileError."""
-    entries = []
+def freeze_meshes(files: Mapping[str, Path], folder: Path) -> StudyMeshes:
+    """Copy mesh files into a folder, which is made, and return them; raises FileError."""
+    digests = {name: file_sha256(file) for name, file in files.items()}
     for name, file in files.items():
-        entry = {"file": name, "sha256": file_sha256(file)}
-        entries.append(entry)
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(file, _copy_of(folder, name, entry["sha256"]))
+            shutil.copyfile(file, _copy_of(folder, name, digests[name]))
         except OSError as error:
             raise FileError(
                 f"The mesh '{file}' could not be copied ({os_error_reason(error)}): check it and '{folder}'."
             ) from error
-    return entries
+    return StudyMeshes(folder, digests)
 
 
 def _copy_of(folder: Path, name: str, sha256: str) -> Path:
@@ -184,22 +181,16 @@ class Distribution:
     def grid_values(self) -> np.ndarray:
         """Return the values of a grid; a normal distribution gives the middles of parts of equal probability."""
         if self.kind == CHOICE:
-            return self._choices
+            return np.array(self.words, object)
         share = (np.arange(self.levels) + 0.5) / self.levels
         if self.kind != NORMAL and self.levels > 1:
             share = np.arange(self.levels) / (self.levels - 1)
         return self.values(share)
 
-    @property
-    def _choices(self) -> np.ndarray:
-        found = np.empty(len(self.words), dtype=object)
-        found[:] = self.words
-        return found
-
     def values(self, share: np.ndarray) -> np.ndarray:
         """Return the values at (n,) cumulative probabilities from 0 to 1: (n,) float, or objects for a choice."""
         if self.kind == CHOICE:
-            return self._choices[np.minimum((share * len(self.words)).astype(int), len(self.words) - 1)]
+            return np.array(self.words, object)[np.minimum((share * len(self.words)).astype(int), len(self.words) - 1)]
         first, second = float(self.words[0]), float(self.words[1])
         if self.kind == NORMAL:
             from scipy.special import ndtr, ndtri

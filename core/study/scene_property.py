@@ -83,11 +83,6 @@ def is_scene_property(name: str) -> bool:
     return name.startswith(PREFIX)
 
 
-def scene_values(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return those values of a run that the scene is read with."""
-    return {name: value for name, value in values.items() if is_scene_property(name)}
-
-
 def write_overrides(path: str | os.PathLike, values: Mapping[str, Any]) -> None:
     """Write values of properties into the file that ``palpate bake --overrides`` takes; :class:`FileError` if that fails."""
     import tomli_w

@@ -32,10 +32,11 @@ import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
 
+import msgspec
 import numpy as np
 
 from ..errors import FileError, ParameterError, did_you_mean
@@ -120,6 +121,27 @@ SAME = "same"
 
 
 @dataclass(frozen=True)
+class FrozenFile:
+    """A scene, program or mesh that a study began with: SHA-256 of its file, name in the folder, digest of what runs see."""
+
+    file: str
+    sha256: str
+    name: str = ""
+    digest: str = ""
+
+
+@dataclass(frozen=True)
+class Frozen:
+    """Table ``[frozen]`` of the study in an output folder: versions of Palpate and of the parts, number of runs, and files."""
+
+    version: str
+    runs: int
+    scenes: Annotated[tuple[FrozenFile, ...], msgspec.Meta(min_length=1)]
+    meshes: tuple[FrozenFile, ...] = ()
+    parts: str = ""
+
+
+@dataclass(frozen=True)
 class Study:
     """A study as its file says, before the scene is known.
 
@@ -150,7 +172,7 @@ class Study:
         Whether the dataset has forces and readings of texels in 16 bits.
     is_job : bool
         Whether a Python file computes the runs, and no solver a scene.
-    frozen : mapping
+    frozen : Frozen or None
         What the output folder's copy says beside it.
     """
 
@@ -167,7 +189,7 @@ class Study:
     points: Switch = False
     half_precision: Switch = False
     is_job: bool = False
-    frozen: Annotated[Mapping[str, Any], wanted("write it as a table, [frozen]")] = field(default_factory=dict)
+    frozen: Annotated[Frozen | None, wanted("give another folder with --out, or the study's own file")] = None
 
     @property
     def has_folders(self) -> bool:
@@ -539,11 +561,11 @@ def _hash_of(plan: Plan, digest: str) -> hashlib._Hash:
     return hashlib.sha256(json.dumps(same, sort_keys=True).encode())
 
 
-def frozen_text(text: str, frozen: Mapping[str, Any]) -> str:
+def frozen_text(text: str, frozen: Frozen) -> str:
     """Return the text of a study with the table ``[frozen]`` at its end."""
     import tomli_w
 
-    return text.rstrip("\n") + "\n\n" + tomli_w.dumps({FROZEN: frozen})
+    return text.rstrip("\n") + "\n\n" + tomli_w.dumps({FROZEN: asdict(frozen)})
 
 
 def differences(before: Study, now: Study) -> list[str]:

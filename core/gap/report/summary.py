@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import PalpateError
-from ...io.file_writing import atomic_write, require_space
+from ...io.file_writing import atomic_write
 from ...io.hidden_folder import FileList
 from ...io.sensor_toml import write_sensor
 from ...jobs import Job, Progress, part_of_job
-from ..dataset.rig import Rig
 from ..fitting.least_squares import BASE, RECORDING
 from ..forward.predictor import Model
 from ..planning.experiment_plan import PlannedExperiment, plan_after
@@ -28,12 +27,6 @@ from .plots import FILE_TYPES, draw
 from .sentences import headline, next_experiment, warnings
 
 FORMAT = "palpate-gap/1"
-LEAST_BYTES = 10e6
-"""Bytes of a report of few samples: ten pictures as PNG, PDF and inside the page."""
-SAMPLE_BYTES = 40.0
-"""Bytes of a sample in the pictures: in PDF, white noise takes 9 for a dot and 5 for a point of each of at most five lines."""
-TEXEL_BYTES = 200.0
-"""Bytes of a texel in the map of errors and in the amended sensor."""
 
 
 def summary(
@@ -153,11 +146,6 @@ def _found(one: Finding, model: Model, result: Diagnosis, errors: GapErrors) -> 
     }
 
 
-def report_bytes(rig: Rig) -> float:
-    """Return an estimate from above of the bytes that a report of a rig occupies."""
-    return LEAST_BYTES + SAMPLE_BYTES * sum(len(trial.time) for trial in rig.trials) + TEXEL_BYTES * len(rig.texels)
-
-
 def write_report(result: Diagnosis, folder: Path, errors: GapErrors | None = None) -> Job[None]:
     """Write everything into a folder. All files of an earlier report there are replaced together (:class:`.FileList`).
 
@@ -175,9 +163,8 @@ def write_report(result: Diagnosis, folder: Path, errors: GapErrors | None = Non
     Raises
     ------
     FileError
-        The folder cannot be written to, or the disk has too little space.
+        The folder cannot be written to.
     """
-    require_space(folder, report_bytes(result.rig), "The report")
     files = FileList(folder)
     with files.new_files("report") as new:
         yield Progress("writing the amended sensor", 0, 1000)

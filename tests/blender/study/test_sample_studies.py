@@ -5,7 +5,6 @@ import pytest
 from small_study import rows_of
 from solver_scenes import GRAVITY
 
-from palpate.sweep.scene_evaluation import read_blend
 from palpate.sweep.study_folder import begin_study
 from palpate.sweep.worker import compute_batch
 
@@ -13,7 +12,7 @@ from palpate.sweep.worker import compute_batch
 def finished(folder, tmp_path, name: str, order, count: int) -> list[dict]:
     """Compute the first and the last runs of a sample study by an order of their values, and return what they say."""
     file = folder / f"{name}.toml"
-    opened = begin_study(file, tmp_path / name, lambda blend, target: read_blend(blend, target, "refuse", "--study", str(file)))
+    opened = begin_study(file, tmp_path / name)
     ordered = sorted(opened.runs, key=lambda run: order(run.values))
     chosen = [run.index for run in (*ordered[:count], *ordered[-count:])]
     assert compute_batch(chosen, str(opened.folder)).done == 2 * count

@@ -1,19 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A report takes the place of the earlier one as a whole, whenever it is stopped."""
 
+import errno
+import os
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 from palpate.core.errors import FileError
 from palpate.core.gap.report import summary
-from palpate.core.io import file_writing
 from palpate.core.io.file_writing import atomic_write
 from palpate.core.io.hidden_folder import LIST_NAME
 from palpate.core.jobs import run_job
 
-TRIAL = SimpleNamespace(time=np.zeros(1000))
 PICTURES = {"old": ["gap", "map"], "new": ["gap", "loops"]}
 
 
@@ -49,9 +48,8 @@ def report(monkeypatch):
     monkeypatch.setattr(summary, "headline", lambda *_: "")
     monkeypatch.setattr(summary, "html_report", lambda result, *_: result.age)
 
-    def write(folder, age, trials=(TRIAL,)):
-        rig = SimpleNamespace(trials=trials, texels=())
-        run_job(summary.write_report(SimpleNamespace(age=age, rig=rig), folder, object()))
+    def write(folder, age):
+        run_job(summary.write_report(SimpleNamespace(age=age), folder, object()))
 
     return write
 
@@ -72,14 +70,17 @@ def test_a_report_takes_the_place_of_the_earlier_one(report, tmp_path):
     assert [path.name for path in tmp_path.glob(".*")] == [LIST_NAME]
 
 
-def test_a_full_disk_is_found_before_the_pictures_are_drawn(report, tmp_path, monkeypatch):
+def test_a_full_disk_is_one_sentence_and_leaves_the_earlier_report(report, tmp_path, monkeypatch):
     report(tmp_path, "old")
     before = ages(tmp_path)
-    free = summary.LEAST_BYTES + summary.SAMPLE_BYTES * 1e6
-    monkeypatch.setattr(file_writing.shutil, "disk_usage", lambda _: SimpleNamespace(free=free))
-    report(tmp_path, "old", trials=1000 * (TRIAL,))
-    with pytest.raises(FileError, match="The report needs up to 50 MB"):
-        report(tmp_path, "new", trials=1001 * (TRIAL,))
+
+    def full(path, _result):
+        with atomic_write(path):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(summary, "write_sensor", full)
+    with pytest.raises(FileError, match="sensor.toml.*no space left on device.*free some space"):
+        report(tmp_path, "new")
     assert ages(tmp_path) == before
 
 

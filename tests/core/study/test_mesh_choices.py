@@ -9,7 +9,7 @@ from study_scenes import BALL_RADIUS, HEAD, tiny_scene
 from palpate.core.errors import PalpateError
 from palpate.core.geometry.mesh import mass_properties
 from palpate.core.io.input_files import load_mesh
-from palpate.core.study.design import StudyMeshes, find_meshes, freeze_meshes, points_of
+from palpate.core.study.design import find_meshes, freeze_meshes, points_of
 from palpate.core.study.study_file import Runs, plan_for, read_study
 from palpate.core.study.variation import varied_scenario
 
@@ -28,8 +28,7 @@ def folder(tmp_path):
 
 def plan_in(folder):
     study = read_study(folder / "study.toml")
-    entries = freeze_meshes(find_meshes(study.vary, folder), folder / "kept")
-    return study, plan_for(study, tiny_scene(), meshes=StudyMeshes(folder / "kept", entries))
+    return study, plan_for(study, tiny_scene(), meshes=freeze_meshes(find_meshes(study.vary, folder), folder / "kept"))
 
 
 def test_a_pattern_stands_for_its_files_and_runs_do_not_need_them(folder):

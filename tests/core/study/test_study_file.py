@@ -7,7 +7,7 @@ import pytest
 from study_scenes import HEAD, tiny_scene
 
 from palpate.core.errors import PalpateError
-from palpate.core.study.study_file import Runs, differences, frozen_text, plan_for, study_of
+from palpate.core.study.study_file import Frozen, FrozenFile, Runs, differences, frozen_text, plan_for, study_of
 
 RANDOM = HEAD + 'design = "random"\nsamples = 4\n'
 
@@ -72,9 +72,10 @@ def test_differences_are_named():
 
 def test_the_frozen_text_is_the_study_again():
     text = RANDOM + "[vary]\n'Pad.k' = { uniform = [1, 2] }\n"
-    frozen = study(frozen_text(text, {"version": "1", "scenes": [{"name": "tiny"}]}))
+    own = Frozen("1", 4, (FrozenFile("tiny.npz", "ab", "tiny", "cd"),), (FrozenFile("ball.stl", "ef"),), "parts/1")
+    frozen = study(frozen_text(text, own))
     assert differences(frozen, study(text)) == []
-    assert frozen.frozen["scenes"] == [{"name": "tiny"}]
+    assert frozen.frozen == own
 
 
 def test_runs_have_different_digests_and_the_same_every_time():

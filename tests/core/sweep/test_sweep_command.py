@@ -100,7 +100,7 @@ def test_a_finished_study_is_exported(undisturbed):
 @pytest.mark.long("computes a study twice")
 def test_failed_runs_are_left_alone_until_they_are_asked_for(undisturbed, tmp_path):
     folder = tmp_path / "study"
-    opened = begin_study(write(tmp_path), folder, lambda blend, target: None)
+    opened = begin_study(write(tmp_path), folder)
     write_part(folder, [RunResult(run, "The lamp went out.") for run in opened.runs[::20]])
     finished = sweep(folder, "--workers", 1)
     assert (finished.returncode, finished.stderr) == (0, "")
@@ -203,7 +203,7 @@ def test_other_limits_hold_for_the_same_study(undisturbed, tmp_path):
     folder = tmp_path / "out"
     shutil.copytree(undisturbed, folder)
     file = write(tmp_path, STUDY.replace("fps = 200", "fps = 200\nrun_limit = 77\nrun_memory = 999"))
-    study = begin_study(file, folder, lambda blend, target: None).study
+    study = begin_study(file, folder).study
     assert (study.run_limit, study.run_memory) == (77.0, 999.0)
 
 
