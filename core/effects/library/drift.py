@@ -10,8 +10,10 @@ from ...model.sensor import Values
 from ..engine.random_streams import random_walk
 from ..engine.specification import Drawing, Form, Kind, TransducerArray, scalar
 
+SMALL_EXPONENT = 1e-6
+"""Below it a power is its logarithm to nearly all digits."""
 MINUTE = 60.0
-"""Seconds after which the amounts of the form "listed" hold."""
+"""Seconds after which the amounts of the forms "shifted-power" and "listed" hold."""
 
 
 def linear(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
@@ -22,6 +24,15 @@ def linear(signal: np.ndarray, time: np.ndarray, values: Values, transducers: Tr
 def warm_up(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Approach a final value exponentially."""
     return signal - scalar(values, "amount") * np.expm1(-time[:, None] / scalar(values, "time"))
+
+
+def shifted_power(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Change by a power of the time that is counted from an earlier moment; with an exponent of zero by its logarithm."""
+    exponent = scalar(values, "exponent")
+    shift = scalar(values, "time")
+    ends = np.log1p(np.append(np.maximum(time, 0.0), MINUTE) / shift)
+    share = np.expm1(exponent * ends) if abs(exponent) > SMALL_EXPONENT else ends
+    return signal + scalar(values, "amount") * (share[:-1, None] / share[-1])
 
 
 def sensitivity(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
@@ -83,7 +94,21 @@ KIND = Kind(
             neutral={"amount": 0.0},
             memoryless=listed,
             after_conversion=True,
-            error=0.01,  # of the other forms that all texels share it leaves 0.0098 at most
+        ),
+        Form(
+            "shifted-power",
+            "r = r₀ + a · ((1 + t/τ)ⁿ − 1) / ((1 + 60 s/τ)ⁿ − 1)",
+            "Boltzmann (1874) and Nutting, J. Franklin Inst. 191 (1921): powers of time; a straight line, a square root, a "
+            "logarithm and an exponential approach are cases of it, or close to one",
+            (
+                Parameter("amount", "unit", 0.05, -1e4, 1e4, "Change a of the reading after 60 s."),
+                Parameter("time", "s", 30.0, 0.1, 1e5, "Time τ before the start from which the power counts.", log=True),
+                Parameter("exponent", "1", 0.5, -10.0, 1.0, "Exponent n: 1 is a constant rate, below 0 a final value exists."),
+            ),
+            neutral={"amount": 0.0},
+            memoryless=shifted_power,
+            after_conversion=True,
+            error=0.005,
         ),
         Form(
             "sensitivity",

@@ -481,9 +481,16 @@ def summed_equations(sums: Sequence[NormalEquations]) -> NormalEquations:
 
 
 def _reduced_equations(
-    sums: Sequence[NormalEquations], free: tuple[FreeParameter, ...], at: list[np.ndarray], damping: float
+    sums: Sequence[NormalEquations],
+    free: tuple[FreeParameter, ...],
+    at: list[np.ndarray],
+    damping: float,
+    held: np.ndarray | None = None,
 ) -> tuple[np.ndarray, ...]:
     """Eliminate the parameters of single texels from damped normal equations (Schur complement).
+
+    With `held`, (n, m) bool, those of some texels keep their values, and the prior of the others is about where they are:
+    what a part of the trials says nothing about stays as the whole of them and the prior have it.
 
     Returns the matrix (p, p) and right-hand side (p,) of the common parameters. Of the parameters of single texels it returns
     how they follow the common ones (n, m, p), and their step if these stay (n, m).
@@ -496,11 +503,15 @@ def _reduced_equations(
     loads = np.einsum("nmm->nm", t.texel)
     local = [(item, x) for item, x in zip(free, at, strict=True) if item.per_texel]
     h = t.texel_gradient - TEXEL_PRECISION * np.stack([x - item.to_coordinate(item.resting_value) for item, x in local], axis=1)
-    c = t.texel + np.einsum("nm,mk->nmk", damping * loads + TEXEL_PRECISION, np.eye(m))
-    follow, alone = np.linalg.solve(c, t.coupling), np.linalg.solve(c, h[:, :, None])[:, :, 0]
+    c, coupling = t.texel + np.einsum("nm,mk->nmk", damping * loads + TEXEL_PRECISION, np.eye(m)), t.coupling
+    if held is not None:
+        moves = ~held
+        h, coupling = t.texel_gradient * moves, coupling * moves[:, :, None]
+        c = np.where(moves[:, :, None] & moves[:, None], c, np.eye(m))
+    follow, alone = np.linalg.solve(c, coupling), np.linalg.solve(c, h[:, :, None])[:, :, 0]
     return (
-        a - np.einsum("nmp,nmq->pq", t.coupling, follow),
-        t.common_gradient - np.einsum("nmp,nm->p", t.coupling, alone),
+        a - np.einsum("nmp,nmq->pq", coupling, follow),
+        t.common_gradient - np.einsum("nmp,nm->p", coupling, alone),
         follow,
         alone,
     )
@@ -511,18 +522,19 @@ def _solved_step(
     free: tuple[FreeParameter, ...],
     at: list[np.ndarray],
     damping: float,
-    known: np.ndarray | None = None,
+    whole: NormalEquations | None = None,
 ) -> list[np.ndarray]:
     """Solve damped normal equations; a step for each free parameter, in its coordinate.
 
-    With `known` (p, p), the matrix of all trials, there is no step in directions about which these equations have too little
-    information.
+    With the equations of the `whole` of the trials there is no step in directions, and of parameters of single texels, about
+    which these equations have too little information.
     """
-    a, rhs, follow, alone = _reduced_equations(sums, free, at, damping)
-    if known is None:
+    held = None if whole is None else _texel_information(sums) <= LEAST_INFORMATION * _texel_information([whole])
+    a, rhs, follow, alone = _reduced_equations(sums, free, at, damping, held)
+    if whole is None:
         common = np.linalg.lstsq(a, rhs, rcond=1e-13)[0]
     else:
-        share, along = _information_shares(a, known)
+        share, along = _information_shares(a, _reduced_equations([whole], free, at, 0.0, held)[0])
         weight = np.where(share > LEAST_INFORMATION, 1.0 / np.maximum(share, LEAST_INFORMATION), 0.0)
         common = along @ (weight * (along.T @ rhs))
     own = alone - follow @ common
@@ -536,6 +548,12 @@ def _solved_step(
             step.append(common[p])
             p += 1
     return step
+
+
+def _texel_information(sums: Sequence[NormalEquations]) -> np.ndarray:
+    """Information about each parameter of each texel, (n, m) float."""
+    found: np.ndarray = np.einsum("nmm->nm", sum(one.texel for one in sums))
+    return found
 
 
 def _information_shares(a: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -566,14 +584,14 @@ def cross_fitted(found: Fit, views: Sequence[TrialView], seen: Sequence[np.ndarr
     if found.equations is None or not found.free:
         return list(seen)
     free, at = found.free, [item.to_coordinate(value_of(found.model, item)) for item in found.free]
-    known, *_ = _reduced_equations(all_equations(found.equations), free, at, 0.0)
+    whole_sum = summed_equations(all_equations(found.equations))
     out = [residual.copy() for residual in seen]
     for fold in (0, 1):
         sums = [one for trial in found.equations for i, one in enumerate(trial) if i % 2 != fold]
         before = sum(one.sse for one in sums) + _prior_penalty(free, at)
         tried, damping = list(seen), 1e-6
         for _ in range(3):
-            moved = _point_after(at, free, _solved_step(sums, free, at, damping, known))
+            moved = _point_after(at, free, _solved_step(sums, free, at, damping, whole_sum))
             model = with_values(found.model, free, [item.from_coordinate(x) for item, x in zip(free, moved, strict=True)])
             residuals = [view.residual(model) for view in views]
             if _squares_of_fold(views, residuals, 1 - fold) + _prior_penalty(free, moved) <= before * (1.0 + 1e-9):

@@ -30,10 +30,11 @@ from .contact_heights import with_starting_heights
 from .findings import Diagnosis, Finding
 from .quantities import FORCES, READINGS, friction_kinds
 from .recording_differences import RecordingDifferences, as_one_session, may_differ, own_numbers, with_own_numbers
+from .rule_numbers import SURE
 from .score import ONE_SESSION, OWN_NUMBERS, Hypothesis
 from .screening import Screening
 from .search import Search, Start
-from .verdict import closed_shares, judge, leaves_gap, with_best_forms, with_best_kinds
+from .verdict import closed_shares, judge, with_best_forms, with_best_kinds
 from .view_set import ViewSet, view_set_of
 
 TOTAL_WORK = 1000
@@ -62,8 +63,14 @@ def diagnose(rig: Rig) -> Job[Diagnosis]:
     is_repeated = begun.result.noise[begun.main_quantity].source == MEASURED_REPEATS
     search = Search(_starts(begun), MOST_SQUARE - 1.0 if is_repeated else None)
     chosen = yield from _progress_of(search.run(), SELECTION_BEGINS, VERDICT_BEGINS)
+    named = with_best_kinds(search, chosen)
+    best = yield from _progress_of(search.predicting(named), SELECTION_BEGINS, VERDICT_BEGINS)
     yield Progress("verdict", VERDICT_BEGINS, TOTAL_WORK)
-    return _concluded(begun, search, with_best_forms(search, with_best_kinds(search, chosen)))
+    if best is named:
+        best = with_best_forms(search, named)
+    elif search.score.weight(best, named) >= SURE:
+        named = best
+    return _concluded(begun, search, named, best)
 
 
 @dataclass
@@ -146,14 +153,14 @@ def _with_own_numbers(result: Diagnosis) -> _Begun:
     return _begun_with(rig, predictors, result.noise, result.full)
 
 
-def _concluded(begun: _Begun, search: Search, best: Hypothesis) -> Diagnosis:
-    """The diagnosis of the model that the rule chose."""
+def _concluded(begun: _Begun, search: Search, named: Hypothesis, best: Hypothesis) -> Diagnosis:
+    """The diagnosis of the model that the rule chose, `named`, and of the one that predicts best with its effects."""
     result, view_set = _under_assumption(begun, search, best)
     result.best = _with_base_refitted(result, view_set, best.fit)
     result.structure = _structure(view_set, result.best)
     result.line = strongest_line(view_set.whole, result.best.model)
     result.check = checked(search.under("")[0].blocks, search.score, search.base, best)
-    judge(search, best, result)
+    judge(search, named, best, result)
     _find_noise(result, view_set, search, best)
     result.intervals = parameter_intervals(result.best)
     result.stages = _stages(result, view_set)
@@ -187,7 +194,7 @@ def _differences(result: Diagnosis, search: Search, best: Hypothesis, before: fl
     """Levels and gains by which recordings differ, with the weight of models that have them."""
     score = search.score
     others = [one for one in search.tried if one.assumed != OWN_NUMBERS]
-    confidence = float(score.weights_of([score.values(best), score.values(max(others, key=score.value))])[0])
+    confidence = score.weight(best, max(others, key=score.value))
     closed = closed_shares(search, search.under(OWN_NUMBERS)[1]).left_out
     factors, zeros = own_numbers(best.fit.model, result.of("fit"))
     closes = max((share for share in closed if share is not None), default=0.0)
@@ -206,7 +213,7 @@ def _find_noise(result: Diagnosis, view_set: ViewSet, search: Search, best: Hypo
     result.findings.append(Finding(len(best.names), found.name, found.form, round(weight, 3), ()))
     result.ruled_out = [(name, why) for name, why in result.ruled_out if name != found.name]
     is_sure = all(one.name not in {name for group in result.ambiguous for name in group} for one in result.findings)
-    if leaves_gap(search.score, best) and is_sure and not result.check.is_refuted:
+    if search.score.leaves_gap(best) and is_sure and not result.check.is_refuted:
         result.verdict = "explained"
 
 

@@ -27,7 +27,7 @@ from ..fitting.least_squares import BASE, Fit
 from .blocks import Sums
 from .candidates import parameters_at_bounds
 from .noise_level import NoiseLevel
-from .rule_numbers import DRAWS, FEWER_NUMBERS, FORMULA_ERROR, LARGEST_FORMULA_ERROR, NEAR_ERRORS, STRETCHES
+from .rule_numbers import DRAWS, FEWER_NUMBERS, FORMULA_ERROR, LARGEST_FORMULA_ERROR, NEAR_ERRORS, RIVAL_ERRORS, STRETCHES
 
 OWN_NUMBERS, ONE_SESSION = "own numbers", "one session"
 """How recordings may be assumed to differ: by a factor and a zero each, or as one session in their order."""
@@ -154,6 +154,16 @@ class Score:
             kept = self._kept[id(one)] = one, -0.5 * STRETCHES * total - self.price * one.price_count
         return kept[1]
 
+    def prediction(self, one: Hypothesis) -> float:
+        """Return S without prices and allowances: how well a model predicts stretches that it has not seen."""
+        excess, _ = self.parts(one)
+        return float(-0.5 * STRETCHES * np.log(excess[0] + self.noise.error)[self.measured].sum())
+
+    def leaves_gap(self, one: Hypothesis) -> bool:
+        """Return whether a model leaves more than noise and the error of its formulas account for."""
+        excess, allowed = self.parts(one)
+        return bool((excess[0] > np.maximum(RIVAL_ERRORS * self.noise.error, allowed[0]))[self.measured].any())
+
     def value(self, one: Hypothesis) -> float:
         """Return S."""
         return float(self.values(one)[0])
@@ -208,6 +218,10 @@ class Score:
         table = np.array([one[1:] for one in values])
         table = np.exp(table - table.max(axis=0))
         return np.asarray((table / table.sum(axis=0)).mean(axis=1))
+
+    def weight(self, one: Hypothesis, other: Hypothesis) -> float:
+        """Return the pseudo-BMA+ weight of a model against another."""
+        return float(self.weights_of([self.values(one), self.values(other)])[0])
 
     def most_to_gain(self, one: Hypothesis) -> float:
         """Return by how much one more effect could raise S at most: if nothing remained beyond the allowance."""

@@ -253,9 +253,9 @@ def share_left(found: Fit, test: ScoreTest) -> float:
     return max(float(found.sse.sum()) - count, 0.0) / max(test.total - count, 0.01 * count)
 
 
-def _is_textbook(one: Promise) -> bool:
-    """True unless the form is free to follow any law of its kind."""
-    return one.candidate.form.error is None
+def _is_textbook(one: Promise) -> tuple[bool, bool]:
+    """True unless the form is free to follow any law of its kind; then, true if it has numbers of texels."""
+    return one.candidate.form.error is None, one.candidate.has_texel_parameters
 
 
 def _left(one: Hypothesis) -> float:

@@ -16,6 +16,7 @@ import numpy as np
 
 from .noise_level import measured_noise, noise_level
 from .pairs import best_pairs
+from .rule_numbers import LEAST_WEIGHT
 from .score import ONE_SESSION, Hypothesis, Score, drawn_weights
 from .screening import ALL_FORMS, Screening
 
@@ -24,7 +25,7 @@ BEAMS = {1: 3, 2: 2}
 MOST_EFFECTS = 3
 LEAST_REMEMBERED = 1e-6
 """Change of a prediction, in deviations of the noise, that is more than rounding."""
-STAGES = {"alone": 0.0, "differing recordings": 0.3, "further effects": 0.5, "reconsidered": 0.8}
+STAGES = {"alone": 0.0, "differing recordings": 0.3, "further effects": 0.5, "reconsidered": 0.8, "prediction": 0.9}
 """Share of the work at which each stage begins."""
 
 Start = Callable[[], tuple[Screening, Hypothesis]]
@@ -92,6 +93,21 @@ class Search:
         best = max(near, key=self.score.value)
         simpler = [one for one in near if self.score.is_near(best, one) and self.score.is_simpler(one, best)]
         return max(simpler, key=self.score.value) if simpler else best
+
+    def predicting(self, named: Hypothesis) -> Generator[tuple[str, float], None, Hypothesis]:
+        """Return the model that predicts best of all that hold the effects of the chosen one, while it leaves a gap.
+
+        What is added need not pay for a name: users get the better prediction, and are told that its name is a guess.
+        """
+        best = named
+        while self.score.leaves_gap(best) and 0 < len(best.names) < MOST_EFFECTS:
+            yield from _in_stage("prediction", self._grow(best))
+            longer = [one for one in self.tried if _holds(one, best) and self.score.weight(one, best) > LEAST_WEIGHT]
+            top = max(longer, key=self.score.prediction, default=best)
+            if self.score.prediction(top) <= self.score.prediction(best):
+                break
+            best = top
+        return best
 
     def under(self, assumed: str) -> tuple[Screening, Hypothesis]:
         """Return the screening under an assumption, and the base model with it."""
@@ -211,6 +227,11 @@ class Search:
         price = float(np.log(max(len(self.library) + len(self.starts) - 1, 1)))
         self.score = Score(noise, count.sum(axis=0) > 0, price, drawn_weights(len(count)))
         self.score.measure_formula_errors(self.base, [one for one in self.tried if len(one.names) == one.price_count == 1])
+
+
+def _holds(one: Hypothesis, best: Hypothesis) -> bool:
+    """True if a model has the kinds of another, and at most one more."""
+    return one.assumed == best.assumed and set(one.names) >= set(best.names) and len(one.names) <= len(best.names) + 1
 
 
 def _in_stage(stage: str, work: Generator[str, None, Outcome]) -> Generator[tuple[str, float], None, Outcome]:

@@ -50,38 +50,46 @@ def _contains(other: Hypothesis, best: Hypothesis, index: int) -> bool:
     return other.is_bent or per_texel
 
 
-def judge(search: Search, best: Hypothesis, result: Diagnosis) -> None:
+def judge(search: Search, named: Hypothesis, best: Hypothesis, result: Diagnosis) -> None:
     """Write verdict, findings, ambiguous groups and ruled-out kinds into a result that has its models.
 
     Findings are in the order in which effects act.
+
+    Parameters
+    ----------
+    search : Search
+    named : Hypothesis
+        The model that the rule chose.
+    best : Hypothesis
+        The amended model: the same kinds, and those that help it predict and do not pay for their names.
+    result : Diagnosis
     """
     result.closed, order = closed_shares(search, best), list(library())
     for index in sorted(range(len(best.names)), key=lambda index: order.index(best.names[index])):
-        finding, rivals = _judged(search, best, index, result)
-        result.findings.append(finding)
-        if rivals:
-            result.ambiguous.append((finding.name, *rivals))
+        name, form = best.forms[index].split("/")
+        if name in named.names:
+            found = _judged(search, named, named.names.index(name), result)
+        else:
+            found = _judged_by_prediction(search, named, best)
+        unsettled = _at_bounds(best, index, result.rig.parameters.unit)
+        result.findings.append(replace(found, effect=index, name=name, form=form, unsettled=unsettled))
+        if found.rivals:
+            result.ambiguous.append((name, *found.rivals))
     if result.misleading_faults:
         result.findings = [
             replace(one, confidence=min(one.confidence, JUST_UNSURE), doubts=(*one.doubts, FAULTY)) for one in result.findings
         ]
-    result.verdict = _verdict(search, best, result)
+    result.verdict = _verdict(search, named, result)
     _rule_out(search, result)
 
 
 def _verdict(search: Search, best: Hypothesis, result: Diagnosis) -> str:
     """Explained needs a name that is sure, and a remainder that noise and the error of formulas account for."""
-    is_open = leaves_gap(search.score, best) or result.line is not None
+    is_open = search.score.leaves_gap(best) or result.line is not None
     if not best.components:
         return "unexplained" if is_open else "no gap"
     is_sure = any(one.confidence >= SURE for one in result.findings) or (not best.names and best.price_count > 0)
     return "explained" if is_sure and not is_open and not result.check.is_refuted else "unexplained"
-
-
-def leaves_gap(score: Score, one: Hypothesis) -> bool:
-    """Return whether a model leaves more than noise and the error of its formulas account for."""
-    excess, allowed = score.parts(one)
-    return bool((excess[0] > np.maximum(RIVAL_ERRORS * score.noise.error, allowed[0]))[score.measured].any())
 
 
 def weighed_kinds(search: Search, best: Hypothesis, index: int) -> tuple[float, list[str]]:
@@ -93,13 +101,13 @@ def weighed_kinds(search: Search, best: Hypothesis, index: int) -> tuple[float, 
     score, name = search.score, best.names[index]
     parent, others = search.in_place_of(best, index)
     own = score.values_of_kind(others[name], search.library[name])
-    rivals, kept, is_needed = [], [own, score.values(parent)], leaves_gap(score, parent)
+    rivals, kept, is_needed = [], [own, score.values(parent)], score.leaves_gap(parent)
     for other, forms in others.items():
         if other == name:
             continue
         value = score.values_of_kind(forms, search.library[other])
         apart, error = float((own - value)[0]), float((own - value)[1:].std())
-        explains = is_needed and any(not (leaves_gap(score, one) or _contains(one, best, index)) for one in forms)
+        explains = is_needed and any(not (score.leaves_gap(one) or _contains(one, best, index)) for one in forms)
         if not explains and apart > -error and _contains(max(forms, key=score.value), best, index):
             continue
         kept.append(value)
@@ -108,8 +116,8 @@ def weighed_kinds(search: Search, best: Hypothesis, index: int) -> tuple[float, 
     return float(score.weights_of(kept)[0]), rivals
 
 
-def _judged(search: Search, best: Hypothesis, index: int, result: Diagnosis) -> tuple[Finding, tuple[str, ...]]:
-    """An effect with its confidence, and its rivals in its place."""
+def _judged(search: Search, best: Hypothesis, index: int, result: Diagnosis) -> Finding:
+    """An effect that the rule chose, with its confidence and its rivals."""
     score, name, form = search.score, best.names[index], best.forms[index].split("/")[1]
     parent, others = search.in_place_of(best, index)
     confidence, rivals = weighed_kinds(search, best, index)
@@ -121,22 +129,20 @@ def _judged(search: Search, best: Hypothesis, index: int, result: Diagnosis) -> 
     left = {other: min(_excess(score, one) for one in forms) for other, forms in others.items() if other != name}
     nearest = min(left, key=lambda other: left[other], default="")
     leaves = left[nearest] / max(_excess(score, best), float(score.noise.error[score.measured].sum())) if nearest else np.inf
-    whole = max(_excess(score, search.under(best.assumed)[1]), 1e-12)
-    closes = (_excess(score, parent) - _excess(score, best)) / whole
-    unsettled = _at_bounds(best, index, result.rig.parameters.unit)
-    found = Finding(
-        index,
-        name,
-        form,
-        round(confidence, 3),
-        tuple(rivals),
-        nearest,
-        leaves,
-        round(float(np.clip(closes, 0.0, 1.0)), 4),
-        unsettled,
-        doubts,
-    )
-    return found, tuple(rivals)
+    closes = _share_of_gap(search, parent, best)
+    return Finding(index, name, form, round(confidence, 3), tuple(rivals), nearest, leaves, closes, doubts=doubts)
+
+
+def _judged_by_prediction(search: Search, named: Hypothesis, best: Hypothesis) -> Finding:
+    """One of the effects that help to predict and do not pay for their names; together they have one weight."""
+    closes = _share_of_gap(search, named, best)
+    return Finding(0, "", "", round(search.score.weight(best, named), 3), (), closes=closes, doubts=(NEARLY_WITHOUT,))
+
+
+def _share_of_gap(search: Search, without: Hypothesis, best: Hypothesis) -> float:
+    """Share of the whole gap that is open without an effect and not with it."""
+    whole = max(_excess(search.score, search.under(best.assumed)[1]), 1e-12)
+    return round(float(np.clip((_excess(search.score, without) - _excess(search.score, best)) / whole, 0.0, 1.0)), 4)
 
 
 def _excess(score: Score, one: Hypothesis) -> float:

@@ -330,6 +330,10 @@ def test_listed_values():
     np.testing.assert_allclose(read(effect("offset", "listed", offset=factor), force, TIME[:9]), force + factor)
     moved = factor * (TIME[:9, None] / 60.0) ** 0.5
     np.testing.assert_allclose(read(effect("drift", "listed", amount=factor, exponent=0.5), force, TIME[:9]), force + moved)
+    straight = read(effect("drift", "shifted-power", amount=12.0, time=30.0, exponent=1.0), force, TIME[:9])
+    np.testing.assert_allclose(straight, read(effect("drift", "linear", rate=0.2), force, TIME[:9]))
+    found = read(effect("drift", "shifted-power", amount=0.3, time=7.0, exponent=0.0), force, TIME[:9])
+    np.testing.assert_allclose(found, force + 0.3 * np.log1p(TIME[:9, None] / 7.0) / np.log1p(60.0 / 7.0))
     dead = (np.arange(N) % 5 == 0).astype(float)
     np.testing.assert_allclose(read(effect("dead-texels", "listed", dead=dead), force, TIME[:9]), force * (1 - dead))
     found = read(effect("dead-texels", "held", dead=dead, level=0.01 * np.arange(N)), force, TIME[:9])

@@ -101,6 +101,21 @@ def test_of_models_within_a_standard_error_the_smallest_wins():
     assert found.best() is few
 
 
+@pytest.mark.parametrize(("left", "helps"), [(2.9, False), (1.8, True)])
+def test_an_effect_may_help_to_predict_without_paying_for_its_name(left, helps):
+    """A gap of two variances shrinks to 0.8, or hardly; the allowance of the first effect hides either."""
+    named = model(3.0, "lag/first-order", changes=(20.0,))
+    more = model(left, "lag/first-order", "drift/sensitivity", changes=(20.0, 1.0))
+    twice = model(1.0, "lag/first-order", "drift/sensitivity", "creep/power", changes=(20.0, 1.0, 1.0))
+    found = search.Search({})
+    found.score, found.tried, found._longer = rule(), [named, more, twice], {one.key: [] for one in (named, more, twice)}
+    assert found.score.value(more) < found.score.value(named)
+    work = found.predicting(named)
+    with pytest.raises(StopIteration) as stop:
+        next(work)
+    assert stop.value.value is ((twice if found.score.leaves_gap(more) else more) if helps else named)
+
+
 def test_a_form_left_out_shows_the_error_of_formulas():
     """The second best form leaves a tenth of the change more: so may nature's. A form of its own statement keeps that."""
     found = rule()
@@ -168,7 +183,7 @@ def searches():
             patch.setattr(
                 diagnosis,
                 "_concluded",
-                lambda begun, one, best, name=name: found.setdefault(name, (begun, one)) and concluded(begun, one, best),
+                lambda begun, one, *models, name=name: found.setdefault(name, (begun, one)) and concluded(begun, one, *models),
             )
             run_job(diagnosis.diagnose(cases.rig(trials=4, seconds=6.0, **words)))
     return found
