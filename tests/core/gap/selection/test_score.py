@@ -54,7 +54,8 @@ def test_the_score_is_the_logarithm_of_what_is_left_and_allowed():
     expected = -0.5 * rule_numbers.STRETCHES * np.log(2.0 + rule_numbers.FORMULA_ERROR * 4.0 + 0.01) - PRICE
     assert rule().value(one) == pytest.approx(expected)
     own = model(3.0, assumed=OWN_NUMBERS, changes=(4.0,))
-    assert rule().value(own) == pytest.approx(expected)  # numbers of recordings cost a name
+    allowed = rule_numbers.FREE_FORM_ERROR * 4.0  # numbers of recordings cost a name, and follow any gain and level
+    assert rule().value(own) == pytest.approx(-0.5 * rule_numbers.STRETCHES * np.log(2.0 + allowed + 0.01) - PRICE)
     assert rule().value(model(0.5)) == pytest.approx(-0.5 * rule_numbers.STRETCHES * np.log(0.01))  # never below the noise
 
 
@@ -99,6 +100,17 @@ def test_of_models_within_a_standard_error_the_smallest_wins():
     bent.__dict__["is_bent"] = True
     found.tried = [model(3.0), few, bent]
     assert found.best() is few
+
+
+def test_a_kind_that_leaves_more_than_its_error_is_refuted_where_another_does_not():
+    """Half the score between them is the allowance of the kind that fits: the other leaves 0.6 where it may leave 0.2."""
+    best, other = model(1.0, "hysteresis/play", changes=(20.0,)), model(1.6, "softening/peak", changes=(4.0,))
+    found = search.Search({})
+    found.score, found.library = rule(), Counter(hysteresis=1, softening=1)
+    found.in_place_of = lambda *_: (model(4.0), {"hysteresis": [best], "softening": [other]})
+    assert found.score.value(other) > found.score.value(best)
+    weight, rivals = verdict.weighed_kinds(found, best, 0)
+    assert weight == pytest.approx(found.score.weight(best, model(4.0))) and not rivals
 
 
 @pytest.mark.parametrize(("left", "helps"), [(2.9, False), (1.8, True)])
