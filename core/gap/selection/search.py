@@ -16,7 +16,7 @@ import numpy as np
 
 from .noise_level import measured_noise, noise_level
 from .pairs import best_pairs
-from .rule_numbers import LEAST_WEIGHT
+from .rule_numbers import DRAWS, LEAST_WEIGHT
 from .score import ONE_SESSION, Hypothesis, Score, drawn_weights
 from .screening import ALL_FORMS, Screening
 
@@ -217,6 +217,14 @@ class Search:
         least = max(self.score.value(parent), self.score.value(self.best()) - self.score.price)
         return self.score.most_left(parent, least)
 
+    def _weights(self) -> np.ndarray:
+        """Weights of the blocks of fitted recordings under each draw; check recordings have none, so they choose no effect."""
+        blocks = self.under("")[0].blocks
+        is_fitted = blocks.recording < len(blocks.views.fitted)
+        weights = np.zeros((DRAWS + 1, len(is_fitted)))
+        weights[:, is_fitted] = drawn_weights(int(is_fitted.sum()))
+        return weights
+
     def _weigh(self, is_noise_measured: bool = False) -> None:
         """Set the score by the noise as the models tried so far leave it without load, or as it was measured before."""
         count = self.base.sums.count
@@ -225,7 +233,7 @@ class Search:
         else:
             noise = measured_noise(count) if is_noise_measured else noise_level([one.sums for one in self.tried])
         price = float(np.log(max(len(self.library) + len(self.starts) - 1, 1)))
-        self.score = Score(noise, count.sum(axis=0) > 0, price, drawn_weights(len(count)))
+        self.score = Score(noise, count.sum(axis=0) > 0, price, self._weights())
         self.score.measure_formula_errors(self.base, [one for one in self.tried if len(one.names) == one.price_count == 1])
 
 
