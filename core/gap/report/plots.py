@@ -317,7 +317,7 @@ def _base_squared_error(predictor: Predictor, result: Diagnosis) -> np.ndarray:
 CAPTIONS = {
     "overview": "Where there are several texels, the error of each on the fitted trials; the error without and with each "
     "effect that was found.",
-    "gap": "The gap before and after. Check trials were never fitted; they count in the score of every effect.",
+    "gap": "The gap before and after. Check trials were never fitted and choose no effect; they decide the verdict.",
     "curves": "Measured and simulated curves where the error of the base model is largest in each trial.",
     "loops": "The same, plotted against the stimulus: the characteristic shape of an effect.",
     "map": "Root mean square error of each texel on the fitted trials.",

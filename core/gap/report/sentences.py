@@ -204,9 +204,16 @@ def check_failure(result: Diagnosis) -> str:
     if worst is None or all(map(_is_noise, result.findings)):
         return ""
     quantity = next(q for q in (READINGS, FORCES) if result.check.refutes(q) and worst.count[q])
-    before, after = ((float(x[quantity]) ** 0.5) * _noise_share(result, quantity) for x in (worst.before, worst.after))
+    before, after, fitted = (
+        (float(x[quantity]) ** 0.5) * _noise_share(result, quantity) for x in (worst.before, worst.after, worst.fitted)
+    )
     what = "" if quantity == READINGS else " of the net force"
-    said = f"in the check recording '{worst.name}' the error{what} rises from {before:.2%} to {after:.2%} of the range"
+    said = f"in the check recording '{worst.name}' the error{what} "
+    said += (
+        f"rises from {before:.2%} to {after:.2%} of the range"
+        if after > before
+        else f"is {after:.2%} of the range, not {fitted:.2%}"
+    )
     return f"{said}; {'; '.join(recording_differences(result, worst.name))}"
 
 
@@ -234,6 +241,14 @@ def _unexplained(result: Diagnosis, errors: GapErrors, sure: list[Finding]) -> s
         fitted = _listed([one.name for one in by_share_closed(result)])
         many = len(result.findings) > 1
         return f"Unexplained: {fitted} {'fit' if many else 'fits'} the fitted recordings, but {failure}.{part}"
+    is_quiet = result.structure.total < LEAST_STRUCTURE and result.line is None
+    if result.check.recordings and not result.findings and result.between is None and is_quiet:
+        apart = max(result.check.recordings, key=lambda one: float(one.before.max())).name
+        left, other = errors.base["fit"] or 0.0, errors.base["check"] or 0.0
+        return (
+            f"Unexplained: the base model fits the fitted recordings ({left:.2%} of the range) and not the check recording "
+            f"'{apart}' (all of them: {other:.2%}); {'; '.join(recording_differences(result, apart))}."
+        )
     if result.line is not None:
         line, unit = result.line, result.rig.parameters.unit
         said = f"a line at {line.frequency:.3g} Hz of {line.amplitude:.3g} {unit}, also present without load"

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How the amended model does in recordings that were never fitted, one by one.
 
-They are part of the score already. Here a user sees whether one of them is predicted worse than by the base model.
+They choose no effect. One that is predicted worse than by the base model, or worse than the fitted recordings are, refutes the
+amended model.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ class CheckedRecording:
         Number of measured values.
     rise : (2,) float
         Largest rise of the mean squares that noise and the error of formulas explain.
+    fitted : (2,) float
+        What the amended model leaves on unseen stretches of the fitted recordings.
     """
 
     name: str
@@ -37,10 +40,12 @@ class CheckedRecording:
     after: np.ndarray
     count: np.ndarray
     rise: np.ndarray
+    fitted: np.ndarray
 
     def is_worse(self, quantity: int) -> bool:
-        """Return whether readings or forces are predicted worse than that."""
-        return bool(self.count[quantity] > 0 and self.after[quantity] > self.before[quantity] + self.rise[quantity])
+        """Return whether readings or forces are predicted worse than by the base model, or than in the fitted recordings."""
+        most = min(self.before[quantity], self.fitted[quantity]) + self.rise[quantity]
+        return bool(self.count[quantity] > 0 and self.after[quantity] > most)
 
 
 @dataclass(frozen=True)
@@ -66,9 +71,10 @@ class CheckOutcome:
 
 
 def checked(blocks: Blocks, score: Score, base: Hypothesis, best: Hypothesis) -> CheckOutcome:
-    """Hold the amended model against the base model in each check recording."""
+    """Hold the amended model against the base model, and against the fitted recordings, in each check recording."""
     allowed = score.noise.error + score.parts(best)[1][0]
-    views, found = blocks.views, []
+    views, found, is_fitted = blocks.views, [], blocks.recording < len(blocks.views.fitted)
+    fitted = best.sums.left[is_fitted].sum(axis=0) / np.maximum(blocks.count[is_fitted].sum(axis=0), 1.0)
     for number, view in enumerate(views.check, start=len(views.fitted)):
         own = blocks.recording == number
         before, after, count = base.sums.left[own], best.sums.left[own], blocks.count[own]
@@ -77,5 +83,5 @@ def checked(blocks: Blocks, score: Score, base: Hypothesis, best: Hypothesis) ->
         error = np.sqrt((apart**2).sum(axis=0)) / total
         rise = RIVAL_ERRORS * error + allowed
         squares = before.sum(axis=0) / total, after.sum(axis=0) / total
-        found.append(CheckedRecording(view.predictor.trial.name, *squares, count.sum(axis=0), rise))
+        found.append(CheckedRecording(view.predictor.trial.name, *squares, count.sum(axis=0), rise, fitted))
     return CheckOutcome(tuple(found))

@@ -118,15 +118,15 @@ class Score:
     formula_errors: dict[str, np.ndarray] = field(default_factory=dict)
     _kept: dict[int, tuple[Hypothesis, np.ndarray]] = field(default_factory=dict)
 
-    def parts(self, one: Hypothesis) -> tuple[np.ndarray, np.ndarray]:
-        """Return E and B under each draw, (draws, 2) each."""
-        s = one.sums
-        count = np.maximum(self.weights @ s.count, 1e-9)
-        excess = np.maximum(self.weights @ s.left / count - self.noise.under(self.weights), 0.0)
+    def parts(self, one: Hypothesis, weights: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Return E and B under each draw, or with other weights of the blocks, (draws, 2) each."""
+        s, weights = one.sums, self.weights if weights is None else weights
+        count = np.maximum(weights @ s.count, 1e-9)
+        excess = np.maximum(weights @ s.left / count - self.noise.under(weights), 0.0)
         allowed = np.zeros(s.count.shape)
         for name, change in zip(one.components, s.changes, strict=True):
             allowed = allowed + self.formula_error(name) * change
-        return excess, self.weights @ allowed / count
+        return excess, weights @ allowed / count
 
     def formula_error(self, label: str) -> np.ndarray:
         """Return φ of a form for readings and forces, (2,)."""
@@ -168,9 +168,9 @@ class Score:
         excess, _ = self.parts(one)
         return float(-0.5 * STRETCHES * np.log(excess[0] + self.noise.error)[self.measured].sum())
 
-    def leaves_gap(self, one: Hypothesis) -> bool:
-        """Return whether a model leaves more than noise and the error of its formulas account for."""
-        excess, allowed = self.parts(one)
+    def leaves_gap(self, one: Hypothesis, weights: np.ndarray | None = None) -> bool:
+        """Return whether a model leaves more than noise and the error of its formulas account for, `weights` (1, b)."""
+        excess, allowed = self.parts(one, self.weights[:1] if weights is None else weights)
         return bool((excess[0] > np.maximum(RIVAL_ERRORS * self.noise.error, allowed[0]))[self.measured].any())
 
     def value(self, one: Hypothesis) -> float:

@@ -85,7 +85,8 @@ def judge(search: Search, named: Hypothesis, best: Hypothesis, result: Diagnosis
 
 def _verdict(search: Search, named: Hypothesis, best: Hypothesis, result: Diagnosis) -> str:
     """Explained needs a name that is sure, and a remainder that noise and the error of formulas account for."""
-    is_open = search.score.leaves_gap(best) or len(best.names) > len(named.names) or result.line is not None
+    everywhere = np.ones((1, len(best.sums.count)))  # check recordings, too: they decide the verdict
+    is_open = search.score.leaves_gap(best, everywhere) or len(best.names) > len(named.names) or result.line is not None
     if not best.components:
         return "unexplained" if is_open else "no gap"
     is_sure = any(one.confidence >= SURE for one in result.findings) or (not named.names and named.price_count > 0)

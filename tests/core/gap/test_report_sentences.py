@@ -22,8 +22,9 @@ from palpate.core.gap.selection.view_set import view_set_of
 from palpate.core.jobs import run_job
 
 
-def test_the_page_says_that_check_trials_are_never_fitted():
-    assert "never fitted" in CAPTIONS["gap"]
+def test_the_page_says_that_check_trials_choose_no_effect():
+    """As they do (``test_check_recordings.py`` changes one, and the model stays)."""
+    assert "choose no effect" in CAPTIONS["gap"] and "decide the verdict" in CAPTIONS["gap"]
 
 
 def shifted(gains, levels):
