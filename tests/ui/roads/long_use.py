@@ -30,6 +30,7 @@ def play_a_while(ui, seconds):
 
 
 def bake_and_undo(ui):
+    yield from ui.wait_until(bpy.ops.palpate.bake.poll, "frames are computed again, and Bake is no longer grey")
     yield from ui.press("palpate.bake()")
     yield from ui.wait_until(lambda: obj("Pad").palpate.is_baked, "the bake is done")
     yield from undo(ui)
