@@ -12,7 +12,6 @@ __all__ = [
     "check_recordings",
     "diagnosis",
     "findings",
-    "identifiability",
     "quantities",
     "rule_numbers",
     "silenced_texels",

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..fitting.least_squares import Fit, TrialView, cross_fitted
 from ..forward.predictor import Model, Predictor
+from .block_sums import Sums
 from .rule_numbers import BLOCKS, MEMORIES
 
 
@@ -71,27 +72,6 @@ def views_of(predictors: Sequence[Predictor], noise: tuple[float, float], memory
 
 def _block_count(predictor: Predictor, memory: float) -> int:
     return int(np.clip(len(predictor.trial.time) / (MEMORIES * max(memory, 1.0)), 2, BLOCKS))
-
-
-@dataclass(frozen=True)
-class Sums:
-    """Sums over each of b blocks, for readings and net forces, in units of the noise's variance: (b, 2) float each.
-
-    Attributes
-    ----------
-    left, count : (b, 2) float
-        Squares that a model leaves on unseen blocks, and the number of values.
-    rest, rest_count : (2, b, 2) float
-        The same of values without load: while nothing touches the sensor, and of texels that nothing touches.
-    changes : (components, b, 2) float
-        Squares of the change of the prediction that each component of the model makes.
-    """
-
-    left: np.ndarray
-    count: np.ndarray
-    rest: np.ndarray
-    rest_count: np.ndarray
-    changes: np.ndarray
 
 
 class Blocks:

@@ -15,10 +15,10 @@ from ...errors import EffectError
 from ...geometry.grid_layout import GridLayout
 from ...model.parameter import Parameter
 from ...model.sensor import Effect
+from ..fitting.identifiability import unidentifiable
 from ..fitting.least_squares import Fit, FreeParameter, value_of
 from ..fitting.noise_floor import coverage
 from ..forward.predictor import Model, Predictor
-from .identifiability import unidentifiable
 
 NOT_FITTED = names_found_by(SCATTER)
 """Kinds that are not fitted but found in the final residual (see :func:`.residual_tests.proportional_noise`)."""

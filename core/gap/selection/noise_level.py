@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .blocks import Sums
+from .block_sums import Sums
 from .rule_numbers import LEAST_NOISE_ERROR, LEAST_VALUES
 
 LEAST_LEVEL = 1e-6

@@ -24,7 +24,7 @@ from scipy.optimize import brentq
 
 from ...effects.engine.registry import form_of, kind_of
 from ..fitting.least_squares import BASE, Fit
-from .blocks import Sums
+from .block_sums import Sums
 from .candidates import parameters_at_bounds
 from .noise_level import NoiseLevel
 from .rule_numbers import (
@@ -35,6 +35,7 @@ from .rule_numbers import (
     LARGEST_FORMULA_ERROR,
     NEAR_ERRORS,
     RIVAL_ERRORS,
+    SAME_SCORE,
     STRETCHES,
 )
 
@@ -183,9 +184,9 @@ class Score:
         return float(apart[0]), float(apart[1:].std())
 
     def is_near(self, best: Hypothesis, one: Hypothesis) -> bool:
-        """Return whether a model does as well as a better one, as far as chance goes."""
+        """Return whether a model does as well as a better one, as far as chance goes, or to a hundredth of their odds."""
         apart, error = self.lead(best, one)
-        return apart < NEAR_ERRORS * error
+        return apart < max(NEAR_ERRORS * error, SAME_SCORE)
 
     @staticmethod
     def is_simpler(one: Hypothesis, other: Hypothesis) -> bool:

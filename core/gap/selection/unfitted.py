@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 from ...effects.engine.registry import library
 from ..dataset.rig import Rig
+from ..fitting.identifiability import unidentifiable
 from ..fitting.noise_floor import ChannelNoise, coverage
 from ..forward.predictor import Model, Predictor, predictors_of
 from .base_model import identified_base_parameters, prepared, start_model, with_recording_numbers
 from .candidates import DIRECTLY_ESTIMATED, NOT_FITTED, candidates
 from .contact_heights import with_starting_heights
-from .identifiability import unidentifiable
 from .quantities import friction_kinds
 
 

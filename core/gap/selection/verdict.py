@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from ...effects.engine.registry import form_of, library
+from ..fitting.identifiability import curvature_ratio, indistinguishable, unidentifiable
 from .candidates import NOT_FITTED, parameters_at_bounds
 from .findings import ClosedShares, Diagnosis, Finding
-from .identifiability import curvature_ratio, indistinguishable, unidentifiable
 from .rule_numbers import RIVAL_ERRORS, SURE
 from .score import Hypothesis, Score
 from .search import Search

@@ -90,7 +90,7 @@ import gap_cases as cases
 from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.report.sentences import next_experiment
 from palpate.core.gap.selection.candidates import candidates
-from palpate.core.gap.selection.identifiability import NONLINEAR
+from palpate.core.gap.fitting.identifiability import NONLINEAR
 
 rig = cases.rig(trials=1, seconds=2.0)
 assert "power-law" in {one.name for one in candidates(predictors_of(rig.trials, rig), Model(rig.parameters))}

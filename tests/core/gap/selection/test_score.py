@@ -11,7 +11,7 @@ import pytest
 
 from palpate.core.effects.engine.registry import library
 from palpate.core.gap.selection import blocks, diagnosis, noise_level, rule_numbers, score, search, verdict
-from palpate.core.gap.selection.blocks import Sums
+from palpate.core.gap.selection.block_sums import Sums
 from palpate.core.gap.selection.noise_level import NoiseLevel
 from palpate.core.gap.selection.score import OWN_NUMBERS, Hypothesis, Score, drawn_weights
 from palpate.core.jobs import run_job

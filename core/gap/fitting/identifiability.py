@@ -20,8 +20,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...effects.engine.registry import names_in_family, names_known_from
-from ..fitting.noise_floor import Coverage
 from ..forward.predictor import Model, Predictor
+from .noise_floor import Coverage
 
 NEVER_UNLOADED = "the sensor was never unloaded, and this effect shows after unloading"
 KNOWN_FROM_UNLOADING, KNOWN_FROM_TIMING = names_known_from("unloading"), names_known_from("timing")
