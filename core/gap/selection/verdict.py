@@ -23,7 +23,7 @@ NEARLY_WITHOUT = "the model without it does nearly as well, for one name less"
 
 
 def with_best_kinds(search: Search, best: Hypothesis) -> Hypothesis:
-    """Return the model, or one with another kind in a place where that kind explains more by all its forms."""
+    """Return the model, or one with another kind in a place where that explains more by all its forms, or is simpler."""
     score = search.score
     for index, name in enumerate(best.names):
         _, others = search.in_place_of(best, index)
@@ -31,7 +31,7 @@ def with_best_kinds(search: Search, best: Hypothesis) -> Hypothesis:
         for other, forms in others.items():
             one = max(forms, key=score.value)
             better = float(score.values_of_kind(forms, search.library[other])[0]) > own
-            if better and not _contains(one, best, index):
+            if better and not _contains(one, best, index) or score.is_near(best, one) and score.is_simpler(one, best):
                 return one
     return best
 
