@@ -40,5 +40,5 @@ FEWER_NUMBERS = 2.0
 SURE = 0.5
 """Confidence from which on a name counts as found: it is more likely than not."""
 LEAST_WEIGHT = 0.1
-"""Least weight of an effect that only helps to predict: one that changes nothing has 0.05, by its price. Such effects of ten real
-recordings have 0.25 to 0.43, where they help, and less than 0.01 elsewhere."""
+"""Least weight of an effect that only helps to predict: one that changes nothing has 0.05, by its price. Such effects of ten
+real recordings have 0.25 to 0.43, where they help, and less than 0.01 elsewhere."""
