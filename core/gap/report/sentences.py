@@ -227,6 +227,10 @@ def caution(result: Diagnosis) -> str:
     failure = check_failure(result)
     if failure:
         return f"The amended sensor fails on the check recordings: {failure}."
+    with_rivals = {group[0] for group in result.ambiguous}
+    if result.findings and all(one.name in with_rivals for one in result.findings):
+        said = "The amended sensor has one of several effects that these recordings do not distinguish"
+        return f"{said}: under other loads it may be wrong."
     if result.verdict == "unexplained" and result.findings:
         return "The amended sensor explains only a part of the gap."
     return ""
