@@ -78,7 +78,7 @@ COPIED = ("__init__.py", "benchmarks", "commands", "core", "pyproject.toml", "te
 TESTS = {
     "tests/core/effects/engine/test_registry.py": "",
     "tests/core/effects/library/test_library.py": "power-law",
-    "tests/core/gap/selection/test_identifiability.py": "pace or nonlinear or unloading",
+    "tests/core/gap/fitting/test_identifiability.py": "pace or nonlinear or unloading",
     "tests/core/gap/test_hidden_cases.py": "every_effect or own_forms",
     "tests/tools/test_effects_page.py": "this_library or every_experiment",
     "tests/core/effects/test_one_file.py": "names_an_effect",
