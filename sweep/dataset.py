@@ -125,7 +125,7 @@ def replace_folder(new: Path | None, target: Path, hidden: Path, files: re.Patte
         None: there is to be no folder.
     target : Path
     hidden : Path
-        Temporary folder beside it, with which the earlier folder is removed.
+        Temporary folder in the same parent folder. The earlier folder is moved into it and removed with it.
     files : compiled regular expression
         Of the names that the earlier folder may hold.
 

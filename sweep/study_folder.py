@@ -47,10 +47,9 @@ from .scene_evaluation import REFUSE, read_blend
 
 BLEND, SCENARIO = ".blend", ".npz"
 ReadBlend = Callable[[Path, Path], None]
-"""Writes what a .blend says to the solver into a file, and beside it what is needed to read the scene again where the study
-asks for that."""
+"""Writes the solver input of a .blend to a file, and to a second file, for some studies, the data for evaluating it again."""
 MADE = (PARTS, LAYOUTS, RUNS, SCENES)
-"""Folders of a study, beside its results."""
+"""Folders of a study, in addition to its results."""
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,6 @@ from ...model.sensor import Values
 from ..engine.random_streams import random_walk
 from ..engine.specification import Drawing, Form, Kind, TransducerArray, scalar
 
-SMALL_EXPONENT = 1e-6
-"""Below it a power is its logarithm to nearly all digits."""
 MINUTE = 60.0
 """Seconds after which the amounts of the forms "shifted-power" and "listed" hold."""
 
@@ -28,11 +26,11 @@ def warm_up(signal: np.ndarray, time: np.ndarray, values: Values, transducers: T
 
 def shifted_power(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Change by a power of the time that is counted from an earlier moment; with an exponent of zero by its logarithm."""
-    exponent = scalar(values, "exponent")
-    shift = scalar(values, "time")
-    ends = np.log1p(np.append(np.maximum(time, 0.0), MINUTE) / shift)
-    share = np.expm1(exponent * ends) if abs(exponent) > SMALL_EXPONENT else ends
-    return signal + scalar(values, "amount") * (share[:-1, None] / share[-1])
+    from scipy.special import boxcox1p
+
+    exponent, shift = scalar(values, "exponent"), scalar(values, "time")
+    share = boxcox1p(np.maximum(time, 0.0) / shift, exponent) / boxcox1p(MINUTE / shift, exponent)
+    return signal + scalar(values, "amount") * share[:, None]
 
 
 def sensitivity(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:

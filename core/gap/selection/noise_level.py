@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The level of the noise and its standard error, from blocks.
 
-The noise is what is left without load by that model, of all that were tried, that leaves least there: while nothing touches the
-sensor, or at texels that nothing touches. A drift, a lag or a coupling that a model lacks leaves more. Where hardly anything
-was read without load, it is the noise that was measured before any fit.
+The noise is the residual without load (before contact, or at texels out of contact) of the model with the smallest one there. A
+missing drift, lag or coupling would enlarge that residual. With few unloaded readings, the noise is the value measured before
+any fit.
 
 The error is that of the mean square of noise over all values less the one without load: each has that of a ratio of sums over
 blocks, so it is large for noise that is slow or common to all texels, and never below that of white noise, √(2/N).
@@ -19,10 +19,10 @@ import numpy as np
 from .block_sums import Sums
 from .rule_numbers import LEAST_NOISE_ERROR, LEAST_VALUES
 
-LEAST_LEVEL = 1e-6
-"""Of recordings without noise, in units of the noise that was measured: rounding."""
+ROUNDING = 1e-6
+"""Least mean square of noise-free recordings, in units of the variance measured before any fit: rounding of their files."""
 WHITE = 2.0
-"""Variance of the square of a value of normal noise, in units of its mean square."""
+"""Variance of the square of a standard normal variable (chi-squared with one degree of freedom)."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def noise_level(many: Sequence[Sums]) -> NoiseLevel:
     for q in (0, 1):
         level, i, way = min((_level(one, way, q), i, way) for i, one in enumerate(many) for way in (0, 1))
         if np.isfinite(level):
-            level = max(level, LEAST_LEVEL)
+            level = max(level, ROUNDING)
             rest[:, q], count[:, q] = many[i].rest[way][:, q], many[i].rest_count[way][:, q]
             share = _variance(rest[:, q], count[:, q]) / level**2
             error[q] = level * _error(count[:, q].sum(), many[i].count[:, q].sum(), share)
@@ -62,7 +62,7 @@ def noise_level(many: Sequence[Sums]) -> NoiseLevel:
 
 
 def measured_noise(count: np.ndarray, error: float = LEAST_NOISE_ERROR) -> NoiseLevel:
-    """Return the noise as it was measured before any fit; `count` of values, (b, 2) float, and an `error` that is the least."""
+    """Return the noise measured before any fit, of `count` values, (b, 2) float, with at least the standard error `error`."""
     return NoiseLevel(count, count, np.array([max(_error(values, values, WHITE), error) for values in count.sum(axis=0)]))
 
 

@@ -21,11 +21,14 @@ from .screening import Making, Screening, free_with
 from .starting_points import LONGEST_STEP, SHORTEST_STEP
 
 PAIRS = 4
-"""Pairs of kinds that are fitted: for speed."""
+"""Pairs of kinds that are fitted. On eight development rigs with two effects the hidden pair ranked first or second, of 80 to
+97 pairs."""
 PAIR_STARTS = 3
-"""Changes of each form beside that which it makes alone: for speed."""
+"""Changes of each form in the dictionary, in addition to that of its fit alone. With 1 or 6 of them every hidden pair still
+ranks first or second."""
 SAME_CHANGE = 0.999
-"""Cosine of two changes from which on they are one."""
+"""Cosine above which two changes count as collinear, so that no least squares divide by rounding. Between 0.99 and 0.9999 the
+ranks of the hidden pairs are the same."""
 
 
 @dataclass(frozen=True)

@@ -76,9 +76,9 @@ class OddRecording:
 
 
 def may_differ(rig: Rig) -> bool:
-    """Return whether it is a question in a rig how its recordings differ.
+    """Return whether recordings may have unknown gains and zeros, or belong to one unnamed session.
 
-    It is none if the rig names sessions, repeats, specimens or numbers of recordings, or has fewer than three recordings to be
+    False if the rig names sessions, repeats, specimens or numbers of recordings, or has fewer than three recordings to be
     fitted.
     """
     known = any(trial.session or trial.repeats or trial.factor != 1.0 or trial.zero != 0.0 for trial in rig.trials)

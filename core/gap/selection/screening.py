@@ -24,7 +24,7 @@ from .starting_points import starting_points
 from .view_set import ViewSet
 
 LATER_STARTS = 1
-"""Points of the search ranges that are tried on top of an effect, beside the values that a form has alone: for speed."""
+"""Points of the search ranges that are tried on top of an effect, in addition to the form's values alone: for speed."""
 FIRST_STARTS, TRIAL_STEPS, FIRST_STEPS, FIRST_TOLERANCE = 2, 3, 8, 1e-3
 """A first fit takes some steps from each of the best starting points, and goes on from the best of these: for speed."""
 FINAL_STEPS, FINAL_TOLERANCE = 10, 3e-4

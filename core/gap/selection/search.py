@@ -37,7 +37,7 @@ Outcome = TypeVar("Outcome")
 
 @dataclass
 class Search:
-    """What was tried on one rig.
+    """The search for missing effects in one rig, with all models fitted so far.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class Search:
     def predicting(self, named: Hypothesis) -> Generator[tuple[str, float], None, Hypothesis]:
         """Return the model that predicts best of all that hold the effects of the chosen one, while it leaves a gap.
 
-        What is added need not pay for a name: users get the better prediction, and are told that its name is a guess.
+        An added effect need not pay for a name. The amended model predicts better, and the report calls the name a guess.
         """
         best = named
         while self.score.leaves_gap(best) and best.components and len(best.names) < MOST_EFFECTS:
@@ -226,7 +226,7 @@ class Search:
         return weights
 
     def _weigh(self, is_noise_measured: bool = False) -> None:
-        """Set the score by the noise as the models tried so far leave it without load, or as it was measured before."""
+        """Set the score, with the noise estimated from all models so far, or with the noise measured before any fit."""
         count = self.base.sums.count
         if self.repeat_error is not None:
             noise = measured_noise(count, self.repeat_error)

@@ -233,9 +233,11 @@ def test_names_hold_and_no_number_is_idle_or_a_cliff(searches):
     for name in (
         "STRETCHES",
         "FORMULA_ERROR",
+        "FREE_FORM_ERROR",
         "LARGEST_FORMULA_ERROR",
         "LEAST_NOISE_ERROR",
         "NEAR_ERRORS",
+        "SAME_SCORE",
         "FEWER_NUMBERS",
         "DRAWS",
     ):
