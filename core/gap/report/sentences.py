@@ -246,12 +246,12 @@ def _unexplained(result: Diagnosis, errors: GapErrors, sure: list[Finding]) -> s
         many = len(result.findings) > 1
         return f"Unexplained: {fitted} {'fit' if many else 'fits'} the fitted recordings, but {failure}.{part}"
     is_quiet = result.structure.total < LEAST_STRUCTURE and result.line is None
-    if result.check.recordings and not result.findings and result.between is None and is_quiet:
-        apart = max(result.check.recordings, key=lambda one: float(one.before.max())).name
+    apart = result.check.worst
+    if apart is not None and not result.findings and result.between is None and is_quiet:
         left, other = errors.base["fit"] or 0.0, errors.base["check"] or 0.0
         return (
             f"Unexplained: the base model fits the fitted recordings ({left:.2%} of the range) and not the check recording "
-            f"'{apart}' (all of them: {other:.2%}); {'; '.join(recording_differences(result, apart))}."
+            f"'{apart.name}' (all of them: {other:.2%}); {'; '.join(recording_differences(result, apart.name))}."
         )
     if result.line is not None:
         line, unit = result.line, result.rig.parameters.unit
