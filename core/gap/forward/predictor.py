@@ -139,11 +139,6 @@ class ResponseModel:
         self._readings: _Recent[np.ndarray] = _Recent(readings_kept)
         self._sites: dict[bytes | None, TransducerArray] = {}
 
-    @property
-    def texel_stimulus(self) -> Stimulus:
-        """The stimulus of the texels, which under a cover are not the points of the surface."""
-        return of_texels(self.stimulus, self.rig)
-
     def reading(self, model: Model, subset: np.ndarray | None = None) -> np.ndarray:
         """Return the readings of each texel, or of some, (T, n) in the sensor's unit."""
         p = model.parameters
