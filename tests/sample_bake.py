@@ -131,6 +131,23 @@ def write_bake(folder: Path) -> None:
     write_sensor(folder, "pad", grid_texels(), Painted(k=np.ones(ROWS * COLUMNS)), sensors=names)
 
 
+def tactile_frame(count: int, seed: int = 0) -> SensorFrame:
+    """Return a frame of random numbers."""
+    rng = np.random.default_rng(seed)
+    return SensorFrame(
+        normal_force=rng.random(count),
+        shear=rng.normal(size=(count, 2)),
+        friction=rng.random(count),
+        depth=rng.random(count) * 1e-3,
+        slip=rng.random(count),
+        contact=rng.random(count) < 0.5,
+        reading=rng.normal(size=count) * 1e3,
+        net_force=np.zeros(3),
+        net_torque=np.zeros(3),
+        centre_of_pressure=np.zeros(3),
+    )
+
+
 def pictures_of(layout: GridLayout | UVLayout, frame: SensorFrame) -> dict[str, np.ndarray]:
     """Return the pictures that an image of a frame has to hold, by channel, each (height, width) with row 0 at the bottom."""
     values = {name: getattr(frame, name) for name in ("reading", "depth", "slip", "contact")}

@@ -4,19 +4,14 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import trimesh
-from sample_bake import grid_texels
+from study_scenes import tiny_scene
 
-from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.io.scenario_npz import save_scenario
-from palpate.core.model.body import Body, Motion
-from palpate.core.model.scenario import Scenario, Target
-from palpate.core.model.sensor import Sensor
-from palpate.core.model.sensor_parameters import SensorParameters
+from palpate.core.model.scenario import Scenario
 from palpate.sweep.parts import Parts
 from palpate.sweep.scene_evaluation import ALLOW
 from palpate.sweep.study_folder import OpenStudy, begin_study
@@ -41,12 +36,8 @@ FAILING = '"Pad.mud" = { choice = [0.2, 0.25, 2.0] }'
 
 
 def scenario() -> Scenario:
-    """A ball over a pad of 5 × 3 texels."""
-    solid = trimesh.creation.icosphere(1, 0.006)
-    ball = TriangleMesh(np.array(solid.vertices), np.array(solid.faces))
-    bodies = (Body("Pad", Motion.at_rest()), Body("Ball", Motion.at_rest((0.0, 0.0, 0.02))))
-    sensor = Sensor("Pad", 0, grid_texels(), SensorParameters())
-    return Scenario(bodies, (sensor,), (Target("Ball", 1, ball),), 1, 3, 50.0, name="pad")
+    """The scene of the studies that are varied, under the name of its file."""
+    return replace(tiny_scene(), name="pad")
 
 
 def write_study(folder: Path, runs: int, seed: int = 1, fails: bool = False, more: str = "", hold: float = 0.0) -> Path:

@@ -89,12 +89,13 @@ def test_copy_to_selected():
     third.palpate.role = "TARGET"
     pad.palpate.k, pad.palpate.mus, pad.palpate.unit, pad.palpate.region = 77.0, 0.9, "V", "GROUP"
     bpy.context.view_layer.objects.active = pad
+    bpy.ops.palpate.effect_add(effect="saturation")
     assert not bpy.ops.palpate.parameters_copy.poll()
     for obj in (pad, other, third):
         obj.select_set(True)
     assert bpy.ops.palpate.parameters_copy() == {"FINISHED"}
     assert (other.palpate.k, other.palpate.mus, other.palpate.unit) == (77.0, pytest.approx(0.9), "V")
-    assert other.palpate.region == "MESH"
+    assert other.palpate.region == "MESH" and [item.kind for item in other.palpate.effects] == ["saturation"]
     assert third.palpate.k == pytest.approx(58.5)
 
 

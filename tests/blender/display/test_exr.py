@@ -9,12 +9,11 @@ import sys
 import bpy
 import numpy as np
 import pytest
-from sample_bake import pictures_of, read_exr
+from sample_bake import pictures_of, read_exr, tactile_frame
 
 from palpate.core.geometry.grid_layout import GridLayout
 from palpate.core.geometry.texture_maps import uv_layout
-from palpate.core.io.tactile_exr import CHANNELS, write_exrs
-from palpate.core.model.recording import SensorFrame
+from palpate.core.io.tactile_exr import write_exrs
 
 ROWS, COLUMNS = 5, 7
 
@@ -24,23 +23,6 @@ def scene():
     """Return the scene of an empty file, without the add-on: a bake plays in any Blender."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     return bpy.context.scene
-
-
-def tactile_frame(count, seed=0):
-    """Return a frame in which every channel differs."""
-    rng = np.random.default_rng(seed)
-    return SensorFrame(
-        normal_force=rng.random(count),
-        shear=rng.normal(size=(count, 2)),
-        friction=rng.random(count),
-        depth=5 + rng.random(count),
-        slip=10 + rng.random(count),
-        contact=np.ones(count, bool),
-        reading=20 + rng.random(count),
-        net_force=np.zeros(3),
-        net_torque=np.zeros(3),
-        centre_of_pressure=np.zeros(3),
-    )
 
 
 def grid():
@@ -56,8 +38,8 @@ def as_blender_sees(image):
     return np.array(image.pixels[:], np.float32).reshape(height, width, 4)
 
 
-def assert_both_read_alike(path, layout, frame):
-    """Write a frame, and compare what Blender and our own reader make of it."""
+def assert_blender_reads_it(path, layout, frame):
+    """Write a frame, and compare what Blender makes of it."""
     write_exrs([path], layout, [frame], [{"unit": "kPa"}])
     expected = pictures_of(layout, frame)
     image = bpy.data.images.load(str(path))
@@ -66,19 +48,15 @@ def assert_both_read_alike(path, layout, frame):
     for i, name in enumerate("RGB"):
         np.testing.assert_array_equal(pixels[..., i], expected[name])
     assert (pixels[..., 3] == 1).all()
-    channels, metadata = read_exr(path)
-    for name in CHANNELS:
-        np.testing.assert_array_equal(channels[name], expected[name])
-    assert metadata == {"unit": "kPa"}
     bpy.data.images.remove(image)
 
 
 def test_first_row_is_the_lowest_and_named_channels_do_not_disturb(tmp_path):
     frame = tactile_frame(ROWS * COLUMNS)
-    assert_both_read_alike(tmp_path / "a.exr", grid(), frame)
+    assert_blender_reads_it(tmp_path / "a.exr", grid(), frame)
     position = np.array([[0, 0, 0], [1, 0, 0], [1.2, 1, 0], [0, 1, 0], [2, 2, 0]]) * 1.0
     layout, _ = uv_layout(position, np.tile([0, 0, 1.0], (5, 1)), np.array([[0, 1, 2], [0, 2, 3], [2, 4, 3]]))
-    assert_both_read_alike(tmp_path / "b.exr", layout, tactile_frame(5))
+    assert_blender_reads_it(tmp_path / "b.exr", layout, tactile_frame(5))
 
 
 def test_both_libraries_work_after_a_render(tmp_path, scene):
@@ -90,7 +68,7 @@ def test_both_libraries_work_after_a_render(tmp_path, scene):
     scene.render.resolution_x, scene.render.resolution_y = 32, 24
     scene.render.image_settings.file_format = "OPEN_EXR"
     for turn in range(2):
-        assert_both_read_alike(tmp_path / f"{turn}.exr", grid(), tactile_frame(ROWS * COLUMNS, turn))
+        assert_blender_reads_it(tmp_path / f"{turn}.exr", grid(), tactile_frame(ROWS * COLUMNS, turn))
         scene.render.filepath = str(tmp_path / f"render_{turn}.exr")
         bpy.ops.render.render(write_still=True)
         channels, _ = read_exr(tmp_path / f"render_{turn}.exr")

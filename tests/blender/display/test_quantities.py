@@ -92,6 +92,7 @@ def test_it_is_seen_on_a_bake(tmp_path, name):
     colors = expected_colors(quantity, felt, texels, scale)
     assert np.ptp([quantity.values(found.recording.sensors["Pad"].at(i), texels) for i in (0, 6)]) > 0.0
     (overlay,) = overlays.baked_overlays(scene, found, 7, scale)  # what Solid view shows
+    assert overlay.plain_only and overlay.line is None
     corner = both_sides(texels)
     free = felt.depth[corner] == 0.0
     assert overlay.colors[free, :3] == pytest.approx(colors[corner][free], abs=1e-6)
@@ -219,17 +220,6 @@ def test_a_heat_map_of_palpate_0_1_is_removed_with_its_areas(tmp_path):
     assert bpy.ops.palpate.bake_clear() == {"FINISHED"}
     assert pad.data.attributes.get("palpate_area") is None
     assert not [image.name for image in bpy.data.images if materials.SENSOR_KEY in image]
-
-
-@EVERY
-def test_a_saved_bake_finds_its_files_again(tmp_path, name):
-    scene = scene_with_readings(4)
-    scene.palpate.quantity = name.upper()
-    path = save(tmp_path)
-    run_job(bake(scene))
-    save(tmp_path)
-    found = figure_export.read_scene_bake(reopen(path))
-    assert list(found.texels) == ["Pad"] and len(found.recording.frames) == 4
 
 
 def test_a_heat_map_leaves_the_sensor_that_is_painted_alone():

@@ -128,8 +128,3 @@ def test_a_sensor_with_an_effect_out_of_bounds_says_where():
     pad.palpate.effects[0].offset_common_offset = 1e9
     with pytest.raises(EffectError, match="offset of effect 'offset' \\(common\\) of sensor 'Pad' is 1e\\+09 unit"):
         check_scenario(run_job(scene_reader.read_scene(scene)).scenario)
-
-
-def test_without_a_sensor_the_button_says_why():
-    bpy.ops.mesh.primitive_cube_add()
-    assert not bpy.ops.palpate.effect_add.poll()

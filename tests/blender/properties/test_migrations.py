@@ -21,6 +21,21 @@ def write_raw(block, values):
         group[key] = value
 
 
+def test_steps_run_in_order_and_only_those_of_the_kind():
+    def renamed(settings):
+        settings["k"] = settings.pop("stiffness")
+        return settings
+
+    def in_metres(settings):
+        return {**settings, "max_penetration": settings["max_penetration"] / 1000.0}
+
+    steps = {("object", 1): renamed, ("object", 2): in_metres, ("scene", 1): lambda settings: {}}
+    old = {"schema_version": 1, "stiffness": 58.4, "max_penetration": 12.0}
+    assert migrations.migrate(old, "object", "Pad", steps, 3) == {"schema_version": 3, "k": 58.4, "max_penetration": 0.012}
+    assert old == {"schema_version": 1, "stiffness": 58.4, "max_penetration": 12.0}
+    assert migrations.migrate({}, "object", "Pad", {("object", 0): renamed}, 1) == {"schema_version": 1}  # never saved
+
+
 def test_an_older_file_is_brought_forward(tmp_path):
     _, pad, _ = press()
     write_raw(pad, {"stiffness": 99.0})

@@ -5,7 +5,7 @@ import argparse
 
 import bpy
 import pytest
-from blender_scenes import press, save
+from blender_scenes import changes, dump, press, save
 
 from palpate.addon.bake.bake import bake
 from palpate.addon.render import figure_export, figure_request
@@ -28,16 +28,23 @@ def baked(tmp_path):
 def test_everything_that_is_chosen_is_made(baked):
     scene, _, place = baked
     own = scene.palpate.figures
-    own.kinds, own.exports = {"SCENE", "STRIP", "CURVES", "NUMBERS", "VIDEO"}, {"CSV", "NPZ", "PNG"}
+    own.kinds, own.exports = {"SCENE", "STRIP", "CURVES", "NUMBERS", "VIDEO", "GEL"}, {"CSV", "NPZ", "PNG"}
     own.formats, own.frames, own.width = {"PNG", "PDF"}, "2-3, 4", "SINGLE"
     own.engine, own.size, own.transparent = "WORKBENCH", (160, 120), True
+    before = dump()
+    blocks = (bpy.data.worlds, bpy.data.lights, bpy.data.cameras, bpy.data.scenes)
+    counts = [len(one) for one in blocks]
     assert bpy.ops.palpate.figures_make() == {"FINISHED"}
+    assert [line for line in changes(before, dump()) if "Render Result" not in line] == []  # Blender's own
+    assert [len(one) for one in blocks] == counts
     names = {path.name for path in (place / "figures").iterdir()}
     expected = {f"{kind}.{ending}" for kind in ("strip", "curves") for ending in ("png", "pdf")}
     expected |= {f"numbers_Pad_{number:04d}.{ending}" for number in (2, 3, 4) for ending in ("png", "pdf")}
-    expected |= {f"{kind}_{number:04d}.png" for kind in ("scene", "scene_and_touch") for number in (2, 3, 4)}
+    kinds = ("scene", "scene_and_touch", "gel_Pad")
+    expected |= {f"{kind}_{number:04d}.png" for kind in kinds for number in (2, 3, 4)}
     assert names == expected | {"video.mp4", "data_csv", "data_npz", "data_png", LIST_NAME}
     assert (place / "figures" / "data_csv" / "Pad" / "normal_force.csv").is_file()
+    assert (place / "figures" / "video.mp4").stat().st_size > 1000
     picture = bpy.data.images.load(str(place / "figures" / "scene_0004.png"))
     assert tuple(picture.size) == (160, 120) and picture.channels == 4
 

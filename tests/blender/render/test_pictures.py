@@ -12,7 +12,7 @@ import pytest
 from blender_scenes import changes, dump, press_and_drop, save
 
 from palpate.addon.bake.bake import bake
-from palpate.addon.render import figure_export, figure_request, render, render_setup, video
+from palpate.addon.render import figure_export, render, render_setup, video
 from palpate.addon.render.figure_request import FigureRequest
 from palpate.commands import main
 from palpate.core.errors import FileError, ParameterError, SceneError
@@ -37,29 +37,6 @@ def image(path):
     from matplotlib.image import imread
 
     return imread(path)
-
-
-@pytest.mark.long("pictures of every kind, and a video")
-def test_everything_at_once_and_nothing_left_behind(baked, tmp_path):
-    scene, _ = baked
-    before = dump()
-    worlds, lights, cameras = len(bpy.data.worlds), len(bpy.data.lights), len(bpy.data.cameras)
-    request = FigureRequest(
-        figure_request.KINDS, FigureStyle(dpi=50), frames=(3, 4), size=(96, 64), samples=1, formats=("png", "pdf")
-    )
-    stages = []
-    written = run_job(
-        figure_export.make_figures(scene, tmp_path / "out", request), lambda step: stages.append((step.done, step.total))
-    )
-    assert {path.name for path in written} == {path.name for path in (tmp_path / "out").iterdir()} - {LIST_NAME}
-    assert {path.suffix for path in written} == {".png", ".pdf", ".mp4"}
-    assert image(tmp_path / "out" / "scene_0003.png").shape[:2] == (64, 96)
-    assert image(tmp_path / "out" / "scene_and_touch_0003.png").shape[0] == 64
-    assert (tmp_path / "out" / "video.mp4").stat().st_size > 1000
-    assert stages[-1][0] == stages[-1][1] and [done for done, _ in stages] == sorted(done for done, _ in stages)
-    assert [line for line in changes(before, dump()) if "Render Result" not in line] == []  # Blender's own
-    assert (len(bpy.data.worlds), len(bpy.data.lights), len(bpy.data.cameras)) == (worlds, lights, cameras)
-    assert len(bpy.data.scenes) == 1
 
 
 def test_figures_take_the_place_of_earlier_ones(baked, tmp_path, monkeypatch):

@@ -526,15 +526,6 @@ def test_one_tiny_flipped_triangle_needs_an_atlas():
     assert uv_layout(position, np.tile([0, 0, 1.0], (400, 1)), triangles)[0].cell > 0
 
 
-def test_longest_edge_lies_across_the_cell_of_an_atlas():
-    position, triangles, _, layout, _ = lay_out(*compact(*next(rest[:2] for n, *rest in surfaces() if n == "torus")))
-    on_map, in_space = (
-        np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-        for corners in (corner_pixels(layout), position[triangles])
-    )
-    np.testing.assert_array_equal(on_map.argmax(axis=1), in_space.argmax(axis=1))
-
-
 # --- texels of a painted region
 
 

@@ -9,9 +9,7 @@ import importlib.util
 import json
 import math
 import os
-import signal
 import stat
-import subprocess
 import sys
 import zipfile
 from dataclasses import fields, replace
@@ -20,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 import pytest
-from sample_bake import pictures_of, read_exr
+from sample_bake import read_exr, tactile_frame
 
 from palpate.core.errors import FileError, PalpateError
 from palpate.core.geometry.grid_layout import GridLayout
@@ -38,7 +36,7 @@ from palpate.core.io.bake_folder import (
 from palpate.core.io.file_writing import atomic_write, writable_file, writable_folder
 from palpate.core.io.recording_npz import load_recording, save_recording
 from palpate.core.io.tactile_exr import CHANNELS, describe, write_exrs
-from palpate.core.model.recording import Frame, Recording, SensorFrame, SensorRecording, VectorReadings
+from palpate.core.model.recording import Frame, Recording, SensorRecording, VectorReadings
 from palpate.core.model.sensor import Effect, Sensor
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
 
@@ -211,21 +209,6 @@ def test_writable_folder(tmp_path):
             writable_folder(tmp_path / place, create=True)
         one_sentence(error, tmp_path / "file")
     assert sorted(os.listdir(tmp_path)) == ["file", "new", "x"]
-
-
-def test_kill_in_the_middle_leaves_the_old_file(tmp_path):
-    target = tmp_path / "manifest.json"
-    target.write_text("old")
-    program = (
-        "import os, signal, sys\n"
-        "from palpate.core.io.file_writing import atomic_write\n"
-        "with atomic_write(sys.argv[1]) as temporary:\n"
-        "    temporary.write_text('half')\n"
-        "    os.kill(os.getpid(), signal.SIGKILL)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", program, str(target)], check=False)
-    assert done.returncode == -signal.SIGKILL
-    assert target.read_text() == "old"
 
 
 # --- names
@@ -407,20 +390,6 @@ def test_recording_round_trip(tmp_path):
         assert os.listdir(tmp_path) == ["recording.npz"]
 
 
-def test_same_recording_same_bytes(tmp_path, monkeypatch):
-    save_recording(tmp_path / "a.npz", recording())
-    monkeypatch.setattr("time.time", lambda: 2e9)
-    other = copy.deepcopy(recording())
-    other.poses = np.asfortranarray(other.poses)
-    other.sensors["Pad"].shear = np.repeat(other.sensors["Pad"].shear, 2, axis=1)[:, ::2]
-    save_recording(tmp_path / "another name.npz", other)
-    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "another name.npz").read_bytes()
-    save_recording(tmp_path / "c.npz", load_recording(tmp_path / "a.npz"))
-    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "c.npz").read_bytes()
-    save_recording(tmp_path / "d.npz", recording(seed=1))
-    assert (tmp_path / "a.npz").read_bytes() != (tmp_path / "d.npz").read_bytes()
-
-
 def test_numpy_alone_reads_a_recording(tmp_path):
     save_recording(tmp_path / "recording.npz", recording())
     with np.load(tmp_path / "recording.npz", allow_pickle=False) as members:
@@ -460,19 +429,10 @@ def cannot_load(read, path):
     return one_sentence(error, path)
 
 
-def test_damaged_recording(tmp_path):
-    path = tmp_path / "recording.npz"
-    assert "does not exist" in cannot_load(load_recording, path)
-    cannot_load(load_recording, tmp_path)
-    save_recording(path, recording())
-    whole = path.read_bytes()
-    for length in (0, 1, 100, len(whole) // 2, len(whole) - 1):
-        path.write_bytes(whole[:length])
-        cannot_load(load_recording, path)
-
-
 def test_other_files_are_no_recordings(tmp_path):
     path = tmp_path / "other.npz"
+    assert "does not exist" in cannot_load(load_recording, path)
+    cannot_load(load_recording, tmp_path)
     np.savez(path, a=np.zeros(3))
     assert "not a recording" in cannot_load(load_recording, path)
     np.savez(path, header=np.array([{"a": 1}], dtype=object))  # a pickle is never opened
@@ -483,37 +443,9 @@ def test_other_files_are_no_recordings(tmp_path):
     with open(path, "wb") as file:
         np.save(file, np.zeros(3))
     cannot_load(load_recording, path)
-    path.write_text("sensor,force\n")
-    cannot_load(load_recording, path)
-    save_recording(path, recording())
-    with zipfile.ZipFile(path) as archive:
-        members = {info.filename: archive.read(info) for info in archive.infolist()}
-    for gone in members:
-        with zipfile.ZipFile(path, "w") as archive:
-            for name, content in members.items():
-                if name != gone:
-                    archive.writestr(name, content)
-        cannot_load(load_recording, path)
 
 
 # --- tactile images
-
-
-def tactile_frame(count, seed=0):
-    """Return a frame of random numbers."""
-    rng = np.random.default_rng(seed)
-    return SensorFrame(
-        normal_force=rng.random(count),
-        shear=rng.normal(size=(count, 2)),
-        friction=rng.random(count),
-        depth=rng.random(count) * 1e-3,
-        slip=rng.random(count),
-        contact=rng.random(count) < 0.5,
-        reading=rng.normal(size=count) * 1e3,
-        net_force=np.zeros(3),
-        net_torque=np.zeros(3),
-        centre_of_pressure=np.zeros(3),
-    )
 
 
 def grid_of(rows, columns, seed=0):
@@ -530,24 +462,28 @@ def write_exr(path, layout, frame, metadata):
 METADATA = {"unit": "kPa", "sensor": "Daumen ü/1", "frame": "12", "time": "0.5", "digest": "ab" * 32, "palpate": "0.1.0"}
 
 
-def test_exr_round_trip(tmp_path):
-    for rows, columns in ((14, 6), (2, 2), (1, 7)):
-        layout, frame = grid_of(rows, columns), tactile_frame(rows * columns)
-        path = tmp_path / "tactile_0012.exr"
-        write_exr(path, layout, frame, METADATA)
-        assert os.listdir(tmp_path) == ["tactile_0012.exr"]
+@pytest.mark.parametrize("shape", [(14, 6), (2, 2), (1, 7), (50, 33)])
+def test_images_come_back_in_their_order(tmp_path, shape):
+    layout, frames = grid_of(*shape), [tactile_frame(math.prod(shape), seed) for seed in range(5)]
+    about = [METADATA | {"frame": str(number)} for number in range(5)]
+    written = []
+    for folder in (tmp_path / "a", tmp_path / "b"):
+        folder.mkdir()
+        paths = [folder / f"{number}.exr" for number in range(5)]
+        write_exrs(paths, layout, frames, about)
+        written.append([path.read_bytes() for path in paths])
+    assert written[0] == written[1] and len(os.listdir(tmp_path / "a")) == 5
+    for path, frame, words in zip(paths, frames, about, strict=True):
         channels, metadata = read_exr(path)
-        assert metadata == METADATA
-        assert set(channels) == set(CHANNELS)
-        for name, picture in channels.items():
-            assert picture.dtype == np.float32 and picture.shape == (rows, columns)
-            np.testing.assert_array_equal(picture, pictures_of(layout, frame)[name])
-        texel = layout.row, layout.column
-        np.testing.assert_array_equal(channels["R"][texel], frame.normal_force.astype(np.float32))
-        np.testing.assert_array_equal(channels["G"][texel], frame.shear[:, 0].astype(np.float32))
-        np.testing.assert_array_equal(channels["B"][texel], frame.shear[:, 1].astype(np.float32))
-        for name in ("reading", "depth", "slip", "contact"):
-            np.testing.assert_array_equal(channels[name][texel], getattr(frame, name).astype(np.float32))
+        assert metadata == words and set(channels) == set(CHANNELS)
+        assert {(picture.dtype.name, picture.shape) for picture in channels.values()} == {("float32", shape)}
+        for name, values in {
+            "R": frame.normal_force,
+            "G": frame.shear[:, 0],
+            "B": frame.shear[:, 1],
+            **{name: getattr(frame, name) for name in ("reading", "depth", "slip", "contact")},
+        }.items():
+            np.testing.assert_array_equal(channels[name][layout.row, layout.column], values.astype(np.float32))
 
 
 def test_exr_as_any_other_program_reads_it(tmp_path):
@@ -580,12 +516,6 @@ def test_exr_of_a_texture_map(tmp_path):
     np.testing.assert_array_equal(channels["reading"], layout.image(frame.reading).astype(np.float32))
 
 
-def test_same_frame_same_bytes(tmp_path):
-    for name in ("a.exr", "b.exr"):
-        write_exr(tmp_path / name, grid_of(4, 4), tactile_frame(16), METADATA)
-    assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
-
-
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 3.5e38, -1e300])
 @pytest.mark.parametrize("channel", ["normal_force", "shear", "reading", "slip"])
 def test_value_that_no_pixel_can_hold_is_our_fault(tmp_path, value, channel):
@@ -594,18 +524,6 @@ def test_value_that_no_pixel_can_hold_is_our_fault(tmp_path, value, channel):
     with pytest.raises(ValueError, match="texel 2"):
         write_exr(tmp_path / "a.exr", grid_of(2, 2), frame, METADATA)
     assert os.listdir(tmp_path) == []
-
-
-@pytest.mark.parametrize("shape", [(1, 1), (4, 5), (16, 3), (50, 33)])
-def test_images_written_together_keep_their_order(tmp_path, shape):
-    layout, rng = grid_of(*shape), np.random.default_rng(7)
-    frames = [replace(tactile_frame(math.prod(shape)), depth=rng.random(math.prod(shape))) for _ in range(5)]
-    together = [tmp_path / f"{i}.exr" for i in range(5)]
-    write_exrs(together, layout, frames, [METADATA | {"frame": str(i)} for i in range(5)])
-    for i, (path, frame) in enumerate(zip(together, frames)):
-        channels, metadata = read_exr(path)
-        assert metadata == METADATA | {"frame": str(i)}
-        np.testing.assert_array_equal(channels["depth"][layout.row, layout.column], frame.depth.astype(np.float32))
 
 
 def test_a_library_that_cannot_write_says_the_reason_of_the_system(tmp_path):
@@ -629,18 +547,7 @@ def test_only_openimageio_can_write_where_the_process_is_linked_against_another_
         with pytest.raises(FileError, match="install it"):
             write_exr(tmp_path / "a.exr", grid_of(2, 2), tactile_frame(4), METADATA)
         return
-    written = [exr_round_trip(tmp_path / f"{i}.exr") for i in range(2)]
-    assert written[0] == written[1]
-
-
-def exr_round_trip(path):
-    """Return the bytes of an image, whose pixels and metadata are compared."""
-    write_exr(path, grid_of(14, 6), tactile_frame(84), METADATA)
-    channels, metadata = read_exr(path)
-    assert metadata == METADATA
-    for name, picture in pictures_of(grid_of(14, 6), tactile_frame(84)).items():
-        np.testing.assert_array_equal(channels[name], picture)
-    return path.read_bytes()
+    test_images_come_back_in_their_order(tmp_path, (14, 6))
 
 
 def test_the_library_reads_what_an_image_says_of_itself(tmp_path):

@@ -13,7 +13,7 @@ from sweep_runs import failed, made_up, new_study, published
 
 from palpate.core.study.study_file import read_study
 from palpate.sweep.dependencies import Dependency, dependencies
-from palpate.sweep.report import _metric_row, _strongest_sentence, write_report
+from palpate.sweep.report import _strongest_sentence, write_report
 
 pytest.importorskip("pyarrow")
 
@@ -125,9 +125,3 @@ def test_names_as_rare_as_are_judged_seldom_seem_to_matter(names, runs):
     metric = np.array([float(name.split()[1]) for name in values["name"]])
     assert dependencies(values, {"m": metric})
     assert not dependencies({"name": values["name"][:-1]}, {"m": metric[:-1]}), "one run fewer is too few"
-
-
-def test_means_of_metrics_are_given():
-    """Of the runs that have a value; the mean of uneven ones is no median."""
-    assert _metric_row("slip", np.array([1.0, 1.0, 7.0])) == ["slip", "3", "1", "1", "7", "3"]
-    assert _metric_row("slip", np.array([])) == ["slip", "", "", "", "", "0"]
