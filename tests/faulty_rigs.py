@@ -17,6 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
+from palpate.benchmarks._recordings import Recording
+
 EFFECTS = ("none", "relaxes", "late", "loop", "gains", "offsets", "drifts", "bends", "steps", "shifted")
 """What a healthy sensor may do, by turns."""
 
@@ -46,8 +48,6 @@ class Family:
 
     sensor: str
     record: Callable[[np.random.Generator, str], list[Measured]]
-    has_places: bool
-    in_newtons: bool
 
 
 def _depths(rng, time: np.ndarray) -> np.ndarray:
@@ -172,17 +172,13 @@ FAMILIES = {
     "gel": Family(
         "grid = { rows = 6, columns = 4, pitch = 0.0032 }\nthickness = 0.006\nk = 85.0\n[indenter]\nshape = { sphere = 0.009 }",
         _gel,
-        True,
-        True,
     ),
     "counts": Family(
         'grid = { rows = 4, columns = 5, pitch = 0.004 }\nthickness = 0.006\nunit = "counts"\n'
         "[indenter]\nshape = { sphere = 0.009 }",
         _counts,
-        True,
-        False,
     ),
-    "foam": Family("grid = { rows = 1, columns = 3, pitch = 0.01 }\nthickness = 0.006\nk = 75.0", _foam, False, True),
+    "foam": Family("grid = { rows = 1, columns = 3, pitch = 0.01 }\nthickness = 0.006\nk = 75.0", _foam),
 }
 
 
@@ -195,10 +191,8 @@ ALL, ONE = "all", "one"
 class FaultyCase:
     """A rig in files, the kind of its fault (empty for none), and the names of the recordings that have it."""
 
-    family: str
     kind: str
     where: tuple[str, ...]
-    effect: str
     path: Path
 
 
@@ -288,11 +282,6 @@ KINDS: dict[str, tuple[Callable, tuple[str, ...]]] = {
 """Faults, and whether they are in all recordings or in one."""
 
 
-def kinds_for(family: str) -> list[str]:
-    """Return the faults that recordings of a family can show: channels under a plate all carry the same load."""
-    return [kind for kind in KINDS if FAMILIES[family].has_places or not kind.endswith("-channels")]
-
-
 def _differ(columns: dict[str, np.ndarray], before: dict[str, np.ndarray]) -> bool:
     """Whether a fault changed anything: a recording may never come near a rail."""
     return any(not np.array_equal(columns[name], before[name]) for name in columns)
@@ -307,29 +296,18 @@ def draw(family: str, kind: str, number: int, folder: Path) -> FaultyCase:
     if kind:
         act, scopes = KINDS[kind]
         scope = scopes[int(rng.integers(len(scopes)))]
-        if kind in ("unit", "sign") and not made.in_newtons:
-            scope = ONE  # nothing says what a count is
         hit = trials if scope == ALL else [trials[int(rng.integers(3))]]
         plan = {"scope": scope, "mixed": bool(rng.integers(2))}
         before = [dict(one.columns) for one in hit]
         for one in hit:
             act(rng, one, plan)
         where = tuple(one.name for one, columns in zip(hit, before, strict=True) if _differ(one.columns, columns))
-    folder.mkdir(parents=True, exist_ok=True)
-    lines = ['format = "palpate-rig/1"', f'name = "{family} {number}"', "[sensor]", made.sensor]
-    for one in trials:
-        lines += ["[[trial]]", f'file = "{one.name}.csv"', f'use = "{one.use}"']
-        table = np.column_stack(list(one.columns.values()))
-        rows = [",".join(f"{value:.9g}" for value in row) for row in table.tolist()]
-        (folder / f"{one.name}.csv").write_text("\n".join([",".join(one.columns), *rows]) + "\n", encoding="utf-8")
-    path = folder / "rig.toml"
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return FaultyCase(family, kind, where, effect, path)
+    trials = [(one.name, one.use, one.columns) for one in trials]
+    path = Recording(f"{family} {number}", made.sensor, trials).write(folder)
+    return FaultyCase(kind, where, path)
 
 
 def is_right(case: FaultyCase, said: list[tuple[str, tuple[str, ...]]]) -> bool:
-    """Return whether exactly the fault of a case is said (kind, recordings), or nothing of a healthy one."""
-    if not case.kind:
-        return not said
+    """Return whether exactly the fault of a case is said (kind, recordings)."""
     recordings = {name for kind, names in said for name in names if kind == case.kind}
     return {kind for kind, _ in said} == {case.kind} and recordings == set(case.where)

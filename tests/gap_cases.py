@@ -5,6 +5,7 @@ import numpy as np
 import trimesh
 from scipy.signal import lfilter
 
+from palpate.benchmarks._recordings import Recording
 from palpate.core.gap.dataset.rig import Indenter, Rig, grid_texels
 from palpate.core.gap.dataset.trial import Trial
 from palpate.core.geometry.mesh import checked_mesh
@@ -89,19 +90,10 @@ def relaxing(amount=0.3, times=(0.4, 2.0)):
 
 def write(rig, folder):
     """Write a rig as files; return the path of its TOML."""
-    lines = [
-        'format = "palpate-rig/1"',
-        f'name = "{rig.name}"',
-        "[sensor]",
-        f"grid = {{ rows = {ROWS}, columns = {COLUMNS}, pitch = [{PITCH}, {PITCH}] }}",
-        f"k = {rig.parameters.k}",
-        "[indenter]",
-        f"shape = {{ sphere = {RADIUS} }}",
-    ]
-    header = ",".join(["time", "x", "y", "z", *(f"texel_{i}" for i in range(ROWS * COLUMNS))])
+    grid = f"grid = {{ rows = {ROWS}, columns = {COLUMNS}, pitch = {PITCH} }}"
+    sensor = f"{grid}\nk = {rig.parameters.k}\n[indenter]\nshape = {{ sphere = {RADIUS} }}"
+    trials = []
     for trial in rig.trials:
-        lines += ["[[trial]]", f'file = "{trial.name}.csv"', f'use = "{trial.use}"']
-        table = np.column_stack([trial.time, trial.position, trial.reading])
-        np.savetxt(folder / f"{trial.name}.csv", table, "%.9g", ",", header=header, comments="")
-    (folder / "rig.toml").write_text("\n".join(lines) + "\n")
-    return folder / "rig.toml"
+        columns = dict(zip("xyz", trial.position.T, strict=True)) | {f"texel_{i}": one for i, one in enumerate(trial.reading.T)}
+        trials.append((trial.name, trial.use, {"time": trial.time, **columns}))
+    return Recording(rig.name, sensor, trials).write(folder)

@@ -1,27 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A small pad of springs under a ball, written as a rig, in which tests of ``palpate gap`` hide effects."""
+"""A small pad of springs under a ball, in whose recordings tests of ``palpate gap`` hide effects."""
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import Any
-
 import numpy as np
-
-from palpate.benchmarks._hidden.rig_text import csv_header
-from palpate.benchmarks._rows import sure_names
-from palpate.core.gap.dataset.rig import read_rig
-from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.jobs import run_job
 
 ROWS, COLUMNS, PITCH, RADIUS, K = 5, 3, 4e-3, 14e-3, 60.0
 SECONDS, RATE, DEEP = 22.0, 25.0, 2.5e-3
-TRIALS = ("fit", "fit", "fit", "fit", "check", "check")
-
-Write = Callable[[str, int, Path], Path]
-"""Writes a case of a kind, by its number, into a folder as a rig and returns the path of its TOML file."""
+SENSOR = f"""
+grid = {{ rows = {ROWS}, columns = {COLUMNS}, pitch = {PITCH} }}
+thickness = 6e-3
+k = {K}
+cn = 0.0
+unit = "N"
+gain = 1.0
+zero = 0.0
+[indenter]
+shape = {{ sphere = {RADIUS} }}
+"""
+"""Lines of a rig."""
 
 
 def presses(rng: np.random.Generator) -> np.ndarray:
@@ -48,16 +45,7 @@ def loads(path: np.ndarray) -> np.ndarray:
     return K * np.maximum(high - path[:, 2:], 0.0) * high / RADIUS  # across the ball's surface
 
 
-def write_recording(file: Path, table: np.ndarray, more: Sequence[str] = ()) -> list[str]:
-    """Write the time, the ball's centre, the readings and the columns that `more` names; return the trial's entry in a rig."""
-    rows = "\n".join(",".join(f"{value:.7g}" for value in row) for row in table.tolist())
-    header = ",".join([csv_header(ROWS * COLUMNS), *more])
-    file.write_text(f"{header}\n{rows}\n", encoding="utf-8")
-    return ["[[trial]]", f'file = "{file.name}"']
-
-
-def examined(write: Write, kind: str, number: int) -> tuple[set[str], Any]:
-    """Return what is surely named in a case, and the diagnosis."""
-    with tempfile.TemporaryDirectory() as folder:
-        result = run_job(diagnose(read_rig(write(kind, number, Path(folder)))))
-    return sure_names(result), result
+def columns_of(path: np.ndarray, readings: np.ndarray, **more: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the columns of a recording of readings (T, n) along a path (T, 3) of the ball's centre."""
+    texels = {f"texel_{i}": one for i, one in enumerate(readings.T)}
+    return {"time": np.arange(len(path)) / RATE, **dict(zip("xyz", path.T, strict=True)), **texels, **more}

@@ -6,9 +6,7 @@ import os
 import pytest
 from bad_files import (
     LOG_WRITERS,
-    exported_sensor,
     fault_in,
-    import_all,
     log_files,
     readers,
     rig_from_log,
@@ -46,9 +44,3 @@ def test_an_undamaged_log_becomes_a_rig(kind, tmp_path):
     write_files(tmp_path, log_files(kind))
     rig_from_log(f"log.{kind}", tmp_path)
     assert (tmp_path / "rig" / "rig.toml").is_file()
-
-
-@pytest.mark.parametrize(("kind", "name"), [("mjcf", "Pad.xml"), ("urdf", "Pad.urdf"), ("probes", "Pad.json")])
-def test_an_undamaged_sensor_is_imported(kind, name, tmp_path):
-    write_files(tmp_path, exported_sensor(kind))
-    assert [sensor.name for sensor in import_all(name, tmp_path)] == ["Pad"]

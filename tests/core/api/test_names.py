@@ -74,13 +74,6 @@ def test_both_lists_of_names_agree(repository):
     assert set(pp.__all__) == {*typed, "__version__"}
 
 
-def test_every_name_is_there():
-    for name in pp.__all__:
-        assert getattr(pp, name) is not None
-        assert name in dir(pp)
-    assert issubclass(pp.PalpateError, Exception)
-
-
 def test_a_wrong_name_is_corrected():
     with pytest.raises(AttributeError, match="did you mean 'simulate'"):
         pp.simulat  # noqa: B018

@@ -68,22 +68,6 @@ def test_an_unknown_format_and_a_missing_file_are_refused(tmp_path):
         pp.read_sensor(tmp_path / "none.toml")
 
 
-def test_a_pressed_sensor_takes_a_sensor_and_a_body():
-    pad = pp.Sensor.grid(14, 6, 4e-3, k=1000.0, cn=0.0)
-    box = pp.Body.box(0.05, position=(0, 0, 0.026))
-    pressed = pp.PressedSensor(pad, box, dt=1e-3)
-    assert repr(pressed) == f"<PressedSensor: {len(pad.texels)} texels, 1 target, step 1 ms>"
-    level = (1.0, 0.0, 0.0, 0.0)
-    for _ in range(2):
-        contact = pressed.step(((0, 0, 0), level), ((0, 0, 0.0249), level))
-    assert contact.force_on_target == pytest.approx([0, 0, 72 * 1000.0 * 1e-4])
-    many = pp.PressedSensors(pad, box, environments=3, dt=1e-3)
-    poses = np.tile([0, 0, 0.0249, *level], (3, 1))
-    for _ in range(2):
-        contacts = many.step([0, 0, 0, *level], poses)
-    assert (contacts.wrench[:, :3] == contact.force_on_target).all()
-
-
 @pytest.mark.parametrize("body", [
     pp.Body.box(0.02), pp.Body.sphere(0.01), pp.Body.capsule(0.005, 0.01), pp.Body.plane(0.1),
 ], ids=lambda body: body.name)  # fmt: skip

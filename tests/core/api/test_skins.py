@@ -152,9 +152,16 @@ def test_channels_are_saved_as_vector_images(pressed, tmp_path):
     pad, rec = pressed
     seen = rec.channels(skin(pad))
     paths = pp.save_channels(seen, tmp_path / "images", 3, 3)
+    assert [path.name for path in paths] == [f"field_{frame:04d}.exr" for frame in range(len(rec))]
     channels, attributes = read_image(paths[-1])
-    np.testing.assert_array_equal(channels["field.Z"][::-1].ravel(), seen.values[-1, :, 2].astype(np.float32))
-    assert len(paths) == len(rec) and attributes["palpate.unit"] == "T"
+    assert set(channels) == {"field.X", "field.Y", "field.Z"}
+    for axis, name in enumerate(("field.X", "field.Y", "field.Z")):
+        np.testing.assert_array_equal(channels[name][::-1].ravel(), seen.values[-1, :, axis].astype(np.float32))
+    assert attributes["palpate.unit"] == "T" and attributes["palpate.frame"] == str(len(rec) - 1)
+    (tmp_path / "images" / "field_0099.exr").write_bytes(b"of the user")
+    shorter = replace(seen, values=seen.values[:1], clipped=seen.clipped[:1])
+    pp.save_channels(shorter, tmp_path / "images", 3, 3)
+    assert sorted(path.name for path in (tmp_path / "images").glob("*.exr")) == ["field_0000.exr", "field_0099.exr"]
     with pytest.raises(pp.PalpateError, match="4 × 4 places has 48 channels and these readings have 27"):
         pp.save_channels(seen, tmp_path / "other", 4, 4)
     with pytest.raises(pp.PalpateError, match="rows is 0"):

@@ -151,6 +151,11 @@ def test_eight_transducers_of_which_nothing_is_wrong_but_creep(tmp_path):
         ("thickness", "strips = [[[0, 0], [0.001, 0.001]]]\nthickness", "not both"),
         (f"sensors = {PLACES}", "strips = [[[0, 0], [0.001, 0.0]]]", "no area"),
         (f"sensors = {PLACES}", "", "either sensors"),
+        (
+            f"sensors = {PLACES}\ncover = {{ size = {list(SIZE)}, depth = {DEPTH} }}",
+            "strips = [[[-0.01, -0.006], [-0.0099, 0.006]]]\ncover = { size = [0.02, 0.012], pitch = 0.03 }",
+            "smaller pitch",
+        ),
         (f"size = {list(SIZE)}", "size = 3", "size of cover"),
     ],
 )

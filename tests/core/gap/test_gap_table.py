@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 
+from palpate.benchmarks._recordings import Recording
 from palpate.commands import main
 from palpate.core.gap.report.gap_table import TableRow, markdown, median_ratio
 
@@ -12,16 +13,12 @@ TIME = np.linspace(0.0, 30.0, 201)
 
 def write_rig(folder, name, curve, uses=("fit", "check")):
     """One texel under a known force of up to 10 N."""
-    folder.mkdir()
-    lines = ['format = "palpate-rig/1"', f'name = "{name}"', "[sensor]", "grid = { rows = 1, columns = 1, pitch = 0.01 }"]
+    trials = []
     for number, use in enumerate(uses):
         force = 5.0 * (1.0 - np.cos(2.0 * np.pi * TIME / (5.0 + number)))
         reading = curve(force) + 0.01 * np.random.default_rng(number).normal(size=len(TIME))
-        table = np.column_stack([TIME, force, reading])
-        np.savetxt(folder / f"{number}.csv", table, "%.8g", ",", header="time,force,texel_0", comments="")
-        lines += ["[[trial]]", f'file = "{number}.csv"', f'use = "{use}"']
-    (folder / "rig.toml").write_text("\n".join([*lines[:4], 'unit = "V"', *lines[4:]]) + "\n", encoding="utf-8")
-    return folder / "rig.toml"
+        trials.append((str(number), use, {"time": TIME, "force": force, "texel_0": reading}))
+    return Recording(name, 'grid = { rows = 1, columns = 1, pitch = 0.01 }\nunit = "V"', trials).write(folder)
 
 
 def test_a_table_has_ratios_and_their_median_where_a_model_by_hand_is_known():

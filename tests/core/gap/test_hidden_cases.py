@@ -51,25 +51,6 @@ def test_own_forms_have_the_librarys_names_and_others_do_not():
 
 
 @pytest.mark.long("draws cases of the benchmark")
-def test_a_case_follows_from_kind_and_number(tmp_path):
-    first, again, next_one = (cases.draw("other", number) for number in (24, 24, 44))
-    files = [cases.write(case, tmp_path / name).parent for case, name in ((first, "a"), (again, "b"))]
-    for path in sorted(files[0].iterdir()):
-        assert path.read_bytes() == (files[1] / path.name).read_bytes()
-    assert first.answer == next_one.answer and not np.array_equal(first.readings[0], next_one.readings[0])
-
-
-def test_a_rig_is_read_and_does_not_tell_its_answer(tmp_path):
-    case = cases.draw("own", 12)
-    path = cases.write(case, tmp_path)
-    rig = read_rig(path)
-    assert [trial.use for trial in rig.trials] == ["fit"] * 4 + ["check"] * 2
-    np.testing.assert_allclose(rig.trials[2].reading, case.readings[2], rtol=1e-6, atol=1e-6 * np.abs(case.readings[2]).max())
-    assert not rig.warnings
-    assert not any(word in path.read_text(encoding="utf-8") for word in (*case.answer, case.hidden[0].form))
-
-
-@pytest.mark.long("draws cases of the benchmark")
 @pytest.mark.parametrize("kind", ["own", "other", "third"])
 @pytest.mark.parametrize("number", [3, 9, 12, 18])
 def test_what_is_hidden_has_the_size_it_is_said_to_have(kind, number):

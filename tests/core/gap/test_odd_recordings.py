@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from random_rigs import random_rig, read_and_diagnose
 
 from palpate.benchmarks._recordings import Recording
 from palpate.core.errors import PalpateError
@@ -86,3 +87,10 @@ def test_rigs_with_nothing_else_are_refused(tmp_path, name):
         run_job(diagnose(read_rig(rig_with(tmp_path, fault, "abc"))))
     message = str(caught.value)
     assert message.endswith((".", ")")) and "\n" not in message and len(message) < 400
+
+
+def test_a_rig_of_which_nothing_is_left_to_be_fitted(tmp_path):
+    """Of those that once ended in a traceback, by the generator that found it."""
+    for name, content in random_rig(12).items():
+        (tmp_path / name).write_bytes(content)
+    assert read_and_diagnose(tmp_path) in ("explained", "no gap", "unexplained")

@@ -6,13 +6,16 @@ import pytest
 import small_pad
 from rig_files import RIG, table, write
 
-from palpate.benchmarks._hidden.rig_text import rig_head
+from palpate.benchmarks._recordings import Recording
+from palpate.benchmarks._rows import sure_names
 from palpate.core.effects.library.temperature import REFERENCE
 from palpate.core.errors import PalpateError
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.logs.column_meaning import meaning_of, unit_of
 from palpate.core.gap.selection.candidates import candidates, scales_of
+from palpate.core.gap.selection.diagnosis import diagnose
+from palpate.core.jobs import run_job
 
 IN_KELVIN = '[columns]\ntemperature = { name = "T", unit = "K" }\n\n[sensor]'
 
@@ -74,26 +77,24 @@ def test_what_a_log_calls_a_temperature():
 
 
 @pytest.mark.long("a whole diagnosis of warm and cold recordings")
-def test_a_gain_and_a_zero_that_follow_it_are_named():
+def test_a_gain_and_a_zero_that_follow_it_are_named(tmp_path):
     """That the zero of each texel follows it in another degree is left."""
-    sure, result = small_pad.examined(pad_in_a_warming_room, "both", 2)
+    sure, result = examined(pad_in_a_warming_room(2), tmp_path)
     closed = [share for share in result.closed.left_out if share is not None]
     assert sure == {"temperature"} and result.findings[0].form == "gain-and-zero" and min(closed) > 0.9
 
 
-def written_rig(folder, recordings):
-    """Write readings (T, n) of paths (T, 3) at temperatures (T,) as a rig."""
-    words = {"k": small_pad.K, "cn": 0.0, "unit": "N", "gain": 1.0, "zero": 0.0}
-    lines = rig_head("pad", (small_pad.ROWS, small_pad.COLUMNS, small_pad.PITCH), words, small_pad.RADIUS)
-    for i, (path, reading, warmth) in enumerate(recordings):
-        parts = np.column_stack([np.arange(len(path)) / small_pad.RATE, path, reading, warmth])
-        lines += small_pad.write_recording(folder / f"t{i}.csv", parts, ("temperature",))
-        lines.append(f'use = "{"check" if i in (2, 4) else "fit"}"')
-    (folder / "rig.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return folder / "rig.toml"
+def examined(recordings, folder):
+    """The diagnosis of a rig of recordings (path, readings, temperatures), and what it names surely."""
+    trials = [
+        (f"t{i}", "check" if i in (2, 4) else "fit", small_pad.columns_of(path, reading, temperature=warmth))
+        for i, (path, reading, warmth) in enumerate(recordings)
+    ]
+    result = run_job(diagnose(read_rig(Recording("pad", small_pad.SENSOR, trials).write(folder))))
+    return sure_names(result), result
 
 
-def pad_in_a_warming_room(_kind, number, folder):
+def pad_in_a_warming_room(number):
     """Six recordings of a room that warms and cools; gain and zero follow it by formulas that the library does not have."""
     rng = np.random.default_rng(number)
     spread, recordings = 1.0 + 0.1 * rng.normal(size=small_pad.ROWS * small_pad.COLUMNS), []
@@ -105,10 +106,10 @@ def pad_in_a_warming_room(_kind, number, folder):
         zero = 0.015 * force.max() * above * (1.0 + 0.01 * above) * spread
         reading = force / (1.0 + 0.02 * above + 0.0001 * above**2) + zero
         recordings.append((path, reading + 0.005 * force.max() * rng.normal(size=force.shape), warmth))
-    return written_rig(folder, recordings)
+    return recordings
 
 
-def pad_in_rooms(kind, number, folder):
+def pad_in_rooms(kind, number):
     """Six recordings, each at a temperature of its own: `kind` says whether gain or zero follows it, by a line."""
     rng = np.random.default_rng(number)
     warmth, rate = rng.permutation(np.linspace(16.0, 32.0, 6)), 0.015
@@ -119,12 +120,12 @@ def pad_in_rooms(kind, number, folder):
         full, noise = force.max(), rng.normal(size=force.shape)
         reading = (force * (1.0 + above) if kind == "gain" else force + above * full) + 0.005 * full * noise
         recordings.append((path, reading, warm + 0.02 * rng.normal(size=len(path))))
-    return written_rig(folder, recordings)
+    return recordings
 
 
 @pytest.mark.long("two whole diagnoses of six recordings")
 @pytest.mark.parametrize("kind", ["gain", "zero"])
-def test_recordings_that_differ_by_their_temperature_do_not_differ_by_levels_and_gains_of_their_own(kind):
-    sure, result = small_pad.examined(pad_in_rooms, kind, 1)
+def test_recordings_that_differ_by_their_temperature_do_not_differ_by_levels_and_gains_of_their_own(tmp_path, kind):
+    sure, result = examined(pad_in_rooms(kind, 1), tmp_path)
     assert sure == {"temperature"} and result.between is None and result.verdict == "explained"
     assert result.findings[0].confidence > 0.95

@@ -213,13 +213,6 @@ def test_creep_is_named_and_the_gap_closes(tmp_path):
         assert (tmp_path / f"{name}.pdf").read_bytes().startswith(b"%PDF")
 
 
-@pytest.mark.long("a whole diagnosis that compares pairs of effects")
-def test_two_effects_are_named():
-    gains = np.exp(np.random.default_rng(8).normal(0, 0.2, cases.ROWS * cases.COLUMNS))
-    result = diagnosed(cases.rig(contact=cases.relaxing(0.35), change=lambda r, t: r * gains, seed=8, trials=6))
-    assert {named.name for named in result.findings} == {"creep", "gain-mismatch"}
-
-
 @pytest.mark.long("a whole diagnosis")
 def test_hum_is_unexplained():
     result = diagnosed(cases.rig(change=lambda r, t: r + 0.01 * np.sin(2 * np.pi * 7.3 * t)[:, None], seed=9))

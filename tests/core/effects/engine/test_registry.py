@@ -80,10 +80,6 @@ def test_what_one_effect_alone_states_is_asked_for_by_it():
         only_name_where(lambda kind: kind.name in ("wear", "hysteresis"))
 
 
-def test_effects_are_plain_data():
-    assert dataclasses.asdict(effect("creep", amount=0.5))["values"] == {"amount": 0.5, "time": 2.0}
-
-
 def test_effects_at_one_site_have_different_places_in_the_order():
     """With equal numbers the order of two effects would follow the user's stack, so each new kind takes a free number."""
     places = [(kind.site, kind.order) for kind in library().values()]

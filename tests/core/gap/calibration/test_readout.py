@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import palpate as pp
+from palpate.benchmarks._recordings import Recording
 from palpate.commands import main
 from palpate.core.gap.calibration.readout import _forward_check
 from palpate.core.gap.calibration.readout_methods import (
@@ -20,7 +21,7 @@ from palpate.core.gap.dataset.rig import read_rig
 GAIN = np.array([1.0, -0.4, 0.7, -1.2])
 SAMPLES = 120
 CURVE = np.array([0.2, 0.5, -0.3, 0.1])
-RIG = 'format = "palpate-rig/1"\n[sensor]\ngrid = { rows = 1, columns = 4, pitch = [0.01, 0.01] }\nunit = "uT"\n'
+SENSOR = 'grid = { rows = 1, columns = 4, pitch = 0.01 }\nunit = "uT"'
 
 
 def press(seed, scale=10.0, late=0.0, offset=0.0, noise=0.004, share=1.0):
@@ -35,14 +36,11 @@ def press(seed, scale=10.0, late=0.0, offset=0.0, noise=0.004, share=1.0):
 
 
 def write_rig(folder, recordings, uses):
-    lines = [RIG]
-    for i, ((time, force, readings), use) in enumerate(zip(recordings, uses, strict=True)):
-        rows = ["time,force," + ",".join(f"texel_{j}" for j in range(readings.shape[1]))]
-        rows += [",".join(f"{v:.9g}" for v in (t, f, *r)) for t, f, r in zip(time, force, readings, strict=True)]
-        (folder / f"press_{i}.csv").write_text("\n".join(rows) + "\n")
-        lines.append(f'[[trial]]\nfile = "press_{i}.csv"\nuse = "{use}"\n')
-    (folder / "rig.toml").write_text("".join(lines))
-    return folder / "rig.toml"
+    trials = [
+        (f"press_{i}", use, {"time": time, "force": force} | {f"texel_{j}": one for j, one in enumerate(readings.T)})
+        for i, ((time, force, readings), use) in enumerate(zip(recordings, uses, strict=True))
+    ]
+    return Recording("rig", SENSOR, trials).write(folder)
 
 
 @pytest.fixture(scope="module")

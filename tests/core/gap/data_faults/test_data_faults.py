@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Faults of the data are found with evidence, put right on request, and no healthy rig is accused."""
 
-import re
 from dataclasses import replace
-from pathlib import Path
 
 import faulty_rigs as made
 import gap_cases as cases
@@ -27,10 +25,6 @@ def stimuli_of(rig):
 def with_correction(path, words='"all"'):
     path.write_text(path.read_text().replace("[sensor]", f"[data]\ncorrect = {words}\n[sensor]", 1))
     return path
-
-
-def test_the_generator_shares_nothing_with_the_package():
-    assert not re.search(r"^\s*(from|import) palpate", Path(made.__file__).read_text(encoding="utf-8"), re.MULTILINE)
 
 
 def test_every_kind_of_fault_is_made():

@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 
+from palpate.benchmarks._recordings import Recording
 from palpate.core.errors import PalpateError
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.dataset.second_logger import MOST_ERROR, bridged, interpolated, longest_gap
@@ -61,20 +62,20 @@ def test_a_second_logger_takes_what_the_first_one_knows():
     np.testing.assert_allclose(interpolated(TIME, values, wanted), np.interp(wanted, TIME, presses(15.0)), atol=3e-4)
 
 
+def written(folder, time, force, reading):
+    """A rig of one recording, with empty cells where there is no number."""
+    columns = {"time": time, "force": force, "texel_0": reading}
+    sensor = 'grid = { rows = 1, columns = 1, pitch = 0.01 }\nunit = "V"'
+    return Recording("one", sensor, [("press", "fit", columns)]).write(folder)
+
+
 def test_a_rig_uses_half_of_a_force_and_leaves_out_what_a_long_gap_hides(tmp_path):
     force = presses(15.0)
     answers = 2.0 * force
     missing = np.zeros(len(TIME), bool)
     missing[1::2] = True
     missing[500:900] = True
-    rows = ["time,force,texel_0"]
-    rows += [f"{t},{'' if gone else f'{f:.9g}'},{r:.9g}" for t, f, r, gone in zip(TIME, force, answers, missing, strict=True)]
-    (tmp_path / "press.csv").write_text("\n".join(rows) + "\n")
-    (tmp_path / "rig.toml").write_text(
-        'format = "palpate-rig/1"\n[sensor]\ngrid = { rows = 1, columns = 1, pitch = [0.01, 0.01] }\nunit = "V"\n'
-        '[[trial]]\nfile = "press.csv"\nuse = "fit"\n'
-    )
-    rig = read_rig(tmp_path / "rig.toml")
+    rig = read_rig(written(tmp_path, TIME, np.where(missing, np.nan, force), answers))
     (trial,) = rig.trials
     used = np.isfinite(trial.reading[:, 0])
     assert not used[500:900].any() and used[:499].all() and used[901:-1].all()
@@ -83,11 +84,7 @@ def test_a_rig_uses_half_of_a_force_and_leaves_out_what_a_long_gap_hides(tmp_pat
 
 
 def test_a_stimulus_without_a_response_beside_it_is_refused(tmp_path):
-    rows = ["time,force,texel_0"] + [f"{t},{t if t < 3 else ''},{'' if t < 4 else t}" for t in np.arange(80) * 0.1]
-    (tmp_path / "press.csv").write_text("\n".join(rows) + "\n")
-    (tmp_path / "rig.toml").write_text(
-        'format = "palpate-rig/1"\n[sensor]\ngrid = { rows = 1, columns = 1, pitch = [0.01, 0.01] }\n'
-        '[[trial]]\nfile = "press.csv"\nuse = "fit"\n'
-    )
+    time = np.arange(80) * 0.1
+    path = written(tmp_path, time, np.where(time < 3, time, np.nan), np.where(time < 4, np.nan, time))
     with pytest.raises(PalpateError, match="No response in 'press.csv' has a stimulus at the same time"):
-        read_rig(tmp_path / "rig.toml")
+        read_rig(path)
