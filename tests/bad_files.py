@@ -424,8 +424,8 @@ def _write_mcap(path: Path) -> None:
         writer.finish()
 
 
-def _write_bag(path: Path) -> None:
-    """A bag of ROS 1 (a file), or of ROS 2 with SQLite (a folder): a wrench and an array of readings."""
+def write_bag(path: Path, storage: str = "SQLITE3") -> None:
+    """A bag of ROS 1 (a file), or of ROS 2 (a folder): a wrench, and an array of readings that is recorded 3 ms later."""
     from rosbags import rosbag1, rosbag2
     from rosbags.rosbag2.enums import StoragePlugin
     from rosbags.typesys import Stores, get_typestore
@@ -435,7 +435,7 @@ def _write_bag(path: Path) -> None:
     types = store.types
     wrench, array = "geometry_msgs/msg/WrenchStamped", "std_msgs/msg/Float64MultiArray"
     vector, stamps = types["geometry_msgs/msg/Vector3"], types["builtin_interfaces/msg/Time"]
-    bag = rosbag1.Writer(path) if is_first else rosbag2.Writer(path, version=9, storage_plugin=StoragePlugin.SQLITE3)
+    bag = rosbag1.Writer(path) if is_first else rosbag2.Writer(path, version=9, storage_plugin=StoragePlugin[storage])
     code = store.serialize_ros1 if is_first else store.serialize_cdr
     with bag as writer:
         force, taxels = (writer.add_connection(f"/{name}", name, typestore=store) for name in (wrench, array))
@@ -443,9 +443,9 @@ def _write_bag(path: Path) -> None:
             stamp = round(1e9 * (100.0 + TIME[i]))
             header = types["std_msgs/msg/Header"](*((i,) if is_first else ()), stamps(*divmod(stamp, 10**9)), "tool")
             load = types["geometry_msgs/msg/Wrench"](vector(0.0, 0.0, 60e3 * float(DEPTH[i])), vector(0.0, 0.0, 0.0))
-            writer.write(force, stamp, code(types[wrench](header, load), wrench))
+            writer.write(force, stamp + 3_000_000, code(types[wrench](header, load), wrench))
             layout = types["std_msgs/msg/MultiArrayLayout"]([], 0)
-            writer.write(taxels, stamp, code(types[array](layout, READING[i]), array))
+            writer.write(taxels, stamp + 3_000_000, code(types[array](layout, READING[i]), array))
 
 
 LOG_WRITERS: dict[str, Callable[[Path], Any]] = {
@@ -454,8 +454,8 @@ LOG_WRITERS: dict[str, Callable[[Path], Any]] = {
     "mat": _write_mat,
     "h5": _write_hdf5,
     "mcap": _write_mcap,
-    "bag": _write_bag,
-    "db3": _write_bag,
+    "bag": write_bag,
+    "db3": write_bag,
 }
 
 

@@ -96,14 +96,6 @@ def test_a_formula_of_the_third_family_changes_what_is_recorded_and_stays_finite
     assert changes[0] < 0.1 * changes[2] and changes[0] < changes[1] < changes[2] and changes[2] > 0.02
 
 
-def test_a_fractional_solid_relaxes_as_the_complementary_error_function():
-    """E of order 1/2 is known: E(-√t) = exp(t) erfc(√t). The integral ends where r^(1/2) = 3e-7 of it is left."""
-    from scipy.special import erfcx
-
-    time = np.array([0.0, 0.01, 0.3, 2.0, 40.0])
-    np.testing.assert_allclose(third._mittag_leffler(time, 0.5), erfcx(np.sqrt(time)), atol=1e-6)
-
-
 @pytest.mark.long("draws a case with three hidden effects")
 def test_three_effects_are_three_and_act_in_their_order():
     for number in range(3):
@@ -111,26 +103,6 @@ def test_three_effects_are_three_and_act_in_their_order():
         assert len(set(hidden)) == 3 and hidden == sorted(hidden, key=cases.ORDER.index)
     case = cases.draw("three", 1)
     assert len(case.answer) == 3 and all(form.form not in third.THIRD for form in case.hidden) and len(case.share) == 3
-
-
-def test_friction_is_coulombs_once_it_slides():
-    """A flat probe at constant speed and depth: after some bristle lengths the force is LuGre's steady state, Eq. 10–12."""
-    pad = world.Pad(60.0, 0.0, 0.6, 0.5, 0.01, 30.0, 0.3, 0.02, 1.0, 0.0, "N")
-    time = np.arange(0, 4, 0.02)
-    speed, depth = 0.02, 1e-3
-    path = np.stack([np.zeros_like(time), speed * time - 0.04, np.full_like(time, 0.01 - depth)], axis=1)
-    probe = world.Probe(None, (0.06, 0.4, 0.02))
-    shear = world.respond(world.touch(probe, pad, time, path), pad).shear[-1]
-    steady = pad.k * depth * (0.5 + 0.1 * np.exp(-4.0)) + pad.ct * speed
-    np.testing.assert_allclose(shear[:, 1], steady, rtol=1e-6)
-    np.testing.assert_allclose(shear[:, [0, 2]], 0.0, atol=1e-12)
-
-
-def test_low_pass_and_relaxation_against_closed_forms():
-    """``τ q' = x − q`` under a ramp, and the reading of a sensor with it hidden in it."""
-    t = np.arange(0, 5, 0.02)
-    got = own._low_pass(t[:, None] * 2.0, 0.02, 0.7, np.zeros(1))[:, 0]
-    np.testing.assert_allclose(got, 2.0 * (t - 0.7 * -np.expm1(-t / 0.7)), atol=1e-12)
 
 
 @pytest.mark.long("draws cases of the benchmark")

@@ -9,8 +9,10 @@ import struct
 import zipfile
 from pathlib import Path
 
+import bad_files
 import numpy as np
 import pytest
+from bad_files import write_bag
 
 from palpate.core.errors import FileError
 from palpate.core.gap.logs.log_file import read_log
@@ -102,45 +104,16 @@ def test_hdf5_with_units_and_mat_7_3(tmp_path):
 # --- messages
 
 
-WRENCH = "geometry_msgs/msg/WrenchStamped"
-
-
-def write_ros2(path, count=40, jump=0):
-    """A bag of ROS 2 with a wrench and an array of readings."""
-    rosbag2 = pytest.importorskip("rosbags.rosbag2")
-    from rosbags.rosbag2.enums import StoragePlugin
-    from rosbags.typesys import Stores, get_typestore
-
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    types = store.types
-    vector = types["geometry_msgs/msg/Vector3"]
-    plugin = StoragePlugin.MCAP if path.suffix == ".mcap" else StoragePlugin.SQLITE3
-    with rosbag2.Writer(path.with_suffix(""), version=9, storage_plugin=plugin) as writer:
-        wrench = writer.add_connection("/ft", WRENCH, typestore=store)
-        array = writer.add_connection("/tactile", "std_msgs/msg/Float32MultiArray", typestore=store)
-        for i in range(count):
-            seconds, nanoseconds = divmod(round((100.0 + TIME[i % 40]) * 1e9), 10**9)
-            header = types["std_msgs/msg/Header"](types["builtin_interfaces/msg/Time"](seconds, nanoseconds), "tool")
-            force = vector(0.0, 0.5, float(FORCE[i % 40]))
-            message = types[WRENCH](header, types["geometry_msgs/msg/Wrench"](force, vector(0.0, 0.0, 0.0)))
-            stamp = seconds * 10**9 + nanoseconds + 3_000_000
-            writer.write(wrench, stamp, store.serialize_cdr(message, WRENCH))
-            layout = types["std_msgs/msg/MultiArrayLayout"]([], 0)
-            numbers = types["std_msgs/msg/Float32MultiArray"](layout, np.arange(4, dtype=np.float32) + i)
-            writer.write(array, stamp, store.serialize_cdr(numbers, "std_msgs/msg/Float32MultiArray"))
-    return path.with_suffix("")
-
-
-@pytest.mark.parametrize("kind", ["bag.db3", "bag.mcap"])
-def test_bags_of_ros_2_without_ros(tmp_path, kind):
-    folder = write_ros2(tmp_path / kind)
-    (file,) = folder.glob(f"*{kind[3:]}")
+@pytest.mark.parametrize("storage", ["SQLITE3", "MCAP"])
+def test_bags_of_ros_2_without_ros(tmp_path, storage):
+    write_bag(folder := tmp_path / "bag", storage)
+    (file,) = folder.glob("bag.*")
     for path in (folder, file):
-        force, readings = table_of(path, "/ft"), table_of(path, "/tactile")
-        np.testing.assert_array_equal(force.columns["wrench.force.z"], FORCE)
-        np.testing.assert_allclose(force.columns["time"], 100.0 + TIME, atol=1e-9)  # of the header
-        np.testing.assert_allclose(readings.columns["time"], 100.003 + TIME, atol=1e-6)  # of the recorder: it has no header
-        assert readings.columns["data_3"].tolist() == [3.0 + i for i in range(40)]
+        force, readings = table_of(path, "/geometry_msgs/msg/WrenchStamped"), table_of(path, "/std_msgs/msg/Float64MultiArray")
+        np.testing.assert_array_equal(force.columns["wrench.force.z"], 60e3 * bad_files.DEPTH)
+        np.testing.assert_allclose(force.columns["time"], 100.0 + bad_files.TIME, atol=1e-9)  # of the header
+        np.testing.assert_allclose(readings.columns["time"], 100.003 + bad_files.TIME, atol=1e-6)  # of the recorder: no header
+        np.testing.assert_array_equal(readings.columns["data_3"], bad_files.READING[:, 3])
 
 
 def test_constants_of_a_type_of_message_are_no_columns():
@@ -169,18 +142,17 @@ def test_a_damaged_length_that_asks_for_all_memory_is_damage(tmp_path):
         raise MemoryError
 
 
-def write_json_mcap(path, count=40, compress=True):
+def write_json_mcap(path):
     writer_of = pytest.importorskip("mcap.writer")
     with path.open("wb") as file:
-        kind = writer_of.CompressionType.ZSTD if compress else writer_of.CompressionType.NONE
-        writer = writer_of.Writer(file, compression=kind)
+        writer = writer_of.Writer(file)
         writer.start()
         schema = writer.register_schema("force", "jsonschema", b"{}")
         channel = writer.register_channel("/force", "json", schema)
         picture = writer.register_schema("foxglove.CompressedImage", "protobuf", b"")
         other = writer.register_channel("/camera", "protobuf", picture)
-        for i in range(count):
-            message = json.dumps({"timestamp": {"sec": i, "nsec": 5}, "value": FORCE[i % 40], "raw": [i, 2 * i], "unit": "N"})
+        for i, force in enumerate(FORCE):
+            message = json.dumps({"timestamp": {"sec": i, "nsec": 5}, "value": force, "raw": [i, 2 * i], "unit": "N"})
             writer.add_message(channel, i * 10**9, message.encode(), i * 10**9)
             writer.add_message(other, i * 10**9, b"?", i * 10**9)
         writer.finish()
@@ -202,19 +174,7 @@ def test_mcap_with_json(tmp_path):
 @pytest.mark.parametrize("kind", ["mcap", "db3", "npz", "mat", "h5"])
 def test_a_log_that_is_cut_off_is_one_sentence(tmp_path, kind, share):
     path = tmp_path / f"log.{kind}"
-    if kind == "mcap":
-        write_json_mcap(path, 400)
-    elif kind == "db3":
-        (found,) = write_ros2(tmp_path / "bag.db3", 200).glob("*.db3")
-        path.write_bytes(found.read_bytes())
-    elif kind == "npz":
-        np.savez(path, **arrays())
-    elif kind == "mat":
-        pytest.importorskip("scipy.io").savemat(path, arrays(), do_compression=True)
-    else:
-        with pytest.importorskip("h5py").File(path, "w") as file:
-            file["force"] = np.random.default_rng(0).random((5000, 4))
-    content = path.read_bytes()
+    (content,) = [content for name, content in bad_files.log_files(kind).items() if name.endswith(kind)]
     path.write_bytes(content[: int(share * len(content))])
     with pytest.raises(FileError, match=r"^'log.*: .*copy it again|^'log.* holds no array") as caught:
         read_log(path)
@@ -229,7 +189,7 @@ def test_a_fifo_is_not_waited_for(tmp_path, name):
 
 
 def test_a_fifo_in_the_folder_of_a_bag_is_not_waited_for(tmp_path):
-    folder = write_ros2(tmp_path / "bag.db3")
+    write_bag(folder := tmp_path / "bag")
     (folder / "metadata.yaml").unlink()
     os.mkfifo(folder / "metadata.yaml")
     with pytest.raises(FileError, match="is a FIFO"):
@@ -247,7 +207,7 @@ def test_headers_that_promise_more_than_there_is_take_no_memory(tmp_path):
         file.create_dataset("force", (10**11, 10), "f8", chunks=(1000, 10))
     with pytest.raises(FileError, match="cut it into several files"):
         read_log(tmp_path / "log.h5")
-    content = bytearray(write_json_mcap(tmp_path / "log.mcap", compress=False).read_bytes())
+    content = bytearray(bad_files.log_files("mcap")["log.mcap"])
     place = content.index(b"\x06", 8)  # the chunk: its length, two times, and the size of what is in it
     content[place + 1 + 8 + 16 : place + 1 + 8 + 24] = struct.pack("<Q", 1 << 50)
     (tmp_path / "log.mcap").write_bytes(content)
