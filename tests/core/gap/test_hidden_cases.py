@@ -65,32 +65,26 @@ PRESSED = np.array([[0, 1, 3, 4, 6, 9], [0, 0, 1e-3, -2e-3, 4e-3, 4e-3], [1e-3, 
 """Time, y and height of a probe's lowest point: in, on, half out, on again with a slide, out."""
 
 
-def pressed_pad(radius=0.012):
-    """A pad, a contact along :data:`PRESSED` and a function that returns what is recorded with hidden effects."""
+def record(*hidden):
+    """Readings and net forces of a pad with hidden effects, under a ball that moves as :data:`PRESSED` says."""
     pad = world.Pad(60.0, 0.6, 0.6, 0.5, 0.01, 30.0, 0.3, 0.02, 500.0, 40.0, "counts")
-    probe = world.Probe(radius, None) if radius else world.Probe(None, (0.06, 0.4, 0.02))
-    time = np.arange(0, 9, 0.02)
+    probe, time = world.Probe(0.012, None), np.arange(0, 9, 0.02)
     y, z = (np.interp(time, PRESSED[0], PRESSED[i]) for i in (1, 2))
     path = np.stack([np.zeros_like(time), y, probe.lowest + z], axis=1)
-
-    def record(*hidden):
-        signals = world.respond(world.touch(probe, pad, time, path, hidden), pad, hidden)
-        return signals, world.converted(signals.reading, pad, hidden), world.net_force(signals)
-
-    return pad, record
+    signals = world.respond(world.touch(probe, pad, time, path, hidden), pad, hidden)
+    return world.converted(signals.reading, pad, hidden), world.net_force(signals)
 
 
 @pytest.mark.parametrize("name", [name for name in third.THIRD if name != "dead-texels"])
 def test_a_formula_of_the_third_family_changes_what_is_recorded_and_stays_finite(name):
     """Nothing at all as the strength goes to zero, more the stronger it is."""
-    pad, record = pressed_pad()
-    _, plain, plain_force = record()
+    plain, plain_force = record()
     changes = []
     for strength in (0.02, 0.3, 3.0):
         made = [record(third.THIRD[name](np.random.default_rng(5), strength)) for _ in range(2)]
-        assert all(np.isfinite(part).all() for part in made[0][1:])
-        np.testing.assert_array_equal(made[0][1], made[1][1])  # the same seed, the same recording
-        reading, force = made[0][1:]
+        assert all(np.isfinite(part).all() for part in made[0])
+        np.testing.assert_array_equal(made[0][0], made[1][0])  # the same seed, the same recording
+        reading, force = made[0]
         shown = (reading - plain) / np.ptp(plain) if name not in cases.IN_FORCE else (force - plain_force) / np.ptp(plain_force)
         changes.append(np.sqrt(np.mean(shown**2)))
     assert changes[0] < 0.1 * changes[2] and changes[0] < changes[1] < changes[2] and changes[2] > 0.02

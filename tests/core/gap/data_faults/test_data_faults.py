@@ -45,9 +45,10 @@ def test_a_fault_is_found_and_put_right(tmp_path, kind):
     assert not find_faults(mended, stimuli_of(mended))
 
 
-@pytest.mark.parametrize("family", made.FAMILIES)
-def test_a_healthy_rig_is_not_accused(tmp_path, family):
-    for number in range(3):
+@pytest.mark.parametrize(("family", "numbers"), [("foam", range(3)), ("counts", range(3, 6)), ("gel", range(6, 10))])
+def test_a_healthy_rig_is_not_accused(tmp_path, family, numbers):
+    """Whatever effect its sensor has: the numbers go through all of them."""
+    for number in numbers:
         rig = read_rig(made.draw(family, "", number, tmp_path).path)
         assert not find_faults(rig, stimuli_of(rig))
 
