@@ -191,10 +191,12 @@ class PressedSensor:
             A pose is not finite, or a quaternion is zero; or the load is none. The sensor stays at the step before. Or a target
             went through the sensor within this step; the sensor is behind it now, and goes on.
         """
-        before = self._out.poses[0, :, :3].copy()
-        self._read_poses(sensor_pose, target_pose)
         if self._steps == 0 and not self._out.begins[0]:
+            before = self._out.poses[0, :, :3].copy()
+            self._read_poses(sensor_pose, target_pose)
             self._require_plausible_speed(before)
+        else:
+            self._read_poses(sensor_pose, target_pose)
         if wrench is None:
             self._forget_load()
             self._press()
