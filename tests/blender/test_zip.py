@@ -134,16 +134,10 @@ def test_a_missing_wheel_is_noticed(missing):
 
 
 @pytest.mark.long("builds the zip and installs it")
-def test_installs_and_enables(life):
-    assert life["enabled"]["is_enabled"]
-    assert life["enabled"]["has_properties"]
-    assert life["enabled"]["commands"] == ["palpate"]
-    assert life["enabled"]["classes"]
-
-
-@pytest.mark.long("builds the zip and installs it")
-def test_enabling_loads_nothing_heavy(life):
-    assert not HEAVY & set(life["enabled"]["modules"])
+def test_it_is_enabled_and_disabled_as_often_as_one_likes(life):
+    """What it registers and loads is the matter of test_registration.py."""
+    assert life["enabled"] == life["enabled again"] == [True, True]
+    assert life["disabled"] == life["uninstalled"] == [False, False]
 
 
 @pytest.mark.long("builds the zip and installs it")
@@ -162,34 +156,13 @@ def test_nothing_is_written_outside_of_the_users_folder_for_the_extension(life):
     assert any(name.startswith("fontlist") for name in life["fonts"])
     left = [path.relative_to(life["home"]).as_posix() for path in life["home"].rglob("*") if path.is_file()]
     assert left == []
-    assert life["disabled"]["MPLCONFIGDIR"] is None
-
-
-@pytest.mark.long("builds the zip and installs it")
-def test_disabling_leaves_nothing_registered(life):
-    before, after = life["before"], life["disabled"]
-    assert not after["is_enabled"]
-    assert not after["has_properties"]
-    assert after["commands"] == []
-    assert after["classes"] == []
-    assert life["enabled"]["menu_entries"] > 0
-    assert after["menu_entries"] == before["menu_entries"] == 0
-    assert after["handlers"] == before["handlers"]
-    assert after["keymap_items"] == before["keymap_items"]
-
-
-@pytest.mark.long("builds the zip and installs it")
-def test_enabling_again_works(life):
-    assert life["enabled_again"]["is_enabled"]
-    assert life["enabled_again"]["classes"] == life["enabled"]["classes"]
+    assert life["MPLCONFIGDIR"] is None
 
 
 @pytest.mark.long("builds the zip and installs it")
 def test_uninstalling_removes_the_files(life):
     left = [path for path in (life["user"] / "extensions").rglob("*") if "palpate" in path.name or path.name == "numba"]
     assert left == []
-    assert life["uninstalled"]["classes"] == []
-    assert life["uninstalled"]["handlers"] == life["before"]["handlers"]
 
 
 @pytest.mark.long("builds the zip and installs it")

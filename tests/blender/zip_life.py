@@ -14,65 +14,13 @@ sys.path.insert(0, only_blender)
 import bpy  # noqa: E402
 
 MODULE = "bl_ext.user_default.palpate"
-commands = []
 
 
-def watch_commands():
-    """Blender has no list of its command line's commands, so they are counted as they come and go."""
-    register, unregister = bpy.utils.register_cli_command, bpy.utils.unregister_cli_command
-    names = {}
-
-    def counted_register(name, execute):
-        handle = register(name, execute)
-        names[id(handle)] = (name, handle)
-        commands.append(name)
-        return handle
-
-    def counted_unregister(handle):
-        if id(handle) in names:  # Blender's own command was registered before the watch began
-            commands.remove(names.pop(id(handle))[0])
-        return unregister(handle)
-
-    bpy.utils.register_cli_command, bpy.utils.unregister_cli_command = counted_register, counted_unregister
-
-
-def ours(thing):
-    return "palpate" in getattr(thing, "__module__", "").split(".")
-
-
-def every_class(base):
-    for kind in base.__subclasses__():
-        yield kind
-        yield from every_class(kind)
-
-
-def state():
-    """Everything an add-on can leave behind."""
+def is_there():
+    """Whether the extension is enabled and its properties are known."""
     import addon_utils
 
-    bases = [bpy.types.Operator, bpy.types.Panel, bpy.types.Menu, bpy.types.Header, bpy.types.UIList]
-    bases += [bpy.types.PropertyGroup, bpy.types.AddonPreferences]
-    kinds = {kind for base in bases for kind in every_class(base)}
-    drawn = [bpy.types.Menu, bpy.types.Panel, bpy.types.Header]
-    # only ours: Blender moves a menu's own function into its list when the first entry is appended, and leaves it there
-    menu_entries = sum(
-        ours(entry)
-        for base in drawn
-        for kind in set(every_class(base))
-        for entry in getattr(getattr(kind, "draw", None), "_draw_funcs", [])
-    )
-    lists = {name: value for name in dir(bpy.app.handlers) if isinstance(value := getattr(bpy.app.handlers, name), list)}
-    keymaps = bpy.context.window_manager.keyconfigs.addon
-    return {
-        "is_enabled": addon_utils.check(MODULE)[1],
-        "has_properties": hasattr(bpy.types.Object, "palpate"),
-        "commands": list(commands),
-        "classes": sorted(kind.__name__ for kind in kinds if ours(kind) and kind.is_registered),
-        "menu_entries": menu_entries,
-        "handlers": {name: sorted(f"{f.__module__}.{f.__name__}" for f in value) for name, value in lists.items()},
-        "keymap_items": sum(len(keymap.keymap_items) for keymap in keymaps.keymaps) if keymaps else 0,
-        "modules": sorted({name.partition(".")[0] for name in sys.modules}),
-    }
+    return [addon_utils.check(MODULE)[1], hasattr(bpy.types.Object, "palpate")]
 
 
 def wheels():
@@ -156,25 +104,24 @@ def figure():
 
 
 def main():
-    watch_commands()
-    report = {"before": state()}
+    report = {}
     done = bpy.ops.extensions.package_install_files(repo="user_default", filepath=zip_path, enable_on_install=True)
     assert done == {"FINISHED"}, done
-    report["enabled"] = state()
+    report["enabled"] = is_there()
     files = files_of_extension()
     report["road"] = road()
     report["fonts"] = figure()
     report["written beside the source"] = sorted(set(files_of_extension()) ^ set(files))
     report["wheels"], report["compiled"] = wheels()
     bpy.ops.preferences.addon_disable(module=MODULE)
-    report["disabled"] = state() | {"MPLCONFIGDIR": os.environ.get("MPLCONFIGDIR")}
+    report["disabled"], report["MPLCONFIGDIR"] = is_there(), os.environ.get("MPLCONFIGDIR")
     bpy.ops.preferences.addon_enable(module=MODULE)
-    report["enabled_again"] = state()
+    report["enabled again"] = is_there()
     repos = bpy.context.preferences.extensions.repos
     index = next(i for i, repo in enumerate(repos) if repo.module == "user_default")
     done = bpy.ops.extensions.package_uninstall(repo_index=index, pkg_id="palpate")
     assert done == {"FINISHED"}, done
-    report["uninstalled"] = state()
+    report["uninstalled"] = is_there()
     with open(report_path, "w", encoding="utf-8") as out:
         json.dump(report, out)
 
