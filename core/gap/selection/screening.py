@@ -25,8 +25,8 @@ from .view_set import ViewSet
 
 LATER_STARTS = 1
 """Points of the search ranges that are tried on top of an effect, in addition to the form's values alone: for speed."""
-FIRST_STARTS, TRIAL_STEPS, FIRST_STEPS, FIRST_TOLERANCE = 2, 3, 8, 1e-3
-"""A first fit takes some steps from each of the best starting points, and goes on from the best of these: for speed."""
+FIRST_STEPS, FIRST_TOLERANCE = 10, 1e-3
+"""Of the fits to a part of the data."""
 FINAL_STEPS, FINAL_TOLERANCE = 10, 3e-4
 """Of the fits to everything."""
 TRIED_KINDS, REFITTED_KINDS = 8, 5
@@ -192,25 +192,19 @@ class Screening:
         return promises
 
     def _first_fit(self, one: Promise, tests: _Tests) -> FirstFit:
-        """A candidate fitted to a part of the data, from its best starting points."""
+        """A candidate fitted to a part of the data, from the starting point that lowers the squares most as it is."""
         test = tests.of(one.candidate)
-        starts = [test.model.with_effect(start) for start in one.starts[:FIRST_STARTS]]
-        tried = [self._fitted_from(start, one.candidate, test, TRIAL_STEPS) for start in starts]
-        best = min(tried, key=lambda found: found.mean)
-        best = self._fitted_from(best.model, one.candidate, test, FIRST_STEPS)
-        return FirstFit(share_left(best, test), one.candidate, best)
-
-    def _fitted_from(self, start: Model, candidate: Candidate, test: ScoreTest, steps: int) -> Fit:
-        return fit(
+        found = fit(
             test.views,
-            start,
-            free_with(test.free, test.model, candidate, self.scales),
-            max_steps=steps,
+            max((test.model.with_effect(effect) for effect in one.starts), key=test.decrease),
+            free_with(test.free, test.model, one.candidate, self.scales),
+            max_steps=FIRST_STEPS,
             tolerance=FIRST_TOLERANCE,
             frozen=len(test.free),
             with_equations=False,
             initial_derivatives=test.initial_derivatives,
         )
+        return FirstFit(share_left(found, test), one.candidate, found)
 
     def _final_fits(self, first_fits: Iterable[FirstFit], parent: Hypothesis) -> Making:
         """Candidates fitted to all fitted recordings, and read on unseen blocks, but for those without their signature."""
