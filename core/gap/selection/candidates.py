@@ -351,6 +351,12 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
     return found
 
 
+def competing(forms: Sequence[Candidate]) -> list[Candidate]:
+    """Return the forms through which their kinds compete: those that no other one can follow."""
+    followed = {(one.name, name) for one in forms for name in one.form.follows}
+    return [one for one in forms if (one.name, one.form.name) not in followed]
+
+
 def is_free_already(candidate: Candidate, free: Sequence[FreeParameter]) -> bool:
     """Return whether the base model has a candidate as a free parameter: a common offset is its `zero`."""
     same = candidate.form.same_as

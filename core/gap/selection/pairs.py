@@ -14,7 +14,7 @@ import numpy as np
 
 from ...model.sensor import Effect
 from ..fitting.least_squares import Fit, fit
-from .candidates import DIRECTLY_ESTIMATED, Candidate, is_free_already
+from .candidates import DIRECTLY_ESTIMATED, Candidate, competing, is_free_already
 from .rao_score import ScoreTest
 from .score import Hypothesis
 from .screening import Making, Screening, free_with
@@ -63,7 +63,7 @@ def best_pairs(screening: Screening, base: Hypothesis) -> Making:
 def _dictionary(screening: Screening, base: Hypothesis) -> Iterator[_Entry]:
     """Forms with numbers at which they make a change."""
     gain = abs(base.fit.model.parameters.gain)
-    for one in screening.candidates(base.fit.model):
+    for one in competing(screening.candidates(base.fit.model)):
         on_friction = one.form.friction_law is not None
         if is_free_already(one, base.fit.free) or one.name in DIRECTLY_ESTIMATED or on_friction:
             continue

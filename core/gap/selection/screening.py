@@ -9,14 +9,23 @@ effects.
 from __future__ import annotations
 
 from collections.abc import Generator, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from ...model.sensor import Effect
 from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
 from ..fitting.least_squares import Fit, FreeParameter, TrialView, fit
 from ..forward.predictor import Model
 from .blocks import Blocks, Views
-from .candidates import DIRECTLY_ESTIMATED, START_COUNT, Candidate, FittedCandidate, Scales, candidates, is_free_already
+from .candidates import (
+    DIRECTLY_ESTIMATED,
+    START_COUNT,
+    Candidate,
+    FittedCandidate,
+    Scales,
+    candidates,
+    competing,
+    is_free_already,
+)
 from .plausibility import is_plausible
 from .rao_score import ScoreTest
 from .score import OWN_NUMBERS, Hypothesis
@@ -90,7 +99,6 @@ class Screening:
     scales: Scales
     assumed: str
     alone: dict[str, Effect]
-    promises: dict[object, list[Promise]] = field(default_factory=dict)
 
     def hypothesis(
         self, found: Fit, names: tuple[str, ...], forms: tuple[str, ...], parent: Hypothesis | None = None
@@ -107,8 +115,8 @@ class Screening:
     def with_one_more(self, parent: Hypothesis, kinds: set[str] | None = None, most_left: float = 1.0) -> Making:
         """Return the parent with one effect more, for the kinds that promise most, in one form of each.
 
-        It is the form that is free to follow any law, if the kind has one, so that kinds compete at equal freedom. Alone, kinds
-        without such a form come in the best of all their forms, and the best kinds in all their forms.
+        Kinds compete at equal freedom, through the forms that no other can follow; on top of an effect through the one of them
+        that is free to follow any law, if there is one. Alone, the best kinds come in all these forms.
 
         Parameters
         ----------
@@ -120,14 +128,10 @@ class Screening:
         """
         is_first = not (parent.names or self.assumed)  # an assumption about recordings is like an effect
         tests = _Tests(self.view_set, parent.fit)
-        promises = yield from self._promises(parent, tests, kinds)
-        by_kind: dict[str, list[Promise]] = {}
-        for one in promises:
-            by_kind.setdefault(one.candidate.name, []).append(one)
+        promised = yield from self._promised(parent, tests, kinds)
         first_fits = []
-        for own in list(by_kind.values())[: None if is_first else TRIED_KINDS]:
-            best = min(own, key=_is_textbook)
-            for one in own if is_first and best.candidate.form.error is None else [best]:
+        for own in promised[: None if is_first else TRIED_KINDS]:
+            for one in own if is_first else [min(own, key=_is_textbook)]:
                 yield f"fitting {one.candidate.name}"
                 first_fits.append(self._first_fit(one, tests))
         best_fits: dict[str, FirstFit] = {}
@@ -141,14 +145,19 @@ class Screening:
             made += yield from self.other_forms(parent, name, [one.forms[-1] for one in made])
         return made
 
-    def other_forms(self, parent: Hypothesis, name: str, done: Sequence[str], most_left: float = 1.0) -> Making:
+    def other_forms(
+        self, parent: Hypothesis, name: str, done: Sequence[str], most_left: float = 1.0, is_followed: bool = False
+    ) -> Making:
         """Return the parent with the forms of a kind that were not fitted yet, so that it is judged by its whole library.
 
-        Forms that leave more than `most_left` of the gap in a part of the data are left out, as in :meth:`with_one_more`.
+        Forms that leave more than `most_left` of the gap in a part of the data are left out, as in :meth:`with_one_more`; those
+        that another can follow come if `is_followed`, for the report.
         """
-        tests = _Tests(self.view_set, parent.fit)
-        own = [one for one in self.promises[parent.key] if one.candidate.name == name and one.candidate.label not in done]
-        fitted = [self._first_fit(one, tests) for one in own]
+        tests, joining = _Tests(self.view_set, parent.fit), self._joining(parent)
+        rivals = [one.label for one in competing(joining)]
+        others = [one for one in joining if one.name == name and one.label not in done]
+        others = [one for one in others if (one.label not in rivals) == is_followed]
+        fitted = [self._first_fit(one, tests) for one in self._promises(others, parent, tests)]
         return (yield from self._final_fits([one for one in fitted if one.left <= most_left], parent))
 
     def without(self, one: Hypothesis, index: int) -> Hypothesis:
@@ -169,17 +178,27 @@ class Screening:
         """Return whether the recordings hold what the library asks of an effect, the last one of a fit."""
         return is_plausible(FittedCandidate(candidate, found), replace(self.view_set, whole=self.views.fitted))
 
-    def _promises(self, parent: Hypothesis, tests: _Tests, kinds: set[str] | None) -> Generator[str, None, list[Promise]]:
-        """What every form could explain on top of a model, with starting points; best first."""
-        model, promises = parent.fit.model, []
-        for one in self.candidates(model):
-            if (
-                one.name in parent.names
-                or is_free_already(one, parent.fit.free)
-                or (kinds is not None and one.name not in kinds)
-            ):
-                continue
+    def _promised(self, parent: Hypothesis, tests: _Tests, kinds: set[str] | None) -> Generator[str, None, list[list[Promise]]]:
+        """What each kind could explain on top of a model, by the forms through which it competes, best first."""
+        by_kind: dict[str, list[Candidate]] = {}
+        for one in competing(self._joining(parent)):
+            if kinds is None or one.name in kinds:
+                by_kind.setdefault(one.name, []).append(one)
+        promised = []
+        for own in by_kind.values():
             yield "screening every effect"
+            promised.append(self._promises(own, parent, tests))
+        return sorted(filter(None, promised), key=lambda own: -own[0].share)
+
+    def _joining(self, parent: Hypothesis) -> list[Candidate]:
+        """Candidates that may join a model: kinds that it does not have."""
+        found = self.candidates(parent.fit.model)
+        return [one for one in found if one.name not in parent.names and not is_free_already(one, parent.fit.free)]
+
+    def _promises(self, forms: Sequence[Candidate], parent: Hypothesis, tests: _Tests) -> list[Promise]:
+        """What forms could explain on top of a model, with starting points; best first."""
+        model, promises = parent.fit.model, []
+        for one in forms:
             test = tests.of(one)
             starts = starting_points(one, test, self.view_set, self.scales, LATER_STARTS if parent.names else START_COUNT)
             if one.label in self.alone:
@@ -187,9 +206,7 @@ class Screening:
                 starts = sorted([*starts, (test.score(model.with_effect(effect))[0], effect)], key=lambda entry: -entry[0])
             if starts and starts[0][0] > 0:
                 promises.append(Promise(starts[0][0] / max(test.total, 1e-300), one, [effect for _, effect in starts]))
-        promises.sort(key=lambda one: -one.share)
-        self.promises[parent.key] = promises
-        return promises
+        return sorted(promises, key=lambda one: -one.share)
 
     def _first_fit(self, one: Promise, tests: _Tests) -> FirstFit:
         """A candidate fitted to a part of the data, from the starting point that lowers the squares most as it is."""

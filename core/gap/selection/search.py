@@ -14,6 +14,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from .candidates import competing
 from .noise_level import measured_noise, noise_level
 from .pairs import best_pairs
 from .rule_numbers import DRAWS, LEAST_WEIGHT
@@ -59,7 +60,7 @@ class Search:
     def run(self) -> Generator[tuple[str, float], None, Hypothesis]:
         """Return the model that the rule chooses; yield what is being done, and which share of the work is done."""
         plain, self.base = self.under("")
-        self.library = Counter(one.name for one in plain.candidates(self.base.fit.model))
+        self.library = Counter(one.name for one in competing(plain.candidates(self.base.fit.model)))
         self.tried.append(self.base)
         self._weigh(is_noise_measured=True)
         if not self.is_open(self.base):
@@ -132,6 +133,14 @@ class Search:
                 found[name] += made
                 self._longer[parent.key] += made
         return parent, found
+
+    def described(self, one: Hypothesis, index: int) -> list[Hypothesis]:
+        """Return a model with each form of one of its kinds, those that another can follow too."""
+        parent, found = self.in_place_of(one, index)
+        own = found[one.names[index]]
+        done = [form for other in own for form in other.forms]
+        others = self.under(one.assumed)[0].other_forms(parent, one.names[index], done, self._most_left(parent), True)
+        return [*own, *_finished(others)]
 
     # --- stages
 

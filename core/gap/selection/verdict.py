@@ -39,8 +39,7 @@ def with_best_kinds(search: Search, best: Hypothesis) -> Hypothesis:
 def with_best_forms(search: Search, best: Hypothesis) -> Hypothesis:
     """Return the model with that form of each kind which describes the recordings best; the names stay."""
     for name in best.names:
-        _, others = search.in_place_of(best, best.names.index(name))
-        best = search.score.best_form(others[name])
+        best = search.score.best_form(search.described(best, best.names.index(name)))
     return best
 
 
