@@ -209,20 +209,6 @@ class Score:
         near = [one for one in forms if one is top or apart[id(one)][0] < NEAR_ERRORS * apart[id(one)][1:].std()]
         return min(near, key=lambda one: (one.is_bent, one.number_count, float(least[id(one)][0])))
 
-    def values_of_kind(self, forms: Sequence[Hypothesis], library: int) -> np.ndarray:
-        """Return S of a kind by all its forms under each draw: the logarithm of the mean of exp(S).
-
-        Parameters
-        ----------
-        forms : sequence of Hypothesis
-            Those that were fitted; forms that promised nothing count as nothing.
-        library : int
-            Number of forms of the kind.
-        """
-        table = np.array([self.values(one) for one in forms])
-        most = table.max(axis=0)
-        return np.asarray(most + np.log(np.exp(table - most).sum(axis=0) / max(library, len(forms))))
-
     def weights_of(self, values: Sequence[np.ndarray]) -> np.ndarray:
         """Return pseudo-BMA+ weights: the mean over the draws of the softmax of S."""
         table = np.array([one[1:] for one in values])

@@ -7,14 +7,12 @@ and one session in their order (what the sensor remembers goes on, which costs n
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 from typing import TypeVar
 
 import numpy as np
 
-from .candidates import competing
 from .noise_level import measured_noise, noise_level
 from .pairs import best_pairs
 from .rule_numbers import DRAWS, LEAST_WEIGHT
@@ -60,7 +58,7 @@ class Search:
     def run(self) -> Generator[tuple[str, float], None, Hypothesis]:
         """Return the model that the rule chooses; yield what is being done, and which share of the work is done."""
         plain, self.base = self.under("")
-        self.library = Counter(one.name for one in competing(plain.candidates(self.base.fit.model)))
+        self.library = {one.name for one in plain.candidates(self.base.fit.model)}
         self.tried.append(self.base)
         self._weigh(is_noise_measured=True)
         if not self.is_open(self.base):
@@ -168,12 +166,14 @@ class Search:
 
     def _remembering(self, screening: Screening) -> set[str]:
         """Kinds whose effects go on from recording to recording: they predict something else in a session."""
-        kinds = {one.name for one in screening.candidates(self.base.fit.model)} - set(self.library)
-        for one in self._longer[self.base.key]:
-            alone = [view.residual(one.fit.model) for view in self.under("")[0].views.fitted]
-            joined = [view.residual(one.fit.model) for view in screening.views.fitted]
+        base, plain = self.base.fit.model, self.under("")[0]
+        kinds = {one.name for one in screening.candidates(base)} - self.library
+        for effect in screening.alone.values():
+            alone, joined = (
+                [view.residual(base.with_effect(effect)) for view in one.views.fitted] for one in (plain, screening)
+            )
             if any(np.abs(a - b).max() > LEAST_REMEMBERED for a, b in zip(alone, joined, strict=True)):
-                kinds.add(one.names[-1])
+                kinds.add(effect.name)
         return kinds
 
     def _extend(self, size: int) -> Steps:

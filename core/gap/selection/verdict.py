@@ -27,10 +27,10 @@ def with_best_kinds(search: Search, best: Hypothesis) -> Hypothesis:
     score = search.score
     for index, name in enumerate(best.names):
         _, others = search.in_place_of(best, index)
-        own = float(score.values_of_kind(others[name], search.library[name])[0])
-        for other, forms in others.items():
+        own = max(map(score.value, others[name]))
+        for forms in others.values():
             one = max(forms, key=score.value)
-            better = float(score.values_of_kind(forms, search.library[other])[0]) > own
+            better = score.value(one) > own
             if better and not _contains(one, best, index) or score.is_near(best, one) and score.is_simpler(one, best):
                 return one
     return best
@@ -101,15 +101,16 @@ def weighed_kinds(search: Search, best: Hypothesis, index: int) -> tuple[float, 
     """
     score, name = search.score, best.names[index]
     parent, others = search.in_place_of(best, index)
-    own = score.values_of_kind(others[name], search.library[name])
+    own = score.values(max(others[name], key=score.value))
     rivals, kept, is_needed, is_enough = [], [own, score.values(parent)], score.leaves_gap(parent), not score.leaves_gap(best)
     for other, forms in others.items():
         if other == name or (is_enough and all(map(score.leaves_gap, forms))):
             continue
-        value = score.values_of_kind(forms, search.library[other])
+        top = max(forms, key=score.value)
+        value = score.values(top)
         apart, error = float((own - value)[0]), float((own - value)[1:].std())
         explains = is_needed and any(not (score.leaves_gap(one) or _contains(one, best, index)) for one in forms)
-        if not explains and apart > -max(error, SAME_SCORE) and _contains(max(forms, key=score.value), best, index):
+        if not explains and apart > -max(error, SAME_SCORE) and _contains(top, best, index):
             continue
         kept.append(value)
         if explains or apart < RIVAL_ERRORS * error:
@@ -192,7 +193,7 @@ def _closed(score: Score, before: np.ndarray, after: np.ndarray, count: np.ndarr
 def _rule_out(search: Search, result: Diagnosis) -> None:
     """Write for each kind that was not found why."""
     named = {name for group in result.ambiguous for name in group} | {one.name for one in result.findings}
-    possible, cannot = set(search.library), unidentifiable(result.coverage)
+    possible, cannot = search.library, unidentifiable(result.coverage)
     before = max(_excess(search.score, search.base), 1e-12)
     for kind in library().values():
         if kind.name in named:
