@@ -257,8 +257,9 @@ class Form:
     error : float or None
         φ of a form that is free to follow any law of its kind: the share of the mean square of the kind's change that it leaves
         of other laws, measured on laws that the library does not have. None for formulas of textbooks.
-    follows : tuple of str
-        Forms of the kind whose laws it can follow, so that these need not be tried where it is.
+    follows : dict of str to dict of str to float
+        Forms of the kind whose laws it can follow, so that these need not be tried where it is, and the bounds of parameters at
+        which it does.
     """
 
     name: str
@@ -284,7 +285,7 @@ class Form:
     same_as: str = ""
     needs: str = ""
     error: float | None = None
-    follows: tuple[str, ...] = ()
+    follows: dict[str, dict[str, float]] = field(default_factory=dict)
 
     @cached_property
     def mechanism(self) -> str:

@@ -137,7 +137,7 @@ KIND = Kind(
             constants=_constants(prony, -1.0),
             state_size=3,
             error=0.005,  # of the other forms that relax it leaves 0.0034 at most
-            follows=("exponential", "logarithmic", "power"),
+            follows={"exponential": {}, "logarithmic": {}, "power": {}},
         ),
         Form(
             "logarithmic",

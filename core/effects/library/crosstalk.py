@@ -121,7 +121,7 @@ KIND = Kind(
             neutral={"share": 0.0},
             memoryless=wires,
             error=0.005,  # of neighbours and lines it leaves 0.0022 at most
-            follows=("neighbours", "lines"),
+            follows={"neighbours": {}, "lines": {"fall": 0.9}},
         ),
     ),
     experiment="press single texels with a pin, along one row and along one column, at two loads",

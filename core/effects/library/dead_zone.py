@@ -77,7 +77,7 @@ KIND = Kind(
             neutral={"threshold": 0.0},
             memoryless=knee,
             error=0.005,  # of hard and soft it leaves 0.0002 at most
-            follows=("hard", "soft"),
+            follows={"hard": {"sharpness": 20.0}, "soft": {}},
         ),
         Form(
             "step",

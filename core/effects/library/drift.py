@@ -107,7 +107,7 @@ KIND = Kind(
             memoryless=shifted_power,
             after_conversion=True,
             error=0.005,  # of linear and warm-up it leaves 0.0002 at most
-            follows=("linear", "warm-up"),
+            follows={"linear": {"exponent": 1.0}, "warm-up": {"exponent": -10.0}},
         ),
         Form(
             "sensitivity",

@@ -65,7 +65,7 @@ KIND = Kind(
             neutral={"factor": 1.0},
             memoryless=listed,
             error=0.005,  # every factor of a texel is one of these
-            follows=("gradient",),
+            follows={"gradient": {}},
         ),
         Form(
             "gradient",

@@ -90,7 +90,7 @@ KIND = Kind(
             neutral=dict.fromkeys(("x", "y", "z", "about_x", "about_y", "about_z"), 0.0),
             placement=displaced,
             error=0.005,  # every motion of a rigid sensor is one of these
-            follows=("shift", "turn", "tilt"),
+            follows={"shift": {}, "turn": {}, "tilt": {}},
         ),
     ),
     experiment="press at many known places, also beyond the edges",

@@ -65,7 +65,7 @@ KIND = Kind(
             memoryless=listed,
             after_conversion=True,
             error=0.005,  # every offset of a texel is one of these
-            follows=("common",),
+            follows={"common": {}},
         ),
     ),
     experiment="record a minute without touching the sensor, before and after a trial",

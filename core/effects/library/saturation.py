@@ -87,7 +87,7 @@ KIND = Kind(
             memoryless=power,
             after_conversion=True,
             error=0.005,  # of the other forms it leaves 0.0016 at most
-            follows=("clip", "tanh", "rational"),
+            follows={"clip": {"sharpness": 20.0}, "tanh": {}, "rational": {}},
         ),
     ),
     experiment="press to the highest permitted load",

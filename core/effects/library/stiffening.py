@@ -92,7 +92,7 @@ KIND = Kind(
             law=foam,
             constants=constants_from("depth", "exponent"),
             error=0.005,  # of the other forms it leaves 0.0007 at most
-            follows=("polynomial", "exponential"),
+            follows={"polynomial": {"exponent": 0.5}, "exponential": {}},
         ),
     ),
     experiment="press slowly to the largest permitted depth",

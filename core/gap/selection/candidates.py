@@ -276,9 +276,10 @@ class FittedCandidate:
 def parameters_at_bounds(model: Model, free: Sequence[FreeParameter], index: int) -> dict[str, float]:
     """Return the fitted parameters of an effect that are at a bound, with the bound.
 
-    The bound at which a part of the formula does nothing does not count: a simpler formula does as well. Nor does the natural
-    bound of a share: then the effect takes all that it can, or its shape is the limit that elements which stick and slip have
-    (the β of Bouc and Wen is 1 where unloading yields as loading does, as in every Masing loop).
+    The bound at which a part of the formula does nothing does not count, nor one at which it is another form of the kind: a
+    simpler formula does as well. Nor does the natural bound of a share: then the effect takes all that it can, or its shape is
+    the limit that elements which stick and slip have (the β of Bouc and Wen is 1 where unloading yields as loading does, as in
+    every Masing loop).
 
     Parameters
     ----------
@@ -289,16 +290,16 @@ def parameters_at_bounds(model: Model, free: Sequence[FreeParameter], index: int
     """
     effect = model.effects[index]
     form = form_of(effect.name, effect.form)
-    neutral = form.neutral
     shares = [p for p in form.parameters if p.unit == "1" and p.low >= 0.0 and p.high <= 1.0]
-    whole = {p.name: p.high for p in shares if p.low == neutral.get(p.name) == 0.0 or p.low > 0.0 and p.high == 1.0}
+    whole = [(p.name, p.high) for p in shares if p.low == form.neutral.get(p.name) == 0.0 or p.low > 0.0 and p.high == 1.0]
+    absent = [(p.name, float(form.neutral.get(p.name, 0.0))) for p in form.parameters if not p.per_texel]
+    simpler = {*whole, *absent, *(bound for bounds in form.follows.values() for bound in bounds.items())}
     found = {}
     for item in free:
         if item.effect == index and not item.per_texel:
             value = float(value_of(model, item))
             for end in (item.low, item.high):
-                counts = end != float(neutral.get(item.name, 0.0)) and end != whole.get(item.name)
-                if counts and abs(value - end) <= AT_BOUND * abs(end):
+                if (item.name, end) not in simpler and abs(value - end) <= AT_BOUND * abs(end):
                     found[item.name] = end
     return found
 

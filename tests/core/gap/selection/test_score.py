@@ -79,7 +79,7 @@ def test_a_kind_whose_remainder_its_formula_accounts_for_is_a_rival(left, rivals
     """It may leave 0.05 of a change of four variances. The other kind leaves nothing, and less by two standard errors."""
     best, other = model(1.0, "creep/power", changes=(4.0,)), model(left, "lag/first-order", changes=(4.0,))
     found = search.Search({})
-    found.score, found.library = rule(), Counter(creep=4, lag=4)
+    found.score, found.library = rule(), {"creep", "lag"}
     found.in_place_of = lambda *_: (model(4.0), {"creep": [best], "lag": [other]})
     assert verdict.weighed_kinds(found, best, 0)[1] == rivals
 
@@ -106,7 +106,7 @@ def test_a_kind_that_leaves_more_than_its_error_is_refuted_where_another_does_no
     """Half the score between them is the allowance of the kind that fits: the other leaves 0.6 where it may leave 0.2."""
     best, other = model(1.0, "hysteresis/play", changes=(20.0,)), model(1.6, "softening/peak", changes=(4.0,))
     found = search.Search({})
-    found.score, found.library = rule(), Counter(hysteresis=1, softening=1)
+    found.score, found.library = rule(), {"hysteresis", "softening"}
     found.in_place_of = lambda *_: (model(4.0), {"hysteresis": [best], "softening": [other]})
     assert found.score.value(other) > found.score.value(best)
     weight, rivals = verdict.weighed_kinds(found, best, 0)
@@ -141,13 +141,9 @@ def test_a_form_left_out_shows_the_error_of_formulas():
     )
 
 
-def test_a_kind_counts_by_all_its_forms_and_confidence_is_a_weight():
+def test_confidence_is_a_weight():
     found = rule()
-    good, poor = model(1.1, "creep/power"), model(3.0, "creep/exponential")
-    alone = found.values_of_kind([good], 1)
-    assert found.values_of_kind([good, poor], 4)[0] == pytest.approx(
-        np.log(np.mean([*np.exp([found.value(good), found.value(poor)]), 0, 0]))
-    )
+    alone = found.values(model(1.1, "creep/power"))
     weights = found.weights_of([alone, found.values(model(3.0))])
     assert weights.sum() == pytest.approx(1.0) and weights[0] > 0.99
     np.testing.assert_allclose(found.weights_of([alone, alone]), 0.5)
