@@ -70,7 +70,8 @@ class Search:
             self.tried += yield from _in_stage("differing recordings", best_pairs(plain, self.base))
         for size in range(1, MOST_EFFECTS):
             self._weigh()
-            if not self.is_open(self.best()):
+            best = self.best()
+            if not self.is_open(best) or best.price_count < size > 1:  # no second effect paid for its name: a third would not
                 break
             yield from _in_stage("further effects", self._extend(size))
         self._weigh()
