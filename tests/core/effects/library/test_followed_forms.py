@@ -45,6 +45,11 @@ def response(*items, is_contact=False):
     return readings(items, GRID, TIME, SPRING.k * presses())
 
 
+def places(item):
+    """Where the texels are, and their directions."""
+    return actual_placement((item,), POSITION, NORMAL, TANGENT)
+
+
 @stated(is_exact=False)
 def test_a_form_leaves_its_error_of_a_form_that_it_follows(kind, form, other):
     on_force = {"is_contact": kind.site_of(form) != "readout"}
@@ -76,15 +81,18 @@ def test_a_form_leaves_its_error_of_a_form_that_it_follows(kind, form, other):
 
 @stated(is_exact=True)
 def test_a_form_with_all_numbers_contains_those_with_some(kind, form, other):
-    followed = kind.forms_by_name[other]
-    values = {p.name: 0.3 * p.high for p in followed.parameters}
-    if form.placement is not None:
-        items = effect(kind.name, other, **values), effect(kind.name, form.name, **{**form.neutral, **values})
-        for one, same in zip(*(actual_placement((item,), POSITION, NORMAL, TANGENT) for item in items), strict=True):
-            np.testing.assert_allclose(one, same, atol=1e-15)
-        return
-    one, (free,) = response(effect(kind.name, other, **values)), form.parameters
-    largest = response().max(axis=0)
-    factor = one.max(axis=0) / np.where(largest > 0.0, largest, 1.0)
-    number = (one - response())[-1] if free.unit == "unit" else factor
-    np.testing.assert_allclose(response(effect(kind.name, form.name, **{free.name: tuple(number)})), one, atol=1e-12)
+    own = kind.forms_by_name[other].parameters
+    values = {p.name: 0.3 * p.high for p in own if not p.per_texel}
+    values |= {p.name: tuple(np.linspace(0.5, 1.0, SIDE**2)) for p in own if p.per_texel}
+    one = effect(kind.name, other, **values)
+    if set(values) <= {p.name for p in form.parameters}:
+        rest = {p.name: (form.neutral[p.name],) * SIDE**2 if p.per_texel else form.neutral[p.name] for p in form.parameters}
+        same = effect(kind.name, form.name, **{**rest, **values})
+    else:
+        (free,) = form.parameters
+        largest = response().max(axis=0)
+        factor = response(one).max(axis=0) / np.where(largest > 0.0, largest, 1.0)
+        number = (response(one) - response())[-1] if free.unit == "unit" else factor
+        same = effect(kind.name, form.name, **{free.name: tuple(number)})
+    for a, b in zip(*(response(item) if form.placement is None else places(item) for item in (one, same)), strict=True):
+        np.testing.assert_allclose(a, b, atol=1e-12)
