@@ -128,7 +128,7 @@ KIND = Kind(
             neutral={"width": 0.0},
             coupling=bell,
             error=0.01,  # of Gaussian, exponential, Lorentzian and conical kernels it leaves 0.009 at most
-            follows={"exponential": {}, "open": {"power": 8.0}},
+            follows={"open": {"power": 8.0}},
         ),
     ),
     experiment="press single texels with a pin narrower than a texel",

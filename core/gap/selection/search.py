@@ -19,8 +19,9 @@ from .rule_numbers import DRAWS, LEAST_WEIGHT
 from .score import ONE_SESSION, Hypothesis, Score, drawn_weights
 from .screening import ALL_FORMS, Screening
 
-BEAMS = {1: 3, 2: 2}
-"""Models on top of which a further effect is looked for, by their number of names: for speed."""
+BEAMS = {1: 2, 2: 1}
+"""Models on top of which a further effect is looked for, by their number of names: for speed. In eleven development rigs with two
+or three effects the first model led to the second effect in ten, and the second one in one."""
 MOST_EFFECTS = 3
 LEAST_REMEMBERED = 1e-6
 """Change of a prediction, in deviations of the noise, that is more than rounding."""
@@ -70,8 +71,7 @@ class Search:
             self.tried += yield from _in_stage("differing recordings", best_pairs(plain, self.base))
         for size in range(1, MOST_EFFECTS):
             self._weigh()
-            best = self.best()
-            if not self.is_open(best) or best.price_count < size > 1:  # no second effect paid for its name: a third would not
+            if not self.is_open(self.best()):
                 break
             yield from _in_stage("further effects", self._extend(size))
         self._weigh()
