@@ -20,8 +20,8 @@ from .score import ONE_SESSION, Hypothesis, Score, drawn_weights
 from .screening import ALL_FORMS, Screening
 
 BEAMS = {1: 2, 2: 1}
-"""Models on top of which a further effect is looked for, by their number of names: for speed. In eleven development rigs with two
-or three effects the first model led to the second effect in ten, and the second one in one."""
+"""Models on top of which a further effect is looked for, by their number of names: for speed. In eleven development rigs with
+two or three effects the first model led to the second effect in ten, and the second one in one."""
 MOST_EFFECTS = 3
 LEAST_REMEMBERED = 1e-6
 """Change of a prediction, in deviations of the noise, that is more than rounding."""
