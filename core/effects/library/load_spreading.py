@@ -42,13 +42,14 @@ def open_rim(values: Values, transducers: TransducerArray) -> CouplingMatrix:
 
 
 def bell(values: Values, transducers: TransducerArray) -> CouplingMatrix:
-    """Weights ``(1 + r²/s²)^(−p)`` over their sum on a square lattice that goes on beyond the texels, as for :func:`open_rim`.
+    """Weights ``(1 + r²/s²)^(−p)`` over their sum on the texels, on a square lattice that goes on beyond them, or in between.
 
     With width and power it comes near to any isotropic weight that falls with the distance.
     """
-    width, power = max(scalar(values, "width"), 1e-9), scalar(values, "power")
+    width, power, lost = max(scalar(values, "width"), 1e-9), scalar(values, "power"), scalar(values, "lost")
+    weights = coupling_matrix(transducers.position, lambda r: (1.0 + (r / width) ** 2) ** -power, 12.0 * width, None)
     whole = _bell_sum(width / float(np.sqrt(np.median(transducers.area))), power)
-    return coupling_matrix(transducers.position, lambda r: (1.0 + (r / width) ** 2) ** -power / whole, 12.0 * width, None)
+    return weights.divided(lost * whole + (1.0 - lost) * weights.sums(len(transducers.position)))
 
 
 def _bell_sum(width: float, power: float) -> float:
@@ -122,13 +123,22 @@ KIND = Kind(
         ),
         Form(
             "bell",
-            "rᵢ = Σⱼ wᵢⱼ fⱼ,  w ∝ (1 + r²/s²)^(−p) over all lattice points",
+            "rᵢ = Σⱼ wᵢⱼ fⱼ,  w ∝ (1 + r²/s²)^(−p),  Σᵢ wᵢⱼ = 1 over the texels or all lattice points",
             "Moffat, Astron. Astrophys. 3 (1969): a point-spread function of any tail; p = 5/2 is Boussinesq's",
-            (_WIDTH, Parameter("power", "1", 2.0, 1.1, 8.0, "Power p with which the weight falls: a large one is a Gaussian.")),
+            (
+                _WIDTH,
+                Parameter("power", "1", 2.0, 1.1, 8.0, "Power p with which the weight falls: a large one is a Gaussian."),
+                Parameter("lost", "1", 1.0, 0.0, 1.0, "Share of the load beyond the rim that is lost; the rest is spread."),
+            ),
             neutral={"width": 0.0},
             coupling=bell,
-            error=0.01,  # of Gaussian, exponential, Lorentzian and conical kernels it leaves 0.009 at most
-            follows={"open": {"power": 8.0}},
+            error=0.005,  # of Gaussian, exponential, Lorentzian and conical kernels, kept or lost, it leaves 0.004 at most
+            follows={
+                "gaussian": {"power": 8.0, "lost": 0.0},
+                "exponential": {"lost": 0.0},
+                "half-space": {"lost": 0.0},
+                "open": {"power": 8.0, "lost": 1.0},
+            },
         ),
     ),
     experiment="press single texels with a pin narrower than a texel",
