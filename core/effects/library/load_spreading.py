@@ -49,7 +49,7 @@ def bell(values: Values, transducers: TransducerArray) -> CouplingMatrix:
     """
     width, shape, power, lost = (scalar(values, name) for name in ("width", "shape", "power", "lost"))
     width = max(width, 1e-9)
-    weights = coupling_matrix(transducers.position, lambda r: (1.0 + (r / width) ** shape) ** -power, np.inf, None)
+    weights = coupling_matrix(transducers.position, lambda r: (1.0 + (r / width) ** shape) ** -power, 12.0 * width, None)
     distance, count = _lattice()
     whole = count @ (1.0 + (distance * np.sqrt(np.median(transducers.area)) / width) ** shape) ** -power
     return weights.divided(lost * whole + (1.0 - lost) * weights.sums(len(transducers.position)))
@@ -126,7 +126,7 @@ KIND = Kind(
         Form(
             "bell",
             "rᵢ = Σⱼ wᵢⱼ fⱼ,  w ∝ (1 + (r/s)^q)^(−p),  Σᵢ wᵢⱼ = 1 over the texels or all lattice points",
-            "Gneiting and Schlather, SIAM Rev. 46 (2004): generalized Cauchy functions, of any tail; q = 2, p = 5/2: Boussinesq's",
+            "Gneiting and Schlather, SIAM Rev. 46 (2004): generalized Cauchy functions; q = 2 and p = 5/2 is Boussinesq's",
             (
                 _WIDTH,
                 Parameter("power", "1", 2.0, 0.6, 8.0, "Power p with which the weight falls."),
