@@ -5,6 +5,7 @@ import bpy
 import pytest
 from blender_scenes import ball, changes, dump, grid, select
 
+from palpate.addon.authoring import sensors
 from palpate.addon.session import identity
 
 
@@ -132,6 +133,18 @@ def test_poll_says_no_without_a_mesh():
     bpy.ops.curve.primitive_bezier_circle_add()
     assert not bpy.ops.palpate.sensor_add.poll()
     assert bpy.ops.palpate.role_set.poll()  # a curve can press, not feel
+
+
+def test_what_automatic_means():
+    pad = grid()
+    select(pad, ())
+    assert sensors.automatic_source(pad, "OBJECT") == "MESH"
+    assert sensors.automatic_source(pad, "WEIGHT_PAINT") == "MESH"
+    pad.vertex_groups.new(name="A")
+    assert sensors.automatic_source(pad, "WEIGHT_PAINT") == "GROUP"
+    assert sensors.automatic_source(pad, "EDIT") == "MESH"
+    select(pad, {0})
+    assert sensors.automatic_source(pad, "EDIT") == "SELECTION"
 
 
 @pytest.mark.parametrize(("size", "expected"), [(2.0, 0.1), (0.2, 0.012), (0.05, 0.012), (0.01, 0.003)])

@@ -86,6 +86,27 @@ def test_a_curved_sensor_has_no_grid_words(tmp_path):
         bpy.ops.palpate.sensor_toml_import(filepath=str(tmp_path / "bent.toml"))
 
 
+def test_files_that_are_something_else_say_so(tmp_path):
+    sensor()
+    (tmp_path / "bad.toml").write_text("a = [", encoding="utf-8")
+    (tmp_path / "bad.xml").write_text("<a>", encoding="utf-8")
+    with pytest.raises(RuntimeError, match="is not TOML"):
+        bpy.ops.palpate.sensor_toml_import(filepath=str(tmp_path / "bad.toml"))
+    with pytest.raises(RuntimeError, match="bad.xml"):
+        bpy.ops.palpate.openrave_import(filepath=str(tmp_path / "bad.xml"))
+
+
+def test_effects_are_copied_with_the_parameters():
+    pad, other = sensor(k=44.0), sensor()
+    bpy.context.view_layer.objects.active = pad
+    bpy.ops.palpate.effect_add(effect="saturation")
+    pad.select_set(True)
+    other.select_set(True)
+    bpy.ops.palpate.parameters_copy()
+    assert [item.kind for item in other.palpate.effects] == ["saturation"]
+    assert other.palpate.k == 44.0
+
+
 # --- fits
 
 
@@ -116,6 +137,15 @@ def test_friction_from_a_curve_is_the_papers_again(tmp_path):
     assert "Palpate Friction Fit" in bpy.data.images
 
 
+def test_measurements_that_cannot_be_fitted_say_so(tmp_path):
+    pad = sensor(k=5.0)
+    (tmp_path / "one.csv").write_text("compression,pressure\n0.001,4000\n", encoding="utf-8")
+    with pytest.raises(RuntimeError, match="two different compressions"):
+        bpy.ops.palpate.stiffness_fit(filepath=str(tmp_path / "one.csv"))
+    assert pad.palpate.k == 5.0
+    assert not bpy.data.images
+
+
 # --- where everything is found
 
 
@@ -142,3 +172,5 @@ def test_every_grey_button_says_why(repository):
         text = path.read_text(encoding="utf-8")
         for body in re.findall(r"def poll\(cls, context\):\n(.*?)(?=\n    def |\n\n\n|\n    @|\Z)", text, re.DOTALL):
             assert "poll_message_set" in body or "support." in body, f"{path.name}: {body}"
+    for text in (p.read_text(encoding="utf-8") for p in (repository / "operators").glob("*.py")):
+        assert "return False\n" not in text or "poll_message_set" in text or "support." in text

@@ -56,6 +56,11 @@ def test_a_pad_in_millimetres_is_as_large():
     assert bpy.context.object.dimensions.y == pytest.approx(18.0)
 
 
+def test_a_pad_that_meets_itself_says_so():
+    with pytest.raises(RuntimeError, match="use a larger radius"):
+        bpy.ops.palpate.pad_mesh_add(columns=60, radius=0.01)
+
+
 @pytest.mark.parametrize(
     ("method", "settings", "grid_size"),
     [
@@ -124,6 +129,14 @@ def test_texels_laid_beside_a_painted_region_leave_it_as_it_is():
     obj.vertex_groups.active_index = other.index
     assert bpy.ops.palpate.skin_add(source="GROUP", method="NOISE", spacing=0.003) == {"FINISHED"}
     assert obj.palpate.role == "SENSOR"
+
+
+def test_lift_and_turn():
+    obj = finger()
+    bpy.ops.palpate.skin_add(method="NOISE", spacing=0.003, source="MESH", lift=0.001)
+    points = np.array([v.co for v in bpy.context.object.data.vertices])
+    assert np.linalg.norm(points, axis=1) == pytest.approx(0.011, rel=0.01)
+    assert obj.palpate.role == "NONE"
 
 
 def test_one_object_carries_several_sensors_that_feel_on_their_own():
@@ -213,3 +226,7 @@ def test_a_skin_that_lost_its_surface_says_so():
     bpy.context.object.parent = None
     with pytest.raises(RuntimeError, match="has lost the mesh it lay on"):
         bpy.ops.palpate.skin_update()
+
+
+def test_a_good_spacing_is_guessed():
+    assert laid_sensors.usual_spacing(grid(size=0.05), bpy.context.scene) == pytest.approx(0.0035, rel=0.3)

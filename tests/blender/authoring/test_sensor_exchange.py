@@ -50,6 +50,17 @@ def test_the_operator_and_the_command_write_the_same(kind, tmp_path):
     assert scenes.contents(tmp_path / "window") == scenes.contents(tmp_path / "line")
 
 
+def test_the_command_says_what_is_not_expressed(tmp_path, capsys):
+    scenes.press()
+    path = scenes.save(tmp_path)
+    assert main(["sensor", "export", str(path), "--to", "mjcf", "--out", str(tmp_path / "out"), "--sensor", "Pad"]) == 0
+    printed = capsys.readouterr()
+    assert printed.out.splitlines()[-1] == str(tmp_path / "out" / "Pad.xml")
+    assert "note: 'Pad': MuJoCo's stiffness is per mass" in printed.err
+    assert main(["sensor", "export", str(path), "--to", "mjcf", "--out", str(path)]) == 1
+    assert "would be overwritten" in capsys.readouterr().err
+
+
 def read_texels(obj):
     return sensor_reader.sensor_in_own_frame(bpy.context.scene, obj, participants.depsgraph_of(bpy.context.scene))[0].texels
 

@@ -116,7 +116,6 @@ def test_the_arrow_is_the_reaction_at_the_centre_of_pressure(tmp_path):
     save(tmp_path)
     result = baked(scene)
     arrow = materials.find_block(scene.objects, pad.palpate.uid)
-    assert marker_meshes.SHAPE_KEY in arrow.data
     readings = result.recording.sensors["Pad"]
     assert readings.contact.any(axis=1).tolist()[0] is False and readings.contact[-1].any()
     for i, frame in enumerate(range(1, 7)):
@@ -340,6 +339,16 @@ def test_a_sensor_all_around_has_a_heat_map_on_its_vertices(tmp_path):
         assert values == pytest.approx(readings.normal_force[i], abs=1e-7)
     scenario = run_job(scene_reader.read_scene(scene)).scenario  # its own nodes do not change what is sampled
     assert scenario.digest() == run_job(bake(scene)).recording.digest
+
+
+def test_an_arrow_without_contact_has_no_size(tmp_path):
+    scene, pad, target = press(frames=3)
+    target.animation_data_clear()
+    target.location.z = 1.0
+    save(tmp_path)
+    baked(scene)
+    assert list(materials.find_block(scene.objects, pad.palpate.uid).scale) == [0.0, 0.0, 0.0]
+    assert marker_meshes.SHAPE_KEY in materials.find_block(scene.objects, pad.palpate.uid).data
 
 
 def test_frame_zero_can_be_baked(tmp_path):

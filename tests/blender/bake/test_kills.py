@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A bake that is killed leaves the earlier bake, the new one, or files that say that they are of both."""
 
-import os
 import random
 import shutil
-import signal
 import subprocess
 import sys
 import time
@@ -27,7 +25,7 @@ KILLS, LONGEST = 20, 300.0
 def begun(path, folder) -> subprocess.Popen:
     """Start a bake, and return its process once it writes into the folder, or has ended."""
     command, end = [sys.executable, "-m", "palpate.commands", "bake", str(path)], time.monotonic() + LONGEST
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     while not any((folder / ".palpate").glob("new/*")) and process.poll() is None:
         assert time.monotonic() < end, "the bake does not begin"
         time.sleep(0.002)
@@ -42,7 +40,6 @@ def completed(path, folder) -> float:
 
 
 @pytest.mark.long("kills twenty bakes at random moments")
-@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 def test_a_bake_killed_at_random_leaves_one_bake_or_says_that_it_is_mixed(tmp_path):
     scene, pad, *_ = press_and_drop(frames=40)
     path = save(tmp_path)
@@ -64,8 +61,7 @@ def test_a_bake_killed_at_random_leaves_one_bake_or_says_that_it_is_mixed(tmp_pa
             process.wait(seconds * (number + dice.random()) / KILLS)
         running += process.poll() is None
         assert process.returncode in (None, 0)
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
+        process.kill()
         process.wait(LONGEST)
         try:
             assert read_bake(folder).recording.digest in (before, after)

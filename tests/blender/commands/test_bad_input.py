@@ -11,6 +11,7 @@ import pytest
 from blender_scenes import ball, changes, cube, dump, press, press_and_drop, save
 
 from palpate.addon.bake.bake import bake
+from palpate.addon.scene import scene_reader
 from palpate.core.errors import PalpateError, SceneError
 from palpate.core.jobs import SlicedJob, run_job
 
@@ -59,6 +60,11 @@ def region(name, vertices=()):
     return spoil
 
 
+def without_area(it):
+    for vertex in it.target.data.vertices:
+        vertex.co.y = vertex.co.z = 0.0
+
+
 def without_mass(it):
     box = cube()
     box.palpate.role, box.palpate.body, box.palpate.mass = "TARGET", "FREE", 0.0
@@ -91,6 +97,7 @@ SPOILED = {
     "a region without faces": (region("Scattered", [0, 8, 20]), "The 3 vertices of sensor 'Pad' span no face"),
     "a region whose group was deleted": (region("Gone", None), "Sensor 'Pad' has no vertex group 'Gone'"),
     "a sensor without faces": (lambda it: it.pad.data.clear_geometry(), "'Pad' has no faces"),
+    "a mesh without area": (without_area, "All faces of 'Ball' have zero area"),
     "a vertex that is no number": (
         value(lambda it: it.target.data.vertices[7].co, "x", float("nan")),
         "Vertex 7 of 'Ball' has a NaN or infinite coordinate",
@@ -103,6 +110,8 @@ SPOILED = {
     "no scale along one axis": (value(lambda it: it.target, "scale", (1.0, 0.0, 1.0)), "The scale of 'Ball' is zero"),
     "no mass": (without_mass, "The mass of free body 'Cube' is 0 kg"),
     "no stiffness": (lambda it: write_raw(it.pad, "k", 0.0), "k of sensor 'Pad' is 0"),
+    "a stiffness below zero": (lambda it: write_raw(it.pad, "k", -58.5), "k of sensor 'Pad' is -58.5"),
+    "a stiffness that is no number": (lambda it: write_raw(it.pad, "k", float("nan")), "k of sensor 'Pad' is nan"),
     "dynamic above static friction": (
         value(lambda it: it.pad.palpate, "mud", 0.8),
         "mud of sensor 'Pad' (0.8) is larger than mus (0.435)",
@@ -126,6 +135,11 @@ def test_a_scene_that_cannot_be_baked_is_one_sentence(pressed, spoil):
     assert refusal().startswith(words)
 
 
+def test_a_time_step_of_zero(pressed):
+    pressed.scene.palpate.use_auto_dt, pressed.scene.palpate.dt = False, 0.0
+    assert refusal().startswith("The time step of 'Scene' is 0 s")
+
+
 @pytest.mark.parametrize(("chosen", "words"), [
     ([], "Nothing is selected on 'Pad'"),
     ([0, 8, 20], "The 3 chosen vertices of 'Pad' span no face"),
@@ -135,6 +149,12 @@ def test_a_selection_that_makes_no_sensor(pressed, chosen, words):
     bpy.context.view_layer.objects.active = pressed.pad
     assert refusal(lambda: bpy.ops.palpate.sensor_add(source="SELECTION")).startswith(words)
     assert refusal(lambda: bpy.ops.palpate.sensor_add(source="GROUP")).startswith("'Pad' has no vertex group")
+
+
+def test_a_frame_range_that_runs_backwards(pressed):
+    """Blender's own buttons keep it straight; a file or a command line need not."""
+    with pytest.raises(SceneError, match=r"frame range of 'Shot' runs backwards \(9 to 3\): set the end frame after"):
+        scene_reader._check_frame_range(SimpleNamespace(name="Shot", frame_start=9, frame_end=3))
 
 
 # --- participants
@@ -247,3 +267,19 @@ def test_a_file_that_was_never_saved():
 def test_a_folder_that_is_missing(pressed):
     pressed.scene.palpate.folder = str(pressed.folder / "not" / "there")
     assert "not' does not exist" in refusal()
+
+
+def test_a_folder_that_cannot_be_written(pressed):
+    locked = pressed.folder / "locked"
+    locked.mkdir()
+    locked.chmod(0o555)
+    if os.access(locked, os.W_OK):  # an administrator may write everywhere but here
+        locked = "/proc"
+    pressed.scene.palpate.folder = str(locked)
+    sentence = refusal()
+    assert "read-only" in sentence or "No file can be made" in sentence
+
+
+def test_a_file_where_the_folder_should_be(pressed):
+    (pressed.folder / "palpate-bake").write_text("a file")
+    assert "is a file where a folder is needed" in refusal()

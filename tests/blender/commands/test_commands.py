@@ -14,11 +14,13 @@ import numpy as np
 import pytest
 from blender_scenes import contents, press, reopen, save, visible
 
+from palpate.addon.bake.bake import bake
 from palpate.commands import blender, console, main
 from palpate.commands.bake import report
 from palpate.core.errors import FileError
 from palpate.core.io.recording_npz import load_recording
 from palpate.core.io.scenario_npz import load_scenario
+from palpate.core.jobs import run_job
 from palpate.core.solver import simulation
 
 
@@ -161,7 +163,13 @@ def test_scripts_in_a_file_do_not_run(tmp_path, demo_blend, scripts_allowed):
 # --- what bake makes
 
 
-def test_a_saved_scene_needs_its_images(tmp_path, demo_blend, capfd):
+def test_a_bake_without_images_has_the_recordings_alone(tmp_path, demo_blend, capfd):
+    assert main(["bake", str(demo_blend), "--frames", "1", "3", "--no-images", "--out", str(tmp_path / "out")]) == 0
+    for name in ("Finger A", "Finger B"):
+        files = {path.name for path in (tmp_path / "out" / name).iterdir()}
+        assert files == {"recording.npz", "sensor.npz", "manifest.json"}
+    assert main(["export", str(tmp_path / "out"), "--out", str(tmp_path / "csv")]) == 0
+    assert (tmp_path / "csv" / "Finger A" / "normal_force.csv").read_text().count("\n") == 4
     assert main(["bake", str(demo_blend), "--no-images", "--save-as", str(tmp_path / "new.blend")]) == 2
     assert "--no-images leaves out what a saved scene shows" in capfd.readouterr().err
     assert not (tmp_path / "new.blend").exists()
@@ -330,6 +338,10 @@ def test_blenders_words_come_back_when_something_is_wrong(capfd):
     assert capfd.readouterr() == ("", "")
 
 
+def test_tables_have_even_columns():
+    assert console.text_table([("a", "bb"), ("ccc", "d")], "<>") == "a    bb\nccc   d"
+
+
 def test_peak_shear_adds_forces_and_not_numbers_of_different_axes():
     """Two texels whose x axes point against each other, each pushed along its own by 1 N: the sensor feels nothing."""
     texels = SimpleNamespace(tangent=np.array([[1.0, 0, 0], [-1.0, 0, 0]]), bitangent=np.array([[0, 1.0, 0], [0, 1.0, 0]]))
@@ -339,6 +351,19 @@ def test_peak_shear_adds_forces_and_not_numbers_of_different_axes():
     scenario = SimpleNamespace(sensors=[SimpleNamespace(name="Tip", texels=texels)])
     row = report(SimpleNamespace(recording=recording, scenario=scenario, folders={"Tip": None}, notes=())).splitlines()[-1]
     assert row.split() == ["Tip", "2", "1.0000", "N", "2.0000", "N", "0.0000", "N", "2.0000", "N"]
+
+
+@pytest.mark.parametrize("where", ["folder", "blend"])
+def test_export_of_a_baked_file(tmp_path, where, capsys):
+    scene, *_ = press(frames=3)
+    path = save(tmp_path)
+    recording = run_job(bake(scene)).recording
+    save(tmp_path)
+    source = path if where == "blend" else tmp_path / "palpate-bake"
+    assert main(["export", str(source), "--out", str(tmp_path / "out"), "--format", "npz"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == str(tmp_path / "out" / "Pad.npz")
+    with np.load(tmp_path / "out" / "Pad.npz") as members:
+        assert members["normal_force"].tobytes() == recording.sensors["Pad"].normal_force.tobytes()
 
 
 def test_export_of_what_is_not_baked_is_one_line(tmp_path, capsys):

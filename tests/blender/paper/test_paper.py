@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 from functools import partial
+from html.parser import HTMLParser
 
+import bpy
 import numpy as np
 import pytest
 
@@ -31,6 +33,20 @@ def test_the_page_holds_every_row_and_picture(tmp_path):
     assert "Title &amp; more" in text and "Table &lt;3&gt;" in text and "9.8000001 N" in text
     assert 'src="a.png"' in text and 'href="a.pdf"' in text
     assert not chapter.kept
+
+    class Balanced(HTMLParser):
+        open_tags: list[str] = []
+
+        def handle_starttag(self, tag, attrs):
+            if tag not in {"meta", "img"}:
+                self.open_tags.append(tag)
+
+        def handle_endtag(self, tag):
+            assert self.open_tags.pop() == tag
+
+    parser = Balanced()
+    parser.feed(text)
+    assert parser.open_tags == []
 
 
 def test_a_row_outside_its_tolerance_is_not_kept():
@@ -94,3 +110,17 @@ def test_finger_and_thumb_hold():
     scene = experiment_tools.new_scene(hand.build)
     rows = grasping.held_rows(experiment_tools.scenario_of(scene), hand.CYLINDER, hand.INDEX, hand.FORCE, SECONDS)
     assert all(row.kept for row in rows), rows
+
+
+@pytest.mark.parametrize(
+    "build",
+    [
+        tilt.build,
+        pick_and_place.build,
+        pytest.param(hand.build, marks=pytest.mark.long("models a hand")),
+        partial(grasps.build, kind="bottle"),
+    ],
+)
+def test_each_scene_explains_itself(build):
+    experiment_tools.new_scene(build)
+    assert "paper, section" in bpy.data.texts["Read me"].as_string()

@@ -64,6 +64,18 @@ def test_a_camera_that_shows_the_texels_keeps_its_direction(tmp_path):
     assert camera_direction.view_of(camera_direction.direction_of((75.0, 20.0))) == pytest.approx((75.0, 20.0))
 
 
+def test_a_direction_that_shows_things_larger_is_preferred(tmp_path):
+    """A pad that is seen equally well from two sides is seen from where a long handle is foreshortened."""
+    scene = wall(tmp_path)
+    loaded = {3: loaded_texels.loaded_texels(scene, figure_export.read_scene_bake(scene), 3)}
+    corners = render.bounding_box_corners([scene.objects["Pad"], scene.objects["Ball"]])
+    for side in (-1.0, 1.0):
+        # the handle goes to −x and to one side, so the picture is larger from where it points at the camera
+        handle = corners + np.array([-0.3, side * 0.17, 0.0])
+        view = camera_direction.best_view(scene, loaded, (90.0, 0.0), True, np.concatenate([corners, handle]))
+        assert side * np.sin(np.radians(view[0])) > 0.0 > np.cos(np.radians(view[0]))
+
+
 def test_what_stands_before_the_texels_blocks_the_sight_unless_it_is_a_target(tmp_path):
     scene = wall(tmp_path)
     loaded = {3: loaded_texels.loaded_texels(scene, figure_export.read_scene_bake(scene), 3)}

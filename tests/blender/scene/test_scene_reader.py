@@ -246,6 +246,14 @@ def test_children_of_free_bodies_are_refused():
         sampled(scene)
 
 
+def test_two_scenes_are_sampled_apart():
+    scene, *_ = press()
+    other = bpy.data.scenes.new("Other")
+    with pytest.raises(SceneError, match="'Other' has no sensor"):
+        sampled(other)
+    assert len(sampled(scene).scenario.sensors) == 1
+
+
 def test_the_region_is_the_vertex_group():
     scene, pad, _ = press()
     group = pad.vertex_groups.new(name="Tip")
@@ -262,3 +270,15 @@ def test_a_pad_is_not_read_out():
     table = grid("Table", (0.1, 0.0, 0.0))
     table.palpate.role = "PAD"
     assert [(s.name, s.readout) for s in sampled(scene).scenario.sensors] == [("Pad", True), ("Table", False)]
+
+
+def test_contact_points_and_normal_law_go_there_and_back():
+    from palpate.addon.authoring import exchange
+
+    scene, pad, _ = press()
+    pad.palpate.points_per_texel, pad.palpate.normal_law, pad.palpate.exponent = "9", "hunt-crossley", 2.0
+    found = sampled(scene).scenario.sensors[0].parameters
+    assert (found.points_per_texel, found.normal_law, found.exponent) == (9, "hunt-crossley", 2.0)
+    pad.palpate.points_per_texel, pad.palpate.normal_law = "1", "linear"
+    exchange.put_parameters(pad, found)
+    assert sampled(scene).scenario.sensors[0].parameters == found

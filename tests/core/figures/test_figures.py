@@ -9,7 +9,7 @@ import pytest
 from sample_bake import COLUMNS, ROWS, grid_texels, recording_of, round_texels
 
 from palpate.core import response
-from palpate.core.errors import ParameterError, SensorError
+from palpate.core.errors import FileError, ParameterError, SensorError
 from palpate.core.figures import figure_canvas, figure_style, tactile_image
 from palpate.core.figures.figure_style import FigureStyle
 from palpate.core.figures.picture_labels import Label, label_picture
@@ -37,6 +37,11 @@ def test_mobilised_friction_is_shear_over_limit_and_zero_without_contact():
     touching = sensor.normal_force.any(axis=1)
     np.testing.assert_allclose(ratio[touching], 0.5)
     assert (ratio[~touching] == 0).all()
+
+
+@pytest.mark.parametrize(("value", "limit"), [(0.11, 0.15), (1.0, 1.0), (0.026, 0.03), (9.9, 10.0), (3e-7, 3e-7)])
+def test_scales_end_at_round_numbers(value, limit):
+    assert response.rounded_limit(value) == pytest.approx(limit)
 
 
 def test_frames_are_spread_over_what_happens():
@@ -150,6 +155,15 @@ def test_on_a_surface_each_texel_colours_its_share_of_the_area(tmp_path, monkeyp
     assert len(rim.get_segments()) == 12
 
 
+@pytest.mark.parametrize("texels", [grid_texels(), round_texels()], ids=["grid", "surface"])
+@pytest.mark.parametrize("inches", [0.01, 0.05, 0.5])
+def test_no_arrow_is_longer_than_arrows_are_apart(texels, inches):
+    view = tactile_image.SensorView.of(texels).at_size(inches)
+    places, _ = view._thinned(np.zeros((len(texels), 2)))
+    gaps = np.linalg.norm(places[:, None] - places[None], axis=2)[~np.eye(len(places), dtype=bool)]
+    assert view.arrow < np.median(gaps.reshape(len(places), -1).min(axis=1)) * 1.3
+
+
 def test_rounding_is_no_shear():
     recording = recording_of(grid_texels())
     assert response.peak_shear(recording) > 0.0
@@ -242,6 +256,12 @@ def test_labels_keep_the_size_of_the_picture(tmp_path):
     assert (out[:, :, :3] > 0.9).any()  # there are white words on the grey
     with pytest.raises(KeyError):
         label_picture(source, tmp_path / "out.png", recording_of(texels), {"pad": texels}, 99)
+
+
+def test_a_missing_folder_is_one_sentence(tmp_path):
+    texels = grid_texels()
+    with pytest.raises(FileError, match="nowhere"):
+        tactile_strip(tmp_path / "nowhere" / "a.png", recording_of(texels), {"pad": texels})
 
 
 @pytest.mark.parametrize(

@@ -51,6 +51,25 @@ def test_own_forms_have_the_librarys_names_and_others_do_not():
 
 
 @pytest.mark.long("draws cases of the benchmark")
+def test_a_case_follows_from_kind_and_number(tmp_path):
+    first, again, next_one = (cases.draw("other", number) for number in (24, 24, 44))
+    files = [cases.write(case, tmp_path / name).parent for case, name in ((first, "a"), (again, "b"))]
+    for path in sorted(files[0].iterdir()):
+        assert path.read_bytes() == (files[1] / path.name).read_bytes()
+    assert first.answer == next_one.answer and not np.array_equal(first.readings[0], next_one.readings[0])
+
+
+def test_a_rig_is_read_and_does_not_tell_its_answer(tmp_path):
+    case = cases.draw("own", 12)
+    path = cases.write(case, tmp_path)
+    rig = read_rig(path)
+    assert [trial.use for trial in rig.trials] == ["fit"] * 4 + ["check"] * 2
+    np.testing.assert_allclose(rig.trials[2].reading, case.readings[2], rtol=1e-6, atol=1e-6 * np.abs(case.readings[2]).max())
+    assert not rig.warnings
+    assert not any(word in path.read_text(encoding="utf-8") for word in (*case.answer, case.hidden[0].form))
+
+
+@pytest.mark.long("draws cases of the benchmark")
 @pytest.mark.parametrize("kind", ["own", "other", "third"])
 @pytest.mark.parametrize("number", [3, 9, 12, 18])
 def test_what_is_hidden_has_the_size_it_is_said_to_have(kind, number):
@@ -65,29 +84,43 @@ PRESSED = np.array([[0, 1, 3, 4, 6, 9], [0, 0, 1e-3, -2e-3, 4e-3, 4e-3], [1e-3, 
 """Time, y and height of a probe's lowest point: in, on, half out, on again with a slide, out."""
 
 
-def record(*hidden):
-    """Readings and net forces of a pad with hidden effects, under a ball that moves as :data:`PRESSED` says."""
+def pressed_pad(radius=0.012):
+    """A pad, a contact along :data:`PRESSED` and a function that returns what is recorded with hidden effects."""
     pad = world.Pad(60.0, 0.6, 0.6, 0.5, 0.01, 30.0, 0.3, 0.02, 500.0, 40.0, "counts")
-    probe, time = world.Probe(0.012, None), np.arange(0, 9, 0.02)
+    probe = world.Probe(radius, None) if radius else world.Probe(None, (0.06, 0.4, 0.02))
+    time = np.arange(0, 9, 0.02)
     y, z = (np.interp(time, PRESSED[0], PRESSED[i]) for i in (1, 2))
     path = np.stack([np.zeros_like(time), y, probe.lowest + z], axis=1)
-    signals = world.respond(world.touch(probe, pad, time, path, hidden), pad, hidden)
-    return world.converted(signals.reading, pad, hidden), world.net_force(signals)
+
+    def record(*hidden):
+        signals = world.respond(world.touch(probe, pad, time, path, hidden), pad, hidden)
+        return signals, world.converted(signals.reading, pad, hidden), world.net_force(signals)
+
+    return pad, record
 
 
 @pytest.mark.parametrize("name", [name for name in third.THIRD if name != "dead-texels"])
 def test_a_formula_of_the_third_family_changes_what_is_recorded_and_stays_finite(name):
     """Nothing at all as the strength goes to zero, more the stronger it is."""
-    plain, plain_force = record()
+    pad, record = pressed_pad()
+    _, plain, plain_force = record()
     changes = []
     for strength in (0.02, 0.3, 3.0):
         made = [record(third.THIRD[name](np.random.default_rng(5), strength)) for _ in range(2)]
-        assert all(np.isfinite(part).all() for part in made[0])
-        np.testing.assert_array_equal(made[0][0], made[1][0])  # the same seed, the same recording
-        reading, force = made[0]
+        assert all(np.isfinite(part).all() for part in made[0][1:])
+        np.testing.assert_array_equal(made[0][1], made[1][1])  # the same seed, the same recording
+        reading, force = made[0][1:]
         shown = (reading - plain) / np.ptp(plain) if name not in cases.IN_FORCE else (force - plain_force) / np.ptp(plain_force)
         changes.append(np.sqrt(np.mean(shown**2)))
     assert changes[0] < 0.1 * changes[2] and changes[0] < changes[1] < changes[2] and changes[2] > 0.02
+
+
+def test_a_fractional_solid_relaxes_as_the_complementary_error_function():
+    """E of order 1/2 is known: E(-√t) = exp(t) erfc(√t). The integral ends where r^(1/2) = 3e-7 of it is left."""
+    from scipy.special import erfcx
+
+    time = np.array([0.0, 0.01, 0.3, 2.0, 40.0])
+    np.testing.assert_allclose(third._mittag_leffler(time, 0.5), erfcx(np.sqrt(time)), atol=1e-6)
 
 
 @pytest.mark.long("draws a case with three hidden effects")
@@ -97,6 +130,26 @@ def test_three_effects_are_three_and_act_in_their_order():
         assert len(set(hidden)) == 3 and hidden == sorted(hidden, key=cases.ORDER.index)
     case = cases.draw("three", 1)
     assert len(case.answer) == 3 and all(form.form not in third.THIRD for form in case.hidden) and len(case.share) == 3
+
+
+def test_friction_is_coulombs_once_it_slides():
+    """A flat probe at constant speed and depth: after some bristle lengths the force is LuGre's steady state, Eq. 10–12."""
+    pad = world.Pad(60.0, 0.0, 0.6, 0.5, 0.01, 30.0, 0.3, 0.02, 1.0, 0.0, "N")
+    time = np.arange(0, 4, 0.02)
+    speed, depth = 0.02, 1e-3
+    path = np.stack([np.zeros_like(time), speed * time - 0.04, np.full_like(time, 0.01 - depth)], axis=1)
+    probe = world.Probe(None, (0.06, 0.4, 0.02))
+    shear = world.respond(world.touch(probe, pad, time, path), pad).shear[-1]
+    steady = pad.k * depth * (0.5 + 0.1 * np.exp(-4.0)) + pad.ct * speed
+    np.testing.assert_allclose(shear[:, 1], steady, rtol=1e-6)
+    np.testing.assert_allclose(shear[:, [0, 2]], 0.0, atol=1e-12)
+
+
+def test_low_pass_and_relaxation_against_closed_forms():
+    """``τ q' = x − q`` under a ramp, and the reading of a sensor with it hidden in it."""
+    t = np.arange(0, 5, 0.02)
+    got = own._low_pass(t[:, None] * 2.0, 0.02, 0.7, np.zeros(1))[:, 0]
+    np.testing.assert_allclose(got, 2.0 * (t - 0.7 * -np.expm1(-t / 0.7)), atol=1e-12)
 
 
 @pytest.mark.long("draws cases of the benchmark")

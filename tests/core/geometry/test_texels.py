@@ -47,6 +47,20 @@ def test_normals_come_from_all_adjoining_triangles_and_areas_from_the_region_alo
     assert (np.abs(texels.normal[:, :2]) > 0.3).all()  # the sides lean into the corners' normals
 
 
+def test_empty_region():
+    mesh = grid_mesh()
+    with pytest.raises(SensorError, match="region of sensor 'tip' is empty"):
+        texels_from_region(mesh, np.zeros(len(mesh.vertices), bool), "tip")
+
+
+def test_region_without_faces():
+    mesh = grid_mesh()
+    region = np.zeros(len(mesh.vertices), bool)
+    region[[0, 30, 60]] = True
+    with pytest.raises(SensorError, match="3 vertices of sensor 'tip' span no face"):
+        texels_from_region(mesh, region, "tip")
+
+
 def test_stray_vertices_are_no_texels():
     mesh = grid_mesh(5, 4)
     loose = TriangleMesh(np.vstack([mesh.vertices, [[1.0, 1, 1]]]), mesh.triangles, mesh.quads)

@@ -9,7 +9,9 @@ import importlib.util
 import json
 import math
 import os
+import signal
 import stat
+import subprocess
 import sys
 import zipfile
 from dataclasses import fields, replace
@@ -211,6 +213,21 @@ def test_writable_folder(tmp_path):
     assert sorted(os.listdir(tmp_path)) == ["file", "new", "x"]
 
 
+def test_kill_in_the_middle_leaves_the_old_file(tmp_path):
+    target = tmp_path / "manifest.json"
+    target.write_text("old")
+    program = (
+        "import os, signal, sys\n"
+        "from palpate.core.io.file_writing import atomic_write\n"
+        "with atomic_write(sys.argv[1]) as temporary:\n"
+        "    temporary.write_text('half')\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program, str(target)], check=False)
+    assert done.returncode == -signal.SIGKILL
+    assert target.read_text() == "old"
+
+
 # --- names
 
 
@@ -388,6 +405,20 @@ def test_recording_round_trip(tmp_path):
         save_recording(tmp_path / "recording.npz", case)
         same(load_recording(tmp_path / "recording.npz"), case)
         assert os.listdir(tmp_path) == ["recording.npz"]
+
+
+def test_same_recording_same_bytes(tmp_path, monkeypatch):
+    save_recording(tmp_path / "a.npz", recording())
+    monkeypatch.setattr("time.time", lambda: 2e9)
+    other = copy.deepcopy(recording())
+    other.poses = np.asfortranarray(other.poses)
+    other.sensors["Pad"].shear = np.repeat(other.sensors["Pad"].shear, 2, axis=1)[:, ::2]
+    save_recording(tmp_path / "another name.npz", other)
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "another name.npz").read_bytes()
+    save_recording(tmp_path / "c.npz", load_recording(tmp_path / "a.npz"))
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "c.npz").read_bytes()
+    save_recording(tmp_path / "d.npz", recording(seed=1))
+    assert (tmp_path / "a.npz").read_bytes() != (tmp_path / "d.npz").read_bytes()
 
 
 def test_numpy_alone_reads_a_recording(tmp_path):

@@ -47,6 +47,12 @@ def test_what_is_read_has_the_digest_of_what_was_written(tmp_path):
     assert replace(read, name="another").digest() != scenario.digest()
 
 
+def test_equal_scenarios_are_equal_files(tmp_path):
+    for name in "ab":
+        save_scenario(tmp_path / name, full_scenario())
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
 @pytest.mark.parametrize("keep", [0, 1, 100, 1000, 3000])
 def test_a_file_that_was_cut_is_refused(tmp_path, keep):
     save_scenario(tmp_path / "a.npz", full_scenario())

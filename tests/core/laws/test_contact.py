@@ -21,6 +21,25 @@ def test_normal_force_never_pulls():
     assert normal_force.normal_force(1e-3, -100.0, LAW) == 0.0
 
 
+@pytest.mark.parametrize("speed", [0.0, 1e-3, 0.05, 0.3, 1.0, 5.0])
+def test_steady_state_is_the_friction_curve_of_fig_7(speed):
+    """At steady sliding ż = 0, so ft = g(v) sign(v) + ct v (Eq. 9 and 13); reached by the step itself to 1e-9."""
+    fn = 0.08
+    assert friction.stribeck_coefficient(speed**2, LAW) * fn == pytest.approx(
+        contact_laws.steady_friction(PAPER, fn, speed), rel=1e-14
+    )
+    z = 0.0
+    for _ in range(400):
+        keep, gain = friction.bristle_step(speed**2, fn, 0.1, LAW)
+        z = friction.next_deflection(keep, z, gain, speed)
+    if speed > 0:
+        rate = friction.bristle_rate(z, speed, speed**2, fn, LAW)
+        expected = contact_laws.steady_friction(PAPER, fn, speed) + PAPER.ct * speed
+        assert friction.friction_force(z, rate, speed, LAW) == pytest.approx(expected, rel=1e-9 if speed > 0.01 else 0.6)
+    else:
+        assert z == 0.0
+
+
 @pytest.mark.parametrize("dt", [1e-6, 1e-3, 0.1, 100.0])
 def test_bristle_step_is_the_exact_solution_at_constant_velocity(dt):
     """Against scipy's Radau at 1e-11, for steps from far below to far above the bristle's own time."""

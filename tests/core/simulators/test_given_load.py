@@ -135,6 +135,22 @@ def test_a_cube_holds_on_a_slope_for_a_minute():
     assert np.abs(pressed.displacement - early).max() < 1e-6
 
 
+def test_a_turned_sensor_carries_the_same_load():
+    turn = Rotation.from_rotvec([0.4, -1.1, 2.0])
+    place = np.array([1.0, 2.0, -3.0])
+    quaternion = np.roll(turn.as_quat(), 1)
+    sensor = (place, quaternion)
+    target = (place + turn.apply(at()[:3]), quaternion)
+    pressed = PressedSensor(pad(8, 8, **LAW), box(SIZE, SIZE, SIZE), 0.01, sensor, target)
+    force = turn.apply([0.5, 0.2, WEIGHT])
+    for _ in range(5):
+        contact = pressed.step(sensor, target, wrench=force)
+    assert contact.force_on_target == pytest.approx(force, abs=EXACT)
+    for _ in range(5):
+        contact = pressed.step(sensor, target, wrench=[WEIGHT])
+    assert turn.apply([0.0, 0.0, 1.0]) @ contact.force_on_target == pytest.approx(WEIGHT, abs=EXACT)
+
+
 @pytest.mark.parametrize(
     ("load", "left"),
     [

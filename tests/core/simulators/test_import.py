@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from bad_files import TOUCH_GRID
 from exported_sensors import FLOAT32, ball, pad
 from scipy.spatial.transform import Rotation
 
@@ -108,17 +109,25 @@ BROKEN = {
     "another root": ("<sdf/>", "holds no sensor that can be read"),
     "no mesh": (TACTILE.format(mesh=""), "MuJoCo cannot compile .*mesh 'm' not found"),
     "no geom": (TACTILE.format(mesh=MESH).replace('geom="g"', 'geom="h"'), "unrecognized name 'h'"),
+    "words": (TACTILE.format(mesh=MESH.replace("1 1 0", "1 one 0")), "bad format in attribute 'vertex'"),
     "NaN": (TACTILE.format(mesh=MESH.replace("1 1 0", "1 nan 0")), "is not finite"),
+    "odd": (TACTILE.format(mesh=MESH.replace(" 1 1 0", " 1 1")), "must be a multiple of 3"),
     "a wrong face": (TACTILE.format(mesh=MESH.replace("0 3 2", "0 3 9")), "does not exist"),
+    "half a face": (TACTILE.format(mesh=MESH.replace("0 3 2", "0 3")), "must be a multiple of 3"),
     "included": ("<mujocoinclude/>", "give the file that includes it"),
     "no file": (
         TACTILE.format(mesh='<mesh name="m" file="gone.stl"/>'),
         "Error opening file 'gone.stl'.*give the file that includes it, with its meshes",
     ),
+    "no quaternion": (TACTILE.format(mesh=MESH).replace("1 0 0 0", "0 0 0 0"), "zero quaternion"),
     "deep": ("<mujoco><worldbody>" + "<body>" * 300 + "</body>" * 300 + "</worldbody></mujoco>", "nests more than"),
-    "no radius": (GRID.format(config=CONFIG).replace('size="0.01"', 'size="0"'), "size 0 must be positive in"),
-    "NaN that MuJoCo compiles": (GRID.format(config=CONFIG).replace('pos="0 0 1"', 'pos="nan 0 1"'), "position .* is NaN"),
+    "no site": (
+        GRID.format(config=CONFIG).replace('objname="s"', 'objname="t"'),
+        "unrecognized name 't'.*give the file that includes it",
+    ),
+    "no size": (GRID.format(config=""), "resolutions must be specified"),
     "one bin": (GRID.format(config=CONFIG.replace("7 5", "1 5")), "two each way"),
+    "huge": (GRID.format(config=CONFIG.replace("7 5", "1e9 5")), "resolutions are too large"),
     "two texels": (ROBOT.format(joints=JOINTS[: JOINTS.index('<link name="skin_sensor_2"')]), "three or more texels"),
     "one place": (ROBOT.format(joints=JOINTS.replace("3 9 0", "2 4 0")), "at the same place"),
     "zero axis": (ROBOT.format(joints=JOINTS.replace("<parent", '<axis xyz="0 0 0"/><parent')), "is zero"),
@@ -149,6 +158,14 @@ def test_a_mesh_beside_the_file_is_read(tmp_path):
     (found,) = read(tmp_path, TACTILE.format(mesh='<mesh name="m" file="ball.stl" scale="0.1 0.1 0.1"/>'))
     assert len(found.position) == 42
     assert np.linalg.norm(found.position, axis=1) == pytest.approx(np.full(42, 0.05), abs=FLOAT32)
+
+
+@pytest.mark.parametrize("size", ["0", "-1 0.1"])
+def test_a_touch_grid_without_a_size_is_one_sentence(tmp_path, size):
+    path = tmp_path / "grid.xml"
+    path.write_text(TOUCH_GRID.replace('size="0.01"', f'size="{size}"'))
+    with pytest.raises(FileError, match="size 0 must be positive in"):
+        import_sensors(path)
 
 
 def test_a_texel_that_is_immeasurably_far_is_one_sentence():
@@ -315,3 +332,10 @@ def test_a_missing_package_is_one_sentence(tmp_path, monkeypatch):
         monkeypatch.setitem(sys.modules, name, None)
         with pytest.raises(FileError, match=f"the package {name} is missing: pip install {name}"):
             read(tmp_path, text)
+
+
+def test_a_place_that_is_no_number_is_one_sentence(tmp_path):
+    """MuJoCo compiles it all the same."""
+    pytest.importorskip("mujoco", reason="MuJoCo reads the MJCF: pip install mujoco")
+    with pytest.raises(FileError, match="The frame position of sensor '.*' in '.*' is NaN or infinite"):
+        read(tmp_path, GRID.format(config=CONFIG).replace('pos="0 0 1"', 'pos="nan 0 1"'))

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from palpate.core.errors import FileError
 from palpate.core.model.sensor_parameters import SensorParameters
-from palpate.core.simulators.openrave_file import OpenRaveSensor, read_openrave, write_openrave
+from palpate.core.simulators.openrave_file import OpenRaveSensor, openrave_xml, read_openrave, write_openrave
 
 TABLE_2 = """\
 <AttachedSensor>
@@ -89,6 +89,15 @@ def test_what_is_no_definition_gets_a_sentence(tmp_path, text, words):
     path.write_text(text, encoding="utf-8")
     with pytest.raises(FileError, match=words):
         read_openrave(path)
+
+
+def test_a_missing_file_gets_a_sentence(tmp_path):
+    with pytest.raises(FileError, match="There is no file"):
+        read_openrave(tmp_path / "none.xml")
+
+
+def test_links_are_escaped():
+    assert "a &lt; b &amp; c" in openrave_xml([OpenRaveSensor("n", "a < b & c", SensorParameters())])
 
 
 @pytest.mark.parametrize("name", ["\udcff\udcfe", "a\0b", "\x1b[31m"])

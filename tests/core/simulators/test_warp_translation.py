@@ -3,13 +3,17 @@
 
 from __future__ import annotations
 
+import importlib.metadata
+import inspect
 import math
 
 import numpy as np
 import pytest
 
+from palpate.core.compiled.kernels import inlined, plain
 from palpate.core.effects.engine.registry import complete_values, effect, form_of, library
 from palpate.core.effects.engine.specification import TexelInput
+from palpate.core.errors import PalpateError
 from palpate.core.geometry import shapes
 from palpate.core.geometry.shapes import is_in_shape, shape_distance, shape_entry, shape_normal
 from palpate.core.laws.contact_law import ContactLaw, read_law, scaled_law, whole_texel_law, with_friction
@@ -36,6 +40,7 @@ from palpate.core.laws.normal_force import (
     normal_force,
     normal_tangent,
 )
+from palpate.core.simulators.warp import engine
 from palpate.core.simulators.warp.press_arrays import IntArray
 from palpate.core.simulators.warp.translation import Translation, TranslationError
 
@@ -179,3 +184,23 @@ def test_what_has_no_translation_is_named():
     for function, words in ((sorts, "'with math"), (counts, "annotated 'object'"), (gammas, "no function 'gamma'")):
         with pytest.raises(TranslationError, match=words):
             translation.function(function)
+
+
+def test_the_source_of_a_kernel_of_numba_is_found():
+    assert plain(inlined(stand_in)) is stand_in
+    assert "return" in inspect.getsource(plain(decay_and_mean))
+
+
+@pytest.mark.parametrize(
+    ("version", "words"),
+    [
+        (None, r"^A sensor on Warp needs warp, which is not installed: run 'pip install warp-lang'\.$"),
+        ("1.2.3", r"^warp is version 1\.2\.3, and a sensor on Warp needs .*: run 'pip install --upgrade warp-lang'\.$"),
+    ],
+)
+def test_warp_that_is_missing_or_old_is_one_sentence(monkeypatch, version, words):
+    if version is None:
+        monkeypatch.setitem(__import__("sys").modules, "warp", None)
+    monkeypatch.setattr(importlib.metadata, "version", lambda _: version)
+    with pytest.raises(PalpateError, match=words):
+        engine.require_warp()

@@ -80,6 +80,15 @@ def test_a_load_cell_reads_the_net_force():
     np.testing.assert_allclose(felt.channels.values[:, 0, 2], -felt.normal_force.sum(axis=1), atol=1e-12 * scale)
 
 
+def test_what_is_beyond_the_range_is_clipped_and_said():
+    texels = pad(6, 5)
+    found = Simulation(scene(MagneticReadout(skin_under(texels, 13e-3), texels, 60.0), texels)).advance_all()
+    values = found.sensors["pad"].channels.values
+    assert np.abs(values).max() == 13e-3
+    (said,) = [warning for warning in found.warnings if "beyond the range" in warning]
+    assert said.startswith("Sensor 'pad', channel z of magnetometer")
+
+
 def test_a_magnet_that_is_pressed_into_a_magnetometer_is_clipped_and_the_run_goes_on():
     texels = pad(3, 3)
     count = len(texels)

@@ -44,6 +44,15 @@ def skin(rows=4, columns=4, pitch=4.7e-3, full_scale=50e-3, lift=3e-3, **changes
     return texels, magnetic_skin(texels, changes.get("magnets", magnets), changes.get("chips", chips), THICKNESS)
 
 
+def test_off_the_axis_the_field_is_that_of_two_charges():
+    """A dipole is the limit of two magnetic charges: their fields, by Coulomb's law, agree to the square of their distance."""
+    at, moment, apart = np.array([3e-3, -2e-3, 4e-3]), np.array([0.01, 0.02, -0.005]), 1e-6
+    way = moment / np.linalg.norm(moment) * apart / 2
+    charge = np.linalg.norm(moment) / apart
+    expected = MU0_4PI * charge * ((at - way) / np.linalg.norm(at - way) ** 3 - (at + way) / np.linalg.norm(at + way) ** 3)
+    np.testing.assert_allclose(dipole_field(at, moment), expected, rtol=1e-6)
+
+
 def test_the_gradient_is_that_of_the_field_without_curl_and_divergence():
     offset, moment = random().normal(size=(20, 3)) * 5e-3, random(1).normal(size=(20, 3))
     gradient = dipole_gradient(offset, moment)

@@ -86,6 +86,29 @@ def test_shear_follows_the_stiff_ode_of_scipy_through_stick_slip_and_reversal():
     assert np.abs(expected).max() > 0.9 * p.mus * fn  # it did break away
 
 
+def test_presliding_of_a_free_body_follows_scipy():
+    """A plate on a slope while it sticks: m ẍ = m g sin - n (sigma0 z + sigma1 ż + ct ẋ), the stiff ODE of the whole body."""
+    values = {"sigma0": 200.0, "sigma1": 2.0, "ct": 0.1, "x0": 0.05}
+    mass, tilt, fps = 0.5, np.radians(8), 200.0
+    scenario, down = plate_on_slope(mass, 8.0, 80, fps, 2.5e-5, **values)
+    recording = run(scenario)
+    n, fn = 196, mass * GRAVITY * np.cos(tilt) / 196
+
+    def derivative(_, y):
+        x, v, z = y
+        g = fn * 0.23 + fn * (0.435 - 0.23) * np.exp(-((v / values["x0"]) ** 2))
+        bristle = v - values["sigma0"] * abs(v) / g * z
+        force = values["sigma0"] * z + values["sigma1"] * bristle + values["ct"] * v
+        return [v, GRAVITY * np.sin(tilt) - n * force / mass, bristle]
+
+    exact = solve_ivp(derivative, (0, 79 / fps), [0, 0, 0], method="Radau", t_eval=recording.times, rtol=1e-9, atol=1e-12)
+    travel = (recording.poses[:, 1, :3] - recording.poses[0, 1, :3]) @ down
+    # First order in the step: 25 µs against a slowest time of about 10 ms.
+    np.testing.assert_allclose(travel, exact.y[0], atol=5e-3 * exact.y[0].max())
+    held = np.linalg.norm(recording.sensors["pad"].shear[-1], axis=1).sum()
+    assert held == pytest.approx(GRAVITY * mass * np.sin(tilt), rel=0.01)
+
+
 def test_friction_goes_when_the_load_goes():
     """Slide, then lift straight up: shear never exceeds what the normal force holds, and ends with the contact."""
     path = [[0, 0, 0.009], [0.002, 0, 0.009], [0.004, 0, 0.009], *([0.004, 0, 0.009 + 1e-4 * i] for i in range(1, 13))]
@@ -135,6 +158,12 @@ def test_starting_deeper_than_the_reach_is_said_at_once(depth):
     )
 
 
+def test_running_past_the_reach_within_one_step_is_said():
+    """3 cm per step, from above the pad to 2 cm below it."""
+    recording = run(pressed(box(0.08, 0.08, 0.2), [[0, 0, 0.11], [0, 0, 0.08]], fps=10.0, dt=0.1))
+    assert any(warning.startswith("Frame 2: 84 texels") for warning in recording.warnings)
+
+
 def test_who_was_too_deep_between_two_frames_is_named():
     """At the frames themselves nothing is touched."""
     scenario = pressed(box(0.08, 0.08, 0.2), [[0, 0, 0.11], [0, 0, 0.08], [0, 0, 0.11]], times=np.arange(3) / 20.0, fps=10.0)
@@ -144,6 +173,14 @@ def test_who_was_too_deep_between_two_frames_is_named():
     assert warning.startswith(
         "Frame 2: 84 texels are pressed past their maximum penetration by 'probe' into 'pad' and exert no force"
     )
+
+
+def test_a_hole_is_not_inside():
+    """Texels in the middle of a ring are within its box and yet free."""
+    ring = shape(trimesh.creation.annulus(0.01, 0.06, 0.1))
+    recording = run(pressed(ring, [[0, 0, 0.03]], texels=pad(4, 4, 0.002)))
+    assert recording.warnings == ()
+    assert not recording.sensors["pad"].contact.any()
 
 
 # ---- free flight ----
