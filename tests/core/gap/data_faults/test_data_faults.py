@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Faults of the data are found with evidence, put right on request, and no healthy rig is accused."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import faulty_rigs as made
 import gap_cases as cases
 import numpy as np
 import pytest
 
+from palpate.benchmarks import _recordings
 from palpate.benchmarks._handmade import low_pass
 from palpate.benchmarks._recordings import Recording
 from palpate.core.errors import PalpateError
@@ -25,6 +28,12 @@ def stimuli_of(rig):
 def with_correction(path, words='"all"'):
     path.write_text(path.read_text().replace("[sensor]", f"[data]\ncorrect = {words}\n[sensor]", 1))
     return path
+
+
+def test_the_generator_shares_nothing_with_the_package_but_a_writer_of_files():
+    for module, allowed in ((made, ["from palpate.benchmarks._recordings import Recording"]), (_recordings, [])):
+        text = Path(module.__file__).read_text(encoding="utf-8")
+        assert re.findall(r"^\s*((?:from|import) (?:palpate|\.).*)$", text, re.MULTILINE) == allowed
 
 
 def test_every_kind_of_fault_is_made():
