@@ -104,6 +104,16 @@ def test_demo_renders_heat_map_and_arrow(tmp_path):
     assert ((red > 0.8) & (green > 0.7) & (blue > 0.45) & (red - blue > 0.15)).sum() > 100  # 0.14 N on the magma map
 
 
+def test_demo_into_a_place_that_is_none(tmp_path, capfd):
+    (tmp_path / "a").write_text("mine")
+    assert main(["demo", "--out", str(tmp_path / "a" / "b")]) == 1
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert len(err.splitlines()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]
+    assert (tmp_path / "a").read_text() == "mine"
+
+
 # --- the camera
 
 

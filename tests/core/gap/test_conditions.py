@@ -64,3 +64,13 @@ def test_the_share_of_cells_that_is_said_is_missing(way):
     for one in empty:
         (at,) = np.nonzero(one.any(axis=1))
         assert low - 1e-3 < len(at) / len(one) < high + 1e-3 and np.ptp(at) == len(at) - 1
+
+
+def test_friction_is_of_each_effect_and_formula_or_nothing(monkeypatch):
+    plain = cases.draw("none", 0)
+    asked = []
+    monkeypatch.setattr(cases, "draw", lambda kind, number, names: asked.append((kind, *names)) or plain)
+    drawn = [conditions.draw("friction", number) for number in range(8)]
+    hidden = {(formula, name) for formula in conditions.FORMULAS for name in cases.IN_FORCE}
+    assert len(asked) == 8 and {entry for entry in asked if len(entry) > 1} == hidden
+    assert [case.kind for case in drawn[3::4]] == ["none", "none"]

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from palpate.core.errors import FileError, PalpateError
 from palpate.core.geometry.mesh import is_closed, mass_properties
-from palpate.core.simulators.formats import urdf
+from palpate.core.model.sensor_parameters import SensorParameters
+from palpate.core.simulators.formats.urdf import roll_pitch_yaw
 from palpate.core.simulators.sensor_format import export_sensors, formats, written_formats
 from palpate.core.simulators.sensor_on_mesh import identifiers, thickened
 
@@ -45,39 +47,73 @@ def test_all_sensors_are_written_and_the_next_export_replaces_them(kind, tmp_pat
     )
 
 
-def test_an_export_that_fails_half_way_leaves_the_earlier_one(tmp_path, monkeypatch):
-    export_sensors(SENSORS, "urdf", tmp_path)
+@pytest.mark.parametrize("kind", written_formats())
+def test_a_full_disk_leaves_the_earlier_export(kind, tmp_path, monkeypatch):
+    export_sensors(SENSORS, kind, tmp_path)
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    module = __import__(f"palpate.core.simulators.formats.{kind}", fromlist=["_"])
+    writers = ("write_xml", "write_probe_list", "write_openrave", "write_file")
+    writer = next(name for name in writers if hasattr(module, name))
+    calls = []
 
-    def full(*_):
-        raise FileError("'x' could not be written (no space left on device): free some space.")
+    def fails_at_the_second(*given, **options):
+        calls.append(given)
+        if len(calls) > 1:
+            raise FileError("'x' could not be written (no space left on device): free some space.")
+        return real(*given, **options)
 
-    monkeypatch.setattr(urdf, "write_probe_list", full)  # the last file of a sensor
+    real = getattr(module, writer)
+    monkeypatch.setattr(module, writer, fails_at_the_second)
     with pytest.raises(FileError, match="no space"):
-        export_sensors([pad(4, 4), ball()], "urdf", tmp_path)
+        export_sensors([pad(4, 4), ball()], kind, tmp_path)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
-def test_the_macro_of_a_urdf_names_its_mesh_and_its_probes(tmp_path):
-    mesh, _, macro, probes = export_sensors([ball()], "urdf", tmp_path).files
-    assert json.loads(probes.read_text())["sensor"] == "Ball"
-    assert probes.name in macro.read_text() and mesh.name in macro.read_text()
-
-
-def test_the_archive_of_a_probe_list_has_its_arrays(tmp_path):
-    item = ball()
-    _, archive = export_sensors([item], "probes", tmp_path).files
+@pytest.mark.parametrize("item", SENSORS, ids=lambda item: item.name)
+def test_probe_lists_hold_every_number(item, tmp_path):
+    text, archive = export_sensors([item], "probes", tmp_path).files
+    listed = json.loads(text.read_text(encoding="utf-8"))
+    assert SensorParameters(**listed["parameters"]) == item.sensor.parameters
+    assert listed["frame"]["position"] == item.position.tolist()
     with np.load(archive) as arrays:
         for name in ("position", "normal", "tangent", "area"):
-            assert np.array_equal(arrays[name], getattr(item.sensor.texels, name))
+            ours = getattr(item.sensor.texels, name)
+            assert np.array_equal(np.array(listed[name]), ours) and np.array_equal(arrays[name], ours)
+        assert listed["units"]["area"] == "m2"
+        assert ("row" in listed) == ("row" in arrays) == hasattr(item.sensor.texels.layout, "row")
+        if "row" in listed:
+            assert listed["row"] == item.sensor.texels.layout.row.tolist()
+        assert ("factor_k" in listed) == (item.sensor.painted.k is not None)
+
+
+def origins(robot):
+    """Return positions and rotations of a URDF's fixed joints, as its specification defines them."""
+    found = [joint.find("origin").attrib for joint in robot.iter("joint")]
+    turns = Rotation.from_euler("xyz", [[float(value) for value in one["rpy"].split()] for one in found])
+    return np.array([[float(value) for value in one["xyz"].split()] for one in found]), turns.as_matrix()
+
+
+@pytest.mark.parametrize("item", SENSORS, ids=lambda item: item.name)
+def test_urdf_has_a_frame_at_every_texel(item, tmp_path):
+    mesh, robot, macro, probes = export_sensors([item], "urdf", tmp_path).files
+    position, turn = origins(ElementTree.parse(robot))
+    assert np.abs(position - item.sensor.texels.position).max() < 1e-12
+    assert np.abs(turn - item.frames).max() < 1e-10  # twelve digits of angles
+    import trimesh
+
+    assert len(trimesh.load_mesh(mesh).faces) == len(item.mesh.triangles)
+    assert json.loads(probes.read_text())["sensor"] == item.name
+    assert probes.name in macro.read_text() and mesh.name in macro.read_text()
 
 
 def test_roll_pitch_yaw_hold_at_gimbal_lock():
     rng = np.random.default_rng(3)
-    pitch = np.repeat([1, -1], 100) * np.pi / 2
-    turns = Rotation.from_euler("xyz", np.column_stack([rng.uniform(-3, 3, 200), pitch, rng.uniform(-3, 3, 200)]))
-    back = Rotation.from_euler("xyz", urdf.roll_pitch_yaw(turns.as_matrix()))
-    assert np.abs(back.as_matrix() - turns.as_matrix()).max() < 1e-12
+    turns = Rotation.from_euler(
+        "xyz", np.column_stack([rng.uniform(-3, 3, (200, 1)), np.repeat([1, -1], 100) * np.pi / 2, rng.uniform(-3, 3, 200)])
+    )
+    frames = turns.as_matrix()
+    back = Rotation.from_euler("xyz", roll_pitch_yaw(frames)).as_matrix()
+    assert np.abs(back - frames).max() < 1e-12
 
 
 def test_a_thickened_sheet_is_closed_and_has_the_volume():
@@ -95,14 +131,35 @@ def test_identifiers_are_unique():
     assert list(identifiers(names).values()) == ["Index_finger", "Index_finger_2", "s_3", "s__"]
 
 
-def test_usd_says_to_all_programs_what_our_reader_does_not_ask(tmp_path):
+@pytest.mark.parametrize("item", SENSORS, ids=lambda item: item.name)
+def test_urdf_is_read_by_a_urdf_library(item, tmp_path):
+    yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy reads the URDF: pip install yourdfpy")
+    robot = yourdfpy.URDF.load(str(export_sensors([item], "urdf", tmp_path).files[1]))
+    link = robot.base_link
+    poses = np.array([robot.get_transform(joint.child, link) for joint in robot.robot.joints])
+    assert len(poses) == len(item.sensor.texels)
+    assert np.abs(poses[:, :3, 3] - item.sensor.texels.position).max() < FLOAT32
+    assert np.abs(poses[:, :3, :3] - item.frames).max() < FLOAT32
+    assert np.abs(np.array(robot.scene.bounds)[1] - item.mesh.vertices.max(axis=0)).max() < FLOAT32
+
+
+@pytest.mark.parametrize("item", [*SENSORS, pad(3, 3, name='a "quoted" \\ n\u00e4me')], ids=lambda item: item.name)
+def test_usd_is_read_by_usd_core(item, tmp_path):
     pytest.importorskip("pxr", reason="usd-core reads the USD: pip install usd-core")
     from pxr import Usd, UsdGeom
 
-    item = pad(3, 3, name='a "quoted" \\ n\u00e4me')
     stage = Usd.Stage.Open(str(export_sensors([item], "usd", tmp_path).files[0]))
     root = stage.GetDefaultPrim()
     assert root.GetDisplayName() == item.name and UsdGeom.GetStageMetersPerUnit(stage) == 1.0
     points = UsdGeom.Points(stage.GetPrimAtPath(root.GetPath().AppendChild("texels")))
+    assert np.abs(np.array(points.GetPointsAttr().Get()) - item.sensor.texels.position).max() < FLOAT32
+    assert np.abs(np.array(points.GetNormalsAttr().Get()) - item.sensor.texels.normal).max() < FLOAT32
     primvars = UsdGeom.PrimvarsAPI(points)
+    assert np.abs(np.array(primvars.GetPrimvar("tangent").Get()) - item.sensor.texels.tangent).max() < FLOAT32
     assert np.array(primvars.GetPrimvar("area").Get()) == pytest.approx(item.sensor.texels.area, rel=FLOAT32)
+    assert root.GetAttribute("palpate:k").Get() == item.sensor.parameters.k
+    mesh = UsdGeom.Mesh(stage.GetPrimAtPath(root.GetPath().AppendChild("surface")))
+    assert len(mesh.GetFaceVertexCountsAttr().Get()) == len(item.mesh.triangles)
+    turn = np.array(UsdGeom.Xformable(root).GetLocalTransformation())
+    assert np.allclose(turn[3, :3], item.position)
+    assert np.allclose(turn[:3, :3].T, Rotation.from_quat(np.roll(item.quaternion, -1)).as_matrix())

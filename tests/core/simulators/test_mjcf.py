@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from exported_sensors import FLOAT32, ball, pad
 
+from palpate.core.simulators.contact_translation import mujoco_contact
+from palpate.core.simulators.formats import mjcf
 from palpate.core.simulators.sensor_format import export_sensors
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo reads the MJCF: pip install mujoco")
@@ -72,6 +74,12 @@ def test_a_kilogram_sinks_in_as_far_as_on_ours(tmp_path):
     assert item.sensor.parameters.k * depths.sum() == pytest.approx(9.81, rel=0.01)
 
 
+def test_the_depth_of_another_mass_is_the_same_as_the_note_says(tmp_path):
+    (light, *_, item), (heavy, *_) = weighed(0.5, tmp_path / "light"), weighed(2.0, tmp_path / "heavy")
+    assert light == pytest.approx(heavy, rel=1e-3)
+    assert "per mass" in " ".join(mjcf._notes(item, mujoco_contact(item)))
+
+
 def test_a_body_that_is_not_convex_is_touched_where_it_is(tmp_path):
     """A ball rests in the middle of a hollow pad, 3 mm below the pad's convex hull."""
     item = pad(radius=-0.02, name="Hollow")
@@ -98,8 +106,14 @@ def test_what_mujoco_cannot_express_is_in_the_file_too(tmp_path):
 
 
 def test_the_error_of_the_contact_is_told(tmp_path):
-    """A linear sensor has none; one that stiffens has."""
-    _, written = loaded(pad(), tmp_path / "springs")
+    """A linear sensor has none, and its `solref` is that of its springs; one that stiffens has."""
+    springs = pad()
+    model, written = loaded(springs, tmp_path / "springs")
+    law, texels = springs.sensor.parameters, len(springs.sensor.texels)
+    geom = model.geom(f"{springs.name} collision")
+    assert geom.solimp[:2] == pytest.approx(mjcf.IMPEDANCE)
+    share = (1.0 - mjcf.IMPEDANCE) * texels / 4.0
+    assert geom.solref == pytest.approx([-share * law.k, -share * law.cn], rel=1e-9)
     assert not any("of the largest force" in note for note in written.notes)
     _, written = loaded(pad(normal_law="hunt-crossley", k=3e4), tmp_path / "power")
     assert any("of the largest force" in note for note in written.notes)
