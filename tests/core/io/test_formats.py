@@ -460,10 +460,19 @@ def cannot_load(read, path):
     return one_sentence(error, path)
 
 
-def test_other_files_are_no_recordings(tmp_path):
-    path = tmp_path / "other.npz"
+def test_damaged_recording(tmp_path):
+    path = tmp_path / "recording.npz"
     assert "does not exist" in cannot_load(load_recording, path)
     cannot_load(load_recording, tmp_path)
+    save_recording(path, recording())
+    whole = path.read_bytes()
+    for length in (0, 1, 100, len(whole) // 2, len(whole) - 1):
+        path.write_bytes(whole[:length])
+        cannot_load(load_recording, path)
+
+
+def test_other_files_are_no_recordings(tmp_path):
+    path = tmp_path / "other.npz"
     np.savez(path, a=np.zeros(3))
     assert "not a recording" in cannot_load(load_recording, path)
     np.savez(path, header=np.array([{"a": 1}], dtype=object))  # a pickle is never opened
@@ -474,6 +483,17 @@ def test_other_files_are_no_recordings(tmp_path):
     with open(path, "wb") as file:
         np.save(file, np.zeros(3))
     cannot_load(load_recording, path)
+    path.write_text("sensor,force\n")
+    cannot_load(load_recording, path)
+    save_recording(path, recording())
+    with zipfile.ZipFile(path) as archive:
+        members = {info.filename: archive.read(info) for info in archive.infolist()}
+    for gone in members:
+        with zipfile.ZipFile(path, "w") as archive:
+            for name, content in members.items():
+                if name != gone:
+                    archive.writestr(name, content)
+        cannot_load(load_recording, path)
 
 
 # --- tactile images
