@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..geometry.grid_layout import GridLayout
+from ..geometry.mesh import unique_edges
 from ..geometry.texels import Texels
 from . import color_maps
 from .figure_style import FONT, INK, SMALL
@@ -263,9 +264,8 @@ def _draw_surface(axes: Axes, triangles: np.ndarray, corners: np.ndarray, values
 
 def _outline(triangles: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """Return the edges that belong to one triangle only, (e, 2, 2)."""
-    edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
     ends = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2, 2)
-    _, which, count = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
+    _, which, count = unique_edges(triangles)
     return ends[count[which.ravel()] == 1]
 
 

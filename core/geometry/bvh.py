@@ -16,7 +16,7 @@ import numpy as np
 
 from ..compiled.kernels import allocating_kernel, kernel
 from ..compiled.struct_reference import by_reference
-from .mesh import TriangleMesh, face_normals
+from .mesh import TriangleMesh, face_normals, unique_edges
 
 LEAF_SIZE = 4
 """Triangles per leaf; two to eight measured alike."""
@@ -102,16 +102,13 @@ def build_tree(meshes: list[TriangleMesh]) -> Tree:
 
 def _adjacent_triangles(triangles: np.ndarray) -> np.ndarray:
     """(n, 3) int: the triangle across each edge, -1 unless the edge joins exactly two of one orientation."""
-    from trimesh.geometry import faces_to_edges
-    from trimesh.grouping import group_rows
-
-    edges = faces_to_edges(triangles)
-    one, other = group_rows(np.sort(edges, axis=1), require_count=2).reshape(-1, 2).T
-    turned = edges[one, 0] == edges[other, 1]  # each goes along the edge its own way
-    one, other = one[turned], other[turned]
-    adjacent = np.full(len(edges), -1)
-    adjacent[one], adjacent[other] = other // 3, one // 3
-    return adjacent.reshape(-1, 3)
+    _, which, count = unique_edges(triangles)
+    edge, start, end = which.ravel(), triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    side = np.arange(len(edge))
+    # Where an edge has two sides, the sum of their numbers without the one is the other.
+    across = np.where(count[edge] == 2, np.bincount(edge, side)[edge].astype(np.int64) - side, -1)
+    turned = start == end[across]  # each goes along the edge its own way
+    return np.where((across >= 0) & turned, across // 3, -1).reshape(-1, 3)
 
 
 @kernel

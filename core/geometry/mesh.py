@@ -90,6 +90,28 @@ def checked_mesh(
     return mesh, found
 
 
+def unique_edges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the edges of triangles, each once.
+
+    Parameters
+    ----------
+    triangles : (nt, 3) int
+
+    Returns
+    -------
+    edges : (ne, 2) int
+        The lower vertex first, in lexicographic order.
+    which : (nt, 3) int
+        The edge from each corner of a triangle to the next.
+    count : (ne,) int
+        Triangles at each edge.
+    """
+    ends = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1), axis=-1).astype(np.int64)
+    size = int(triangles.max(initial=0)) + 1
+    keys, which, count = np.unique(ends[..., 0] * size + ends[..., 1], return_inverse=True, return_counts=True)
+    return np.stack(np.divmod(keys, size), axis=1), which.reshape(-1, 3), count
+
+
 def edge_defects(triangles: np.ndarray) -> tuple[int, int, int]:
     """Count edges with one face, with more than two faces, and between two faces of opposite orientation.
 
@@ -101,13 +123,8 @@ def edge_defects(triangles: np.ndarray) -> tuple[int, int, int]:
     -------
     open_edges, branching, flipped : int
     """
-    from trimesh.geometry import faces_to_edges
-    from trimesh.grouping import unique_rows
-
-    edges = faces_to_edges(triangles)
-    _, which = unique_rows(np.sort(edges, axis=1))
-    count = np.bincount(which)
-    along = np.bincount(which, edges[:, 0] < edges[:, 1])
+    _, which, count = unique_edges(triangles)
+    along = np.bincount(which.ravel(), (triangles < np.roll(triangles, -1, axis=1)).ravel())
     return int((count == 1).sum()), int((count > 2).sum()), int(((count == 2) & (along != 1)).sum())
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import SensorError
-from .mesh import TriangleMesh, face_normals, triangle_areas
+from .mesh import TriangleMesh, face_normals, triangle_areas, unique_edges
 from .texel_arrays import TexelMesh, nearest_point
 
 # A number of points spread evenly over a surface, each with the normal of the surface below it.
@@ -217,8 +217,7 @@ def refined(mesh: TriangleMesh, longest: float) -> TriangleMesh:
     used, triangles = np.unique(mesh.triangles, return_inverse=True)
     vertices, triangles = mesh.vertices[used], triangles.reshape(-1, 3)
     while True:
-        edges, which = np.unique(np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0, return_inverse=True)
-        which = which.reshape(-1, 3)
+        edges, which, _ = unique_edges(triangles)
         long = np.linalg.norm(vertices[edges[:, 1]] - vertices[edges[:, 0]], axis=1) > longest
         if not long.any():
             return TriangleMesh(vertices, triangles)
@@ -251,7 +250,7 @@ def _split(triangles: np.ndarray, middle: np.ndarray) -> np.ndarray:
 
 def _links(mesh: TriangleMesh) -> list[list[int]]:
     """Neighbours of each vertex."""
-    edges = np.unique(np.sort(mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    edges, _, _ = unique_edges(mesh.triangles)
     both = np.vstack([edges, edges[:, ::-1]])
     both = both[np.argsort(both[:, 0], kind="stable")]
     starts = np.searchsorted(both[:, 0], np.arange(len(mesh.vertices) + 1)).tolist()

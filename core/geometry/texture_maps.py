@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import ImageError
 from .grid_layout import preference, unit
+from .mesh import unique_edges
 
 GUTTER = 2
 """Pixels around the surface that repeat its rim: bilinear look-ups reach one."""
@@ -198,10 +199,8 @@ def _rim_triangles(corners: np.ndarray) -> np.ndarray:
     """Return the triangles with an edge that no other triangle on the map has."""
     places = np.round(corners * 64).astype(np.int64)
     _, node = np.unique(places[..., 1] << 32 | places[..., 0], return_inverse=True)
-    node = node.reshape(-1, 3)
-    ends = np.sort(np.stack([node, np.roll(node, -1, axis=1)], axis=-1), axis=-1)
-    _, edge, uses = np.unique(ends[..., 0] * (node.max() + 1) + ends[..., 1], return_inverse=True, return_counts=True)
-    return np.flatnonzero((uses[edge.reshape(-1, 3)] == 1).any(axis=1))
+    _, which, count = unique_edges(node.reshape(-1, 3))
+    return np.flatnonzero((count[which] == 1).any(axis=1))
 
 
 _PIXELS_APART = 3.0  # neighbouring texels in a flattened region, so that a bilinear look-up can tell them apart

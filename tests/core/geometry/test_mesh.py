@@ -15,6 +15,7 @@ from palpate.core.geometry.mesh import (
     mass_properties,
     outward_faces,
     triangle_areas,
+    unique_edges,
     vertex_areas,
     vertex_normals,
 )
@@ -52,6 +53,20 @@ def test_flipped_face_is_noticed():
     faces[0] = faces[0, ::-1]
     assert edge_defects(faces)[2] > 0
     assert any("opposite sides" in warning for warning in checked_mesh(solid.vertices, faces, "box")[1])
+
+
+def test_edges_are_those_of_trimesh():
+    """Also where faces are degenerate, repeated or turned, and where edges are open or branch."""
+    solid = np.array(trimesh.creation.icosphere(2).faces)
+    soup = np.random.default_rng(1).integers(0, 30, (200, 3))
+    for faces in (solid, solid[:100], np.vstack([solid, solid[:50, ::-1]]), soup, soup + 2_000_000_000):
+        every = trimesh.geometry.faces_to_edges(faces)
+        first, same = trimesh.grouping.unique_rows(np.sort(every, axis=1))
+        edges, which, count = unique_edges(faces)
+        np.testing.assert_array_equal(edges[which].reshape(-1, 2), np.sort(every, axis=1))
+        np.testing.assert_array_equal(count[which].ravel(), np.bincount(same)[same])
+        assert len(edges) == len(first)
+        assert edges.tolist() == sorted(edges.tolist())
 
 
 def test_normals_point_outwards_and_vertex_normals_are_the_paper_s_sum():
