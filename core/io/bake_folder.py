@@ -218,8 +218,8 @@ def write_arrays_of(folder: Path, sensor: Sensor, recording: Recording) -> dict[
         A file cannot be written.
     """
     own = replace(recording, sensors={sensor.name: recording.sensors[sensor.name]})
-    save_recording(folder / RECORDING_NAME, own, atomic=False)
-    save_sensor(folder / SENSOR_NAME, sensor.texels, sensor.painted, atomic=False)
+    save_recording(folder / RECORDING_NAME, own)
+    save_sensor(folder / SENSOR_NAME, sensor.texels, sensor.painted)
     names = (RECORDING_NAME, SENSOR_NAME, IMAGE_LIST_NAME)
     return {name: file_sha256(folder / name) for name in names if (folder / name).exists()}
 

@@ -83,37 +83,6 @@ def require_replaceable(path: str | os.PathLike) -> None:
         raise FileError(f"'{path}' is read-only: change its permissions or choose another name.")
 
 
-@contextmanager
-def write_file(path: str | os.PathLike, atomic: bool = True) -> Iterator[Path]:
-    """Write a file, either atomically (:func:`atomic_write`) or directly.
-
-    Parameters
-    ----------
-    path : path
-    atomic : bool
-        False writes to `path` itself, and an interruption leaves an incomplete file: only for a folder that nobody reads before
-        it is complete.
-
-    Yields
-    ------
-    Path
-        The file to write and close.
-
-    Raises
-    ------
-    FileError
-        As :func:`atomic_write`.
-    """
-    if atomic:
-        with atomic_write(path) as temporary:
-            yield temporary
-        return
-    try:
-        yield Path(path)
-    except OSError as error:
-        raise FileError(f"'{path}' could not be written ({os_error_reason(error)}): {_remedy(error)}.") from error
-
-
 def writable_folder(path: str | os.PathLike, create: bool = False) -> Path:
     """Check that files can be written into a folder, by making one.
 

@@ -27,18 +27,17 @@ from ..geometry.texels import Texels
 from ..geometry.texture_maps import UVLayout
 from ..model.recording import CLIPPED, SENSOR_FIELDS, VALUES, Recording, SensorRecording, VectorReadings, row_blocks
 from ..model.sensor_parameters import Painted, SensorParameters, stated_parameters
-from .file_writing import write_file
+from .file_writing import atomic_write
 from .input_files import open_regular
 
 
-def write_arrays(path: str | os.PathLike, arrays: Mapping[str, np.ndarray], atomic: bool = True) -> None:
-    """Write arrays as .npz, as :func:`.write_file` does; equal arrays give equal bytes.
+def write_arrays(path: str | os.PathLike, arrays: Mapping[str, np.ndarray]) -> None:
+    """Write arrays as .npz, whole or not at all; equal arrays give equal bytes.
 
     Parameters
     ----------
     path : path
     arrays : mapping of str to ndarray
-    atomic : bool
 
     Raises
     ------
@@ -47,7 +46,7 @@ def write_arrays(path: str | os.PathLike, arrays: Mapping[str, np.ndarray], atom
     """
     if any(array.dtype.hasobject for array in arrays.values()):
         raise ValueError("objects are not written: reading them would run code")
-    with write_file(path, atomic) as temporary, open(temporary, "wb") as file:
+    with atomic_write(path) as temporary, open(temporary, "wb") as file:
         np.savez_compressed(file, **{name: array.copy("C") if array.flags.fnc else array for name, array in arrays.items()})
 
 
@@ -88,15 +87,15 @@ _ARRAYS = tuple(item.name for item in fields(Texels) if item.name != "layout")
 _LAYOUTS: dict[str, type[GridLayout] | type[UVLayout]] = {"grid": GridLayout, "uv": UVLayout}
 
 
-def save_sensor(path: str | os.PathLike, texels: Texels, painted: Painted | None = None, atomic: bool = True) -> None:
-    """Write texels, their layout and what is painted on them as .npz, as :func:`.write_file` does.
+def save_sensor(path: str | os.PathLike, texels: Texels, painted: Painted | None = None) -> None:
+    """Write texels, their layout and what is painted on them as .npz, whole or not at all.
 
     Raises
     ------
     FileError
         The file cannot be written.
     """
-    write_arrays(path, sensor_arrays(texels, painted), atomic)
+    write_arrays(path, sensor_arrays(texels, painted))
 
 
 def sensor_arrays(texels: Texels, painted: Painted | None = None) -> dict[str, np.ndarray]:
@@ -143,8 +142,8 @@ def _plain(value: np.ndarray) -> Any:
 RECORDING_FORMAT = "palpate-recording/2"
 
 
-def save_recording(path: str | os.PathLike, recording: Recording, atomic: bool = True) -> None:
-    """Write a recording as .npz, as :func:`.write_file` does; the same recording gives the same bytes.
+def save_recording(path: str | os.PathLike, recording: Recording) -> None:
+    """Write a recording as .npz, whole or not at all; the same recording gives the same bytes.
 
     Raises
     ------
@@ -153,7 +152,7 @@ def save_recording(path: str | os.PathLike, recording: Recording, atomic: bool =
     ValueError
         As :func:`recording_arrays`.
     """
-    write_arrays(path, recording_arrays(recording), atomic)
+    write_arrays(path, recording_arrays(recording))
 
 
 def recording_arrays(recording: Recording) -> dict[str, np.ndarray]:

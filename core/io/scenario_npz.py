@@ -41,7 +41,7 @@ _CLASS, _ARRAY, _TUPLE, _DICT = "class", "array", "tuple", "dict"
 
 
 def save_scenario(path: str | os.PathLike, scenario: Scenario) -> None:
-    """Write a scenario as .npz, as :func:`.write_file` does; equal scenarios give equal bytes.
+    """Write a scenario as .npz, whole or not at all; equal scenarios give equal bytes.
 
     Raises
     ------

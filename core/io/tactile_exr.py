@@ -29,7 +29,7 @@ from ..geometry.texels import Texels
 from ..geometry.texture_maps import UVLayout
 from ..model.recording import Frame, SensorFrame, VectorReadings
 from ..model.sensor import Sensor
-from .file_writing import writable_folder, write_file
+from .file_writing import atomic_write, writable_folder
 from .hidden_folder import FileList
 
 # OpenEXR images of 32-bit floats with named channels and attributes, written by a library.
@@ -178,7 +178,7 @@ def write_exrs(
     metadata: Sequence[Mapping[str, str]],
     nearest: np.ndarray | None = None,
 ) -> None:
-    """Write frames of one sensor directly to their files: an interruption leaves an incomplete file, see :func:`.write_file`.
+    """Write frames of one sensor, each image whole or not at all.
 
     Parameters
     ----------
@@ -201,8 +201,8 @@ def write_exrs(
     names = CHANNELS if nearest is None else (*CHANNELS, *layer_names(_channels_of(frames[0])))
     pictures = _pictures(layout, frames, names, nearest)
     for path, own, about in zip(paths, pictures, metadata, strict=True):
-        with write_file(path, atomic=False):
-            write_image(path, dict(zip(names, own)), {_PREFIX + key: str(value) for key, value in about.items()})
+        with atomic_write(path) as temporary:
+            write_image(temporary, dict(zip(names, own)), {_PREFIX + key: str(value) for key, value in about.items()})
 
 
 def layer_names(channels: VectorReadings) -> list[str]:
@@ -271,9 +271,10 @@ def write_vector_exrs(folder: Path, values: np.ndarray, shape: tuple[int, int], 
         )
     images = values.reshape(-1, rows, columns, 3)[:, ::-1].astype(np.float32)
     files = FileList(writable_folder(folder, create=True))
-    with files.new_files(LAYER) as new, write_file(new / LAYER, atomic=False):
+    with files.new_files(LAYER) as new:
         paths = [new / f"{LAYER}_{frame:0{DIGITS}d}.exr" for frame in range(len(images))]
         for frame, (path, image) in enumerate(zip(paths, images)):
             pictures = {f"{LAYER}.{axis}": image[:, :, i] for i, axis in enumerate(AXES)}
-            write_image(path, pictures, {"palpate.unit": unit, "palpate.frame": str(frame)})
+            with atomic_write(path) as temporary:
+                write_image(temporary, pictures, {"palpate.unit": unit, "palpate.frame": str(frame)})
         return files.replace(new, {LAYER: paths})

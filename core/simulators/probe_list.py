@@ -18,7 +18,7 @@ from ..geometry.grid_layout import GridLayout
 from ..geometry.mesh import TriangleMesh, checked_mesh
 from ..geometry.texels import Texels
 from ..geometry.texture_maps import uv_layout
-from ..io.file_writing import write_file
+from ..io.file_writing import atomic_write
 from ..io.input_files import checked_name, read_bounded
 from ..io.schema import known_words
 from ..io.sensor_toml import MOST_TEXELS
@@ -52,8 +52,8 @@ def write_probe_list(path: str | os.PathLike, item: SensorOnMesh) -> None:
         "effects": [to_dict(effect) for effect in item.sensor.effects],
     }
     content = about | {name: values.tolist() for name, values in arrays.items()} | {"faces": item.faces.tolist()}
-    with write_file(path, atomic=False) as place:
-        place.write_text(json.dumps(content, allow_nan=False) + "\n", encoding="utf-8")
+    with atomic_write(path) as temporary:
+        temporary.write_text(json.dumps(content, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def read_probe_list(path: str | os.PathLike) -> SensorOnMesh:

@@ -18,7 +18,7 @@ import numpy as np
 from ..errors import FileError, PalpateError, SensorError
 from ..geometry.mesh import TriangleMesh, checked_mesh
 from ..geometry.texels import texels_with_normals
-from ..io.file_writing import writable_folder, write_file
+from ..io.file_writing import atomic_write, writable_folder
 from ..io.hidden_folder import FileList
 from ..io.input_files import require_xml_text
 from ..model.sensor import Effect, Sensor
@@ -107,8 +107,9 @@ def comment(parent: ElementTree.Element, text: str) -> None:
 def write_xml(path: Path, root: ElementTree.Element) -> None:
     """Write an element as an indented file."""
     ElementTree.indent(root)
-    with write_file(path, atomic=False) as place:
-        place.write_bytes(b'<?xml version="1.0" encoding="utf-8"?>\n' + ElementTree.tostring(root, encoding="utf-8") + b"\n")
+    text = b'<?xml version="1.0" encoding="utf-8"?>\n' + ElementTree.tostring(root, encoding="utf-8") + b"\n"
+    with atomic_write(path) as temporary:
+        temporary.write_bytes(text)
 
 
 @dataclass(frozen=True)

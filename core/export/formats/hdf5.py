@@ -13,7 +13,7 @@ import numpy as np
 from ...errors import imported
 from ...figures.figure_style import FigureStyle
 from ...io.bake_reader import Bake
-from ...io.file_writing import write_file
+from ...io.file_writing import atomic_write
 from ...jobs import Job
 from ..exporter import UNITS, Exporter, bake_arrays, sensor_progress
 
@@ -47,7 +47,7 @@ def write_hdf5(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Path]]
             for key, array in bake_arrays(bake, name).items():
                 _dataset(group, key, array, _unit(bake, name, key))
         file.flush()
-        with write_file(path) as temporary:
+        with atomic_write(path) as temporary:
             temporary.write_bytes(file.id.get_file_image())
     return [path]
 

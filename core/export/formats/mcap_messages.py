@@ -18,7 +18,7 @@ from ...figures.figure_style import FigureStyle
 from ...figures.quantities import Quantity
 from ...geometry.grid_layout import GridLayout
 from ...io.bake_reader import Bake
-from ...io.file_writing import write_file
+from ...io.file_writing import atomic_write
 from ...io.recording_npz import described
 from ...jobs import Job
 from ...model.recording import Recording, VectorReadings
@@ -126,7 +126,7 @@ def write_mcap(bake: Bake, folder: Path, style: FigureStyle) -> Job[list[Path]]:
     from mcap.writer import CompressionType, Writer
 
     path = folder / "palpate.mcap"
-    with write_file(path) as temporary, open(temporary, "wb") as file:
+    with atomic_write(path) as temporary, open(temporary, "wb") as file:
         writer = Writer(file, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD)
         writer.start(profile=Profile.ROS2, library="palpate")
         output = _Output(writer, bake, style.shown)

@@ -9,7 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from ...io.bake_folder import folder_names
-from ...io.file_writing import write_file
+from ...io.file_writing import atomic_write
 from ..sensor_format import SensorFormat, Written
 from ..sensor_on_mesh import SensorOnMesh
 
@@ -26,8 +26,8 @@ def write_contacts(sensors: Sequence[SensorOnMesh], folder: Path) -> Written:
         content = {"format": CONTACT_FORMAT, "sensor": item.name, "mujoco": asdict(mujoco)}
         content["newton"] = asdict(newton) | {"pressure": newton.pressure.tolist()}
         files.append(folder / f"{stem}.contact.json")
-        with write_file(files[-1], atomic=False) as place:
-            place.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        with atomic_write(files[-1]) as temporary:
+            temporary.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
         notes.append(f"'{item.name}' in MuJoCo: {mujoco.error}; damping: {mujoco.damping_error}.")
         notes.append(f"'{item.name}' in Newton: {newton.error}.")
         notes += [f"'{item.name}': {note}" for note in dict.fromkeys((*mujoco.notes, *newton.notes))]

@@ -25,7 +25,7 @@ def write_probes(sensors: Sequence[SensorOnMesh], folder: Path) -> Written:
         files += [folder / f"{stem}.json", folder / f"{stem}.npz"]
         write_probe_list(files[-2], item)
         arrays = texel_arrays(item) | {"frame_position": item.position, "frame_quaternion": item.quaternion}
-        write_arrays(files[-1], arrays | {"faces": item.faces, "format": np.array(PROBES_FORMAT)}, atomic=False)
+        write_arrays(files[-1], arrays | {"faces": item.faces, "format": np.array(PROBES_FORMAT)})
     note = "parameters and effects are written as data; only Palpate computes with them."
     return Written(files, [f"'{item.name}': {note}" for item in sensors])
 

@@ -20,7 +20,7 @@ from ...errors import FileError, PalpateError
 from ...geometry.mesh import TriangleMesh
 from ...geometry.point_surface import triangles_between
 from ...io.bake_folder import folder_names
-from ...io.file_writing import write_file
+from ...io.file_writing import atomic_write
 from ...io.input_files import load_mesh, read_xml
 from ...io.sensor_toml import MOST_TEXELS
 from ..probe_list import write_probe_list
@@ -306,8 +306,8 @@ def _write_stl(path: Path, mesh: TriangleMesh) -> None:
     """Write a mesh as binary STL, in metres."""
     import trimesh
 
-    with write_file(path, atomic=False) as place:
-        place.write_bytes(trimesh.exchange.stl.export_stl(trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)))
+    with atomic_write(path) as temporary:
+        temporary.write_bytes(trimesh.exchange.stl.export_stl(trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)))
 
 
 FORMAT = SensorFormat("urdf", "URDF", "A link with the mesh, and a fixed frame for each texel", write_urdf, read_urdf, is_urdf)

@@ -16,7 +16,7 @@ from ...geometry.mesh import TriangleMesh
 from ...geometry.point_surface import triangles_between
 from ...geometry.rotations import quaternion_of
 from ...io.bake_folder import folder_names
-from ...io.file_writing import write_file
+from ...io.file_writing import atomic_write
 from ...io.input_files import require_regular
 from ...io.sensor_toml import MOST_TEXELS
 from ...model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters, stated_parameters
@@ -136,8 +136,8 @@ def write_usd(sensors: Sequence[SensorOnMesh], folder: Path) -> Written:
     stems, prims = folder_names(item.name for item in sensors), identifiers(item.name for item in sensors)
     for item in sensors:
         path = folder / f"{stems[item.name]}.usda"
-        with write_file(path, atomic=False) as place:
-            place.write_text("\n".join(_stage(item, prims[item.name])) + "\n", encoding="utf-8", newline="\n")
+        with atomic_write(path) as temporary:
+            temporary.write_text("\n".join(_stage(item, prims[item.name])) + "\n", encoding="utf-8", newline="\n")
         files.append(path)
     return Written(files, [_note(item) for item in sensors])
 

@@ -52,7 +52,7 @@ def test_a_full_disk_leaves_the_earlier_export(kind, tmp_path, monkeypatch):
     export_sensors(SENSORS, kind, tmp_path)
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     module = __import__(f"palpate.core.simulators.formats.{kind}", fromlist=["_"])
-    writers = ("write_xml", "write_probe_list", "write_openrave", "write_file")
+    writers = ("write_xml", "write_probe_list", "write_openrave", "atomic_write")
     writer = next(name for name in writers if hasattr(module, name))
     calls = []
 
