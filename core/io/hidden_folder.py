@@ -163,8 +163,8 @@ def _lock(folder: Path) -> BaseFileLock | None:
 #
 # An export is written whole into a hidden folder. Then its files are moved to their places, and files of the earlier export
 # that have no successor are removed: an export of a hundred frames that is followed by one of ten leaves no images of the
-# earlier one. A list in the folder names the files of exports with their SHA-256, and says whether all of an export are in
-# their places. Only files that the list names, and that still have the content it was written for, are removed.
+# earlier one. A list in the folder names the files of exports with their SHA-256. Only files that the list names, and that
+# still have the content it was written for, are removed.
 
 LIST_NAME = ".palpate-export.json"
 LIST_FORMAT = "palpate-export/1"
@@ -228,11 +228,12 @@ class FileList:
         ------
         FileError
             Something is in the place of a file that no file may replace, or a folder cannot be written to: earlier files are
-            as they were. Or a file cannot be moved: the list says that the export is incomplete.
+            as they were. Or a file cannot be moved.
         """
         names = {kind: [path.relative_to(new).as_posix() for path in paths] for kind, paths in written.items()}
         every = [name for those in names.values() for name in those]
         self._check_places(every)
+        kinds: dict[str, dict[str, Any]] = {}
         removed: dict[str, str] = {}
         for kind, those in names.items():
             before = self._kinds.get(kind, {"files": {}, "source": ""})
@@ -241,19 +242,17 @@ class FileList:
             if source and source == before["source"]:
                 kept = {name: digest for name, digest in earlier.items() if self._is_own_file(name, digest)}
             removed |= {name: digest for name, digest in earlier.items() if name not in kept}
-            files = kept | {name: file_sha256(new / name) for name in those}
-            self._kinds[kind] = {"complete": False, "files": files, "source": source}
+            kinds[kind] = {"files": kept | {name: file_sha256(new / name) for name in those}, "source": source}
         with _moving:
-            self._write(removed)
+            # Files that are about to be removed belong to the list until that is done.
+            self._write({kind: {**own, "files": removed | own["files"]} for kind, own in kinds.items()})
             for name in every:
                 _move(new / name, self._folder / name)
-            listed = {name for own in self._kinds.values() for name in own["files"]}
+            listed = {name for own in (self._kinds | kinds).values() for name in own["files"]}
             for name, digest in removed.items():
                 if name not in listed and self._is_own_file(name, digest):
                     self._remove(self._folder / name)
-            for kind in names:
-                self._kinds[kind]["complete"] = True
-            self._write({})
+            self._write(kinds)
         return [self._folder / name for name in every]
 
     def _check_places(self, names: Iterable[str]) -> None:
@@ -286,14 +285,11 @@ class FileList:
                     break
                 parent.rmdir()  # raises if it holds other files
 
-    def _write(self, removed: Mapping[str, str]) -> None:
-        """Write the list. Files that are about to be removed belong to it until that is done."""
-        kinds = {kind: {**own, "files": {**own["files"]}} for kind, own in self._kinds.items()}
-        for own in kinds.values():
-            if not own["complete"]:
-                own["files"] |= removed
+    def _write(self, kinds: Mapping[str, dict[str, Any]]) -> None:
+        """Write the list with these kinds; the others are as they were."""
+        self._kinds |= kinds
         with atomic_write(self._folder / LIST_NAME) as temporary:
-            content = {"format": LIST_FORMAT, "exports": kinds}
+            content = {"format": LIST_FORMAT, "exports": self._kinds}
             temporary.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
 
@@ -330,7 +326,6 @@ def _read(path: Path) -> dict[str, dict[str, Any]]:
             return {}
         return {
             str(kind): {
-                "complete": own.get("complete") is True,
                 "files": {name: str(digest) for name, digest in own["files"].items() if _is_safe(name)},
                 "source": str(own.get("source", "")),
             }

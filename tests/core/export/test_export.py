@@ -165,7 +165,7 @@ def test_a_damaged_list_is_as_none(bake, tmp_path, content):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / LIST_NAME).write_text(content)
     run_job(export(bake, "npz", tmp_path / "out"))
-    assert json.loads((tmp_path / "out" / LIST_NAME).read_text())["exports"]["npz"]["complete"]
+    assert json.loads((tmp_path / "out" / LIST_NAME).read_text())["exports"]["npz"]["files"]
 
 
 @pytest.mark.parametrize("kind", ["csv", "npz", "hdf5", "png", "mcap"])

@@ -65,10 +65,6 @@ def exported(folder):
     return {name: text for name, text in found if not any(part[0] == "." for part in name.split("/")) and "mine" not in name}
 
 
-def is_complete(folder):
-    return json.loads((folder / LIST_NAME).read_text())["exports"]["text"]["complete"]
-
-
 def hidden(folder):
     return sorted(path.name for path in folder.rglob(".*") if ".partial" not in path.name)
 
@@ -77,12 +73,12 @@ def test_an_export_takes_the_place_of_the_earlier_one(out):
     written = run_job(export(NEW, "text", out))
     assert written == [out / "bodies.csv", out / "pad", out / "tip"]
     assert exported(out) == NEW and (out / "pad" / "mine.txt").read_text() == "mine"
-    assert hidden(out) == [LIST_NAME] and is_complete(out)
+    assert hidden(out) == [LIST_NAME]
     assert run_job(export(NEW, "text", out)) == written
 
 
 @pytest.mark.long("exports thrice for each step")
-def test_stopped_at_any_step_the_list_says_so_and_the_next_export_is_whole(out, tmp_path):
+def test_stopped_at_any_step_the_next_export_is_whole(out, tmp_path):
     states = []
     for number in range(1, 100):
         copy = tmp_path / f"copy {number}"
@@ -94,14 +90,13 @@ def test_stopped_at_any_step_the_list_says_so_and_the_next_export_is_whole(out, 
         gc.collect()  # the lock of the stopped process
         found = exported(copy)
         assert set(found.values()) <= {"old", "new"}
-        assert not is_complete(copy) or found in (OLD, NEW)
-        states.append((found, is_complete(copy)))
+        states.append(found)
         run_job(export({"other.txt": "other"}, "other", copy))
-        assert exported(copy) == {**found, "other.txt": "other"} and is_complete(copy) == states[-1][1]
+        assert exported(copy) == {**found, "other.txt": "other"}
         run_job(export(NEW, "text", copy))
-        assert exported(copy) == {**NEW, "other.txt": "other"} and is_complete(copy) and hidden(copy) == [LIST_NAME]
+        assert exported(copy) == {**NEW, "other.txt": "other"} and hidden(copy) == [LIST_NAME]
         assert (copy / "pad" / "mine.txt").read_text() == "mine"
-    assert 10 < number < 99 and (OLD, True) in states and (NEW, True) in states and False in {state[1] for state in states}
+    assert 10 < number < 99 and OLD in states and NEW in states and any(state not in (OLD, NEW) for state in states)
 
 
 def test_an_error_while_files_are_moved_is_one_sentence(out, monkeypatch):
@@ -116,10 +111,10 @@ def test_an_error_while_files_are_moved_is_one_sentence(out, monkeypatch):
     with pytest.raises(FileError) as caught:
         run_job(export(NEW, "text", out))
     assert str(caught.value).startswith(f"'{out / 'pad' / 'force.csv'}' could not be replaced (permission denied): close")
-    assert not is_complete(out) and hidden(out) == [LIST_NAME]
+    assert hidden(out) == [LIST_NAME]
     monkeypatch.setattr(os, "replace", move)
     run_job(export(NEW, "text", out))
-    assert exported(out) == NEW and is_complete(out)
+    assert exported(out) == NEW
 
 
 def test_a_folder_that_cannot_be_written_to_is_found_before_the_old_export_is_touched(out, monkeypatch):
@@ -132,7 +127,7 @@ def test_a_folder_that_cannot_be_written_to_is_found_before_the_old_export_is_to
     monkeypatch.setattr(hidden_folder, "writable_folder", writable)
     with pytest.raises(FileError, match="read-only"):
         run_job(export(NEW, "text", out))
-    assert exported(out) == OLD and hidden(out) == [LIST_NAME] and is_complete(out)
+    assert exported(out) == OLD and hidden(out) == [LIST_NAME]
 
 
 def test_files_of_several_kinds_are_exchanged_together_and_those_of_one_source_are_gathered(tmp_path):
@@ -189,7 +184,7 @@ def test_an_error_names_the_place_of_the_file(out, formats):
     with pytest.raises(FileError) as caught:
         run_job(export(NEW, "text", out))
     assert str(caught.value).startswith(f"'{out / 'pad.csv'}' could not be written")
-    assert exported(out) == OLD and hidden(out) == [LIST_NAME] and is_complete(out)
+    assert exported(out) == OLD and hidden(out) == [LIST_NAME]
 
 
 @pytest.mark.parametrize(
