@@ -9,6 +9,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from palpate.addon.display import markers, materials
 from palpate.core.io.hidden_folder import PRIVATE_FOLDER
 
 
@@ -76,6 +77,12 @@ def scene_with_readings(frames=8):
     target.keyframe_insert("location", frame=frames)
     scene.frame_set(1)
     return scene
+
+
+def find_marker(objects, uid, kind):
+    """The marker of a sensor among some objects; None if there is none."""
+    own = (obj for obj in objects if obj.get(materials.SENSOR_KEY) == uid)
+    return next((obj for obj in own if obj.get(markers.KIND_KEY) == kind), None)
 
 
 def save(folder, name="scene.blend"):

@@ -34,11 +34,6 @@ BALL_SHARE, RING_SHARE = 0.03, 0.25
 """Radius of the ball, and of the ring if all texels slip, as shares of the sensor's size."""
 
 
-def find_marker(objects, uid: str, kind: str):
-    """Return a sensor's marker among some objects; None if there is none."""
-    return next((obj for obj in objects if obj.get(materials.SENSOR_KEY) == uid and obj.get(KIND_KEY, "FORCE") == kind), None)
-
-
 def only_marker(objects, uid: str, kind: str):
     """Return a sensor's marker among some objects, or None, and remove its duplicates: they would show an earlier bake."""
     found = [obj for obj in objects if obj.get(materials.SENSOR_KEY) == uid and obj.get(KIND_KEY, "FORCE") == kind]

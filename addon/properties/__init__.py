@@ -3,7 +3,7 @@
 
 Only what has to be saved lives here, no state of a simulation. Numbers are in SI units with the unit in the name, since Blender
 has no unit for N/m; :mod:`.scene_units` shows lengths, masses and velocities in the units of the scene. Names of properties
-stand in saved files, so a property that is renamed needs a migration.
+stand in saved files, so a property that is renamed is also read under its former name, in :mod:`.migrations`.
 """
 
 __all__ = [

@@ -140,16 +140,30 @@ def test_enabling_imports_nothing_heavy():
     assert not loaded & {"numba", "llvmlite", "scipy", "matplotlib", "trimesh", "OpenEXR", "tqdm", "tomli_w", "jinja2", "warp"}
 
 
-def test_a_bake_without_a_window_loads_no_panels_and_no_exporters():
-    code = (
-        "import sys, palpate.commands.bake, palpate.addon.bake.bake, palpate.addon.properties.registration;"
-        "print(*[name for name in sys.modules if name.startswith('palpate.')])"
-    )
+def loaded_by(*modules):
+    code = f"import sys, {', '.join(modules)}; print(*[name for name in sys.modules if name.startswith('palpate.')])"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
-    loaded = run.stdout.split()
+    return run.stdout.split()
+
+
+def test_a_bake_without_a_window_loads_no_panels_and_no_exporters():
+    loaded = loaded_by("palpate.commands.bake", "palpate.addon.bake.bake", "palpate.addon.properties.registration")
     unwanted = ("palpate.panels", "palpate.operators", "palpate.core.export.formats", "palpate.addon.display")
     assert "palpate.addon.bake.bake_files" in loaded and len(loaded) <= 150
     assert not [name for name in loaded if name.startswith(unwanted)]
+
+
+def test_the_gap_without_a_window_loads_of_the_add_on_where_numba_keeps_its_files_alone():
+    loaded = loaded_by(
+        "palpate.commands.gap", "palpate.addon.session.dependencies", "palpate.api.gap", "palpate.core.gap.report.summary"
+    )
+    assert "palpate.core.gap.fitting.least_squares" in loaded
+    own = ("palpate.addon", "palpate.panels", "palpate.operators")
+    assert {name for name in loaded if name.startswith(own)} == {
+        "palpate.addon",
+        "palpate.addon.session",
+        "palpate.addon.session.dependencies",
+    }
 
 
 def test_a_process_that_forgets_to_disable_still_ends():

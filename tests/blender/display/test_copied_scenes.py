@@ -3,7 +3,7 @@
 
 import bpy
 import pytest
-from blender_scenes import press, save
+from blender_scenes import find_marker, press, save
 
 from palpate.addon.display import markers
 
@@ -51,7 +51,7 @@ def test_clear_bake_of_a_full_copy_removes_every_marker_of_it(scenes, bakes):
 def test_a_bake_removes_copies_of_its_own_markers(scenes):
     original, _ = scenes
     bpy.context.window.scene = original
-    arrow = markers.find_marker(original.objects, original.objects["Pad"].palpate.uid, "FORCE")
+    arrow = find_marker(original.objects, original.objects["Pad"].palpate.uid, "FORCE")
     original.collection.objects.link(arrow.copy())
     assert len(marker_names(original)) == len(ALL) + 1
     assert bpy.ops.palpate.bake() == {"FINISHED"}

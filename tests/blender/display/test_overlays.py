@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import press_and_drop, save
+from blender_scenes import find_marker, press_and_drop, save
 
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import bake_display, baked_scene, markers, materials, overlays, texel_arrows
@@ -55,7 +55,7 @@ def test_texel_arrows_are_the_forces_of_their_texels(baked, kind):
     force = readings.normal_force[:, None] * texels.normal
     if kind == "SHEARS":
         force = -readings.shear[:, :1] * texels.tangent - readings.shear[:, 1:] * texels.bitangent
-    found = instances(markers.find_marker(scene.objects, pad.palpate.uid, kind))
+    found = instances(find_marker(scene.objects, pad.palpate.uid, kind))
     size = np.linalg.norm(force, axis=1)
     assert len(found) == (size > texel_arrows.MIN_ARROW_SHARE * size.max()).sum() >= 3
     place = result.recording.poses[-1, body, :3] + texels.position @ rotation.T
@@ -81,11 +81,11 @@ def test_markers_stand_at_the_centre_of_pressure_and_show_moment_and_slip(baked)
         rotation = transforms.rotation(result.recording.poses[i, 0, 3:])
         foot = result.recording.poses[i, 0, :3] + rotation @ readings.centre_of_pressure[i]
         for kind in ("TORQUE", "CENTRE", "SLIP"):
-            marker = markers.find_marker(scene.objects, pad.palpate.uid, kind)
+            marker = find_marker(scene.objects, pad.palpate.uid, kind)
             assert list(marker.location) == pytest.approx(foot, abs=1e-7)
             assert (marker.scale.x > 0) <= bool(readings.contact[i].any())
         assert marker.scale.x == pytest.approx(share[i] * radius, abs=1e-7)  # SLIP
-        arrow = markers.find_marker(scene.objects, pad.palpate.uid, "TORQUE")
+        arrow = find_marker(scene.objects, pad.palpate.uid, "TORQUE")
         if readings.contact[i].any():
             axis = transforms.as_array(arrow.matrix_world)[:3, 2] / arrow.scale.x
             assert axis == pytest.approx(-rotation @ moment[i] / np.linalg.norm(moment[i]), abs=1e-4)
@@ -96,7 +96,7 @@ def test_all_sensors_share_one_scale(baked):
     lengths = {}
     scene.frame_set(8)
     for name, obj in (("Pad", pad), ("Pad 2", scene.objects["Pad 2"])):
-        arrow = markers.find_marker(scene.objects, obj.palpate.uid, "FORCE")
+        arrow = find_marker(scene.objects, obj.palpate.uid, "FORCE")
         lengths[name] = arrow.scale.x / np.linalg.norm(result.recording.sensors[name].net_force[-1])
     assert lengths["Pad"] == pytest.approx(lengths["Pad 2"], rel=1e-5)
     ends = {
@@ -117,7 +117,7 @@ def test_arrows_of_fingers_that_face_each_other_do_not_cross(tmp_path):
     run_job(bake(scene))
     scene.frame_set(15)
     left, right = (
-        markers.find_marker(scene.objects, scene.objects[name].palpate.uid, "FORCE") for name in (grasp.LEFT, grasp.RIGHT)
+        find_marker(scene.objects, scene.objects[name].palpate.uid, "FORCE") for name in (grasp.LEFT, grasp.RIGHT)
     )
     between = right.location.x - left.location.x
     assert left.scale.z + right.scale.z == pytest.approx(0.94 * between, rel=0.05)  # the tightest is of another frame
@@ -162,13 +162,13 @@ def test_arrows_of_a_lost_image_do_not_show(baked, tmp_path):
     materials.find_block(bpy.data.images, pad.palpate.uid).reload()
     scene.frame_set(7)
     scene.frame_set(8)
-    assert instances(markers.find_marker(scene.objects, pad.palpate.uid, "NORMALS")) == []
+    assert instances(find_marker(scene.objects, pad.palpate.uid, "NORMALS")) == []
 
 
 @pytest.mark.parametrize("end", ["read", "stopped"])
 def test_arrows_rest_while_a_bake_reads_the_scene(baked, end):
     scene, pad, _ = baked
-    own = [markers.find_marker(scene.objects, pad.palpate.uid, kind).modifiers[ARROWS_MODIFIER] for kind in texel_arrows.KINDS]
+    own = [find_marker(scene.objects, pad.palpate.uid, kind).modifiers[ARROWS_MODIFIER] for kind in texel_arrows.KINDS]
     own[1].show_viewport = False  # as the user left it
     work = bake(scene)
     for _ in range(3):
