@@ -155,8 +155,8 @@ FINENESS = 5.0
 """Small triangles per spacing."""
 RADIUS = 0.84
 """Radius of the discs as a share of the spacing. After relaxation, neighbours are then about one spacing apart."""
-ROUNDS = 6
-"""Of relaxation."""
+RELAXATIONS = 6
+"""How often each texel moves to the middle of its part of the region."""
 MOST = 60_000
 """Texels at the most; more would take minutes."""
 
@@ -191,7 +191,7 @@ def scatter(mesh: TriangleMesh, spacing: float, seed: int = 0) -> TexelMesh:
     sites = _discs(fine.vertices, links, RADIUS * spacing, np.random.default_rng(seed))
     points = fine.vertices[sites]
     owner = np.zeros(0, dtype=int)
-    for _ in range(ROUNDS):
+    for _ in range(RELAXATIONS):
         owner = _nearest(fine.vertices, links, points, sites)
         middle, sites = _centres(fine.vertices, weight, owner, len(sites))
         points = fine.vertices[sites]

@@ -6,10 +6,11 @@ import math
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial import cKDTree
 
 from palpate.core.errors import SensorError
 from palpate.core.geometry.mesh import TriangleMesh, checked_mesh, edge_defects, triangle_areas
-from palpate.core.geometry.scattered_points import refined, scatter
+from palpate.core.geometry.scattered_points import even_points, refined, scatter
 from palpate.core.geometry.texel_arrays import (
     GeodesicTracer,
     filled_region,
@@ -237,6 +238,14 @@ def test_both_sides_of_a_thin_finger_are_covered():
     alone = len(scatter(sheet(0.02, 0.02), 0.003).vertices)
     for side in (skin.vertices[:, 2] > 1e-4, skin.vertices[:, 2] < -1e-4):
         assert side.sum() == pytest.approx(alone, rel=0.35)
+
+
+def test_points_on_a_box_are_spread_evenly():
+    """Six rounds of Lloyd's algorithm leave two points at 0.56 of the mean spacing, twenty at 0.68."""
+    solid = trimesh.creation.box((0.03, 0.02, 0.01)).subdivide().subdivide().subdivide()
+    points = even_points(TriangleMesh(np.asarray(solid.vertices), np.asarray(solid.faces)), 300).position
+    spacing = cKDTree(points).query(points, 2)[0][:, 1]
+    assert spacing.min() > 0.65 * spacing.mean()
 
 
 def test_refining_keeps_the_surface():
