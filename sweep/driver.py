@@ -128,7 +128,7 @@ def _closing(resource: Any, **words: Any) -> Iterator[Any]:
             resource.close(**words)
 
 
-def batches_of(indices: np.ndarray, total: int, seconds: float, workers: int) -> list[list[int]]:
+def batches_of(indices: np.ndarray, total: int, seconds: float, workers: int) -> list[np.ndarray]:
     """Return runs in batches of neighbours.
 
     Parameters
@@ -143,7 +143,7 @@ def batches_of(indices: np.ndarray, total: int, seconds: float, workers: int) ->
     """
     size = min(BATCH_SECONDS / max(seconds, 1e-6), len(indices) / (BATCHES_EACH * workers))
     size = max(1, round(size), -(-total // MOST_PARTS))
-    return [indices[at : at + size].tolist() for at in range(0, len(indices), size)]
+    return [indices[at : at + size] for at in range(0, len(indices), size)]
 
 
 class Dispatch:
@@ -185,11 +185,11 @@ class Dispatch:
         try:
             workers = max(1, len(self.client.scheduler_info(n_workers=-1)["workers"]))
             first, rest = indices[:workers], indices[workers:]
-            lost = self._compute([[index] for index in first.tolist()])  # nobody knows how long a run takes before
+            lost = self._compute(np.split(first, len(first)))  # nobody knows how long a run takes before
             seconds = self.over.seconds / max(1, self.over.finished)
             lost += self._compute(batches_of(rest, len(self.opened.runs), seconds, workers))
-            for index in self._compute([[index] for index in lost]):
-                if self._compute([[index]]):
+            for index in self._compute([np.array([index]) for index in lost]):
+                if self._compute([np.array([index])]):
                     self._note_fatal(index)
         except (CommClosedError, CancelledError, RuntimeError) as error:
             if isinstance(error, RuntimeError) and self.client.status == "running":  # a fault, not a lost connection
@@ -197,13 +197,14 @@ class Dispatch:
             raise _scheduler_gone() from error
         return self.over
 
-    def _compute(self, batches: Sequence[Sequence[int]]) -> list[int]:
+    def _compute(self, batches: Sequence[np.ndarray]) -> list[int]:
         """Compute batches and return the runs of those that took their workers down."""
         from distributed import as_completed
 
-        futures = self.client.map(compute_batch, batches, **self.words, pure=False, retries=RETRIES)
-        waiting, lost = dict(zip(futures, batches, strict=True)), list[int]()
-        completed = as_completed(futures)
+        # No other reference than this to a future: Dask forgets a batch that is taken, and does not compute it again when the
+        # worker that has its result is lost.
+        waiting = dict(zip(self.client.map(compute_batch, batches, **self.words, pure=False, retries=RETRIES), batches))
+        completed, lost = as_completed(list(waiting)), list[int]()
         try:
             while waiting:
                 self.on_progress(self.over)
@@ -227,16 +228,15 @@ class Dispatch:
         if isinstance(cluster, LocalCluster):
             cluster.scale(len(cluster.worker_spec))
 
-    def _take(self, future: Any, batch: Sequence[int]) -> Sequence[int]:
+    def _take(self, future: Any, batch: np.ndarray) -> list[int]:
         """Note what became of a batch; return its runs if it took its worker down."""
         from distributed.scheduler import KilledWorker
 
         if future.status == "cancelled":  # as all batches are when the scheduler ends
             raise _scheduler_gone()
-        try:
-            found = future.result()  # waits where a result is lost with its worker, as Dask computes it again
-        except KilledWorker:
-            return batch
+        if isinstance(future.exception(), KilledWorker):  # to catch it would keep the futures of this frame
+            return [int(index) for index in batch]
+        found = future.result()  # waits where a result is lost with its worker, as Dask computes it again
         self.over.done += found.done
         self.over.seconds += found.seconds
         self._note_failed(found.failures, found.failed)

@@ -359,12 +359,14 @@ def _computer_for(folder: Path, scripts: str, limit: float | None) -> RunCompute
     return found
 
 
-def compute_batch(indices: Sequence[int], folder: str, scripts: str = REFUSE, limit: float | None = None) -> BatchResult:
+def compute_batch(
+    indices: Sequence[int] | np.ndarray, folder: str, scripts: str = REFUSE, limit: float | None = None
+) -> BatchResult:
     """Compute runs of a study and write them into a part; called by Dask.
 
     Parameters
     ----------
-    indices : sequence of int
+    indices : sequence or array of int
     folder : str
         Of the study, as this machine sees it.
     scripts : str
@@ -381,7 +383,7 @@ def compute_batch(indices: Sequence[int], folder: str, scripts: str = REFUSE, li
     """
     place, batch, waiting = Path(folder), BatchResult(), list[RunResult]()
     computer = _computer_for(place, scripts, limit)
-    for index in indices:
+    for index in np.asarray(indices).tolist():
         result = computer.result(index)
         batch.seconds += result.seconds
         batch.done += not result.message

@@ -116,9 +116,7 @@ def test_arrows_of_fingers_that_face_each_other_do_not_cross(tmp_path):
     save(tmp_path)
     run_job(bake(scene))
     scene.frame_set(15)
-    left, right = (
-        find_marker(scene.objects, scene.objects[name].palpate.uid, "FORCE") for name in (grasp.LEFT, grasp.RIGHT)
-    )
+    left, right = (find_marker(scene.objects, scene.objects[name].palpate.uid, "FORCE") for name in (grasp.LEFT, grasp.RIGHT))
     between = right.location.x - left.location.x
     assert left.scale.z + right.scale.z == pytest.approx(0.94 * between, rel=0.05)  # the tightest is of another frame
 

@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
@@ -31,9 +32,13 @@ RUNS = 3000
 LONGEST = 300.0
 """Seconds until a wait counts as hanging; a busy machine may have to compile the solver first."""
 FATAL = """
-import os
+import os, time
+from pathlib import Path
 def run(values, folder):
-    if values["number"] == 3:
+    with open(Path(__file__).with_name("calls"), "a") as file:
+        file.write(f"{values['number']:.0f} ")
+    time.sleep(0.1)
+    if values["number"] == 25:
         os._exit(9)
     return {"double": 2.0 * values["number"]}
 """
@@ -194,4 +199,8 @@ def test_a_run_that_ends_its_worker_fails_alone(tmp_path, job, more):
     assert "30 runs: 29 done, 1 failed, 0 left" in finished.stdout
     (row,) = [row for row in rows_of(tmp_path / "out") if row["status"] == "failed"]
     advice = "raise run_memory, 600 MB" if more else "it may need more memory"
-    assert row["message"] == f"Run 3 ended its worker each time that it was computed: {advice}, or vary less widely."
+    assert row["message"] == f"Run 25 ended its worker each time that it was computed: {advice}, or vary less widely."
+    calls = Counter((tmp_path / "out" / "scenes" / "calls").read_text().split())
+    assert calls["25"] == 3
+    # Once each but for the batch of four that was lost, and perhaps one whose result was not yet taken.
+    assert sum(count == 1 for count in calls.values()) >= 22
