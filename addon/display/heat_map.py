@@ -147,11 +147,9 @@ def region_faces(mesh, texels: Texels) -> np.ndarray:
     """(nf,) bool: faces whose corners are all texels."""
     inside = np.zeros(len(mesh.vertices), dtype=bool)
     inside[texels.vertex] = True
-    corner = np.empty(len(mesh.loops), dtype=np.int32)
     start = np.empty(len(mesh.polygons), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", corner)
     mesh.polygons.foreach_get("loop_start", start)
-    return np.logical_and.reduceat(inside[corner], start)
+    return np.logical_and.reduceat(inside[mesh_arrays.corner_vertices(mesh)], start)
 
 
 def _assign(obj, texels: Texels, material) -> None:

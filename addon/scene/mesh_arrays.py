@@ -54,9 +54,8 @@ def _undo_indentation(mesh, base) -> None:
     """Give an indented mesh the vertices and faces of the object's own mesh, and the places that these had before."""
     rest = np.empty(3 * len(mesh.vertices), dtype=np.float32)
     mesh.attributes[REST_POSITION].data.foreach_get("vector", rest)
-    starts, totals = np.empty(len(base.polygons), dtype=np.int32), np.empty(len(base.polygons), dtype=np.int32)
+    starts = np.empty(len(base.polygons), dtype=np.int32)
     base.polygons.foreach_get("loop_start", starts)
-    base.polygons.foreach_get("loop_total", totals)
     mesh.clear_geometry()
     mesh.vertices.add(len(base.vertices))
     mesh.vertices.foreach_set("co", rest[: 3 * len(base.vertices)])
