@@ -280,14 +280,6 @@ def write_manifest(folder: str | os.PathLike, manifest: Manifest) -> Path:
         A number is not finite or a parameter is no JSON value (a fault of the program, not of the user).
     """
     path = Path(folder) / MANIFEST_NAME
-    content = manifest_bytes(manifest)
-    with atomic_write(path) as temporary:
-        temporary.write_bytes(content)
-    return path
-
-
-def manifest_bytes(manifest: Manifest) -> bytes:
-    """Return the content of ``manifest.json``; raises ValueError as :func:`write_manifest`."""
     content = {"format": MANIFEST_FORMAT, **{item.name: getattr(manifest, item.name) for item in fields(manifest)}}
     if manifest.effects is None:
         del content["effects"]
@@ -298,7 +290,9 @@ def manifest_bytes(manifest: Manifest) -> bytes:
         text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
     except TypeError as error:
         raise ValueError(f"the manifest of '{manifest.sensor}' holds something that is not JSON: {error}") from error
-    return (text + "\n").encode("utf-8", "surrogatepass")
+    with atomic_write(path) as temporary:
+        temporary.write_bytes((text + "\n").encode("utf-8", "surrogatepass"))
+    return path
 
 
 def read_manifest(folder: str | os.PathLike) -> Manifest:
