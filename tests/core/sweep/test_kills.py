@@ -201,6 +201,6 @@ def test_a_run_that_ends_its_worker_fails_alone(tmp_path, job, more):
     advice = "raise run_memory, 600 MB" if more else "it may need more memory"
     assert row["message"] == f"Run 25 ended its worker each time that it was computed: {advice}, or vary less widely."
     calls = Counter((tmp_path / "out" / "scenes" / "calls").read_text().split())
-    assert calls["25"] == 3
+    assert calls["25"] <= 3
     # Once each but for the batch of four that was lost, and perhaps one whose result was not yet taken.
     assert sum(count == 1 for count in calls.values()) >= 22
