@@ -24,6 +24,8 @@ NOT_FITTED = names_found_by(SCATTER)
 """Kinds that are not fitted but found in the final residual (see :func:`.residual_tests.proportional_noise`)."""
 DIRECTLY_ESTIMATED = (*names_found_by(SILENT_TEXELS), *names_found_by(STEPS))
 """Kinds whose parameters are estimated directly from the readings (see :mod:`.direct_estimates`)."""
+SHORTEST_STEP, LONGEST_STEP = 0.01, 20.0
+"""A starting point is moved along a candidate's strength by factors between these."""
 SMALL, LARGE = 0.02, 4.0
 """A parameter shows between these multiples of the quantity that it is compared with."""
 SIGNED_SHARE = 0.25
@@ -225,19 +227,29 @@ class Candidate:
                     values[p.name] = float(low + share * (high - low))
             yield values
 
-    def strength_parameter(self) -> str | None:
-        """Return the parameter that is zero if the effect is absent, or None."""
-        for name, value in self.form.neutral.items():
-            if value == 0.0:
-                return name
-        return None
+    @property
+    def is_signed(self) -> bool:
+        """True if its strength may be negative."""
+        strength, _ = self._strength()
+        return strength is not None and strength.low < 0.0
 
-    def inverse_strength_parameter(self) -> str | None:
-        """Return the parameter that is infinite if the effect is absent, or None; its inverse is the strength."""
-        for name, value in self.form.neutral.items():
-            if np.isinf(value):
-                return name
-        return None
+    def scaled(self, effect: Effect, length: float, gain: float) -> Effect:
+        """Return the effect with so many times its strength, inside its bounds; the same if it has none."""
+        strength, power = self._strength()
+        if strength is None:
+            return effect
+        p, value = strength.scaled(gain), effect.values[strength.name]
+        factor = np.clip(length, -LONGEST_STEP if p.low < 0.0 else SHORTEST_STEP, LONGEST_STEP)
+        return replace(effect, values={**effect.values, p.name: float(np.clip(value * factor**power, p.low, p.high))})
+
+    def _strength(self) -> tuple[Parameter | None, float]:
+        """The parameter that is zero if the effect is absent, with 1, or the one that is infinite, with -1."""
+        absent = {0.0: 1.0, np.inf: -1.0}
+        for end, power in absent.items():
+            for p in self.form.parameters:
+                if not p.per_texel and self.form.neutral.get(p.name) == end:
+                    return p, power
+        return None, 1.0
 
 
 @cache

@@ -14,6 +14,7 @@ from typing import TypeVar
 import numpy as np
 
 from ...jobs import Job, Progress
+from ...model.sensor import Effect
 from ..data_faults.data_fault import DataFault
 from ..data_faults.search import find_faults, put_right
 from ..dataset.rig import Rig
@@ -128,10 +129,11 @@ def _starts(begun: _Begun) -> dict[str, Start]:
     memory = result.noise[READINGS].correlation_time, result.noise[FORCES].correlation_time
     views = views_of(result.predictors, deviations, memory)
     blocks = Blocks(views, result.base.model)
+    alone: dict[str, Effect] = {}
 
     def start(own: _Begun, assumed: str) -> tuple[Screening, Hypothesis]:
         used = views if own is begun else views.with_predictors(own.result.predictors)
-        screening = Screening(own.view_set, blocks, used, own.result.scales, assumed)
+        screening = Screening(own.view_set, blocks, used, own.result.scales, assumed, alone)
         base = fit(used.fitted, own.result.base.model, own.result.base.free, max_steps=3)
         return screening, screening.hypothesis(base, (), ())
 

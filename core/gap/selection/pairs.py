@@ -18,7 +18,6 @@ from .candidates import DIRECTLY_ESTIMATED, Candidate, is_free_already
 from .rao_score import ScoreTest
 from .score import Hypothesis
 from .screening import Making, Screening, free_with
-from .starting_points import LONGEST_STEP, SHORTEST_STEP
 
 PAIRS = 4
 """Pairs of kinds that are fitted. On eight development rigs with two effects the hidden pair ranked first or second, of 80 to
@@ -91,7 +90,7 @@ def _ranked(entries: list[_Entry], gram: np.ndarray, along: np.ndarray) -> list[
         determinant = np.outer(square, square) - gram**2
         first = (along[:, None] * square[None] - along[None] * gram) / determinant
         gained = first * along[:, None] + first.T * along[None]
-    signed = np.array([_is_signed(one.candidate) for one in entries])
+    signed = np.array([one.candidate.is_signed for one in entries])
     good = ((first > 0) | signed[:, None]) & ((first.T > 0) | signed[None])
     good &= (np.abs(cosine) < SAME_CHANGE) & np.isfinite(gained)
     kinds = np.unique([one.candidate.name for one in entries], return_inverse=True)[1]
@@ -106,18 +105,12 @@ def _ranked(entries: list[_Entry], gram: np.ndarray, along: np.ndarray) -> list[
     ]
 
 
-def _is_signed(one: Candidate) -> bool:
-    """True if the strength of a form may be negative."""
-    name = one.strength_parameter()
-    return any(q.name == name and q.low < 0.0 for q in one.form.parameters)
-
-
 def _fitted(screening: Screening, base: Hypothesis, pair: tuple[_Entry, _Entry]) -> list[Hypothesis]:
     """Two effects fitted together, first to a part of the data; empty if the signature of one of them is not there."""
     model, free = base.fit.model, tuple(base.fit.free)
     for one in pair:
         free = free_with(free, model, one.candidate, screening.scales)
-        model = model.with_effect(_scaled(one))
+        model = model.with_effect(one.candidate.scaled(one.effect, one.length, abs(model.parameters.gain)))
     views = screening.view_set.few_samples
     quick = fit(views, model, free, max_steps=10, tolerance=1e-3, with_equations=False)
     found = screening.final_fit(quick.model, free, len(base.fit.free))
@@ -133,15 +126,3 @@ def with_effect_last(found: Fit, index: int) -> Fit:
     effects = tuple(found.model.effects[i] for i in order)
     free = tuple(item if item.effect < 0 else replace(item, effect=order.index(item.effect)) for item in found.free)
     return replace(found, model=replace(found.model, effects=effects), free=free)
-
-
-def _scaled(one: _Entry) -> Effect:
-    """An effect at its length along its change, if it has a strength."""
-    for name, power in ((one.candidate.strength_parameter(), 1.0), (one.candidate.inverse_strength_parameter(), -1.0)):
-        value = one.effect.values.get(name) if name else None
-        if name and isinstance(value, float) and one.length > 0:
-            parameter = next((q for q in one.candidate.form.parameters if q.name == name), None)
-            scaled = value * float(np.clip(one.length, SHORTEST_STEP, LONGEST_STEP)) ** power
-            low, high = (parameter.low, parameter.high) if parameter else (-np.inf, np.inf)
-            return replace(one.effect, values={**one.effect.values, name: float(np.clip(scaled, low, high))})
-    return one.effect

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -82,7 +83,7 @@ class ScoreTest:
         """Derivatives with which a fit of these parameters and more may begin; None if some belong to single texels."""
         return None if any(item.per_texel for item in self.free) else self.tables
 
-    @property
+    @cached_property
     def total(self) -> float:
         """Sum of squares of the residual."""
         return sum(float(np.vdot(r, r)) for r in self.residual)
@@ -152,7 +153,6 @@ class ScoreTest:
         return decrease, best[size:]
 
     def decrease(self, model: Model) -> float:
-        """Return by how much another model lowers the squares as it is."""
-        before = sum(float(np.vdot(r, r)) for r in self.residual)
+        """Return by how much another model lowers the squares as it is; minus infinity if it predicts no numbers."""
         after = sum(float(np.vdot(r, r)) for r in (view.residual(model) for view in self.views))
-        return before - after
+        return self.total - after if np.isfinite(after) else -np.inf

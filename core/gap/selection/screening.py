@@ -25,8 +25,8 @@ from .view_set import ViewSet
 
 LATER_STARTS = 1
 """Points of the search ranges that are tried on top of an effect, in addition to the form's values alone: for speed."""
-FIRST_STARTS, TRIAL_STEPS, FIRST_STEPS, FIRST_TOLERANCE = 2, 3, 8, 1e-3
-"""A first fit takes some steps from each of the best starting points, and goes on from the best of these: for speed."""
+FIRST_STEPS, FIRST_TOLERANCE = 10, 1e-3
+"""Of the fits to a part of the data."""
 FINAL_STEPS, FINAL_TOLERANCE = 10, 3e-4
 """Of the fits to everything."""
 TRIED_KINDS, REFITTED_KINDS = 8, 5
@@ -81,15 +81,15 @@ class Screening:
     assumed : str
         What is assumed of that (see :attr:`.score.Hypothesis.assumed`).
     alone : dict of str to Effect
-        What each form was fitted to alone, by its label.
+        What each form was fitted to alone, by its label, in recordings that do not differ.
     """
 
     view_set: ViewSet
     blocks: Blocks
     views: Views
     scales: Scales
-    assumed: str = ""
-    alone: dict[str, Effect] = field(default_factory=dict)
+    assumed: str
+    alone: dict[str, Effect]
     promises: dict[object, list[Promise]] = field(default_factory=dict)
 
     def hypothesis(
@@ -107,8 +107,8 @@ class Screening:
     def with_one_more(self, parent: Hypothesis, kinds: set[str] | None = None, most_left: float = 1.0) -> Making:
         """Return the parent with one effect more, for the kinds that promise most, in one form of each.
 
-        It is the form that is free to follow any law, if the kind has one, so that kinds compete at equal freedom. Alone, the
-        best kinds come in all their forms.
+        It is the form that is free to follow any law, if the kind has one, so that kinds compete at equal freedom. Alone, kinds
+        without such a form come in the best of all their forms, and the best kinds in all their forms.
 
         Parameters
         ----------
@@ -118,7 +118,7 @@ class Screening:
         most_left : float
             Share of the parent's gap that a fit to a part of the data may leave at most, for one to everything to follow.
         """
-        is_first = not parent.names
+        is_first = not (parent.names or self.assumed)  # an assumption about recordings is like an effect
         tests = _Tests(self.view_set, parent.fit)
         promises = yield from self._promises(parent, tests, kinds)
         by_kind: dict[str, list[Promise]] = {}
@@ -126,16 +126,16 @@ class Screening:
             by_kind.setdefault(one.candidate.name, []).append(one)
         first_fits = []
         for own in list(by_kind.values())[: None if is_first else TRIED_KINDS]:
-            for one in own if is_first else [min(own, key=_is_textbook)]:
+            best = min(own, key=_is_textbook)
+            for one in own if is_first and best.candidate.form.error is None else [best]:
                 yield f"fitting {one.candidate.name}"
                 first_fits.append(self._first_fit(one, tests))
-        first_fits = sorted((one for one in first_fits if one.left <= most_left), key=lambda one: one.left)
-        best: dict[str, FirstFit] = {}
-        for fitted in first_fits:
-            best.setdefault(fitted.candidate.name, fitted)
+        best_fits: dict[str, FirstFit] = {}
+        for fitted in sorted((one for one in first_fits if one.left <= most_left), key=lambda one: one.left):
+            best_fits.setdefault(fitted.candidate.name, fitted)
             if is_first:
                 self.alone.setdefault(fitted.candidate.label, fitted.fit.model.effects[-1])
-        made = yield from self._final_fits(list(best.values())[: None if is_first else REFITTED_KINDS], parent)
+        made = yield from self._final_fits(list(best_fits.values())[:REFITTED_KINDS], parent)
         made.sort(key=_left)
         for name in [one.names[-1] for one in made[:ALL_FORMS]] if is_first else []:
             made += yield from self.other_forms(parent, name, [one.forms[-1] for one in made])
@@ -182,7 +182,7 @@ class Screening:
             yield "screening every effect"
             test = tests.of(one)
             starts = starting_points(one, test, self.view_set, self.scales, LATER_STARTS if parent.names else START_COUNT)
-            if one.label in self.alone and parent.names:
+            if one.label in self.alone:
                 effect = self.alone[one.label]
                 starts = sorted([*starts, (test.score(model.with_effect(effect))[0], effect)], key=lambda entry: -entry[0])
             if starts and starts[0][0] > 0:
@@ -192,25 +192,19 @@ class Screening:
         return promises
 
     def _first_fit(self, one: Promise, tests: _Tests) -> FirstFit:
-        """A candidate fitted to a part of the data, from its best starting points."""
+        """A candidate fitted to a part of the data, from the starting point that lowers the squares most as it is."""
         test = tests.of(one.candidate)
-        starts = [test.model.with_effect(start) for start in one.starts[:FIRST_STARTS]]
-        tried = [self._fitted_from(start, one.candidate, test, TRIAL_STEPS) for start in starts]
-        best = min(tried, key=lambda found: found.mean)
-        best = self._fitted_from(best.model, one.candidate, test, FIRST_STEPS)
-        return FirstFit(share_left(best, test), one.candidate, best)
-
-    def _fitted_from(self, start: Model, candidate: Candidate, test: ScoreTest, steps: int) -> Fit:
-        return fit(
+        found = fit(
             test.views,
-            start,
-            free_with(test.free, test.model, candidate, self.scales),
-            max_steps=steps,
+            max((test.model.with_effect(effect) for effect in one.starts), key=test.decrease),
+            free_with(test.free, test.model, one.candidate, self.scales),
+            max_steps=FIRST_STEPS,
             tolerance=FIRST_TOLERANCE,
             frozen=len(test.free),
             with_equations=False,
             initial_derivatives=test.initial_derivatives,
         )
+        return FirstFit(share_left(found, test), one.candidate, found)
 
     def _final_fits(self, first_fits: Iterable[FirstFit], parent: Hypothesis) -> Making:
         """Candidates fitted to all fitted recordings, and read on unseen blocks, but for those without their signature."""

@@ -159,12 +159,14 @@ class Search:
 
     def _remembering(self, screening: Screening) -> set[str]:
         """Kinds whose effects go on from recording to recording: they predict something else in a session."""
-        kinds = {one.name for one in screening.candidates(self.base.fit.model)} - set(self.library)
-        for one in self._longer[self.base.key]:
-            alone = [view.residual(one.fit.model) for view in self.under("")[0].views.fitted]
-            joined = [view.residual(one.fit.model) for view in screening.views.fitted]
+        base, plain = self.base.fit.model, self.under("")[0]
+        kinds = {one.name for one in screening.candidates(base)} - set(self.library)
+        for effect in screening.alone.values():
+            alone, joined = (
+                [view.residual(base.with_effect(effect)) for view in one.views.fitted] for one in (plain, screening)
+            )
             if any(np.abs(a - b).max() > LEAST_REMEMBERED for a, b in zip(alone, joined, strict=True)):
-                kinds.add(one.names[-1])
+                kinds.add(effect.name)
         return kinds
 
     def _extend(self, size: int) -> Steps:

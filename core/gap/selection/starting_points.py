@@ -14,9 +14,6 @@ from .view_set import ViewSet
 
 VISIBLE_STEPS_PROMISE = 0.5
 """Promise of quantization whose steps are seen in the readings, as a share of the squares: it is always fitted."""
-LONGEST_STEP = 20.0
-"""A starting point is moved along a candidate's strength by at most this factor."""
-SHORTEST_STEP = 0.01
 SMALL_SHIFT, SMALL_TURN = 0.02, 2e-3
 """Test steps of displaced texels: a share of the pitch, and an angle in rad."""
 LARGEST_SHIFT, LARGEST_TURN = 0.5, 0.1
@@ -54,44 +51,20 @@ def starting_points(
     if candidate.form.placement is not None:
         starts = [_displacement_start(candidate, score_test, scales), *_large_displacements(candidate, score_test, scales)]
         return sorted(starts, key=lambda entry: -entry[0])
-    starts = _scaled_starts(candidate, score_test, scales, count)
-    return _by_decrease(starts, score_test) if candidate.form.coupling is not None else starts
-
-
-def _by_decrease(starts: list[tuple[float, Effect]], score_test: ScoreTest) -> list[tuple[float, Effect]]:
-    """Starting points in the order of what they decrease as they are; promises stay in their own order."""
-    effects = sorted((effect for _, effect in starts), key=lambda one: -score_test.decrease(score_test.model.with_effect(one)))
-    return [(promise, effect) for (promise, _), effect in zip(starts, effects, strict=True)]
+    return _scaled_starts(candidate, score_test, scales, count)
 
 
 def _scaled_starts(candidate: Candidate, score_test: ScoreTest, scales: Scales, count: int) -> list[tuple[float, Effect]]:
-    """Points of the search ranges, each scaled along the candidate's strength to the best length of its score test."""
-    model, gain = score_test.model, abs(score_test.model.parameters.gain)
-    strength, inverse, tried = candidate.strength_parameter(), candidate.inverse_strength_parameter(), []
+    """Points of the search ranges, as they are and scaled along the candidate's strength to the best length of a score test.
+
+    The score test is linear and an effect is not: how far loads spread does nothing near a width of zero.
+    """
+    model, gain, tried = score_test.model, abs(score_test.model.parameters.gain), []
     for values in candidate.starting_values(scales, gain, count):
         effect = candidate.effect(values, scales.texels, gain)
         promise, length = score_test.score(model.with_effect(effect))
-        if strength is not None:
-            parameter = next(q.scaled(gain) for q in candidate.form.parameters if q.name == strength)
-            if parameter.low >= 0.0 and length <= 0.0:
-                continue
-            longer = values[strength] * np.clip(length, -LONGEST_STEP, LONGEST_STEP)
-            scaled = float(np.clip(longer, parameter.low, parameter.high))
-            other = candidate.effect({**values, strength: scaled}, scales.texels, gain)
-            # How far loads spread is not linear in a width: near zero it does nothing. Take the one that fits better as it is.
-            is_width = candidate.form.coupling is not None and parameter.unit == "m"
-            near = (effect, other) if is_width else (other,)
-            effect = near[0] if len(near) == 1 else max(near, key=lambda one: score_test.decrease(model.with_effect(one)))
-        elif length <= 0.0:
-            continue
-        elif inverse is not None:
-            parameter = next(q.scaled(gain) for q in candidate.form.parameters if q.name == inverse)
-            nearer = values[inverse] / np.clip(length, SHORTEST_STEP, LONGEST_STEP)
-            scaled = float(np.clip(nearer, parameter.low, parameter.high))
-            other = candidate.effect({**values, inverse: scaled}, scales.texels, gain)
-            # The score test is linear and the inverse strength is not: take the one that fits better as it is.
-            effect = max((effect, other), key=lambda one: score_test.decrease(model.with_effect(one)))
-        tried.append((promise, effect))
+        if length > 0.0 or candidate.is_signed:
+            tried += [(promise, effect), (promise, candidate.scaled(effect, length, gain))]
     return sorted(tried, key=lambda entry: -entry[0])
 
 
