@@ -88,6 +88,14 @@ class ScoreTest:
         """Sum of squares of the residual."""
         return sum(float(np.vdot(r, r)) for r in self.residual)
 
+    @cached_property
+    def least(self) -> float:
+        """Sum of squares that the free parameters leave at best, to first order.
+
+        Views are a part of the data, and the fit was to all of them: effects are compared with what refitting leaves here.
+        """
+        return self.total - float(self.along @ np.linalg.solve(self.gram, self.along))
+
     def score(self, model: Model) -> tuple[float, float]:
         """Test the change from the fit's model to another one.
 
@@ -149,8 +157,7 @@ class ScoreTest:
             gram += x @ x.T
             along += x @ r.ravel()
         best = np.linalg.solve(ridged(gram), along)
-        decrease = float(along @ best) - float(self.along @ np.linalg.solve(self.gram, self.along))
-        return decrease, best[size:]
+        return self.least - (self.total - float(along @ best)), best[size:]
 
     def decrease(self, model: Model) -> float:
         """Return by how much another model lowers the squares as it is; minus infinity if it predicts no numbers."""

@@ -242,9 +242,10 @@ def free_with(free: Sequence[FreeParameter], model: Model, candidate: Candidate,
 
 
 def share_left(found: Fit, test: ScoreTest) -> float:
-    """Return which share of the gap of a test's model a fit leaves there."""
+    """Return which share a fit leaves of the gap that the parameters of a test's model leave at best."""
     count = float(found.count.sum())
-    return max(float(found.sse.sum()) - count, 0.0) / max(test.total - count, 0.01 * count)
+    closed = (test.least - float(found.sse.sum())) / max(test.least - count, 0.01 * count)
+    return max(1.0 - closed, 0.0)
 
 
 def _is_textbook(one: Promise) -> tuple[bool, bool]:
