@@ -55,9 +55,19 @@ class Promise:
 
 @dataclass(frozen=True)
 class FirstFit:
-    """A candidate fitted to a part of the recordings; `left` is the share of the gap there that it leaves."""
+    """A candidate fitted to a part of the recordings.
+
+    Attributes
+    ----------
+    left : float
+        Share that it leaves of the parent's gap there.
+    rank : float
+        The same share of what the parent's parameters leave there if they are fitted again. The candidate that leaves least
+        comes first: parts differ between kinds, and on the pressed texels alone the base model may fit better.
+    """
 
     left: float
+    rank: float
     candidate: Candidate
     fit: Fit
 
@@ -131,7 +141,7 @@ class Screening:
                 yield f"fitting {one.candidate.name}"
                 first_fits.append(self._first_fit(one, tests))
         best_fits: dict[str, FirstFit] = {}
-        for fitted in sorted((one for one in first_fits if one.left <= most_left), key=lambda one: one.left):
+        for fitted in sorted((one for one in first_fits if one.left <= most_left), key=lambda one: one.rank):
             best_fits.setdefault(fitted.candidate.name, fitted)
             if is_first:
                 self.alone.setdefault(fitted.candidate.label, fitted.fit.model.effects[-1])
@@ -204,7 +214,8 @@ class Screening:
             with_equations=False,
             initial_derivatives=test.initial_derivatives,
         )
-        return FirstFit(share_left(found, test), one.candidate, found)
+        left, rank = (share_left(found, before) for before in (test.total, test.least))
+        return FirstFit(left, rank, one.candidate, found)
 
     def _final_fits(self, first_fits: Iterable[FirstFit], parent: Hypothesis) -> Making:
         """Candidates fitted to all fitted recordings, and read on unseen blocks, but for those without their signature."""
@@ -241,11 +252,10 @@ def free_with(free: Sequence[FreeParameter], model: Model, candidate: Candidate,
     return (*free, *candidate.free_parameters(len(model.effects), scales, abs(model.parameters.gain)))
 
 
-def share_left(found: Fit, test: ScoreTest) -> float:
-    """Return which share a fit leaves of the gap that the parameters of a test's model leave at best."""
+def share_left(found: Fit, before: float) -> float:
+    """Return which share a fit leaves of a sum of squares, both beyond the noise's."""
     count = float(found.count.sum())
-    closed = (test.least - float(found.sse.sum())) / max(test.least - count, 0.01 * count)
-    return max(1.0 - closed, 0.0)
+    return 1.0 - (before - float(found.sse.sum())) / max(before - count, 0.01 * count)
 
 
 def _is_textbook(one: Promise) -> tuple[bool, bool]:
