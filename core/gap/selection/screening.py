@@ -9,7 +9,7 @@ effects.
 from __future__ import annotations
 
 from collections.abc import Generator, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from ...model.sensor import Effect
 from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
@@ -100,7 +100,6 @@ class Screening:
     scales: Scales
     assumed: str
     alone: dict[str, Effect]
-    promises: dict[object, list[Promise]] = field(default_factory=dict)
 
     def hypothesis(
         self, found: Fit, names: tuple[str, ...], forms: tuple[str, ...], parent: Hypothesis | None = None
@@ -130,14 +129,19 @@ class Screening:
         """
         is_first = not (parent.names or self.assumed)  # an assumption about recordings is like an effect
         tests = _Tests(self.view_set, parent.fit)
-        promises = yield from self._promises(parent, tests, kinds)
-        by_kind: dict[str, list[Promise]] = {}
-        for one in promises:
-            by_kind.setdefault(one.candidate.name, []).append(one)
+        by_kind: dict[str, list[Candidate]] = {}
+        for one in self._candidates_beside(parent):
+            by_kind.setdefault(one.name, []).append(one)
+        screened = []
+        for name, forms in by_kind.items():
+            if kinds is None or name in kinds:
+                yield "screening every effect"
+                free = [one for one in forms if one.form.error is not None]
+                screened.append(self._promises(parent, tests, free or forms))
+        screened = sorted((own for own in screened if own), key=lambda own: -own[0].share)
         first_fits = []
-        for own in list(by_kind.values())[: None if is_first else TRIED_KINDS]:
-            best = min(own, key=_is_textbook)
-            for one in own if is_first and best.candidate.form.error is None else [best]:
+        for own in screened[: None if is_first else TRIED_KINDS]:
+            for one in own if is_first and own[0].candidate.form.error is None else own[:1]:
                 yield f"fitting {one.candidate.name}"
                 first_fits.append(self._first_fit(one, tests))
         best_fits: dict[str, FirstFit] = {}
@@ -157,8 +161,8 @@ class Screening:
         Forms that leave more than `most_left` of the gap in a part of the data are left out, as in :meth:`with_one_more`.
         """
         tests = _Tests(self.view_set, parent.fit)
-        own = [one for one in self.promises[parent.key] if one.candidate.name == name and one.candidate.label not in done]
-        fitted = [self._first_fit(one, tests) for one in own]
+        own = [one for one in self._candidates_beside(parent) if one.name == name and one.label not in done]
+        fitted = [self._first_fit(one, tests) for one in self._promises(parent, tests, own)]
         return (yield from self._final_fits([one for one in fitted if one.left <= most_left], parent))
 
     def without(self, one: Hypothesis, index: int) -> Hypothesis:
@@ -179,40 +183,38 @@ class Screening:
         """Return whether the recordings hold what the library asks of an effect, the last one of a fit."""
         return is_plausible(FittedCandidate(candidate, found), replace(self.view_set, whole=self.views.fitted))
 
-    def _promises(self, parent: Hypothesis, tests: _Tests, kinds: set[str] | None) -> Generator[str, None, list[Promise]]:
-        """What every form could explain on top of a model, with starting points; best first."""
-        model, promises = parent.fit.model, []
-        for one in self.candidates(model):
-            if (
-                one.name in parent.names
-                or is_free_already(one, parent.fit.free)
-                or (kinds is not None and one.name not in kinds)
-            ):
-                continue
-            yield "screening every effect"
+    def _candidates_beside(self, parent: Hypothesis) -> list[Candidate]:
+        """Candidates of the kinds that a model does not have."""
+        every = self.candidates(parent.fit.model)
+        return [one for one in every if one.name not in parent.names and not is_free_already(one, parent.fit.free)]
+
+    def _promises(self, parent: Hypothesis, tests: _Tests, own: Iterable[Candidate]) -> list[Promise]:
+        """What forms could explain on top of a model, with starting points; best first, without numbers of texels first."""
+        promises = []
+        for one in own:
             test = tests.of(one)
             starts = starting_points(one, test, self.view_set, self.scales, LATER_STARTS if parent.names else START_COUNT)
             if one.label in self.alone:
                 effect = self.alone[one.label]
-                starts = sorted([*starts, (test.score(model.with_effect(effect))[0], effect)], key=lambda entry: -entry[0])
+                promise, _ = test.score(test.model.with_effect(effect))
+                starts = sorted([*starts, (promise, effect)], key=lambda entry: -entry[0])
             if starts and starts[0][0] > 0:
                 promises.append(Promise(starts[0][0] / max(test.total, 1e-300), one, [effect for _, effect in starts]))
-        promises.sort(key=lambda one: -one.share)
-        self.promises[parent.key] = promises
-        return promises
+        return sorted(promises, key=lambda one: (one.candidate.has_texel_parameters, -one.share))
 
     def _first_fit(self, one: Promise, tests: _Tests) -> FirstFit:
         """A candidate fitted to a part of the data, from the starting point that lowers the squares most as it is."""
         test = tests.of(one.candidate)
+        moves_texels = one.candidate.form.placement is not None  # they meet another part of the indenter then
         found = fit(
             test.views,
             max((test.model.with_effect(effect) for effect in one.starts), key=test.decrease),
             free_with(test.free, test.model, one.candidate, self.scales),
             max_steps=FIRST_STEPS,
             tolerance=FIRST_TOLERANCE,
-            frozen=len(test.free),
+            frozen=0 if moves_texels else len(test.free),
             with_equations=False,
-            initial_derivatives=test.initial_derivatives,
+            initial_derivatives=None if moves_texels else test.initial_derivatives,
         )
         left, rank = (share_left(found, before) for before in (test.total, test.least))
         return FirstFit(left, rank, one.candidate, found)
@@ -256,11 +258,6 @@ def share_left(found: Fit, before: float) -> float:
     """Return which share a fit leaves of a sum of squares, both beyond the noise's."""
     count = float(found.count.sum())
     return 1.0 - (before - float(found.sse.sum())) / max(before - count, 0.01 * count)
-
-
-def _is_textbook(one: Promise) -> tuple[bool, bool]:
-    """True unless the form is free to follow any law of its kind; then, true if it has numbers of texels."""
-    return one.candidate.form.error is None, one.candidate.has_texel_parameters
 
 
 def _left(one: Hypothesis) -> float:
