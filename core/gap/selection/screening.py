@@ -130,8 +130,8 @@ class Screening:
         is_first = not (parent.names or self.assumed)  # an assumption about recordings is like an effect
         tests = _Tests(self.view_set, parent.fit)
         by_kind: dict[str, list[Candidate]] = {}
-        for one in self._candidates_beside(parent):
-            by_kind.setdefault(one.name, []).append(one)
+        for candidate in self._candidates_beside(parent):
+            by_kind.setdefault(candidate.name, []).append(candidate)
         screened = []
         for name, forms in by_kind.items():
             if kinds is None or name in kinds:
