@@ -20,8 +20,8 @@ SMALL_SHIFT, SMALL_TURN = 0.02, 2e-3
 LARGEST_SHIFT, LARGEST_TURN = 0.5, 0.1
 """Bounds of their starting points, in the same units."""
 FARTHEST_SHIFT, TRIED_SHIFTS = 1.2, 40
-"""Range of the search for a large shift along each axis, as a share of the pitch, and how many it tries. The six flat punches
-of three development rigs are found to the same texels with 40, 80 and 160."""
+"""Range of the search for a large shift along each axis, as a share of the pitch, and how many it tries. Of three development
+rigs with flat punches it finds the same shifts with 40, 80 and 160."""
 TEXEL_STEP = 0.01
 """Test step of parameters of single texels, as a share of their scale."""
 
