@@ -26,8 +26,8 @@ from .view_set import ViewSet
 LATER_STARTS = 1
 """Points of the search ranges that are tried on top of an effect, in addition to the form's values alone: for speed."""
 FIRST_STEPS, FIRST_TOLERANCE = 6, 3e-3
-"""Of the fits to a part of the data. With 10 steps and a tolerance of 1e-3, 36 development rigs have the same outcomes and take a
-third more processor time."""
+"""Of the fits to a part of the data. With 10 steps and a tolerance of 1e-3, 36 development rigs have the same outcomes, in a third
+more processor time."""
 FINAL_STEPS, FINAL_TOLERANCE = 10, 3e-4
 """Of the fits to everything."""
 TRIED_KINDS, REFITTED_KINDS = 8, 5
@@ -117,8 +117,8 @@ class Screening:
     def with_one_more(self, parent: Hypothesis, kinds: set[str] | None = None, most_left: float = 1.0) -> Making:
         """Return the parent with one effect more, for the kinds that promise most, in one form of each.
 
-        It is the form that is free to follow any law, if the kind has one, so that kinds compete at equal freedom. Alone, kinds
-        without such a form come in the best of all their forms, and the best kinds in all their forms.
+        It is the form that is free to follow any law, if the kind has one that promises anything, so that kinds compete at
+        equal freedom. Alone, other kinds come in the best of all their forms, and the best kinds in all their forms.
 
         Parameters
         ----------
@@ -137,8 +137,8 @@ class Screening:
         for name, forms in by_kind.items():
             if kinds is None or name in kinds:
                 yield "screening every effect"
-                free = [one for one in forms if one.form.error is not None]
-                screened.append(self._promises(parent, tests, free or forms))
+                free, textbook = ([one for one in forms if (one.form.error is None) == known] for known in (False, True))
+                screened.append(self._promises(parent, tests, free) or self._promises(parent, tests, textbook))
         screened = sorted((own for own in screened if own), key=lambda own: -own[0].share)
         first_fits = []
         for own in screened[: None if is_first else TRIED_KINDS]:

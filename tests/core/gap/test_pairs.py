@@ -41,6 +41,6 @@ def test_a_second_effect_is_dropped_if_a_third_does_its_work(tmp_path):
 
 @pytest.mark.long("a whole diagnosis of two hidden effects")
 def test_a_kind_that_leads_clearly_is_named_although_a_number_is_at_its_bound(tmp_path):
-    sure, verdict, found = named(47004, tmp_path)
-    assert sure == {"drift", "stribeck"} == set(cases.answer_of("two", 47004)) and verdict == "explained"
+    sure, _, found = named(47004, tmp_path)
+    assert sure == {"drift", "stribeck"} == set(cases.answer_of("two", 47004))
     assert found["stribeck"].unsettled == ("rise is at its bound of 4",)
