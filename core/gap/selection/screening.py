@@ -26,8 +26,8 @@ from .view_set import ViewSet
 LATER_STARTS = 1
 """Points of the search ranges that are tried on top of an effect, in addition to the form's values alone: for speed."""
 FIRST_STEPS, FIRST_TOLERANCE = 10, 1e-3
-"""Of the fits to a part of the data. With 6 steps and 3e-3 they take a quarter less processor time, and kinds that explain as much
-are left out before they are fitted to everything: crosstalk was sure in three of 74 rigs where load spreading does as well."""
+"""Of the fits to a part of the data. With 6 steps and 3e-3 they take a quarter less processor time, and rivals are left out
+before they are fitted to everything: in three of 74 rigs crosstalk was sure where load spreading explains as much."""
 FINAL_STEPS, FINAL_TOLERANCE = 10, 3e-4
 """Of the fits to everything."""
 TRIED_KINDS, REFITTED_KINDS = 8, 5
