@@ -6,15 +6,20 @@ from dataclasses import replace
 import gap_cases as cases
 import numpy as np
 import pytest
+import trimesh
 
 from palpate.core.effects.engine.registry import effect, form_of, kind_of
-from palpate.core.gap.fitting.least_squares import FRICTION_LEVEL, free_base_parameters, with_values
+from palpate.core.gap.dataset.rig import Indenter
+from palpate.core.gap.fitting.least_squares import FRICTION_LEVEL, TrialView, fit, free_base_parameters, with_values
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.selection.base_model import friction_parameters_to_search
-from palpate.core.gap.selection.candidates import Candidate
+from palpate.core.gap.selection.candidates import Candidate, scales_of
 from palpate.core.gap.selection.direct_estimates import companding_starts, few_levels
 from palpate.core.gap.selection.quantities import friction_kinds
+from palpate.core.gap.selection.rao_score import ScoreTest
+from palpate.core.gap.selection.starting_points import starting_points
 from palpate.core.gap.selection.view_set import view_set_of
+from palpate.core.geometry.mesh import checked_mesh
 from palpate.core.model.sensor_parameters import SensorParameters
 
 
@@ -70,3 +75,34 @@ def test_friction_is_looked_for_where_forces_are(beside):
     seen = views.quick(Candidate(creep, creep.forms[0]), model)
     assert seen is (views.few_samples if beside else views.few_texels)
     assert not any(view.with_forces for view in seen)
+
+
+def test_a_large_shift_under_a_flat_punch_is_found():
+    """A shift changes nothing until an edge passes a texel, so that no derivative points to it."""
+    half, shift = np.array([0.0062, 0.0081, 0.01]), np.array([0.0021, -0.0027])
+    solid = trimesh.creation.box(2.0 * half)
+    punch = checked_mesh(solid.vertices, solid.faces, "punch")[0]
+    plain = cases.rig(trials=4, seconds=1.5)
+    rig = replace(plain, indenter=Indenter(punch, edges=tuple(2.0 * half)))
+    trials = []
+    for trial in rig.trials:
+        level = trial.position[:, 2] - cases.RADIUS  # of the ball's lowest point
+        position = np.column_stack([trial.position[:, :2], level + half[2]])
+        apart = np.abs(rig.texels.position[:, :2] + shift - trial.position[0, :2])
+        reading = 80.0 * np.maximum(-level, 0.0)[:, None] * (apart < half[:2]).all(axis=1)
+        trials.append(replace(trial, position=position, reading=reading))
+    rig = replace(rig, trials=tuple(trials))
+    views = [TrialView(Predictor(trial, rig), noise=(1e-3, 1.0)) for trial in rig.trials]
+    base = Model(SensorParameters(k=80.0, cn=0.0))
+    candidate = Candidate(kind_of("misalignment"), form_of("misalignment", "shift"))
+    scales = scales_of([view.predictor for view in views], base)
+    test = ScoreTest(views, fit(views, base, free_base_parameters(base.parameters, ("k",), 1.0)))
+    _, best = starting_points(candidate, test, None, scales)[0]
+    left, whole = (
+        sum(
+            float(((view.predictor.predict(model).reading - trial.reading) ** 2).sum())
+            for view, trial in zip(views, trials, strict=True)
+        )
+        for model in (base.with_effect(best), base)
+    )
+    assert left < 0.05 * whole
