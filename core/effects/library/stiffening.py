@@ -86,7 +86,7 @@ KIND = Kind(
             "Gibson and Ashby, Cellular Solids (1997), chapter 5: densification",
             (
                 Parameter("depth", "m", 0.01, 2e-4, 0.1, "Depth L at which the cells are closed.", log=True),
-                Parameter("exponent", "1", 2.0, 0.5, 8.0, "Exponent p of the densification."),
+                Parameter("exponent", "1", 2.0, 0.1, 8.0, "Exponent p of the densification."),
             ),
             neutral={"depth": math.inf},
             law=foam,
