@@ -20,7 +20,7 @@ from .candidates import DIRECTLY_ESTIMATED, START_COUNT, Candidate, FittedCandid
 from .plausibility import is_plausible
 from .rao_score import ScoreTest
 from .score import OWN_NUMBERS, Hypothesis
-from .starting_points import starting_points
+from .starting_points import is_large_shift, starting_points
 from .view_set import ViewSet
 
 LATER_STARTS = 1
@@ -206,16 +206,17 @@ class Screening:
     def _first_fit(self, one: Promise, tests: _Tests) -> FirstFit:
         """A candidate fitted to a part of the data, from the starting point that lowers the squares most as it is."""
         test = tests.of(one.candidate)
-        moves_texels = one.candidate.form.placement is not None  # they meet another part of the indenter then
+        start = max((test.model.with_effect(effect) for effect in one.starts), key=test.decrease)
+        is_far = is_large_shift(start.effects[-1], self.scales)  # texels meet another part of the indenter then
         found = fit(
             test.views,
-            max((test.model.with_effect(effect) for effect in one.starts), key=test.decrease),
+            start,
             free_with(test.free, test.model, one.candidate, self.scales),
             max_steps=FIRST_STEPS,
             tolerance=FIRST_TOLERANCE,
-            frozen=0 if moves_texels else len(test.free),
+            frozen=0 if is_far else len(test.free),
             with_equations=False,
-            initial_derivatives=None if moves_texels else test.initial_derivatives,
+            initial_derivatives=None if is_far else test.initial_derivatives,
         )
         left, rank = (share_left(found, before) for before in (test.total, test.least))
         return FirstFit(left, rank, one.candidate, found)

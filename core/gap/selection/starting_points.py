@@ -6,7 +6,8 @@ from __future__ import annotations
 import numpy as np
 from scipy import optimize
 
-from ...effects.engine.specification import SILENT_TEXELS, STEPS
+from ...effects.engine.registry import form_of
+from ...effects.engine.specification import SILENT_TEXELS, STEPS, scalar
 from ...model.sensor import Effect
 from .candidates import START_COUNT, Candidate, Scales
 from .direct_estimates import few_levels, quantization_starts, unresponsive_texels
@@ -108,6 +109,16 @@ def _displacement_start(candidate: Candidate, score_test: ScoreTest, scales: Sca
     lengths = [float(np.clip(b * s, -m, m)) for b, s, m in zip(best, steps, limits, strict=True)]
     values = {q.name: length for q, length in zip(parameters, lengths, strict=True)}
     return promise, candidate.effect(values, scales.texels, gain)
+
+
+def is_large_shift(effect: Effect, scales: Scales) -> bool:
+    """Return whether an effect moves the texels farther than a small displacement does."""
+    if form_of(effect.name, effect.form).placement is None:
+        return False
+    return (
+        max(abs(scalar(effect.values, name)) for name in ("x", "y", "z") if name in effect.values)
+        > LARGEST_SHIFT * scales.pitch
+    )
 
 
 def _large_displacement(candidate: Candidate, score_test: ScoreTest, scales: Scales) -> list[tuple[float, Effect]]:
