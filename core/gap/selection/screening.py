@@ -137,8 +137,9 @@ class Screening:
         for name, forms in by_kind.items():
             if kinds is None or name in kinds:
                 yield "screening every effect"
-                free, textbook = ([one for one in forms if (one.form.error is None) == known] for known in (False, True))
-                screened.append(self._promises(parent, tests, free) or self._promises(parent, tests, textbook))
+                free = [one for one in forms if one.form.error is not None]
+                others = [one for one in forms if one.form.error is None]
+                screened.append(self._promises(parent, tests, free) or self._promises(parent, tests, others))
         screened = sorted((own for own in screened if own), key=lambda own: -own[0].share)
         first_fits = []
         for own in screened[: None if is_first else TRIED_KINDS]:
