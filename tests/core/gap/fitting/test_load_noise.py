@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Loads that weights put on in steps have no noise, and measured loads have theirs: two families of simulated loads.
 
-`LEAST_TREMBLING` was set on the first family and is judged on the second one, which has other shapes, rates and noise.
+`LEAST_NOISY_SHARE` was set on the first family and is judged on the second one, which has other shapes, rates and noise.
 """
 
 import numpy as np
 import pytest
 
-from palpate.core.gap.fitting.noise_floor import LEAST_TREMBLING, PRESSED_SHARE, _load_noise
+from palpate.core.gap.fitting.noise_floor import LEAST_NOISY_SHARE, PRESSED_SHARE, _load_noise
 
 LOADS = 60
 
@@ -58,7 +58,7 @@ def measured(rng, load, noise):
     return (np.round(values / step) * step if step else values), np.hypot(deviation, step / np.sqrt(12.0))
 
 
-def trembling(load):
+def noisy_share(load):
     second = np.diff(load, 2)
     on = load[1:-1] > PRESSED_SHARE * load.max()
     return np.count_nonzero(second[on]) / on.sum()
@@ -66,9 +66,9 @@ def trembling(load):
 
 def test_the_share_was_set_between_weights_and_measured_loads():
     rng = np.random.default_rng(1)
-    most = max(trembling(weights(rng)) for _ in range(LOADS))
-    least = min(trembling(pressed(rng)[0]) for _ in range(LOADS))
-    assert most < 0.8 * LEAST_TREMBLING and least > 1.25 * LEAST_TREMBLING
+    most = max(noisy_share(weights(rng)) for _ in range(LOADS))
+    least = min(noisy_share(pressed(rng)[0]) for _ in range(LOADS))
+    assert most < 0.8 * LEAST_NOISY_SHARE and least > 1.25 * LEAST_NOISY_SHARE
 
 
 @pytest.mark.parametrize("family", [weights, staircases])
