@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from types import ModuleType
 from xml.etree import ElementTree
 
 import numpy as np
@@ -56,25 +55,6 @@ def require_sensor_size(points: np.ndarray, name: str, what: str = "sensor") -> 
     possible = [word for word, metres in UNITS.items() if SMALLEST_SENSOR <= span * metres <= LARGEST_SENSOR / 3.0]
     asked = f"are its coordinates in {possible[0]}? Scale it by {UNITS[possible[0]]:g}" if possible else "give metres"
     raise SensorError(f"The {what} '{name}' would be {size}, and lengths are metres: {asked}.")
-
-
-def optional_package(name: str, why: str, package: str | None = None) -> ModuleType:
-    """Return a module, or raise FileError with the command that installs its package.
-
-    Parameters
-    ----------
-    name : str
-        Of the module.
-    why : str
-        What needs it, as a clause.
-    package : str, optional
-        What is installed. Default: the name of the module.
-    """
-    try:
-        return importlib.import_module(name)
-    except ImportError as error:
-        wanted = package or name
-        raise FileError(f"{why}, and the package {wanted} is missing: pip install {wanted}.") from error
 
 
 DIGITS = 9

@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from ...errors import FileError
+from ...errors import FileError, imported
 from ...geometry.mesh import TriangleMesh, checked_mesh, vertex_normals
 from ...geometry.point_surface import triangles_between
 from ...geometry.rotations import quaternion_of, rotation_matrices
@@ -24,7 +24,7 @@ from ...io.bake_folder import folder_names
 from ...io.input_files import read_xml
 from ...io.sensor_toml import MOST_TEXELS
 from ..contact_translation import REFERENCE_MASS, MujocoContact, mujoco_contact
-from ..sensor_format import FoundSensor, SensorFormat, Written, add, comment, numbers, optional_package, write_xml
+from ..sensor_format import FoundSensor, SensorFormat, Written, add, comment, numbers, write_xml
 from ..sensor_on_mesh import SensorOnMesh, unmodelled
 
 # Sensors of MJCF files, as MuJoCo compiles them: ``tactile``, ``touch`` on sites, and the plugin ``touch_grid``.
@@ -56,10 +56,10 @@ def read_mjcf(path: str | os.PathLike) -> list[FoundSensor]:
 
     Raises
     ------
-    FileError
+    PalpateError
         The package mujoco is missing, MuJoCo refuses the file, or it has no tactile sensor.
     """
-    mujoco = optional_package("mujoco", f"'{path}' is an MJCF file")
+    mujoco = imported("mujoco", f"'{path}', an MJCF file,")
     root = read_xml(path, "a model")
     if root.find("mujoco") is None:
         raise FileError(f"'{path}' is a part of a model (<mujocoinclude>): give the file that includes it.")

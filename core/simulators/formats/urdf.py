@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from ...errors import FileError, PalpateError
+from ...errors import FileError, PalpateError, imported
 from ...geometry.mesh import TriangleMesh
 from ...geometry.point_surface import triangles_between
 from ...io.bake_folder import folder_names
@@ -24,7 +24,7 @@ from ...io.file_writing import atomic_write
 from ...io.input_files import load_mesh, read_xml
 from ...io.sensor_toml import MOST_TEXELS
 from ..probe_list import write_probe_list
-from ..sensor_format import FoundSensor, SensorFormat, Written, add, comment, numbers, optional_package, write_xml
+from ..sensor_format import FoundSensor, SensorFormat, Written, add, comment, numbers, write_xml
 from ..sensor_on_mesh import SensorOnMesh, identifiers, unmodelled
 
 TEXEL_NAME = re.compile(
@@ -52,10 +52,10 @@ def read_urdf(path: str | os.PathLike) -> list[FoundSensor]:
 
     Raises
     ------
-    FileError
+    PalpateError
         The package yourdfpy is missing, the file is damaged, or nothing in it has three texels.
     """
-    yourdfpy = optional_package("yourdfpy", f"'{path}' is a URDF file")
+    yourdfpy = imported("yourdfpy", f"'{path}', a URDF file,")
     root = _read(path).find("robot")
     assert root is not None
     tactile = [item for item in root.iterfind("sensor") if item.find("tactile") is not None]

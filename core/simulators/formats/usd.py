@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import FileError
+from ...errors import FileError, imported
 from ...geometry.mesh import TriangleMesh
 from ...geometry.point_surface import triangles_between
 from ...geometry.rotations import quaternion_of
@@ -20,7 +20,7 @@ from ...io.file_writing import atomic_write
 from ...io.input_files import require_regular
 from ...io.sensor_toml import MOST_TEXELS
 from ...model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters, stated_parameters
-from ..sensor_format import FoundSensor, SensorFormat, Written, optional_package
+from ..sensor_format import FoundSensor, SensorFormat, Written
 from ..sensor_on_mesh import SensorOnMesh, identifiers, texel_arrays, unmodelled
 
 OWN = "palpate:"
@@ -39,10 +39,10 @@ def read_usd(path: str | os.PathLike) -> list[FoundSensor]:
 
     Raises
     ------
-    FileError
+    PalpateError
         The package usd-core is missing, USD refuses the file, or it has no such points.
     """
-    optional_package("pxr", f"'{path}' is a USD file", "usd-core")
+    imported("pxr", f"'{path}', a USD file,", "run 'pip install usd-core'")
     from pxr import Tf, Usd, UsdGeom
 
     require_regular(path)

@@ -330,7 +330,7 @@ def test_a_missing_package_is_one_sentence(tmp_path, monkeypatch):
 
     for name, text in (("mujoco", GRID.format(config=CONFIG)), ("yourdfpy", ROBOT.format(joints=JOINTS))):
         monkeypatch.setitem(sys.modules, name, None)
-        with pytest.raises(FileError, match=f"the package {name} is missing: pip install {name}"):
+        with pytest.raises(PalpateError, match=f"needs the package {name}, which is not installed: run 'pip install {name}'"):
             read(tmp_path, text)
 
 

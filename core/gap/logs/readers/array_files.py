@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ....errors import FileError
+from ....errors import FileError, imported
 from ....io.input_files import open_regular
 from ..log_table import FEWEST_ROWS, LARGEST_FILE, LogFile, LogTable, cleaned, require_size
 from .damaged_file import damage_said
@@ -100,10 +100,7 @@ def _members(name: str, value: Any) -> Iterator[tuple[str, tuple[np.ndarray, str
 
 def read_hdf5(path: Path, kind: str = "HDF5") -> LogFile:
     """Read an HDF5 file, or a MAT file of version 7.3, which is one."""
-    try:
-        import h5py
-    except ImportError as error:
-        raise FileError(f"'{path.name}' needs the package h5py: install it with 'pip install h5py'.") from error
+    h5py = imported("h5py", f"'{path.name}'")
     arrays: Arrays = {}
     notes, total = [], 0
     with open_regular(path) as plain, ExitStack() as stack:

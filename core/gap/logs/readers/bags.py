@@ -9,7 +9,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
-from ....errors import FileError
+from ....errors import FileError, imported
 from ....io.input_files import open_regular, require_regular
 from ..log_table import LARGEST_FILE, LogFile, LogTable
 from .damaged_file import damage_said, read_by
@@ -19,19 +19,16 @@ LARGEST_RECORD = 256 * 2**20
 """Bytes of a record of the file, and of a chunk when it is unpacked."""
 MOST_FILES = 1000
 """Files in the folder of a bag."""
+INSTALL = "run 'pip install mcap rosbags'"
 Decoder = Callable[[bytes], Any]
 
 
 def read_mcap(path: Path) -> LogFile:
     """Read an MCAP file."""
-    try:
-        import mcap.exceptions
-        from mcap import stream_reader
-    except ImportError as error:
-        raise FileError(f"'{path.name}' needs the package mcap: install it with 'pip install mcap rosbags'.") from error
+    exceptions, stream_reader = (imported(f"mcap.{one}", f"'{path.name}'", INSTALL) for one in ("exceptions", "stream_reader"))
     topics: dict[str, TopicColumns] = {}
     left_out: dict[str, str] = {}
-    known = (mcap.exceptions.EndOfFile, stream_reader.CRCValidationError)
+    known = (exceptions.EndOfFile, stream_reader.CRCValidationError)
     try:
         with open_regular(path) as file:
             for topic, kind, time, content, decode in _messages(file, path, known):
@@ -41,7 +38,7 @@ def read_mcap(path: Path) -> LogFile:
                 with damage_said(path, "MCAP"):
                     message = decode(content)
                 topics.setdefault(topic, TopicColumns(topic, path)).add(message, time)
-    except mcap.exceptions.EndOfFile as error:
+    except exceptions.EndOfFile as error:
         raise FileError(f"'{path.name}' is cut off{_until(topics)}: copy it again, or mend it with `mcap recover`.") from error
     except stream_reader.CRCValidationError as error:
         raise FileError(f"'{path.name}' is damaged (a checksum is wrong): copy it again.") from error
@@ -129,17 +126,14 @@ class _Decoders:
             return json.loads
         if schema is None or schema.encoding not in ("ros2msg", "ros1msg") or is_picture(schema.name):
             return None
-        try:
-            from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-        except ImportError as error:
-            raise FileError("Messages of ROS need the package rosbags: install it with 'pip install rosbags'.") from error
+        typesys = imported("rosbags.typesys", f"'{self._path.name}'", INSTALL)
         if self._store is None:
-            self._store = get_typestore(Stores.EMPTY)
+            self._store = typesys.get_typestore(typesys.Stores.EMPTY)
         store, name = self._store, schema.name
         if name.count("/") == 1:  # as ROS 1 writes it
             name = name.replace("/", "/msg/")
         with damage_said(self._path, "MCAP"):
-            types = get_types_from_msg(schema.data.decode(), name)
+            types = typesys.get_types_from_msg(schema.data.decode(), name)
         with damage_said(self._path, "MCAP"), suppress(KeyError):
             store.register({one: kind for one, kind in types.items() if one not in store.fielddefs})
         if schema.encoding == "ros1msg":
@@ -167,16 +161,14 @@ def read_bag(path: Path) -> LogFile:
 
 
 def _read_with_rosbags(path: Path) -> LogFile:
-    try:
-        from rosbags.highlevel import AnyReader
-        from rosbags.typesys import Stores, get_typestore
-    except ImportError as error:
-        raise FileError(f"'{path.name}' needs the package rosbags: install it with 'pip install rosbags'.") from error
+    highlevel, typesys = (imported(f"rosbags.{one}", f"'{path.name}'", INSTALL) for one in ("highlevel", "typesys"))
     topics: dict[str, TopicColumns] = {}
     left_out: dict[str, str] = {}
     with ExitStack() as stack:
         with damage_said(path, "a bag"):
-            reader = stack.enter_context(AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)))
+            reader = stack.enter_context(
+                highlevel.AnyReader([path], default_typestore=typesys.get_typestore(typesys.Stores.ROS2_HUMBLE))
+            )
         known = [one for one in reader.connections if not is_picture(one.msgtype) and one.msgtype in reader.typestore.fielddefs]
         left_out |= {one.topic: one.msgtype for one in reader.connections if one not in known}
         for connection, time, content in read_by(reader.messages(connections=known), path, "a bag") if known else ():
