@@ -121,12 +121,9 @@ def frictionless_nrmse(result: Diagnosis) -> dict[str, float | None] | None:
     """
     if not any(p.trial.force is not None and p.stimulus.slide_speed.any() for p in result.predictors):
         return None
-    return {use: nrmse(result.of(use), frictionless(result.base.model), result.full) for use in USES}
-
-
-def frictionless(model: Model) -> Model:
-    """Return the model without the base model's friction."""
-    return replace(model, parameters=replace(model.parameters, mus=0.0, mud=0.0, ct=0.0))
+    base = result.base.model
+    frictionless = replace(base, parameters=replace(base.parameters, mus=0.0, mud=0.0, ct=0.0))
+    return {use: nrmse(result.of(use), frictionless, result.full) for use in USES}
 
 
 def noise_floor_nrmse(result: Diagnosis) -> float:
@@ -153,8 +150,6 @@ def error_location(result: Diagnosis, model: Model) -> list[dict[str, Any]]:
     by_phase, by_range, by_texel = np.zeros(len(PHASES)), np.zeros(RANGE_PARTS + 1), np.zeros(n)
     for predictor in result.of("fit"):
         square = squared_errors(predictor, model, result)
-        if square is None:
-            continue
         phase = phase_indices(predictor.stimulus)
         part = np.ceil(relative_load(predictor.stimulus) * RANGE_PARTS).astype(int).clip(0, RANGE_PARTS)
         by_phase += np.bincount(phase.ravel(), square.ravel(), len(PHASES))
@@ -175,19 +170,18 @@ def error_location(result: Diagnosis, model: Model) -> list[dict[str, Any]]:
     return entries
 
 
-def squared_errors(predictor: Predictor, model: Model, result: Diagnosis) -> np.ndarray | None:
+def squared_errors(predictor: Predictor, model: Model, result: Diagnosis) -> np.ndarray:
     """Return the squared error of each texel at each sample, (T, n), as a share of the squared range.
 
-    Without readings it is that of the net force, divided equally among the texels; None without either.
+    Without readings it is that of the net force, divided equally among the texels.
     """
     trial, predicted = predictor.trial, predictor.predict(model)
     n = len(result.rig.texels)
     if trial.reading is not None:
         return np.nan_to_num((trial.reading - predicted.reading) / result.full[0]) ** 2
-    if trial.force is not None and predicted.force is not None:
-        error = np.nan_to_num((trial.force - predicted.force) / result.full[1]) ** 2
-        return np.tile(error.sum(axis=1, keepdims=True) / n, (1, n))
-    return None
+    assert trial.force is not None and predicted.force is not None
+    error = np.nan_to_num((trial.force - predicted.force) / result.full[1]) ** 2
+    return np.tile(error.sum(axis=1, keepdims=True) / n, (1, n))
 
 
 def rms_by_texel(result: Diagnosis, model: Model, use: str = "fit") -> np.ndarray:
@@ -195,8 +189,7 @@ def rms_by_texel(result: Diagnosis, model: Model, use: str = "fit") -> np.ndarra
     total, count = np.zeros(len(result.rig.texels)), 0
     for predictor in result.of(use):
         square = squared_errors(predictor, model, result)
-        if square is not None:
-            total, count = total + square.sum(axis=0), count + len(square)
+        total, count = total + square.sum(axis=0), count + len(square)
     return np.sqrt(total / max(count, 1))
 
 

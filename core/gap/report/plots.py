@@ -19,7 +19,7 @@ from ...jobs import Job, Progress
 from ..forward.contact_phases import PHASES
 from ..forward.predictor import Model, Predictor
 from ..selection.findings import Diagnosis
-from .comparison import GapErrors, error_location, rms_by_texel
+from .comparison import GapErrors, error_location, rms_by_texel, squared_errors
 from .sentences import said_confidence
 
 if TYPE_CHECKING:
@@ -271,7 +271,7 @@ def phase_bars(result: Diagnosis, errors: GapErrors) -> Figure:
 
 def loops(result: Diagnosis) -> Figure:
     """Reading over depth (or load, or travel) of the texel with the largest error: what an effect's signature looks like."""
-    predictor = max(result.of("fit"), key=lambda p: float(np.nansum(_base_squared_error(p, result))))
+    predictor = max(result.of("fit"), key=lambda p: float(squared_errors(p, result.base.model, result).sum()))
     s, trial = predictor.stimulus, predictor.trial
     name, measured, pick = _worst_channel(result, predictor, s.depth if s.force_share is None else s.force_share)
     if "texel" in name:
@@ -303,15 +303,6 @@ def loops(result: Diagnosis) -> Figure:
     place = {"loc": "lower right", "bbox_to_anchor": (1.02, 0.98), "borderaxespad": 0.2}
     axes.legend(frameon=False, fontsize=8, ncols=3, columnspacing=0.9, handlelength=1.4, handletextpad=0.5, **place)
     return figure
-
-
-def _base_squared_error(predictor: Predictor, result: Diagnosis) -> np.ndarray:
-    """Squared error of the base model in a trial, as a share of the squared range."""
-    predicted = predictor.predict(result.base.model)
-    if predictor.trial.reading is not None:
-        return ((predictor.trial.reading - predicted.reading) / result.full[0]) ** 2
-    assert predictor.trial.force is not None and predicted.force is not None
-    return ((predictor.trial.force - predicted.force) / result.full[1]) ** 2
 
 
 CAPTIONS = {
