@@ -11,7 +11,8 @@ import numpy as np
 
 from ..core.gap.calibration.friction import FrictionData, fit_friction, friction_over_time, steady_friction
 from ..core.gap.calibration.plots import plot_friction, plot_stiffness
-from ..core.gap.calibration.stiffness import STANDARD_GRAVITY, FoamData, fit_stiffness, texel_stiffness
+from ..core.gap.calibration.stiffness import FoamData, fit_stiffness, texel_stiffness
+from ..core.gap.dataset.column_names import GRAVITY
 from ..core.model.sensor_parameters import SensorParameters
 from ..core.simulators.openrave_file import OpenRaveSensor, openrave_xml, read_openrave
 from .chapter import Chapter, Picture, Row, compare
@@ -35,7 +36,7 @@ def stiffness(folder: Path, progress: Callable) -> Chapter:
     chapter.rows += [
         compare("k of a texel, Eq. 18", "58.5 N/m", 58.392857, k, 1e-6, "N/m", "the print is 0.2 % off its own inputs"),
         compare(
-            "pressure of 304.15 g on 804.25 mm²", "9810 Pa", 3708.7, WEIGHT * STANDARD_GRAVITY / WEIGHT_AREA, 0.1, "Pa",
+            "pressure of 304.15 g on 804.25 mm²", "9810 Pa", 3708.7, WEIGHT * GRAVITY / WEIGHT_AREA, 0.1, "Pa",
             "9810 Pa would need 804 g",
         ),
     ]  # fmt: skip

@@ -10,10 +10,9 @@ import numpy as np
 
 from ...errors import FileError, ParameterError
 from ...io.text_table import read_columns
+from ..dataset.column_names import GRAVITY
 from ..fitting.intervals import Estimate, linear_estimates
 
-STANDARD_GRAVITY = 9.80665
-"""Standard acceleration of gravity, which converts masses to forces, m/s²."""
 AREAS = (1e-12, 1e6)
 """Least and largest area of a sensor or of a weight, m²: beyond it the unit is wrong or numbers overflow."""
 STIFFENS = 0.05
@@ -130,7 +129,7 @@ def read_foam(path: str | os.PathLike, weight_area: float | None = None) -> Foam
             raise FileError(
                 f"'{path}' has a column '{loads[0]}': say on which area it rested (--weight-area), in m², finite and above 0."
             )
-        load = load * (STANDARD_GRAVITY if loads[0] == "mass" else 1.0) / weight_area
+        load = load * (GRAVITY if loads[0] == "mass" else 1.0) / weight_area
     return FoamData(columns["compression"], load)
 
 

@@ -15,12 +15,14 @@ from ...io.csv_table import UNITS
 from ...io.input_files import checked_name
 from ...io.schema import Number, Positive, known_words, read_words, wanted
 
+POSE, TURN, SLIDE = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("slide_x", "slide_y")
+FORCE = ("force_x", "force_y", "force_z")
 QUANTITIES = {
     "time": "s",
-    **dict.fromkeys(("x", "y", "z", "depth", "slide_x", "slide_y"), "m"),
-    **dict.fromkeys(("force", "force_x", "force_y", "force_z"), "N"),
+    **dict.fromkeys((*POSE, "depth", *SLIDE), "m"),
+    **dict.fromkeys(("force", *FORCE), "N"),
     "temperature": "°C",
-    **dict.fromkeys(("qw", "qx", "qy", "qz", "texel"), ""),
+    **dict.fromkeys((*TURN, "texel"), ""),
 }
 """Columns that a rig can name, and the SI unit of each; `texel` stands for all texels."""
 GRAVITY = 9.80665
@@ -211,7 +213,7 @@ def translated(names: Sequence[str], values: np.ndarray, rules: Mapping[str, Col
     found = {}
     for column, (source, rule) in wanted_ones.items():
         if source not in columns:
-            if column in ("force_x", "force_y", "force_z", "slide_x", "slide_y", "temperature"):
+            if column in (*FORCE, *SLIDE, "temperature"):
                 continue  # not every recording has them
             raise FileError(f"'{file.name}' has no column '{source}', which [columns] names for {column}.")
         if column != source and column in columns and column not in taken:

@@ -77,7 +77,7 @@ def read_cover(sensor: Mapping[str, Any], path: Path) -> tuple[Texels, Cover]:
         surface = _surface(size, _pitch(words, size, depth / POINTS_PER_DEPTH, where), where)
         area = float(np.prod(size)) / len(places)
         weights = _load_at_depth(places, surface, depth)
-        return _texels(places, np.full(len(places), area)), Cover(surface, _cut(weights), surface.area / area)
+        return flat_texels(places, np.full(len(places), area)), Cover(surface, _cut(weights), surface.area / area)
     strips = _strips(sensor["strips"], f"strips of '{path.name}'", size)
     narrowest = min(_width(strip) for strip in strips)
     surface = _surface(size, _pitch(words, size, narrowest / POINTS_PER_STRIP, where), where)
@@ -90,7 +90,7 @@ def read_cover(sensor: Mapping[str, Any], path: Path) -> tuple[Texels, Cover]:
     if depth:
         spread = _cut(_load_at_depth(surface.position[:, :2], surface, depth))
         covered = covered @ spread
-    return _texels(centres, areas), Cover(surface, covered / areas.mean(), surface.area / areas.mean())
+    return flat_texels(centres, areas), Cover(surface, covered / areas.mean(), surface.area / areas.mean())
 
 
 def _pitch(words: Mapping[str, Any], size: np.ndarray, otherwise: float, where: str) -> float:
@@ -151,11 +151,11 @@ def _surface(size: np.ndarray, pitch: float, where: str) -> Texels:
     step = size / counts
     row, column = np.divmod(np.arange(rows * columns), columns)
     places = np.stack([column + 0.5, row + 0.5], axis=1) * step - 0.5 * size
-    return _texels(places, np.full(len(places), float(np.prod(step))))
+    return flat_texels(places, np.full(len(places), float(np.prod(step))))
 
 
-def _texels(places: np.ndarray, area: np.ndarray) -> Texels:
-    """Texels in z = 0, normals +z, that form no grid."""
+def flat_texels(places: np.ndarray, area: np.ndarray) -> Texels:
+    """Return texels in z = 0, normals +z, that form no grid, given their places (n, 2) and areas (n,)."""
     n = len(places)
     return Texels(
         vertex=np.arange(n),

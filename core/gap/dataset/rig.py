@@ -27,9 +27,9 @@ from ...model.sensor_parameters import (
     stated_parameters,
     with_dependent_defaults,
 )
-from .column_names import Column, read_column_rules, translated
-from .cover import COVER_WORDS, Cover, read_cover
-from .second_logger import SecondLogger, bridged, joined
+from .column_names import FORCE, POSE, SLIDE, TURN, Column, read_column_rules, translated
+from .cover import COVER_WORDS, Cover, flat_texels, read_cover
+from .second_logger import SecondLogger, bridged, joined, with_steady_signs
 from .trial import (
     FAULT_KINDS,
     FREE,
@@ -46,8 +46,6 @@ from .trial import (
 FORMAT = "palpate-rig/1"
 LOWEST_TEMPERATURE, HIGHEST_TEMPERATURE = -273.15, 2000.0
 """°C: what a sensor can have."""
-POSE, TURN, SLIDE = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("slide_x", "slide_y")
-FORCE = ("force_x", "force_y", "force_z")
 SMALLEST_RESPONSE = 1e-30
 """Responses of a smaller magnitude, in any unit, count as zero."""
 RIG_SENSOR_WORDS = {"name", "contact_height", *COVER_WORDS}
@@ -313,17 +311,10 @@ def grid_texels(rows: int, columns: int, pitch_x: float, pitch_y: float) -> Texe
 
     row, column = np.divmod(np.arange(rows * columns), columns)
     x, y = (column - 0.5 * (columns - 1)) * pitch_x, (row - 0.5 * (rows - 1)) * pitch_y
-    n = rows * columns
     corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     quads = np.stack([corner, corner + 1, corner + columns + 1, corner + columns], axis=1)
-    return Texels(
-        vertex=np.arange(n),
-        position=np.stack([x, y, np.zeros(n)], axis=1),
-        normal=np.tile([0.0, 0.0, 1.0], (n, 1)),
-        tangent=np.tile([1.0, 0.0, 0.0], (n, 1)),
-        area=np.full(n, pitch_x * pitch_y),
-        layout=GridLayout(rows, columns, row, column, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])),
-    )
+    layout = GridLayout(rows, columns, row, column, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))
+    return replace(flat_texels(np.stack([x, y], axis=1), np.full(len(x), pitch_x * pitch_y)), layout=layout)
 
 
 def _mesh(path: Path, name: str) -> tuple[TriangleMesh, list[str]]:
@@ -617,16 +608,14 @@ def _turns(columns: Mapping[str, np.ndarray], file: Path) -> np.ndarray:
     if len(found) < 4:
         lacking = ", ".join(name for name in TURN if name not in columns)
         raise FileError(f"'{file.name}' has no column {lacking}: an orientation needs qw, qx, qy and qz.")
-    turns = np.stack([columns[name] for name in TURN], axis=1)
+    steady = with_steady_signs(columns)
+    turns = np.stack([steady[name] for name in TURN], axis=1)
     length = np.linalg.norm(turns, axis=1)
     (bad,) = np.nonzero(np.abs(length - 1.0) > 0.05)
     if len(bad):
         raise FileError(
             f"Line {bad[0] + 2} of '{file.name}': qw qx qy qz have length {length[bad[0]]:.3g}, a rotation has length 1."
         )
-    for i in range(1, len(turns)):  # of the two quaternions of a rotation take the one near the previous
-        if turns[i] @ turns[i - 1] < 0:
-            turns[i] *= -1.0
     return turns
 
 

@@ -22,6 +22,7 @@ import numpy as np
 
 from ...errors import FileError
 from ...io.schema import wanted
+from .column_names import TURN
 
 # Missing samples of what drove a sensor: which of them can be interpolated.
 #
@@ -118,7 +119,6 @@ def peak_offset(values: np.ndarray, top: int) -> float:
     return float(0.5 * (before - after) / bend) if bend < 0.0 else 0.0
 
 
-TURN = {"qw", "qx", "qy", "qz"}
 LARGEST_SHIFT = 1e10
 """Seconds."""
 
@@ -175,8 +175,8 @@ def joined(
 def with_steady_signs(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Return columns in which ``qw qx qy qz`` do not jump between the two quaternions of a rotation."""
     found = dict(columns)
-    if set(columns) >= TURN:
-        turns = np.stack([columns[name] for name in sorted(TURN)])
+    if set(columns) >= set(TURN):
+        turns = np.stack([columns[name] for name in TURN])
         flips = np.where((turns[:, 1:] * turns[:, :-1]).sum(axis=0) < 0.0, -1.0, 1.0)
         sign = np.concatenate([[1.0], np.cumprod(flips)])
         found |= {name: columns[name] * sign for name in TURN}

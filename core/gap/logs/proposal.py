@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import FileError
-from ..dataset.column_names import PRESSURES, READING_UNITS
+from ..dataset.column_names import FORCE, POSE, PRESSURES, READING_UNITS, TURN
 from .answers import Use
 from .column_behaviour import LEAST_CONTACT, contact_of, correlation, is_force, is_unnamed, is_unordered, missing_code
 from .column_meaning import (
@@ -28,7 +28,6 @@ from .column_meaning import (
 from .guess import UNKNOWN, Evidence, Guess, Proposal
 from .log_table import FEWEST_ROWS, FRAMES, LogFile, LogTable, with_distinct_names
 
-POSE, TURN, FORCE = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("force_x", "force_y", "force_z")
 BEGINNING = 0.05
 """Share of a recording at its beginning whose median counts as the value without load."""
 AT_AN_END, AT_REST, RESTS = 0.05, 0.03, 0.05
