@@ -39,17 +39,19 @@ def _sensor_on_mesh(scene, obj) -> SensorOnMesh:
     depsgraph = participants.depsgraph_of(scene)
     sensor, mesh = sensor_reader.sensor_in_own_frame(scene, obj, depsgraph)
     pose = moved_bodies.body_pose(scene, obj, depsgraph)
-    return SensorOnMesh(sensor, mesh, _carrying_surface(scene, obj, depsgraph), pose[:3], pose[3:])
+    surface = carrying_surface(scene, obj, depsgraph) if obj.palpate.body == "PARENT" else None
+    surface = surface and checked_mesh(surface.vertices, surface.triangles, obj.parent.name)[0]
+    return SensorOnMesh(sensor, mesh, surface, pose[:3], pose[3:])
 
 
-def _carrying_surface(scene, obj, depsgraph) -> TriangleMesh | None:
-    """Return the surface of the object that a sensor is part of, in the sensor's frame, metres; None where it has its own."""
+def carrying_surface(scene, obj, depsgraph) -> TriangleMesh | None:
+    """Return the surface of a sensor's parent in the frame of the sensor's object, metres; None where it has none."""
     carrier = obj.parent
-    if obj.palpate.body != "PARENT" or carrier is None or carrier.type not in participants.OBJECT_TYPES:
+    if carrier is None or carrier.type not in participants.OBJECT_TYPES:
         return None
     arrays = mesh_arrays.target_arrays(carrier, depsgraph)
     location, quaternion, _ = moved_bodies.decompose(obj, moved_bodies.world_matrix(obj, depsgraph))
     matrix = np.linalg.inv(transforms.pose_matrix(location, quaternion)) @ moved_bodies.world_matrix(carrier, depsgraph)
     vertices = (arrays.vertices @ matrix[:3, :3].T + matrix[:3, 3]) * transforms.metres_per_unit(scene)
     triangles = arrays.triangles[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else arrays.triangles
-    return checked_mesh(vertices, triangles, carrier.name)[0]
+    return TriangleMesh(vertices, triangles)

@@ -169,8 +169,7 @@ def _flagged_points(mesh, name: str):
         return None
     values = np.empty(len(mesh.vertices), {"BOOLEAN": bool, "INT": np.int32, "FLOAT": np.float32}[flag.data_type])
     flag.data.foreach_get("value", values)
-    position = _vectors(mesh, POSITION)
-    normal = _vectors(mesh, NORMAL)
+    position, normal = (mesh_arrays.point_vectors(mesh, name) for name in (POSITION, NORMAL))
     notes = [f"'{name}': the kind and the radius of GenTact's sensors were not imported; parameters have their defaults."]
     if position is None:
         position = mesh_arrays.vertices(mesh)
@@ -191,15 +190,6 @@ def _flagged_points(mesh, name: str):
         raise FileError(f"Sensor {int(length.argmin())} of '{name}' has no normal: set the attribute '{NORMAL}'.")
     normal = normal[chosen] / length
     return position[chosen], normal, triangles_between(position[chosen], normal), notes
-
-
-def _vectors(mesh, name: str) -> np.ndarray | None:
-    attribute = mesh.attributes.get(name)
-    if attribute is None or attribute.domain != "POINT" or attribute.data_type != "FLOAT_VECTOR":
-        return None
-    values = np.empty(3 * len(mesh.vertices), np.float32)
-    attribute.data.foreach_get("vector", values)
-    return values.astype(float).reshape(-1, 3)
 
 
 @contextmanager

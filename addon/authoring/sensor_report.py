@@ -10,15 +10,14 @@ import time
 from dataclasses import dataclass, field
 
 import bpy
-import numpy as np
 
 from ...core.errors import PalpateError, SceneError
 from ...core.geometry.mesh import TriangleMesh
 from ...core.geometry.texels import Texels
 from ...core.solver.time_step_adviser import Advice, advise
-from ..scene import mesh_arrays, moved_bodies, participants, scene_fingerprint, scene_reader, sensor_reader
+from ..scene import mesh_arrays, participants, scene_fingerprint, scene_reader, sensor_reader
 from ..session import session_state, transforms
-from . import laid_sensors, problems
+from . import laid_sensors, problems, sensor_exchange
 
 DELAY = 0.2
 """Seconds from a change to the new report, besides three times the duration of the last computation."""
@@ -140,25 +139,13 @@ def _compute(obj, scene) -> Report:
     try:
         notes = mesh_arrays.sensor_arrays(obj, depsgraph)[1]
         sensor, mesh = sensor_reader.sensor_in_own_frame(scene, obj, depsgraph)
-        around = _around(obj, depsgraph, metres) if laid_sensors.is_laid(obj) and obj.parent else None
+        around = sensor_exchange.carrying_surface(scene, obj, depsgraph) if laid_sensors.is_laid(obj) else None
         found = hidden + problems.object_problems(obj, notes)
         found += problems.texel_problems(obj, mesh, sensor.texels, reach, around)
     except PalpateError as error:
         modified = [problems.Problem("MODIFIER", note) for note in notes]  # perhaps why nothing is where it was painted
         return Report(None, reach, metres, None, [problems.problem_of_error(obj, error), *modified], advice, missing)
     return Report(sensor.texels, reach, metres, mesh if around is None else around, found, advice, missing)
-
-
-def _around(obj, depsgraph, metres: float) -> TriangleMesh | None:
-    """Return the surface of a laid sensor's carrier, in the frame of the sensor's own object, metres."""
-    carrier = obj.parent
-    if carrier.type not in participants.OBJECT_TYPES:
-        return None
-    arrays = mesh_arrays.target_arrays(carrier, depsgraph)
-    matrix = transforms.as_array(obj.evaluated_get(depsgraph).matrix_world)
-    linear, offset = moved_bodies.to_body_frame(matrix, np.linalg.inv(matrix) @ transforms.as_array(carrier.matrix_world))
-    triangles = arrays.triangles[:, ::-1] if np.linalg.det(linear) < 0 else arrays.triangles
-    return TriangleMesh((arrays.vertices @ linear.T + offset) * metres, triangles)
 
 
 def _advice(scene, depsgraph) -> tuple[Advice | None, str]:

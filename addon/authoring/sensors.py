@@ -7,7 +7,7 @@ import numpy as np
 
 from ...core.errors import SensorError
 from ..display import baked_scene
-from ..scene import sensor_regions
+from ..scene import mesh_arrays, sensor_regions
 from ..session import transforms
 
 GROUP_NAME = "Palpate Sensor"
@@ -81,10 +81,8 @@ def follow_size(scene, obj) -> str:
     settings = obj.palpate
     if settings.is_property_set("max_penetration") or not obj.is_editable:
         return ""
-    places = np.empty(3 * len(obj.data.vertices), dtype=np.float32)
-    obj.data.vertices.foreach_get("co", places)
     try:
-        chosen = places.reshape(-1, 3)[sensor_regions.region_vertices(obj, len(obj.data.vertices))]
+        chosen = mesh_arrays.positions(obj.data).reshape(-1, 3)[sensor_regions.region_vertices(obj, len(obj.data.vertices))]
     except SensorError:
         return ""  # nothing is painted yet
     scale = np.abs(obj.matrix_world.to_scale()) * transforms.metres_per_unit(scene)

@@ -65,10 +65,7 @@ def unbind(sensor) -> None:
     modifier = sensor.modifiers.get(MODIFIER)
     if modifier is not None:
         sensor.modifiers.remove(modifier)
-    for name in (*CORNER_ATTRIBUTES, WEIGHTS, OFFSET):
-        attribute = sensor.data.attributes.get(name)
-        if attribute is not None:
-            sensor.data.attributes.remove(attribute)
+    mesh_arrays.remove_attributes(sensor.data, (*CORNER_ATTRIBUTES, WEIGHTS, OFFSET))
 
 
 def _surface_input(modifier) -> str:

@@ -113,14 +113,14 @@ def draw() -> None:
         gpu.state.depth_test_set("NONE" if session_state.is_xray(bpy.context.space_data.shading) else "LESS_EQUAL")
         shown = hides_dots(bpy.context.scene, obj, bpy.context.space_data.shading)
         if own.show_texels and not shown:
-            _triangles(drawing, "fine", VALID_COLOR)
+            _draw(drawing, "fine", VALID_COLOR)
         if own.show_normals and not shown:
-            _lines(drawing, "normals", NORMAL_COLOR)
+            _draw(drawing, "normals", NORMAL_COLOR)
         gpu.state.depth_test_set("NONE")  # what follows may be inside the object
         if own.show_texels and not shown:
-            _triangles(drawing, "faulty", FAULTY_COLOR)
+            _draw(drawing, "faulty", FAULTY_COLOR)
         if own.show_reach:
-            _lines(drawing, "reach", REACH_COLOR)
+            _draw(drawing, "reach", REACH_COLOR)
     gpu.state.blend_set("NONE")
 
 
@@ -134,31 +134,23 @@ def hides_dots(scene, obj, shading) -> bool:
     return errors or (readings is not None and obj.name in readings.sensors)
 
 
-def _triangles(drawing: Drawing, name: str, color) -> None:
+def _draw(drawing: Drawing, name: str, color) -> None:
+    """Draw the triangles or lines of a name."""
     import gpu
     from gpu_extras.batch import batch_for_shader
 
-    if not len(drawing.spots[name]):
+    is_line = name in drawing.lines
+    places = drawing.lines[name] if is_line else drawing.spots[name]
+    if not len(places):
         return
-    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR" if is_line else "UNIFORM_COLOR")
     if name not in drawing.batches:
-        drawing.batches[name] = batch_for_shader(shader, "TRIS", {"pos": drawing.spots[name].astype(np.float32)})
+        drawing.batches[name] = batch_for_shader(shader, "LINES" if is_line else "TRIS", {"pos": places.astype(np.float32)})
     shader.bind()
     shader.uniform_float("color", color)
-    drawing.batches[name].draw(shader)
-
-
-def _lines(drawing: Drawing, name: str, color) -> None:
-    import gpu
-    from gpu_extras.batch import batch_for_shader
-
-    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
-    if name not in drawing.batches:
-        drawing.batches[name] = batch_for_shader(shader, "LINES", {"pos": drawing.lines[name].astype(np.float32)})
-    shader.bind()
-    shader.uniform_float("color", color)
-    shader.uniform_float("lineWidth", 1.5)
-    shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
+    if is_line:
+        shader.uniform_float("lineWidth", 1.5)
+        shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
     drawing.batches[name].draw(shader)
 
 

@@ -55,17 +55,12 @@ def manifest_stamp(folder: Path) -> tuple[int, ...]:
 
 def _manifest(folder: Path) -> Manifest | None:
     """Return the manifest in a sensor's folder; None when it cannot be read."""
-    try:
-        stamp = manifest_stamp(folder)
-        if folder not in _manifests or _manifests[folder][0] != stamp:
-            _manifests[folder] = stamp, _read(folder)
-    except (OSError, FileError):
-        return None
+    stamp = manifest_stamp(folder)
+    if folder not in _manifests or _manifests[folder][0] != stamp:
+        try:
+            _manifests[folder] = stamp, read_manifest(folder)
+        except FileError:  # who reads the bake says so
+            _manifests[folder] = stamp, None
+        except OSError:
+            return None
     return _manifests[folder][1]
-
-
-def _read(folder: Path) -> Manifest | None:
-    try:
-        return read_manifest(folder)
-    except FileError:
-        return None  # who reads the bake says so

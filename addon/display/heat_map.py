@@ -109,10 +109,7 @@ def clear(obj, keep_image: bool = False) -> None:
         layer = mesh.uv_layers.get(UV_MAP)
         if layer is not None:
             mesh.uv_layers.remove(layer)
-    for name in names:
-        attribute = mesh.attributes.get(name)
-        if attribute is not None:
-            mesh.attributes.remove(attribute)
+    mesh_arrays.remove_attributes(mesh, names)
     materials.remove_blocks(uid, keep_image)
 
 

@@ -13,7 +13,6 @@ without it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -39,26 +38,13 @@ MOST_CORNERS = 8
 corners below: Blender 4.5 subdivides it in 4 s per frame, and its triangles in 0.05 s."""
 
 
-@dataclass(frozen=True)
-class _Names:
-    """Names of a sensor's attributes. They hold its identity, because several sensors may share a mesh."""
+def _attributes(uid: str) -> tuple[str, str, str]:
+    """Return the names of a sensor's attributes. They hold its identity, because several sensors may share a mesh.
 
-    uid: str
-
-    @property
-    def inward(self) -> str:
-        """Vector on vertices: displacement per metre of depth, object's frame, Blender units; zero where never touched."""
-        return f"palpate_inward:{self.uid}"
-
-    @property
-    def column(self) -> str:
-        """See :class:`.PlayedTable`."""
-        return f"palpate_column:{self.uid}"
-
-    @property
-    def channel(self) -> str:
-        """See :class:`.PlayedTable`."""
-        return f"palpate_channel:{self.uid}"
+    The first is a vector on vertices: displacement per metre of depth, object's frame, Blender units; zero where never touched.
+    The others are those of :class:`.PlayedTable`.
+    """
+    return f"palpate_inward:{uid}", f"palpate_column:{uid}", f"palpate_channel:{uid}"
 
 
 def show(sensors: Sequence[BakedSensor], factor: float | None) -> None:
@@ -89,12 +75,11 @@ def show(sensors: Sequence[BakedSensor], factor: float | None) -> None:
 def _apply(sensor: BakedSensor, touched: np.ndarray, factor: float) -> None:
     obj, uid = sensor.obj, sensor.obj.palpate.uid
     vertices, mark = sensor.texels.vertex[touched], f"{uid}:{MARK}"
-    names = _Names(uid)
+    inward_name, *attributes = _attributes(uid)
     inward = -sensor.texels.normal[touched] @ np.linalg.inv(_body_from_object(sensor)).T
-    played_table.store_vectors(obj.data, names.inward, vertices, inward)
+    played_table.store_vectors(obj.data, inward_name, vertices, inward)
     step = played_table.frame_step(len(sensor.frames), len(vertices))
     depth = np.maximum(sensor.readings.depth[::step][:, touched], 0.0)
-    attributes = names.column, names.channel
     play = PlayedTable.packed(mark, f"Palpate {obj.name} depth", obj.data, vertices, depth, sensor.frames, attributes)
     obj.data.update()
     modifier = obj.modifiers.new(INDENTATION_MODIFIER, "NODES")
@@ -108,11 +93,7 @@ def clear(obj) -> None:
     modifier, uid = obj.modifiers.get(INDENTATION_MODIFIER), obj.palpate.uid
     if modifier is not None:
         obj.modifiers.remove(modifier)
-    names = _Names(uid)
-    for name in (names.inward, names.column, names.channel):
-        attribute = obj.data.attributes.get(name)
-        if attribute is not None:
-            obj.data.attributes.remove(attribute)
+    mesh_arrays.remove_attributes(obj.data, _attributes(uid))
     for blocks in (bpy.data.node_groups, bpy.data.images):
         block = materials.find_block(blocks, f"{uid}:{MARK}")
         if block is not None:
@@ -162,12 +143,12 @@ def _body_from_object(sensor: BakedSensor) -> np.ndarray:
 def _nodes(uid: str, name: str, play: PlayedTable, levels: int, factor: float):
     """Return geometry nodes that look up each texel's depth, spread it smoothly over finer faces, and move them inwards."""
     group = materials.empty_node_group(f"{uid}:{MARK}", f"{name} indentation")
-    add, names, depth_name = materials.NodeAdder(group), _Names(uid), f"palpate_depth:{uid}"
+    add, depth_name = materials.NodeAdder(group), f"palpate_depth:{uid}"
     rest = add.stored(add("NodeGroupInput"), REST_POSITION, add("GeometryNodeInputPosition"), "FLOAT_VECTOR")
     coarse = add.stored(rest, depth_name, play.lookup(add), "FLOAT")
     fine, depth = _subdivided(add, coarse, add.attribute(depth_name, "FLOAT"), levels)
     depth = _math(add, "MAXIMUM", depth, 0.0)
-    inward = add("ShaderNodeVectorMath", {0: add.attribute(names.inward), "Scale": depth}, operation="SCALE")
+    inward = add("ShaderNodeVectorMath", {0: add.attribute(_attributes(uid)[0]), "Scale": depth}, operation="SCALE")
     moved = add("ShaderNodeVectorMath", {0: inward, "Scale": factor}, operation="SCALE", label=FACTOR_LABEL)
     move = add("GeometryNodeSetPosition", {"Geometry": fine, "Offset": moved})
     add.end("NodeGroupOutput", {0: move})

@@ -109,6 +109,24 @@ def corner_vertices(mesh) -> np.ndarray:
     return found
 
 
+def point_vectors(mesh, name: str) -> np.ndarray | None:
+    """Return a vector attribute of the vertices, (nv, 3) float; None where the mesh has none of the name."""
+    attribute = mesh.attributes.get(name)
+    if attribute is None or attribute.domain != "POINT" or attribute.data_type != "FLOAT_VECTOR":
+        return None
+    values = np.empty(3 * len(attribute.data), np.float32)
+    attribute.data.foreach_get("vector", values)
+    return values.astype(float).reshape(-1, 3)
+
+
+def remove_attributes(mesh, names) -> None:
+    """Remove the attributes of these names, as far as the mesh has them."""
+    for name in names:
+        attribute = mesh.attributes.get(name)
+        if attribute is not None:
+            mesh.attributes.remove(attribute)
+
+
 def target_arrays(obj, depsgraph) -> MeshArrays:
     """Return the surface of a target: its evaluated mesh."""
     with evaluated_mesh(obj, depsgraph) as mesh:

@@ -14,7 +14,7 @@ from ...core.model.body import Drive, Signal
 from ..properties import object_properties
 from ..properties.parameter_properties import DRIVE_PARAMETER_PROPERTIES, drive_parameters
 from ..session import fcurves, identity, transforms
-from . import stored_names
+from . import mesh_arrays, stored_names
 
 # Driven bodies: their settings become a :class:`.Drive`; their parents move them like any child object.
 #
@@ -402,6 +402,4 @@ def remove_played(scene) -> None:
         if settings.has_start and obj.is_editable:
             object_properties.restore_start(obj)
         if obj.type == "MESH" and obj.data.is_editable:
-            attribute = obj.data.attributes.get(stored_names.FORCE)
-            if attribute is not None:
-                obj.data.attributes.remove(attribute)
+            mesh_arrays.remove_attributes(obj.data, (stored_names.FORCE,))

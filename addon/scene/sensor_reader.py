@@ -162,12 +162,10 @@ def read_sensor(obj, body: int, mesh: TriangleMesh, linear: np.ndarray) -> Senso
 
 def _with_stated_normals(data, texels: Texels, linear: np.ndarray) -> Texels:
     """The texels with the normals that the file of an imported sensor states, if it states others than the surface has."""
-    attribute = data.attributes.get(STATED_NORMAL)
-    if attribute is None or attribute.domain != "POINT" or attribute.data_type != "FLOAT_VECTOR":
+    stated = mesh_arrays.point_vectors(data, STATED_NORMAL)
+    if stated is None:
         return texels
-    stated = np.empty(3 * len(attribute.data), np.float32)
-    attribute.data.foreach_get("vector", stated)
-    normal = np.linalg.solve(linear.T, stated.astype(float).reshape(-1, 3)[texels.vertex].T).T
+    normal = np.linalg.solve(linear.T, stated[texels.vertex].T).T
     has_one = np.linalg.norm(normal, axis=1) > 0.0  # vertices that were added later have none
     frames = texels.local_frames
     frames[has_one, FRAME_NORMAL] = normal[has_one]

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -14,9 +15,6 @@ from . import mesh_arrays, stored_names
 
 IMAGE_PROPERTIES = ("image_layout", "image_map", "image_size", "image_filter")
 """Properties of :class:`.properties.PALPATE_PG_object` that choose the layout."""
-_cached_layouts: list[tuple[tuple, UVLayout]] = []
-"""Arguments and results of the last few calls: panels ask for the same layout repeatedly, and computing it takes a while."""
-_CACHE_SIZE = 8
 
 
 def with_uv_layout(obj, texels: Texels) -> Texels:
@@ -41,8 +39,9 @@ def with_uv_layout(obj, texels: Texels) -> Texels:
     triangles, corner_uv = triangles[inside], uv.reshape(-1, 2).astype(float)[loops[inside]]
     if obj.matrix_world.is_negative:  # the sensor's triangles are turned too, so that both are anticlockwise from outside
         triangles, corner_uv = triangles[:, ::-1], corner_uv[:, ::-1]
-    key = (triangles.tobytes(), corner_uv.tobytes(), own.image_size, own.image_filter, layer.name, obj.name)
-    return replace(texels, layout=_cached(key) or _cache(key, _computed(obj, triangles, corner_uv, layer.name)))
+    nearest = own.image_filter == "NEAREST"
+    layout = _layout(triangles.tobytes(), corner_uv.tobytes(), own.image_size, layer.name, nearest, obj.name)
+    return replace(texels, layout=layout)
 
 
 def uv_layer(obj):
@@ -82,20 +81,11 @@ def layout_warnings(obj, texels: Texels) -> list[str]:
     ]
 
 
-def _computed(obj, triangles: np.ndarray, corner_uv: np.ndarray, name: str) -> UVLayout:
-    own = obj.palpate
-    nearest = own.image_filter == "NEAREST"
-    return mapped_layout(triangles, corner_uv, own.image_size, map_name=name, nearest=nearest, sensor=obj.name)
-
-
-def _cached(key: tuple) -> UVLayout | None:
-    return next((layout for other, layout in _cached_layouts if other == key), None)
-
-
-def _cache(key: tuple, layout: UVLayout) -> UVLayout:
-    _cached_layouts.append((key, layout))
-    del _cached_layouts[:-_CACHE_SIZE]
-    return layout
+@lru_cache(maxsize=8)
+def _layout(triangles: bytes, corner_uv: bytes, size: int, name: str, nearest: bool, sensor: str) -> UVLayout:
+    """Compute a layout, which takes a while; panels ask for the same one repeatedly."""
+    corners, uv = np.frombuffer(triangles, int).reshape(-1, 3), np.frombuffer(corner_uv).reshape(-1, 3, 2)
+    return mapped_layout(corners, uv, size, map_name=name, nearest=nearest, sensor=sensor)
 
 
 def _triangles(mesh) -> tuple[np.ndarray, np.ndarray]:

@@ -43,7 +43,7 @@ def pixels_of(image):
 @pytest.fixture(autouse=True)
 def clean():
     yield
-    uv_layouts._cached_layouts.clear()
+    uv_layouts._layout.cache_clear()
 
 
 @pytest.mark.parametrize("kind", ["uv_sphere", "ico_sphere", "cylinder", "cone", "torus", "cube", "monkey"])
