@@ -96,17 +96,6 @@ def test_files_that_are_something_else_say_so(tmp_path):
         bpy.ops.palpate.openrave_import(filepath=str(tmp_path / "bad.xml"))
 
 
-def test_effects_are_copied_with_the_parameters():
-    pad, other = sensor(k=44.0), sensor()
-    bpy.context.view_layer.objects.active = pad
-    bpy.ops.palpate.effect_add(effect="saturation")
-    pad.select_set(True)
-    other.select_set(True)
-    bpy.ops.palpate.parameters_copy()
-    assert [item.kind for item in other.palpate.effects] == ["saturation"]
-    assert other.palpate.k == 44.0
-
-
 # --- fits
 
 

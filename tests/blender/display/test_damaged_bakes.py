@@ -23,6 +23,7 @@ from palpate.core.jobs import run_job
 DAMAGES = {
     "half a recording": lambda pad: os.truncate(pad / "recording.npz", 3000),
     "no sensor": lambda pad: (pad / "sensor.npz").unlink(),
+    "no folder": shutil.rmtree,
     "no manifest": lambda pad: (pad / "manifest.json").write_bytes(b"{"),
     "another manifest": lambda pad: (pad / "manifest.json").write_text('{"format": "palpate-bake/1", "sensor": "pad"}'),
     "half an image": lambda pad: os.truncate(pad / "tactile_0002.exr", 300),

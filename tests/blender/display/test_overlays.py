@@ -7,11 +7,10 @@ import pytest
 from blender_scenes import find_marker, press_and_drop, save
 
 from palpate.addon.bake.bake import bake
-from palpate.addon.display import bake_display, baked_scene, markers, materials, overlays, texel_arrows
+from palpate.addon.display import markers, materials, overlays, texel_arrows
 from palpate.addon.scene.stored_names import ARROWS_MODIFIER
 from palpate.addon.session import transforms
 from palpate.core import response
-from palpate.core.errors import PalpateError
 from palpate.core.jobs import run_job
 from palpate.sample_blends import grasp
 
@@ -144,13 +143,6 @@ def test_views_that_change_colours_get_the_overlay(baked):
     assert not overlays.shows_colors_as_they_are(scene)
     scene.view_settings.exposure, scene.view_settings.view_transform = 0.0, "AgX"
     assert not overlays.shows_colors_as_they_are(scene)
-
-
-def test_applying_without_the_files_says_so(baked, tmp_path):
-    scene, *_ = baked
-    (tmp_path / "palpate-bake").rename(tmp_path / "lost")
-    with pytest.raises(PalpateError, match="bake"):
-        bake_display.refresh(scene, baked_scene.bake_folders(scene))
 
 
 def test_arrows_of_a_lost_image_do_not_show(baked, tmp_path):

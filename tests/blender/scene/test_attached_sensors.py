@@ -111,13 +111,6 @@ def test_a_part_that_moves_on_its_parent_is_refused():
         run_job(scene_reader.read_scene(scene))
 
 
-def test_a_child_of_a_free_body_says_what_to_do():
-    scene, _, soles, _ = box_on_soles(4)
-    soles[0].palpate.body = "KEYFRAMED"
-    with pytest.raises(SceneError, match="Part of Parent"):
-        run_job(scene_reader.read_scene(scene))
-
-
 def test_playing_a_free_body_moves_its_parts_and_does_not_start_anew(monkeypatch):
     from palpate.addon.timeline import live_cache
 

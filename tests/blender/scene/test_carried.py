@@ -135,16 +135,12 @@ def test_whatever_moves_a_sensor_gives_the_same_forces(way, reference):
     np.testing.assert_allclose(force, expected, atol=2e-4 * expected.max())
 
 
-@pytest.mark.parametrize(
-    ("constraint", "says"),
-    [("COPY_LOCATION", "Free body 'Ball' has constraints"), ("FLOOR", "Free body 'Ball' has constraints")],
-)
-def test_free_bodies_with_constraints_are_refused(constraint, says):
+def test_free_bodies_with_constraints_are_refused():
     scene, _ = scene_with(keyframed)
     free = bpy.data.objects["Ball"]
     free.palpate.body = "FREE"
-    free.constraints.new(constraint)
-    with pytest.raises(SceneError, match=says):
+    free.constraints.new("COPY_LOCATION")
+    with pytest.raises(SceneError, match="Free body 'Ball' has constraints"):
         run_job(scene_reader.read_scene(scene))
     free.constraints[0].enabled = False
     run_job(scene_reader.read_scene(scene))

@@ -242,7 +242,7 @@ def test_children_of_free_bodies_are_refused():
     box = cube()
     box.palpate.role, box.palpate.body = "TARGET", "FREE"
     pad.parent = box
-    with pytest.raises(SceneError, match="'Pad' is a child of free body 'Cube'"):
+    with pytest.raises(SceneError, match="'Pad' is a child of free body 'Cube': set its body to Part of Parent"):
         sampled(scene)
 
 

@@ -117,9 +117,6 @@ def test_a_step_is_captured_as_a_graph():
         assert np.array_equal(graph.texels.numpy(), plain.texels.numpy())
 
 
-# --- simple shapes
-
-
 # --- physics
 
 

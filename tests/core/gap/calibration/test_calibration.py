@@ -13,7 +13,6 @@ from scipy.integrate import solve_ivp
 from palpate.core.errors import FileError, ParameterError
 from palpate.core.gap.calibration.friction import FrictionData, fit_friction, friction_over_time, read_friction, steady_friction
 from palpate.core.gap.calibration.stiffness import FoamData, fit_stiffness, read_foam, texel_stiffness
-from palpate.core.io.text_table import read_columns
 from palpate.core.model.sensor_parameters import SensorParameters
 
 PAPER = SensorParameters(sigma0=1.0, sigma1=0.1, x0=0.3, ct=0.01, mus=0.435, mud=0.23)
@@ -151,22 +150,15 @@ def test_what_a_curve_cannot_tell_is_said():
 def test_columns_in_other_units(tmp_path):
     path = tmp_path / "foam.csv"
     path.write_text("# made by hand\ncompression (mm);mass_g;note\n1.0;120;a\n2.0;240;b\n", encoding="utf-8")
-    columns = read_columns(path, {"compression": "m", "mass": "kg"})
-    assert columns["compression"] == pytest.approx([1e-3, 2e-3]) and columns["mass"] == pytest.approx([0.12, 0.24])
     data = read_foam(path, weight_area=804.25e-6)
+    assert data.compression == pytest.approx([1e-3, 2e-3])
     assert data.pressure == pytest.approx([0.12 * 9.80665 / 804.25e-6, 0.24 * 9.80665 / 804.25e-6])
 
 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "is empty"),
-        ("compression,pressure\n", "no measurements"),
-        ("a,b\n1,2\n", "none of the columns"),
         ("compression,pressure\n1,x\n", "Line 2 of"),
-        ("compression,pressure\n1,2\n1,nan\n", "Line 3 of"),
-        ("compression (furlong),pressure\n1,2\n", "unit that is not known"),
-        ("compression,compression_mm,pressure\n1,2,3\n", "two columns for compression"),
         ("compression,depth\n1,2\n", "exactly one of the columns"),
         ("pressure,force\n1,2\n", "no column 'compression'"),
         ("compression,mass\n1,2\n", "on which area"),
