@@ -48,7 +48,7 @@ class PALPATE_OT_pad_mesh_add(support.PalpateOperator, AddObjectHelper, bpy.type
             column.prop(self, name)
 
 
-class PALPATE_OT_skin_add(support.PalpateOperator, bpy.types.Operator):
+class PALPATE_OT_skin_add(support.PalpateOperator, object_properties.PatternProperties, bpy.types.Operator):
     """Lay texels onto the surface of the active mesh: a sensor of its own that is fixed to it; an object can carry several"""
 
     bl_idname = "palpate.skin_add"
@@ -82,26 +82,6 @@ class PALPATE_OT_skin_add(support.PalpateOperator, bpy.types.Operator):
         description="From texel to texel, m; 0: after the size of the object",
         min=0.0,
         precision=5,
-        step=0.01,
-    )
-    rows: IntProperty(name="Rows", description="Of the array", default=14, min=2, soft_max=128)
-    columns: IntProperty(name="Columns", description="Of the array", default=6, min=2, soft_max=128)
-    pitch_x: FloatProperty(
-        name="Column Pitch (m)", description="From column to column, m", default=0.0034, min=1e-6, precision=5, step=0.01
-    )
-    pitch_y: FloatProperty(
-        name="Row Pitch (m)", description="From row to row, m", default=0.0034, min=1e-6, precision=5, step=0.01
-    )
-    shift_x: FloatProperty(name="Shift Across (m)", description="Of the array's middle, along its rows", precision=5, step=0.01)
-    shift_y: FloatProperty(name="Shift Along (m)", description="Of the array's middle, from row to row", precision=5, step=0.01)
-    angle: FloatProperty(name="Turn", description="Of the rows, anticlockwise seen from outside", subtype="ANGLE")
-    seed: IntProperty(name="Seed", description="Another pattern for each", min=0)
-    lift: FloatProperty(
-        name="Lift (m)",
-        description="Height of the texels above the surface, m",
-        default=0.0,
-        min=0.0,
-        precision=6,
         step=0.01,
     )
 

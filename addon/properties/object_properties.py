@@ -111,7 +111,25 @@ class LengthsInUnits:
     )
 
 
-class PALPATE_PG_skin(LengthsInUnits, bpy.types.PropertyGroup):
+class PatternProperties:
+    """Settings of patterns besides the spacing, whose default is not the same everywhere."""
+
+    rows: IntProperty(name="Rows", description="Number of rows of the array", default=14, min=2, soft_max=128, options=set())
+    columns: IntProperty(
+        name="Columns", description="Number of columns of the array", default=6, min=2, soft_max=128, options=set()
+    )
+    pitch_x: _length("Column Pitch (m)", "Distance between columns, m", default=0.0034, min=1e-6)
+    pitch_y: _length("Row Pitch (m)", "Distance between rows, m", default=0.0034, min=1e-6)
+    shift_x: _length("Shift Across (m)", "Displacement of the middle of the array along its rows, m")
+    shift_y: _length("Shift Along (m)", "Displacement of the middle of the array across its rows, m")
+    angle: FloatProperty(
+        name="Turn", description="Angle of the rows, anticlockwise seen from outside", subtype="ANGLE", options=set()
+    )
+    seed: IntProperty(name="Seed", description="Seed of the random pattern", min=0, options=set())
+    lift: _length("Lift (m)", "Height of the texels above the surface, m", min=0.0)
+
+
+class PALPATE_PG_skin(PatternProperties, LengthsInUnits, bpy.types.PropertyGroup):
     """How the texels of a sensor were laid onto the surface of its parent: `Object.palpate.skin`"""
 
     method: EnumProperty(
@@ -121,18 +139,7 @@ class PALPATE_PG_skin(LengthsInUnits, bpy.types.PropertyGroup):
         options=set(),
         override={"LIBRARY_OVERRIDABLE"},
     )
-    rows: IntProperty(name="Rows", description="Number of rows of the array", default=14, min=2, options=set())
-    columns: IntProperty(name="Columns", description="Number of columns of the array", default=6, min=2, options=set())
-    pitch_x: _length("Column Pitch (m)", "Distance between columns, m", default=0.0034, min=1e-6)
-    pitch_y: _length("Row Pitch (m)", "Distance between rows, m", default=0.0034, min=1e-6)
-    shift_x: _length("Shift Across (m)", "Displacement of the middle of the array along its rows, m")
-    shift_y: _length("Shift Along (m)", "Displacement of the middle of the array across its rows, m")
-    angle: FloatProperty(
-        name="Turn", description="Angle of the rows, anticlockwise seen from outside", subtype="ANGLE", options=set()
-    )
     spacing: _length("Spacing (m)", "Distance between texels, m", default=0.002, min=1e-6)
-    seed: IntProperty(name="Seed", description="Seed of the random pattern", min=0, options=set())
-    lift: _length("Lift (m)", "Height of the texels above the surface, m", min=0.0)
     region: StringProperty(options={"HIDDEN"})
     region_name: StringProperty(options={"HIDDEN"})
     region_number: IntProperty(options={"HIDDEN"})
