@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -45,6 +45,16 @@ class CouplingMatrix:
             result[i, self.target[starts]] = np.add.reduceat(self.weight * signal[i, self.source], starts)
         return result
 
+    def sums(self, texels: int) -> np.ndarray:
+        """Return the sum of the weights of each source, (n,) float."""
+        return np.bincount(self.source, self.weight, texels) if self.matrix is None else self.matrix.sum(axis=0)
+
+    def divided(self, by: np.ndarray) -> CouplingMatrix:
+        """Return the weights of each source divided by a number of its own, `by` (n,) float."""
+        if self.matrix is None:
+            return replace(self, weight=self.weight / by[self.source])
+        return replace(self, matrix=self.matrix / by)
+
 
 def coupling_matrix(
     position: np.ndarray, weight: Callable[[np.ndarray], np.ndarray], reach: float, area: np.ndarray | None
@@ -68,15 +78,13 @@ def coupling_matrix(
         matrix = weight(_distances_kept(position.tobytes()) if n <= LARGEST_KEPT else _distances(position))
         if area is not None:
             matrix = matrix * area[:, None]
-            matrix = matrix / matrix.sum(axis=0)
         nothing = np.zeros(0, dtype=int)
-        return CouplingMatrix(matrix, nothing, nothing, np.zeros(0))
-    target, source, distance = pairs_within(position, reach)
-    values = weight(distance)
-    if area is not None:
-        values = values * area[target]
-        values = values / np.bincount(source, values, n)[source]
-    return CouplingMatrix(None, target, source, values)
+        weights = CouplingMatrix(matrix, nothing, nothing, np.zeros(0))
+    else:
+        target, source, distance = pairs_within(position, reach)
+        values = weight(distance)
+        weights = CouplingMatrix(None, target, source, values if area is None else values * area[target])
+    return weights if area is None else weights.divided(weights.sums(n))
 
 
 def _distances(position: np.ndarray) -> np.ndarray:

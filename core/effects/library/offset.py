@@ -64,7 +64,6 @@ KIND = Kind(
             neutral={"offset": 0.0},
             memoryless=listed,
             after_conversion=True,
-            error=0.005,  # every offset of a texel is one of these
         ),
     ),
     experiment="record a minute without touching the sensor, before and after a trial",

@@ -19,7 +19,7 @@ class Sums:
     rest, rest_count : (2, b, 2) float
         The same of values without load: while nothing touches the sensor, and of texels that nothing touches.
     changes : (components, b, 2) float
-        Squares of the change of the prediction that each component of the model makes.
+        Squares of the change of the prediction that each component of the model makes, beyond a factor and a zero.
     """
 
     left: np.ndarray

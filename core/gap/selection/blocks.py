@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..fitting.least_squares import Fit, TrialView, cross_fitted
-from ..forward.predictor import Model, Predictor
+from ..forward.predictor import Model, Predictor, number_name
 from .block_sums import Sums
 from .rule_numbers import BLOCKS, MEMORIES
 
@@ -80,8 +80,6 @@ class Blocks:
     Parameters
     ----------
     views : Views
-    base : Model
-        From which changes of the prediction are counted.
 
     Attributes
     ----------
@@ -91,7 +89,7 @@ class Blocks:
         See :class:`Sums`.
     """
 
-    def __init__(self, views: Views, base: Model):
+    def __init__(self, views: Views):
         self.views = views
         touched = np.any([_touched(view.predictor) for view in views.fitted], axis=0)
         self._masks = [_measured(view) for view in views.fitted]
@@ -102,9 +100,9 @@ class Blocks:
         self.recording = np.repeat(np.arange(len(views.all)), [view.stretch_count for view in views.all])
         self.count = self._summed([mask.astype(float) for mask in self._masks])
         self.rest_count = np.stack([self._summed([rest[way].astype(float) for rest in self._rests]) for way in (0, 1)])
-        self._base = [view.residual(base) for view in views.all]
+        self._data = [_data(view) for view in views.all]
 
-    def sums(self, found: Fit, views: Views, has_own_numbers: bool, parent: tuple[Model, Sums] | None) -> Sums:
+    def sums(self, found: Fit, views: Views, has_own_numbers: bool) -> Sums:
         """Return what a fit leaves on unseen blocks.
 
         Parameters
@@ -114,8 +112,6 @@ class Blocks:
             Of the recordings as they are assumed to differ.
         has_own_numbers : bool
             True if recordings have numbers of their own, the first component.
-        parent : (Model, Sums) or None
-            The model without its last effect. Without it, the change from the base model is divided among the effects.
         """
         model = found.model
         seen = [view.residual(model) for view in views.fitted]
@@ -123,28 +119,42 @@ class Blocks:
         unseen = cross_fitted(found, views.fitted, seen)
         squares = [r**2 * mask for r, mask in zip([*unseen, *outside], self._masks, strict=True)]
         rest = [self._summed([s * rest[way] for s, rest in zip(squares, self._rests, strict=True)]) for way in (0, 1)]
-        before = self._base if parent is None else [view.residual(parent[0]) for view in views.all]
-        change = self._summed([(a - b) ** 2 * m for a, b, m in zip([*seen, *outside], before, self._masks, strict=True)])
-        if parent is not None:
-            changes = np.concatenate([parent[1].changes, change[None]])
-        elif model.effects:
-            changes = self._shares(model, views, seen)[:, None, :] * change
-            changes = np.concatenate([0.0 * change[None], changes]) if has_own_numbers else changes
-        else:
-            changes = change[None] if has_own_numbers else np.zeros((0, *change.shape))
-        return Sums(self._summed(squares), self.count, np.stack(rest), self.rest_count, changes)
+        without = [model.without(index) for index in range(len(model.effects))]
+        without = [with_equal_recordings(model), *without] if has_own_numbers else without
+        changes = [self._change([*seen, *outside], [view.residual(other) for view in views.all]) for other in without]
+        return Sums(
+            self._summed(squares), self.count, np.stack(rest), self.rest_count, np.array(changes).reshape(-1, *self.count.shape)
+        )
 
-    def _shares(self, model: Model, views: Views, whole: Sequence[np.ndarray]) -> np.ndarray:
-        """The part of each effect in the change, by what leaving it away changes in the fitted recordings, (effects, 2)."""
-        if len(model.effects) == 1:
-            return np.ones((1, 2))
-        parts = np.zeros((len(model.effects), 2))
-        for index in range(len(model.effects)):
-            without = model.without(index)
-            for view, mask, residual in zip(views.fitted, self._masks, whole, strict=False):
-                square = (view.residual(without) - residual) ** 2 * mask
-                parts[index] += square[:, :-3].sum(), square[:, -3:].sum()
-        return parts / np.maximum(parts.sum(axis=0), 1e-300)
+    def _change(self, whole: Sequence[np.ndarray], without: Sequence[np.ndarray]) -> np.ndarray:
+        """Squares of the change that a component makes to predictions, (b, 2) float.
+
+        A factor and a zero of all readings, and of each axis of the forces, are taken out, as the base model can make them.
+
+        Parameters
+        ----------
+        whole, without : sequences of (T, n + 3) float
+            Residuals with the component and without it.
+        """
+        changes = [b - a for a, b in zip(whole, without, strict=True)]
+        before = [data - b for data, b in zip(self._data, without, strict=True)]
+        sums = np.sum(
+            [
+                [(part * mask).sum(axis=0) for part in (1.0, x, y, x * x, x * y)]
+                for x, y, mask in zip(before, changes, self._masks, strict=True)
+            ],
+            axis=0,
+        )
+        sums = np.column_stack([sums[:, :-3].sum(axis=1), sums[:, -3:]])
+        count, x, y, xx, xy = sums / np.maximum(sums[0], 1.0)
+        slope = (xy - x * y) / np.maximum(xx - x * x, 1e-12)
+        level = y - slope * x
+        spread = [0] * (changes[0].shape[1] - 3) + [1, 2, 3]
+        rest = [
+            (change - slope[spread] * row - level[spread]) ** 2 * mask
+            for change, row, mask in zip(changes, before, self._masks, strict=True)
+        ]
+        return self._summed(rest)
 
     def _summed(self, tables: Sequence[np.ndarray]) -> np.ndarray:
         """Sums of tables (T, n + 3) over blocks, of readings and of forces."""
@@ -154,10 +164,27 @@ class Blocks:
         return np.array(rows)
 
 
+def with_equal_recordings(model: Model) -> Model:
+    """Return a model with factors of recordings of one and zeros of zero."""
+    neutral = {number_name("factor", ""): 1.0, number_name("zero", ""): 0.0}
+    changed = {name: value for name in model.recordings for word, value in neutral.items() if name.startswith(word)}
+    return replace(model, recordings={**model.recordings, **changed})
+
+
 def _touched(predictor: Predictor) -> np.ndarray:
     """Texels that are loaded in a recording, (n,) bool."""
     loaded: np.ndarray = (predictor.stimulus.load > 0).any(axis=0)
     return loaded
+
+
+def _data(view: TrialView) -> np.ndarray:
+    """Measured values in units of the noise, (T, n + 3) float; zero where there are none."""
+    trial, n = view.predictor.trial, len(view.texels)
+    data = np.zeros((len(trial.time), n + 3))
+    for part, values, noise in ((slice(0, n), trial.reading, view.noise[0]), (slice(n, n + 3), trial.force, view.noise[1])):
+        if values is not None:
+            data[:, part] = np.nan_to_num(values) / noise
+    return data
 
 
 def _measured(view: TrialView) -> np.ndarray:

@@ -128,7 +128,7 @@ def _starts(begun: _Begun) -> dict[str, Start]:
     deviations = result.noise[READINGS].deviation, result.noise[FORCES].deviation
     memory = result.noise[READINGS].correlation_time, result.noise[FORCES].correlation_time
     views = views_of(result.predictors, deviations, memory)
-    blocks = Blocks(views, result.base.model)
+    blocks = Blocks(views)
     alone: dict[str, Effect] = {}
 
     def start(own: _Begun, assumed: str) -> tuple[Screening, Hypothesis]:

@@ -4,8 +4,9 @@
 ``S = - M/2 · Σ_q log(E_q + B_q + e_q) - price · names`` over the measured quantities q, readings and net forces:
 
 - E: mean square that a fit leaves on stretches that it has not seen, less the noise's, never below zero;
-- B: what the error of formulas may leave: φ times the mean square of the change that an effect makes to the prediction. A
-  formula of the library is never nature's, so an effect of size A may leave √φ·A and still be the right name;
+- B: what the error of formulas may leave: φ times the mean square of the change that an effect makes to the prediction of q,
+  beyond a factor and a zero. A formula of the library is never nature's, so an effect of size A may leave √φ·A and still be
+  the right name;
 - e: standard error of the noise's level;
 - M: number of independent stretches.
 

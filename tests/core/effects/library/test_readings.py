@@ -248,18 +248,27 @@ def test_the_elastic_half_space_is_boussinesqs():
     np.testing.assert_allclose(found, stress * pitch**2, rtol=1e-2)  # what lies beyond the sheet's edge, and the cells' size
 
 
-@pytest.mark.parametrize(("power", "width"), [(1.5, 0.002), (2.5, 0.003), (6.0, 0.006)])
-def test_a_bell_has_the_right_shape_and_loses_what_falls_beyond_the_rim(power, width):
-    """Its weights are those of an endless lattice: the sum over a far larger one is nearly one."""
+@pytest.mark.parametrize(("shape", "width"), [(0.8, 0.002), (1.5, 0.003), (4.0, 0.006)])
+def test_a_stretched_exponential_has_the_right_shape_and_loses_what_falls_beyond_the_rim(shape, width):
+    """Its weights are those of an endless lattice: the sum over a far larger one is one."""
     texel = 7 * COLUMNS + 3
-    found = read(effect("load-spreading", "bell", width=width, power=power), image(texel))[0]
+    found = read(effect("load-spreading", "stretched-exponential", width=width, shape=shape, lost=1.0), image(texel))[0]
     distance = np.linalg.norm(POSITION - POSITION[texel], axis=1)
-    np.testing.assert_allclose(found / found[texel], (1 + (distance / width) ** 2) ** -power, rtol=1e-12)
-    lattice = PITCH * np.arange(-600.0, 601.0)
-    square = lattice[:, None] ** 2 + lattice[None] ** 2
-    whole = ((1 + square / width**2) ** -power)[square <= lattice[-1] ** 2].sum()
-    assert found[texel] == pytest.approx(1.0 / whole, rel=3e-3)  # a Lorentzian's tail goes on even there
+    np.testing.assert_allclose(found / found[texel], np.exp(-((distance / width) ** shape)), rtol=1e-12)
+    lattice = PITCH * np.arange(-200.0, 201.0)
+    whole = np.exp(-((np.hypot(lattice[:, None], lattice) / width) ** shape)).sum()
+    assert found[texel] == pytest.approx(1.0 / whole, rel=1e-6)
     assert found.sum() < 1.0
+
+
+@pytest.mark.parametrize(
+    ("form", "shape", "lost", "times"),
+    [("gaussian", 2.0, 0.0, 2**0.5), ("exponential", 1.0, 0.0, 1.0), ("open", 2.0, 1.0, 2**0.5)],
+)
+def test_a_stretched_exponential_is_each_kernel_of_its_shape(form, shape, lost, times):
+    loads = np.random.default_rng(1).random((3, ROWS * COLUMNS))
+    found = read(effect("load-spreading", "stretched-exponential", width=0.004 * times, shape=shape, lost=lost), loads)
+    np.testing.assert_allclose(found, read(effect("load-spreading", form, width=0.004), loads), rtol=1e-9)
 
 
 def test_crosstalk():

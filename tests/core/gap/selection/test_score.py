@@ -3,6 +3,7 @@
 
 import contextlib
 from collections import Counter
+from dataclasses import replace
 from types import SimpleNamespace
 
 import gap_cases as cases
@@ -10,11 +11,16 @@ import numpy as np
 import pytest
 
 from palpate.core.effects.engine.registry import library
+from palpate.core.gap.fitting.least_squares import Fit
+from palpate.core.gap.forward.predictor import Model, number_name, predictors_of
 from palpate.core.gap.selection import blocks, diagnosis, noise_level, rule_numbers, score, search, verdict
+from palpate.core.gap.selection.base_model import with_recording_numbers
 from palpate.core.gap.selection.block_sums import Sums
 from palpate.core.gap.selection.noise_level import NoiseLevel
+from palpate.core.gap.selection.recording_differences import with_own_numbers
 from palpate.core.gap.selection.score import OWN_NUMBERS, Hypothesis, Score, drawn_weights
 from palpate.core.jobs import run_job
+from palpate.core.model.sensor import Effect
 
 BLOCKS, COUNT = 16, 100.0
 MEASURED = np.array([True, False])
@@ -253,3 +259,36 @@ def test_names_hold_and_no_number_is_idle_or_a_cliff(searches):
                     not np.allclose(after[sensor][1], before[sensor][1]) for sensor in SENSORS if len(before[sensor][1]) > 2
                 )
                 assert changed, name
+
+
+@pytest.mark.parametrize(
+    ("name", "form", "values", "shows"),
+    [
+        ("offset", "common", {"offset": 0.2}, (False, False)),
+        ("load-spreading", "gaussian", {"width": 0.004}, (True, False)),
+        ("stiffening", "polynomial", {"beta2": 300.0, "beta3": 0.0}, (True, True)),
+    ],
+)
+def test_what_an_effect_changes_is_counted_where_it_acts_and_beyond_a_factor_and_a_zero(name, form, values, shows):
+    """The formula of an effect on readings leaves nothing in forces, though the stiffness is fitted to both."""
+    rig = cases.rig(trials=2)
+    rig = replace(rig, trials=tuple(replace(one, force=one.reading[:, :3] * 0.0 + 1.0) for one in rig.trials))
+    views = blocks.views_of(predictors_of(rig.trials, rig), (0.01, 0.01), (1.0, 1.0))
+    model = Model(replace(rig.parameters, k=1.3 * rig.parameters.k), (Effect(name, form, values),))
+    found = Fit(model, (), np.zeros((1, 2)), np.ones((1, 2)))
+    (changes,) = blocks.Blocks(views).sums(found, views, False).changes
+    largest = changes.sum(axis=0).max()
+    assert [bool(change > 1e-9 * max(largest, 1.0)) for change in changes.sum(axis=0)] == list(shows)
+
+
+def test_numbers_of_recordings_are_counted_beyond_those_that_all_share():
+    rig = with_own_numbers(cases.rig(trials=3))
+    predictors = predictors_of(rig.trials, rig)
+    views = blocks.views_of(predictors, (0.01, 0.01), (1.0, 1.0))
+    model = with_recording_numbers(Model(rig.parameters), predictors)
+    shares = []
+    for factors in ([1.2, 1.2, 1.2], [1.2, 0.9, 1.1]):
+        numbers = {number_name("factor", one.name): factor for one, factor in zip(rig.trials, factors, strict=True)}
+        found = Fit(replace(model, recordings={**model.recordings, **numbers}), (), np.zeros((1, 2)), np.ones((1, 2)))
+        shares.append(float(blocks.Blocks(views).sums(found, views, True).changes[0].sum()))
+    assert shares[0] < 1e-9 * shares[1]
