@@ -31,8 +31,8 @@ DRAWS = 200
 NEAR_ERRORS = 1.0
 """Models within so many standard errors of the best count as equal, and the smallest of them wins: the usual rule."""
 SAME_SCORE = 0.1
-"""Scores that differ by less count as equal: the odds are then 0.9. Gains of zero and dead texels differ by 0.0007 to 0.012 where
-some texels are dead, with standard errors as small."""
+"""Scores that differ by less count as equal: the odds are then 0.9. Gains of zero and dead texels differ by 0.0007 to 0.012
+where some texels are dead, with standard errors as small."""
 RIVAL_ERRORS = 2.0
 """Kinds within so many standard errors are rivals: the usual two."""
 FEWER_NUMBERS = 2.0

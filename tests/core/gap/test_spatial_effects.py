@@ -53,6 +53,6 @@ def test_a_narrow_cover_and_wires_side_by_side_are_not_told_apart():
     result = run_job(diagnose(cases.rig(partial(beneath_a_wide_cover, width=3e-3), seed=4)))
     assert result.verdict == "unexplained" and set(result.ambiguous[0]) == {"load-spreading", "crosstalk"}
     assert sentences.headline(result, gap_errors(result)).startswith(
-        "Indistinguishable in these recordings: crosstalk or load-"
+        "Indistinguishable in these recordings: load-spreading or crosstalk"
     )
     assert not any(one.confidence >= SURE for one in result.findings)
