@@ -30,7 +30,7 @@ FIRST_STEPS, FIRST_TOLERANCE = 10, 1e-3
 before they are fitted to everything: in three of 74 rigs crosstalk was sure where load spreading explains as much."""
 FINAL_STEPS, FINAL_TOLERANCE = 10, 3e-4
 """Of the fits to everything."""
-REFINED_STEPS, REFINED_TOLERANCE = 40, 1e-5
+REFINED_STEPS, REFINED_TOLERANCE = 40, 1e-4
 """Of the fits to everything on top of which a further effect is looked for. With ten steps alone a Maxwell slip model ended at
 1.5 times its share, and wear was named in addition."""
 TRIED_KINDS, REFITTED_KINDS = 8, 5

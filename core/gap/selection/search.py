@@ -66,13 +66,12 @@ class Search:
             return self.base
         yield from _in_stage("alone", self._grow(self.base))
         self._weigh(is_noise_measured=True)
-        self._refine(self._beam(1), is_noise_measured=True)
+        self._refine(self.best(), is_noise_measured=True)
         if self.is_open(self.best()):
             yield from _in_stage("differing recordings", self._assume_differences())
             self.tried += yield from _in_stage("differing recordings", best_pairs(plain, self.base))
         for size in range(1, MOST_EFFECTS):
             self._weigh()
-            self._refine(self._beam(size))
             if not self.is_open(self.best()):
                 break
             yield from _in_stage("further effects", self._extend(size))
@@ -173,19 +172,26 @@ class Search:
 
     def _extend(self, size: int) -> Steps:
         """Try one effect more on top of the best models of a size that could still become the best."""
-        best = self.best()
         for parent in self._beam(size):
-            lacks = self.score.value(best) - self.score.value(parent)
-            if self.score.most_to_gain(parent) > max(0.0, lacks):
-                yield from self._grow(parent)
+            if self._could_lead(parent):
+                parent = self._refine(parent)
+                if self._could_lead(parent):
+                    yield from self._grow(parent)
 
-    def _refine(self, models: list[Hypothesis], is_noise_measured: bool = False) -> None:
-        """Fit some models to the end."""
-        for one in models:
-            better = self.under(one.assumed)[0].refined(one)
-            for known in (self.tried, *self._longer.values()):
-                known[:] = [better if other is one else other for other in known]
+    def _could_lead(self, parent: Hypothesis) -> bool:
+        """Return whether one effect more could make a model the best."""
+        lacks = self.score.value(self.best()) - self.score.value(parent)
+        return self.score.most_to_gain(parent) > max(0.0, lacks)
+
+    def _refine(self, one: Hypothesis, is_noise_measured: bool = False) -> Hypothesis:
+        """Fit a model with effects to the end, and put it in its place."""
+        if not one.names:
+            return one
+        better = self.under(one.assumed)[0].refined(one)
+        for known in (self.tried, *self._longer.values()):
+            known[:] = [better if other is one else other for other in known]
         self._weigh(is_noise_measured)
+        return better
 
     def _beam(self, size: int) -> list[Hypothesis]:
         """The best models of a number of names, of different kinds."""
