@@ -148,6 +148,7 @@ def run() -> Iterator[dict]:
     """Steps of all objects, in both precisions; of other numbers of environments; under loads; and of MuJoCo Warp."""
     import warp
 
+    warp.config.quiet = True  # its messages would stand between the figures
     gpu = next((one for one in warp.get_devices() if one.is_cuda), None)
     if gpu is None:
         print("Warp finds no GPU on this machine, so that the group 'gpu' measures nothing.", file=sys.stderr)

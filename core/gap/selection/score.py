@@ -185,7 +185,7 @@ class Score:
         return float(apart[0]), float(apart[1:].std())
 
     def is_near(self, best: Hypothesis, one: Hypothesis) -> bool:
-        """Return whether a model does as well as a better one, as far as chance goes, or to a hundredth of their odds."""
+        """Return whether a model does as well as a better one, as far as chance goes, or to a tenth of their odds."""
         apart, error = self.lead(best, one)
         return apart < max(NEAR_ERRORS * error, SAME_SCORE)
 
