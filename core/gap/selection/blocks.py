@@ -129,7 +129,8 @@ class Blocks:
     def _change(self, whole: Sequence[np.ndarray], without: Sequence[np.ndarray]) -> np.ndarray:
         """Squares of the change that a component makes to predictions, (b, 2) float.
 
-        A factor and a zero of all readings, and of each axis of the forces, are taken out, as the base model can make them.
+        A factor and a zero of all readings, and of each axis of the forces, are taken out: parameters of the base model follow
+        them. They are those of the fitted recordings, so that check recordings choose no effect.
 
         Parameters
         ----------
@@ -141,7 +142,7 @@ class Blocks:
         sums = np.sum(
             [
                 [(part * mask).sum(axis=0) for part in (1.0, x, y, x * x, x * y)]
-                for x, y, mask in zip(before, changes, self._masks, strict=True)
+                for x, y, mask in zip(before, changes, self._masks[: len(self.views.fitted)], strict=False)
             ],
             axis=0,
         )
@@ -183,7 +184,7 @@ def _data(view: TrialView) -> np.ndarray:
     data = np.zeros((len(trial.time), n + 3))
     for part, values, noise in ((slice(0, n), trial.reading, view.noise[0]), (slice(n, n + 3), trial.force, view.noise[1])):
         if values is not None:
-            data[:, part] = np.nan_to_num(values) / noise
+            data[:, part] = np.where(np.isfinite(values), values, 0.0) / noise
     return data
 
 

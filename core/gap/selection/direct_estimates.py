@@ -46,8 +46,7 @@ reaches this share. Chosen by eye from 40 readings behind companding converters.
 def unresponsive_texels(views: Sequence[TrialView], model: Model, candidate: Candidate, texels: int) -> Effect | None:
     """Return the effect for texels that hardly follow the model although they are loaded; None if all follow.
 
-    A texel that goes to a rail at the first touch is dead too: loaded it always reads the same, far from what it should. If
-    there are such texels, one that was not loaded and reads something else than the model says may stay at this level, too.
+    A texel that goes to a rail at the first touch is dead too: loaded it always reads the same, far from what it should.
 
     Parameters
     ----------
@@ -83,14 +82,8 @@ def unresponsive_texels(views: Sequence[TrialView], model: Model, candidate: Can
     silent = railed | (loaded & (slope < LEAST_SLOPE * np.nanmedian(slope[~railed])))
     if not silent.any() or silent.sum() > MOST_DEAD_SHARE * loaded.sum():
         return None
-    own, count = [q.name for q in candidate.form.parameters], good.sum(axis=0)
-    if "level" in own:
-        apart, rest = (
-            np.where(good, part, 0.0).sum(axis=0) / np.maximum(count, 1) for part in (measured - predicted, measured)
-        )
-        idle = ~loaded & (count * apart**2 > LEAST_LOADED_SQUARE)
-        silent, level = silent | idle, np.where(idle, rest, level)
     values = {"dead": silent.astype(float), "level": np.where(silent, level * noise + model.parameters.zero, 0.0)}
+    own = [q.name for q in candidate.form.parameters]
     return Effect(candidate.name, candidate.form.name, {name: tuple(values[name].tolist()) for name in own})
 
 

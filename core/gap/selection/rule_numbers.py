@@ -18,7 +18,7 @@ FORMULA_ERROR = 0.05
 recordings show no larger one. The textbook forms of load spreading leave 0.04 to 0.09 of other kernels in the middle, and 0.25
 at most; a form that is free to follow any law states its own (:attr:`.specification.Form.error`)."""
 FREE_FORM_ERROR = 0.005
-"""φ of a gain and a zero of each recording, as of other lists of numbers: every gain and zero is one of these."""
+"""φ of a gain and a zero of each recording, as of a gain of each texel: every gain and zero is one of these."""
 LARGEST_FORMULA_ERROR = 0.25
 """Largest φ that recordings may show: two forms of which one leaves more describe two kinds of things."""
 LEAST_NOISE_ERROR = 0.01
@@ -31,8 +31,8 @@ DRAWS = 200
 NEAR_ERRORS = 1.0
 """Models within so many standard errors of the best count as equal, and the smallest of them wins: the usual rule."""
 SAME_SCORE = 0.1
-"""Scores that differ by less count as equal: the odds are then 0.9. Gains of zero and dead texels differ by 0.0007 to 0.012
-where some texels are dead, with standard errors as small."""
+"""Scores that differ by less count as equal: odds of 0.9 decide nothing. Gains of zero and dead texels differ by 0.0007 where
+two texels are dead, and by 0.01 beside a stiffening, with standard errors of 0.0003 and 0.01."""
 RIVAL_ERRORS = 2.0
 """Kinds within so many standard errors are rivals: the usual two."""
 FEWER_NUMBERS = 2.0

@@ -16,7 +16,7 @@ import numpy as np
 
 from .noise_level import measured_noise, noise_level
 from .pairs import best_pairs
-from .rule_numbers import DRAWS, LEAST_WEIGHT
+from .rule_numbers import DRAWS, LEAST_WEIGHT, RIVAL_ERRORS
 from .score import ONE_SESSION, Hypothesis, Score, drawn_weights
 from .screening import ALL_FORMS, Screening
 
@@ -54,6 +54,7 @@ class Search:
     tried: list[Hypothesis] = field(default_factory=list)
     _longer: dict[object, list[Hypothesis]] = field(default_factory=dict)
     _whole: set[tuple[object, str]] = field(default_factory=set)
+    _at_end: dict[int, Hypothesis] = field(default_factory=dict)
     _made: dict[str, tuple[Screening, Hypothesis]] = field(default_factory=dict)
 
     def run(self) -> Generator[tuple[str, float], None, Hypothesis]:
@@ -66,7 +67,8 @@ class Search:
             return self.base
         yield from _in_stage("alone", self._grow(self.base))
         self._weigh(is_noise_measured=True)
-        self._refine(self.best(), is_noise_measured=True)
+        self.refined(self.best())
+        self._weigh(is_noise_measured=True)
         if self.is_open(self.best()):
             yield from _in_stage("differing recordings", self._assume_differences())
             self.tried += yield from _in_stage("differing recordings", best_pairs(plain, self.base))
@@ -120,8 +122,10 @@ class Search:
         """Return a model without one of its effects, and the fitted forms of each kind in its place, itself included."""
         parent = _finished(self._grown_without(one, index))
         found: dict[str, list[Hypothesis]] = {one.names[index]: [one]}
-        for other in self._longer[parent.key]:
+        for other in list(self._longer[parent.key]):
             if other.key != one.key:
+                apart, error = self.score.lead(one, other)
+                other = self.refined(other) if apart < RIVAL_ERRORS * error else other
                 found.setdefault(other.names[-1], []).append(other)
         best = {name: max(map(self.score.value, forms)) for name, forms in found.items()}
         screening = self.under(one.assumed)[0]
@@ -151,7 +155,7 @@ class Search:
     def _try_session(self, screening: Screening, base: Hypothesis) -> Steps:
         """Kinds that explain no more in a session than in recordings that begin untouched are left out of it."""
         made = yield from screening.with_one_more(base, self._remembering(screening))
-        for one in made:
+        for one in [*map(screening.refined, made[:1]), *made[1:]]:
             alone = [other for other in self._longer[self.base.key] if other.names == one.names]
             leads = [self.score.lead(one, other) for other in alone]
             if all(apart > error for apart, error in leads):
@@ -174,7 +178,8 @@ class Search:
         """Try one effect more on top of the best models of a size that could still become the best."""
         for parent in self._beam(size):
             if self._could_lead(parent):
-                parent = self._refine(parent)
+                parent = self.refined(parent)
+                self._weigh()
                 if self._could_lead(parent):
                     yield from self._grow(parent)
 
@@ -183,14 +188,14 @@ class Search:
         lacks = self.score.value(self.best()) - self.score.value(parent)
         return self.score.most_to_gain(parent) > max(0.0, lacks)
 
-    def _refine(self, one: Hypothesis, is_noise_measured: bool = False) -> Hypothesis:
-        """Fit a model with effects to the end, and put it in its place."""
-        if not one.names:
+    def refined(self, one: Hypothesis) -> Hypothesis:
+        """Return a model with effects at the end of its fit, and put it in its place."""
+        if not one.names or id(one) in self._at_end:
             return one
         better = self.under(one.assumed)[0].refined(one)
         for known in (self.tried, *self._longer.values()):
             known[:] = [better if other is one else other for other in known]
-        self._weigh(is_noise_measured)
+        self._at_end[id(better)] = better
         return better
 
     def _beam(self, size: int) -> list[Hypothesis]:
@@ -213,7 +218,7 @@ class Search:
         key = (*sorted(forms), one.assumed)
         screening, base = self.under(one.assumed)
         known = [other for other in [*self.tried, base] if other.key == key]
-        parent = known[0] if known else screening.without(one, index)
+        parent = max(known, key=self.score.value) if known else screening.without(one, index)
         if not known:
             self.tried.append(parent)
         yield from self._grow(parent)

@@ -40,7 +40,8 @@ def with_best_forms(search: Search, best: Hypothesis) -> Hypothesis:
     """Return the model with that form of each kind which describes the recordings best; the names stay."""
     for name in best.names:
         _, others = search.in_place_of(best, best.names.index(name))
-        best = search.score.best_form(others[name])
+        forms = [search.refined(one) if one.number_count < best.number_count else one for one in others[name]]
+        best = search.score.best_form(forms)
     return best
 
 
