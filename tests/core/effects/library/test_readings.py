@@ -8,6 +8,7 @@ from scipy.signal import TransferFunction, lsim
 from palpate.core.effects.engine.readout_chain import ReadoutChain, readings
 from palpate.core.effects.engine.registry import effect
 from palpate.core.effects.engine.specification import TransducerArray
+from palpate.core.effects.library.load_spreading import stretched_exponential
 from palpate.core.errors import EffectError
 
 ROWS, COLUMNS, PITCH = 14, 6, 0.0034
@@ -269,6 +270,26 @@ def test_a_stretched_exponential_is_each_kernel_of_its_shape(form, shape, lost, 
     loads = np.random.default_rng(1).random((3, ROWS * COLUMNS))
     found = read(effect("load-spreading", "stretched-exponential", width=0.004 * times, shape=shape, lost=lost), loads)
     np.testing.assert_allclose(found, read(effect("load-spreading", form, width=0.004), loads), rtol=1e-9)
+
+
+def test_a_stretched_exponential_loses_the_share_that_it_states():
+    loads, words = np.eye(N), {"width": 0.006, "shape": 1.2}
+    kept, half, gone = (
+        read(effect("load-spreading", "stretched-exponential", lost=lost, **words), loads).sum(axis=1)
+        for lost in (0.0, 0.5, 1.0)
+    )
+    np.testing.assert_allclose(kept, 1.0, rtol=1e-12)
+    np.testing.assert_allclose(1.0 - half, 0.5 * (1.0 - gone), rtol=1e-9)
+
+
+def test_a_stretched_exponential_couples_pairs_within_its_reach_alone():
+    """Of many texels a list of all pairs would not fit into memory."""
+    y, x = np.mgrid[0:50, 0:50] * 0.002
+    position = np.stack([x.ravel(), y.ravel(), np.zeros(2500)], axis=1)
+    array = TransducerArray(position, np.full(2500, 4e-6))
+    found = stretched_exponential({"width": 0.003, "shape": 2.0, "lost": 1.0}, array)
+    assert found.matrix is None and len(found.weight) < 2500 * 270  # texels within 5.5 widths
+    np.testing.assert_allclose(found.sums(2500)[25 * 50 + 25], 1.0, rtol=1e-9)
 
 
 def test_crosstalk():

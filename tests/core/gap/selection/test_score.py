@@ -292,3 +292,23 @@ def test_numbers_of_recordings_are_counted_beyond_those_that_all_share():
         found = Fit(replace(model, recordings={**model.recordings, **numbers}), (), np.zeros((1, 2)), np.ones((1, 2)))
         shares.append(float(blocks.Blocks(views).sums(found, views, True).changes[0].sum()))
     assert shares[0] < 1e-9 * shares[1]
+
+
+def test_check_recordings_change_nothing_of_what_is_counted_in_fitted_ones():
+    rig = cases.rig(trials=3)
+    effect, counted = Effect("stiffening", "polynomial", {"beta2": 300.0, "beta3": 0.0}), []
+    for deeper in (0.0, 0.002):
+        last = rig.trials[-1]
+        moved = replace(rig, trials=(*rig.trials[:-1], replace(last, position=last.position - [0.0, 0.0, deeper])))
+        views = blocks.views_of(predictors_of(moved.trials, moved), (0.01, 1.0), (1.0, 1.0))
+        one = blocks.Blocks(views)
+        found = Fit(Model(moved.parameters, (effect,)), (), np.zeros((1, 2)), np.ones((1, 2)))
+        counted.append(one.sums(found, views, False).changes[0][one.recording < len(views.fitted)])
+    np.testing.assert_array_equal(*counted)
+
+
+@pytest.mark.parametrize(("left", "chosen"), [(1.005, "creep/exponential"), (1.05, "creep/power")])
+def test_a_form_with_fewer_numbers_describes_as_well_what_the_noise_leaves_open(left, chosen):
+    """The error of the noise is 0.01; blocks are alike, so that the difference has no error of its own."""
+    forms = [model(1.0, "creep/power", numbers=3), model(left, "creep/exponential", numbers=2)]
+    assert rule().best_form(forms).forms == (chosen,)
