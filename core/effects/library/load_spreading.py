@@ -37,9 +37,7 @@ def open_rim(values: Values, transducers: TransducerArray) -> CouplingMatrix:
 
     What would fall on texels outside is lost. The pitch of the lattice is the root of a texel's median area.
     """
-    width = max(scalar(values, "width"), 1e-9)
-    whole = _lattice_sum(width / float(np.sqrt(np.median(transducers.area))))
-    return coupling_matrix(transducers.position, lambda r: np.exp(-0.5 * (r / width) ** 2) / whole, 5.0 * width, None)
+    return stretched_exponential({"width": 2.0**0.5 * scalar(values, "width"), "shape": 2.0, "lost": 1.0}, transducers)
 
 
 def stretched_exponential(values: Values, transducers: TransducerArray) -> CouplingMatrix:
@@ -68,12 +66,6 @@ def _lattice() -> tuple[np.ndarray, np.ndarray]:
     square = (near[:, None] ** 2 + near[None] ** 2).ravel()
     found, count = np.unique(square[square <= LATTICE_REACH**2], return_counts=True)
     return np.sqrt(found), count.astype(float)
-
-
-def _lattice_sum(width: float) -> float:
-    """Sum of ``exp(−r²/2s²)`` over a square lattice of pitch 1."""
-    reach = np.arange(1.0, 10.0 * width + 2.0)
-    return float(1.0 + 2.0 * np.exp(-0.5 * (reach / width) ** 2).sum()) ** 2
 
 
 def _spread(transducers: TransducerArray, weight: Callable[[np.ndarray], np.ndarray], reach: float) -> CouplingMatrix:
