@@ -63,6 +63,7 @@ KIND = Kind(
             (_DEAD,),
             neutral={"dead": 0.0},
             memoryless=listed,
+            error=0.005,  # every texel that is silent is one of these
         ),
         Form(
             "held",
@@ -75,7 +76,6 @@ KIND = Kind(
             neutral={"dead": 0.0},
             memoryless=held,
             after_conversion=True,
-            error=0.005,  # every texel that does not respond is one of these
         ),
         Form(
             "stuck",
