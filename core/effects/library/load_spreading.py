@@ -48,7 +48,8 @@ def stretched_exponential(values: Values, transducers: TransducerArray) -> Coupl
     """
     width, shape, lost = max(scalar(values, "width"), 1e-9), scalar(values, "shape"), scalar(values, "lost")
     pitch = float(np.sqrt(np.median(transducers.area)))
-    reach = min(width * SMALLEST_EXPONENT ** (1.0 / shape), LATTICE_REACH * pitch)
+    rounding = -np.log(np.finfo(float).eps)  # weights with larger exponents are lost beside the largest one
+    reach = min(width * rounding ** (1.0 / shape), LATTICE_REACH * pitch)
 
     def weight(distance: np.ndarray) -> np.ndarray:
         return np.where(distance <= reach, np.exp(-((distance / width) ** shape)), 0.0)
@@ -79,8 +80,6 @@ def _spread(transducers: TransducerArray, weight: Callable[[np.ndarray], np.ndar
 
 LATTICE_REACH = 40
 """Distance, in pitches, at which a stretched exponential ends."""
-SMALLEST_EXPONENT = 30.0
-"""Weights below ``exp(−30)`` of the largest are left out: 1e-13, which is rounding."""
 _WIDTH = Parameter("width", "m", 0.003, 0.0, 0.1, "Spread s of a point load.")
 
 

@@ -111,6 +111,10 @@ class Prediction:
     force: np.ndarray | None
 
 
+NEUTRAL_NUMBERS = {"factor": 1.0, "zero": 0.0}
+"""Factor and zero of a recording that does not differ from the others, by the words for :func:`number_name`."""
+
+
 def number_name(word: str, name: str) -> str:
     """Return the name of a free number of recordings in :attr:`Model.recordings`; `word` says what it is, as "factor"."""
     return f"{word} of {name}"

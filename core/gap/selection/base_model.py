@@ -12,7 +12,7 @@ from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
 from ..dataset.rig import FORCE, Rig
 from ..fitting.least_squares import FRICTION_LEVEL, RECORDING, Fit, FreeParameter, TrialView, fit, free_base_parameters
 from ..fitting.noise_floor import ChannelNoise, force_noise, reading_noise, with_repeats
-from ..forward.predictor import CONTACT_HEIGHT, Model, Predictor, number_name
+from ..forward.predictor import CONTACT_HEIGHT, NEUTRAL_NUMBERS, Model, Predictor, number_name
 from ..forward.response_check import check_responses
 
 FULL_STEPS, TRIAL_STEPS = 40, 6
@@ -219,7 +219,7 @@ def _contact_heights(rig: Rig, predictors: Sequence[Predictor]) -> list[FreePara
 def with_recording_numbers(model: Model, predictors: Sequence[Predictor]) -> Model:
     """Return a model with free factors of one, free zeros of zero, and free contact heights where their fit starts."""
     numbers: dict[str, float] = {}
-    for word, value in (("factor", 1.0), ("zero", 0.0)):
+    for word, value in NEUTRAL_NUMBERS.items():
         names = [getattr(p.trial, word) for p in predictors]
         numbers |= {number_name(word, name): value for name in names if isinstance(name, str)}
     biased = [p.trial.force_zero for p in predictors if isinstance(p.trial.force_zero, str) and p.trial.force is not None]

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..fitting.least_squares import Fit, TrialView, cross_fitted
-from ..forward.predictor import Model, Predictor, number_name
+from ..forward.predictor import NEUTRAL_NUMBERS, Model, Predictor, number_name
 from .block_sums import Sums
 from .rule_numbers import BLOCKS, MEMORIES
 
@@ -92,15 +92,15 @@ class Blocks:
     def __init__(self, views: Views):
         self.views = views
         touched = np.any([_touched(view.predictor) for view in views.fitted], axis=0)
-        self._masks = [_measured(view) for view in views.fitted]
-        self._masks += [
-            _measured(view) & np.append(touched | ~_touched(view.predictor), [True] * 3)[None] for view in views.check
-        ]
+        measured = [_measured(view) for view in views.all]
+        self._masks = [np.isfinite(values) for values in measured]
+        self._data = [np.where(mask, values, 0.0) for mask, values in zip(self._masks, measured, strict=True)]
+        for mask, view in zip(self._masks[len(views.fitted) :], views.check, strict=True):
+            mask &= np.append(touched | ~_touched(view.predictor), [True] * 3)
         self._rests = [[rest & mask for rest in _without_load(view)] for view, mask in zip(views.all, self._masks, strict=True)]
         self.recording = np.repeat(np.arange(len(views.all)), [view.stretch_count for view in views.all])
         self.count = self._summed([mask.astype(float) for mask in self._masks])
         self.rest_count = np.stack([self._summed([rest[way].astype(float) for rest in self._rests]) for way in (0, 1)])
-        self._data = [_data(view) for view in views.all]
 
     def sums(self, found: Fit, views: Views, has_own_numbers: bool) -> Sums:
         """Return what a fit leaves on unseen blocks.
@@ -120,7 +120,7 @@ class Blocks:
         squares = [r**2 * mask for r, mask in zip([*unseen, *outside], self._masks, strict=True)]
         rest = [self._summed([s * rest[way] for s, rest in zip(squares, self._rests, strict=True)]) for way in (0, 1)]
         without = [model.without(index) for index in range(len(model.effects))]
-        without = [with_equal_recordings(model), *without] if has_own_numbers else without
+        without = [_with_equal_recordings(model), *without] if has_own_numbers else without
         changes = [self._change([*seen, *outside], [view.residual(other) for view in views.all]) for other in without]
         return Sums(
             self._summed(squares), self.count, np.stack(rest), self.rest_count, np.array(changes).reshape(-1, *self.count.shape)
@@ -165,11 +165,12 @@ class Blocks:
         return np.array(rows)
 
 
-def with_equal_recordings(model: Model) -> Model:
-    """Return a model with factors of recordings of one and zeros of zero."""
-    neutral = {number_name("factor", ""): 1.0, number_name("zero", ""): 0.0}
-    changed = {name: value for name in model.recordings for word, value in neutral.items() if name.startswith(word)}
-    return replace(model, recordings={**model.recordings, **changed})
+def _with_equal_recordings(model: Model) -> Model:
+    """The model with the neutral factor and zero of each recording."""
+    numbers = dict(model.recordings)
+    for word, value in NEUTRAL_NUMBERS.items():
+        numbers |= dict.fromkeys((name for name in numbers if name.startswith(number_name(word, ""))), value)
+    return replace(model, recordings=numbers)
 
 
 def _touched(predictor: Predictor) -> np.ndarray:
@@ -178,25 +179,15 @@ def _touched(predictor: Predictor) -> np.ndarray:
     return loaded
 
 
-def _data(view: TrialView) -> np.ndarray:
-    """Measured values in units of the noise, (T, n + 3) float; zero where there are none."""
-    trial, n = view.predictor.trial, len(view.texels)
-    data = np.zeros((len(trial.time), n + 3))
-    for part, values, noise in ((slice(0, n), trial.reading, view.noise[0]), (slice(n, n + 3), trial.force, view.noise[1])):
-        if values is not None:
-            data[:, part] = np.where(np.isfinite(values), values, 0.0) / noise
-    return data
-
-
 def _measured(view: TrialView) -> np.ndarray:
-    """Where values were measured, (T, n + 3) bool."""
+    """Measured values in units of the noise, (T, n + 3) float; not finite where there are none."""
     trial, n = view.predictor.trial, len(view.texels)
-    mask = np.zeros((len(trial.time), n + 3), bool)
+    measured = np.full((len(trial.time), n + 3), np.nan)
     if trial.reading is not None:
-        mask[:, :n] = np.isfinite(trial.reading)
+        measured[:, :n] = trial.reading / view.noise[0]
     if trial.force is not None and view.with_forces:
-        mask[:, n:] = np.isfinite(trial.force)
-    return mask
+        measured[:, n:] = trial.force / view.noise[1]
+    return measured
 
 
 def _without_load(view: TrialView) -> tuple[np.ndarray, np.ndarray]:

@@ -31,12 +31,12 @@ from .noise_level import NoiseLevel
 from .rule_numbers import (
     DRAWS,
     FEWER_NUMBERS,
+    FIT_TOLERANCE,
     FORMULA_ERROR,
     FREE_FORM_ERROR,
     LARGEST_FORMULA_ERROR,
     NEAR_ERRORS,
     RIVAL_ERRORS,
-    SAME_SCORE,
     STRETCHES,
 )
 
@@ -184,10 +184,15 @@ class Score:
         apart = self.values(one) - self.values(other)
         return float(apart[0]), float(apart[1:].std())
 
+    @property
+    def resolution(self) -> float:
+        """By how much scores may change if fits go on: the squares of a right model fall by less than the fits' tolerance."""
+        return float(0.5 * STRETCHES * (FIT_TOLERANCE / self.noise.error)[self.measured].sum())
+
     def is_near(self, best: Hypothesis, one: Hypothesis) -> bool:
-        """Return whether a model does as well as a better one, as far as chance goes, or to a tenth of their odds."""
+        """Return whether a model does as well as a better one, as far as chance goes, or as scores are known."""
         apart, error = self.lead(best, one)
-        return apart < max(NEAR_ERRORS * error, SAME_SCORE)
+        return apart < max(NEAR_ERRORS * error, self.resolution)
 
     @staticmethod
     def is_simpler(one: Hypothesis, other: Hypothesis) -> bool:

@@ -19,6 +19,7 @@ from .blocks import Blocks, Views
 from .candidates import DIRECTLY_ESTIMATED, START_COUNT, Candidate, FittedCandidate, Scales, candidates, is_free_already
 from .plausibility import is_plausible
 from .rao_score import ScoreTest
+from .rule_numbers import FIT_TOLERANCE
 from .score import OWN_NUMBERS, Hypothesis
 from .starting_points import is_large_shift, starting_points
 from .view_set import ViewSet
@@ -30,9 +31,8 @@ FIRST_STEPS, FIRST_TOLERANCE = 10, 1e-3
 before they are fitted to everything: in three of 74 rigs crosstalk was sure where load spreading explains as much."""
 FINAL_STEPS, FINAL_TOLERANCE = 10, 3e-4
 """Of the fits to everything."""
-REFINED_STEPS, REFINED_TOLERANCE = 40, 1e-4
-"""Of the fits to everything on top of which a further effect is looked for. With ten steps alone a Maxwell slip model ended at
-1.5 times its share, and wear was named in addition."""
+REFINED_STEPS = 40
+"""Of the fits of the best models: those on top of which a further effect is looked for, and rivals."""
 TRIED_KINDS, REFITTED_KINDS = 8, 5
 """Kinds that are fitted to a part of the data on top of an effect, and to everything at most: for speed."""
 ALL_FORMS = 2
@@ -175,7 +175,7 @@ class Screening:
 
     def refined(self, one: Hypothesis) -> Hypothesis:
         """Return a model at the end of its fit: final fits are cut short, as most models are far behind the best."""
-        found = fit(self.views.fitted, one.fit.model, one.fit.free, max_steps=REFINED_STEPS, tolerance=REFINED_TOLERANCE)
+        found = fit(self.views.fitted, one.fit.model, one.fit.free, max_steps=REFINED_STEPS, tolerance=FIT_TOLERANCE)
         return one if found.sse.sum() >= one.fit.sse.sum() else self.hypothesis(found, one.names, one.forms)
 
     def final_fit(self, found: Model, free: Sequence[FreeParameter], frozen: int) -> Fit:

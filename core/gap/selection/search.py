@@ -54,7 +54,7 @@ class Search:
     tried: list[Hypothesis] = field(default_factory=list)
     _longer: dict[object, list[Hypothesis]] = field(default_factory=dict)
     _whole: set[tuple[object, str]] = field(default_factory=set)
-    _at_end: dict[int, Hypothesis] = field(default_factory=dict)
+    _at_end: set[Hypothesis] = field(default_factory=set)
     _made: dict[str, tuple[Screening, Hypothesis]] = field(default_factory=dict)
 
     def run(self) -> Generator[tuple[str, float], None, Hypothesis]:
@@ -190,12 +190,12 @@ class Search:
 
     def refined(self, one: Hypothesis) -> Hypothesis:
         """Return a model with effects at the end of its fit, and put it in its place."""
-        if not one.names or id(one) in self._at_end:
+        if not one.names or one in self._at_end:
             return one
         better = self.under(one.assumed)[0].refined(one)
         for known in (self.tried, *self._longer.values()):
             known[:] = [better if other is one else other for other in known]
-        self._at_end[id(better)] = better
+        self._at_end.add(better)
         return better
 
     def _beam(self, size: int) -> list[Hypothesis]:

@@ -11,7 +11,7 @@ from ...effects.engine.registry import form_of, library
 from ..fitting.identifiability import curvature_ratio, indistinguishable, unidentifiable
 from .candidates import NOT_FITTED, parameters_at_bounds
 from .findings import ClosedShares, Diagnosis, Finding
-from .rule_numbers import RIVAL_ERRORS, SAME_SCORE, SURE
+from .rule_numbers import RIVAL_ERRORS, SURE
 from .score import Hypothesis, Score
 from .search import Search
 
@@ -111,7 +111,7 @@ def weighed_kinds(search: Search, best: Hypothesis, index: int) -> tuple[float, 
         value = score.values_of_kind(forms, search.library[other])
         apart, error = float((own - value)[0]), float((own - value)[1:].std())
         explains = is_needed and any(not (score.leaves_gap(one) or _contains(one, best, index)) for one in forms)
-        if not explains and apart > -max(error, SAME_SCORE) and _contains(max(forms, key=score.value), best, index):
+        if not explains and apart > -max(error, score.resolution) and _contains(max(forms, key=score.value), best, index):
             continue
         kept.append(value)
         if explains or apart < RIVAL_ERRORS * error:

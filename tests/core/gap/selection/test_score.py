@@ -243,7 +243,7 @@ def test_names_hold_and_no_number_is_idle_or_a_cliff(searches):
         "LARGEST_FORMULA_ERROR",
         "LEAST_NOISE_ERROR",
         "NEAR_ERRORS",
-        "SAME_SCORE",
+        "FIT_TOLERANCE",
         "FEWER_NUMBERS",
         "DRAWS",
     ):
