@@ -48,6 +48,8 @@ THREES = "axes"
 """What forms need, of :data:`.specification.NEEDS`, that are only defined for the channels of all magnetometers."""
 START_COUNT = 8
 """Number of starting points of a candidate."""
+IN_PLANE = ("x", "y", "about_z")
+"""Parameters of a displacement along the skin."""
 COUPLING_PITCH, COUPLING_LOAD = 0.003, 0.05
 """Distance (m) and load (N) of the texels on which :func:`is_spatial` tests a form."""
 
@@ -307,7 +309,9 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
     """Return the candidates that could show in these recordings at all.
 
     A gain that changes by itself is a warm-up in a session, in which the time goes on from recording to recording. Elsewhere
-    each recording begins with an untouched sensor, and such a gain is a form of drift.
+    each recording begins with an untouched sensor, and such a gain is a form of drift. The height of displaced texels belongs
+    to the base model if contact heights are free. How far texels are displaced along the skin is not fitted under a box, whose
+    edges make steps of it: a scan finds it (:mod:`.starting_points`).
     """
     posed = any(p.trial.stimulus == "pose" for p in predictors)
     dragged = any(p.trial.force is not None and p.stimulus.slide_speed.any() for p in predictors)
@@ -319,6 +323,8 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
     on_clock = all(p.session is not None for p in predictors)
     warmed = _warmth(predictors) >= LEAST_WARMTH
     heights_open = all(isinstance(p.trial.contact_height, str) for p in predictors if p.trial.stimulus == "pose")
+    pressed_by = [p.rig.indenter_of(p.trial) for p in predictors]
+    has_edges = any(one is not None and one.edges is not None for one in pressed_by)
     signed = has_signed_channels(predictors, model)
     in_threes = signed and len(predictors[0].rig.texels) % 3 == 0
     lacking = {"temperature": not warmed, "clock": not on_clock, "no clock": on_clock}
@@ -342,7 +348,9 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
             if not acts_on_force and not read:
                 continue
             fitted = _without(form, kind.known_parameters)
-            one = Candidate(kind, _without_height(fitted) if heights_open else fitted)
+            if form.placement is not None:
+                fitted = _without(fitted, [*(["z"] if heights_open else []), *(IN_PLANE if has_edges else [])])
+            one = Candidate(kind, fitted)
             if several and not in_rows and _needs_rows(form):
                 continue
             if not several and (one.has_texel_parameters or is_spatial(form)):
@@ -371,11 +379,6 @@ def has_signed_channels(predictors: Sequence[Predictor], model: Model) -> bool:
     follows = sums[0] / np.sqrt(np.maximum(sums[1] * sums[2], 1e-300))
     least = max(1.0, LEAST_SIGNED * len(follows))
     return bool((follows >= SIGNED_CORRELATION).sum() >= least and (follows <= -SIGNED_CORRELATION).sum() >= least)
-
-
-def _without_height(form: Form) -> Form:
-    """A form that moves texels without its height, which belongs to the base model if contact heights are free."""
-    return form if form.placement is None else _without(form, ("z",))
 
 
 def _without(form: Form, names: Sequence[str]) -> Form:
