@@ -412,6 +412,11 @@ def predictors_of(trials: Sequence[Trial], rig: Rig) -> list[Predictor]:
     return [Predictor(trial, rig, sessions.get(trial.session)) for trial in trials]
 
 
+def placed_stimulus(trial: Trial, rig: Rig, model: Model) -> Stimulus:
+    """Return the stimulus of the texels in a trial at the places where a model's effects move them."""
+    return of_texels(ResponseModel(rig, surface_stimulus_of(trial, rig)).placed(model), rig)
+
+
 def _height_of(trial: Trial, model: Model | None) -> float:
     """Contact height of a trial; that from which its fit starts if it is free and the model does not have it."""
     if not isinstance(trial.contact_height, str):

@@ -22,7 +22,7 @@ from ..fitting.intervals import parameter_intervals
 from ..fitting.least_squares import BASE, Fit, fit, free_base_parameters
 from ..fitting.noise_floor import MEASURED_REPEATS, MOST_SQUARE, ChannelNoise, coverage
 from ..fitting.residual_tests import LEAST_STRUCTURE, ResidualStructure, proportional_noise, residual_structure, strongest_line
-from ..forward.predictor import Model, Predictor, predictors_of
+from ..forward.predictor import Model, Predictor, placed_stimulus, predictors_of
 from .base_model import base_fit, identified_base_parameters, prepared
 from .blocks import Blocks, views_of
 from .candidates import scales_of
@@ -162,6 +162,7 @@ def _concluded(begun: _Begun, search: Search, named: Hypothesis, best: Hypothesi
     result.structure = _structure(view_set, result.best)
     result.line = strongest_line(view_set.whole, result.best.model)
     result.check = checked(search.under("")[0].blocks, search.score, search.base, best)
+    result.faults = _lasting_faults(result)
     judge(search, named, best, result)
     _find_noise(result, view_set, search, best)
     result.intervals = parameter_intervals(result.best)
@@ -233,6 +234,16 @@ def _with_checked_data(rig: Rig) -> tuple[Rig, list[Predictor], list[DataFault]]
         return rig, predictors, faults
     rig, faults = put_right(rig, [predictor.stimulus for predictor in predictors])
     return rig, predictors_of(rig.trials, rig), faults
+
+
+def _lasting_faults(result: Diagnosis) -> list[DataFault]:
+    """Faults that were put right, and others if the data have them with the texels where the amended model puts them, too."""
+    model = result.best.model
+    if not model.placing_effects:
+        return result.faults
+    stimuli = [placed_stimulus(one, result.rig, model) for one in result.rig.trials]
+    kinds = {fault.kind for fault in find_faults(result.rig, stimuli)}
+    return [fault for fault in result.faults if fault.put_right or fault.kind in kinds]
 
 
 def _stages(result: Diagnosis, view_set: ViewSet) -> list[Model]:
