@@ -29,6 +29,7 @@ from .block_sums import Sums
 from .candidates import parameters_at_bounds
 from .noise_level import NoiseLevel
 from .rule_numbers import (
+    CLEAR_ERRORS,
     DRAWS,
     FEWER_NUMBERS,
     FIT_TOLERANCE,
@@ -36,7 +37,6 @@ from .rule_numbers import (
     FREE_FORM_ERROR,
     LARGEST_FORMULA_ERROR,
     NEAR_ERRORS,
-    RIVAL_ERRORS,
     STRETCHES,
 )
 
@@ -173,7 +173,7 @@ class Score:
     def leaves_gap(self, one: Hypothesis, weights: np.ndarray | None = None) -> bool:
         """Return whether a model leaves more than noise and the error of its formulas account for, `weights` (1, b)."""
         excess, allowed = self.parts(one, self.weights[:1] if weights is None else weights)
-        return bool((excess[0] > np.maximum(RIVAL_ERRORS * self.noise.error, allowed[0]))[self.measured].any())
+        return bool((excess[0] > np.maximum(CLEAR_ERRORS * self.noise.error, allowed[0]))[self.measured].any())
 
     def value(self, one: Hypothesis) -> float:
         """Return S."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from .noise_level import measured_noise, noise_level
 from .pairs import best_pairs
-from .rule_numbers import DRAWS, LEAST_WEIGHT, RIVAL_ERRORS
+from .rule_numbers import DRAWS, LEAST_WEIGHT
 from .score import ONE_SESSION, Hypothesis, Score, drawn_weights
 from .screening import ALL_FORMS, Screening
 
@@ -124,8 +124,7 @@ class Search:
         found: dict[str, list[Hypothesis]] = {one.names[index]: [one]}
         for other in list(self._longer[parent.key]):
             if other.key != one.key:
-                apart, error = self.score.lead(one, other)
-                other = self.refined(other) if apart < RIVAL_ERRORS * error else other
+                other = self.refined(other) if self.score.weight(other, one) > LEAST_WEIGHT else other
                 found.setdefault(other.names[-1], []).append(other)
         best = {name: max(map(self.score.value, forms)) for name, forms in found.items()}
         screening = self.under(one.assumed)[0]

@@ -21,8 +21,8 @@ LARGEST_SHIFT, LARGEST_TURN = 0.5, 0.1
 """Bounds of their starting points, in the same units."""
 DISPLACEMENT_SCANS = ((0.1, 12), (0.05, 5))
 """Step and number of steps to each side of the scans for a large displacement, first ones and second ones; steps are shares of
-the pitch and of `LARGEST_TURN`. Shifts of nine development rigs with flat punches are at most 0.9 pitches. Each gets the best of
-a grid of 0.05 pitches; a search with DIRECT misses it in two of them."""
+the pitch and of `LARGEST_TURN`. Shifts of nine development rigs with flat punches are at most 0.9 pitches. Each gets the best
+of a grid of 0.05 pitches; a search with DIRECT misses it in two of them."""
 TEXEL_STEP = 0.01
 """Test step of parameters of single texels, as a share of their scale."""
 

@@ -11,7 +11,7 @@ from ...effects.engine.registry import form_of, library
 from ..fitting.identifiability import curvature_ratio, indistinguishable, unidentifiable
 from .candidates import NOT_FITTED, parameters_at_bounds
 from .findings import ClosedShares, Diagnosis, Finding
-from .rule_numbers import RIVAL_ERRORS, SURE
+from .rule_numbers import CLEAR_ERRORS, LEAST_WEIGHT, SURE
 from .score import Hypothesis, Score
 from .search import Search
 
@@ -95,28 +95,23 @@ def _verdict(search: Search, named: Hypothesis, best: Hypothesis, result: Diagno
 
 
 def weighed_kinds(search: Search, best: Hypothesis, index: int) -> tuple[float, list[str]]:
-    """Return the confidence of an effect's kind, and its rivals in its place.
+    """Return the confidence of an effect's kind, and its rivals in its place: kinds with a weight of :data:`LEAST_WEIGHT`.
 
-    Rivals are kinds that explain as much by all their forms, and those of which a form leaves no more than noise and its own
-    error account for: then the recordings do not refute it, however much less another leaves. Kinds of which every form leaves
-    more are refuted where this one does not: they are no rivals and have no weight.
+    A kind that can do whatever this one does (see :func:`_contains`) has no weight if it does no better.
     """
     score, name = search.score, best.names[index]
     parent, others = search.in_place_of(best, index)
-    own = score.values_of_kind(others[name], search.library[name])
-    rivals, kept, is_needed, is_enough = [], [own, score.values(parent)], score.leaves_gap(parent), not score.leaves_gap(best)
-    for other, forms in others.items():
-        if other == name or (is_enough and all(map(score.leaves_gap, forms))):
-            continue
-        value = score.values_of_kind(forms, search.library[other])
-        apart, error = float((own - value)[0]), float((own - value)[1:].std())
-        explains = is_needed and any(not (score.leaves_gap(one) or _contains(one, best, index)) for one in forms)
-        if not explains and apart > -max(error, score.resolution) and _contains(max(forms, key=score.value), best, index):
-            continue
-        kept.append(value)
-        if explains or apart < RIVAL_ERRORS * error:
-            rivals.append(other)
-    return float(score.weights_of(kept)[0]), rivals
+    values = {other: score.values_of_kind(forms, search.library[other]) for other, forms in others.items()}
+
+    def competes(other: str) -> bool:
+        ahead = values[other] - values[name]
+        is_better = float(ahead[0]) > max(float(ahead[1:].std()), score.resolution)
+        return other == name or is_better or not _contains(max(others[other], key=score.value), best, index)
+
+    kinds = [other for other in values if competes(other)]
+    weights = score.weights_of([*(values[other] for other in kinds), score.values(parent)])
+    rivals = [other for other, weight in zip(kinds, weights, strict=False) if other != name and weight > LEAST_WEIGHT]
+    return float(weights[kinds.index(name)]), rivals
 
 
 def _judged(search: Search, best: Hypothesis, index: int, result: Diagnosis) -> Finding:
@@ -184,7 +179,7 @@ def _closed(score: Score, before: np.ndarray, after: np.ndarray, count: np.ndarr
     gap = before - level * count
     shares = [
         float(min((before[q] - after[q]) / gap[q], 1.0))
-        if gap[q] > RIVAL_ERRORS * score.noise.error[q] * count[q] > 0
+        if gap[q] > CLEAR_ERRORS * score.noise.error[q] * count[q] > 0
         else None
         for q in (0, 1)
     ]
