@@ -81,7 +81,7 @@ KIND = Kind(
             neutral={"offset": 0.0, "level": np.inf},
             memoryless=relieved,
             after_conversion=True,
-            error=0.005,  # listed is a limit of it, and of b / (1 + r₀/L) it leaves 0.001
+            error=0.005,  # listed is a limit of it; of b / (1 + r/L) up to three L it leaves 0.003
         ),
     ),
     experiment="record a minute without touching the sensor, before and after a trial",

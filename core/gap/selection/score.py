@@ -175,6 +175,11 @@ class Score:
         excess, allowed = self.parts(one, self.weights[:1] if weights is None else weights)
         return bool((excess[0] > np.maximum(CLEAR_ERRORS * self.noise.error, allowed[0]))[self.measured].any())
 
+    def is_refuted(self, forms: Sequence[Hypothesis]) -> bool:
+        """Return whether a kind leaves a gap in all its forms that are free to follow any law, or in all if it has none."""
+        free = [one for one in forms if form_of(*one.forms[-1].split("/")).error is not None]
+        return all(map(self.leaves_gap, free or forms))
+
     def value(self, one: Hypothesis) -> float:
         """Return S."""
         return float(self.values(one)[0])

@@ -97,18 +97,21 @@ def _verdict(search: Search, named: Hypothesis, best: Hypothesis, result: Diagno
 def weighed_kinds(search: Search, best: Hypothesis, index: int) -> tuple[float, list[str]]:
     """Return the confidence of an effect's kind, and its rivals in its place: kinds with a weight of :data:`LEAST_WEIGHT`.
 
-    A kind that can do whatever this one does (see :func:`_contains`) has no weight if it does no better.
+    Two sorts of kinds have no weight: those that leave more than noise and their own error account for where this one does not,
+    and those that can do whatever this one does (see :func:`_contains`) and do no better.
     """
     score, name = search.score, best.names[index]
     parent, others = search.in_place_of(best, index)
     values = {other: score.values_of_kind(forms, search.library[other]) for other, forms in others.items()}
+    is_enough = not score.leaves_gap(best)
 
-    def competes(other: str) -> bool:
+    def has_weight(other: str) -> bool:
         ahead = values[other] - values[name]
         is_better = float(ahead[0]) > max(float(ahead[1:].std()), score.resolution)
-        return other == name or is_better or not _contains(max(others[other], key=score.value), best, index)
+        is_refuted = is_enough and score.is_refuted(others[other])
+        return not is_refuted and (is_better or not _contains(max(others[other], key=score.value), best, index))
 
-    kinds = [other for other in values if competes(other)]
+    kinds = [other for other in values if other == name or has_weight(other)]
     weights = score.weights_of([*(values[other] for other in kinds), score.values(parent)])
     rivals = [other for other, weight in zip(kinds, weights, strict=False) if other != name and weight > LEAST_WEIGHT]
     return float(weights[kinds.index(name)]), rivals

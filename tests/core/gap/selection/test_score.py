@@ -82,7 +82,7 @@ def test_an_effect_more_reaches_a_score_where_it_leaves_no_more_than_this(least)
 
 @pytest.mark.parametrize(("left", "rivals"), [(1.15, ["lag"]), (1.4, [])])
 def test_a_kind_with_a_tenth_of_the_weight_is_a_rival(left, rivals):
-    """It may leave 0.05 of a change of four variances; the other kind leaves nothing. Its odds are one to eight, or to seventy."""
+    """It may leave 0.05 of a change of four variances; the other kind leaves nothing. Its odds are one to eight, or seventy."""
     best, other = model(1.0, "creep/power", changes=(4.0,)), model(left, "lag/first-order", changes=(4.0,))
     found = search.Search({})
     found.score, found.library = rule(), Counter(creep=4, lag=4)
@@ -106,6 +106,17 @@ def test_of_models_within_a_standard_error_the_smallest_wins():
     bent.__dict__["is_bent"] = True
     found.tried = [model(3.0), few, bent]
     assert found.best() is few
+
+
+def test_a_kind_that_leaves_more_than_its_error_is_refuted_where_another_does_not():
+    """Half the score between them is the allowance of the kind that fits: the other leaves 0.6 where it may leave 0.2."""
+    best, other = model(1.0, "hysteresis/play", changes=(20.0,)), model(1.6, "softening/peak", changes=(4.0,))
+    found = search.Search({})
+    found.score, found.library = rule(), Counter(hysteresis=1, softening=1)
+    found.in_place_of = lambda *_: (model(4.0), {"hysteresis": [best], "softening": [other]})
+    assert found.score.value(other) > found.score.value(best)
+    weight, rivals = verdict.weighed_kinds(found, best, 0)
+    assert weight == pytest.approx(found.score.weight(best, model(4.0))) and not rivals
 
 
 @pytest.mark.parametrize(("left", "helps"), [(2.9, False), (1.8, True)])
