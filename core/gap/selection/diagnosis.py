@@ -162,7 +162,7 @@ def _concluded(begun: _Begun, search: Search, named: Hypothesis, best: Hypothesi
     result.structure = _structure(view_set, result.best)
     result.line = strongest_line(view_set.whole, result.best.model)
     result.check = checked(search.under("")[0].blocks, search.score, search.base, best)
-    result.faults = _lasting_faults(result)
+    result.faults = lasting_faults(result)
     judge(search, named, best, result)
     _find_noise(result, view_set, search, best)
     result.intervals = parameter_intervals(result.best)
@@ -236,8 +236,8 @@ def _with_checked_data(rig: Rig) -> tuple[Rig, list[Predictor], list[DataFault]]
     return rig, predictors_of(rig.trials, rig), faults
 
 
-def _lasting_faults(result: Diagnosis) -> list[DataFault]:
-    """Faults that were put right, and others if the data have them with the texels where the amended model puts them, too."""
+def lasting_faults(result: Diagnosis) -> list[DataFault]:
+    """Return faults that were put right, and those that the data also have with texels where the amended model puts them."""
     model = result.best.model
     if not model.placing_effects:
         return result.faults

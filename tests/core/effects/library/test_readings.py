@@ -360,6 +360,8 @@ def test_listed_values():
     assert np.log(exponent[0]).std() == pytest.approx(0.2, rel=0.25)
     np.testing.assert_allclose(read(powers, np.full((2, N), 0.5), TIME[:2]), 0.5)
     np.testing.assert_allclose(read(effect("offset", "listed", offset=factor), force, TIME[:9]), force + factor)
+    relieved = read(effect("offset", "relieved", offset=factor, level=0.5), force, TIME[:9])
+    np.testing.assert_allclose(relieved, force + factor * np.exp(-force / 0.5))
     moved = factor * (TIME[:9, None] / 60.0) ** 0.5
     np.testing.assert_allclose(read(effect("drift", "listed", amount=factor, exponent=0.5), force, TIME[:9]), force + moved)
     straight = read(effect("drift", "shifted-power", amount=12.0, time=30.0, exponent=1.0), force, TIME[:9])

@@ -2,6 +2,7 @@
 """Where fits of candidates start, and on which views: steps that are seen, friction that is held, and forces."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import gap_cases as cases
 import numpy as np
@@ -9,11 +10,13 @@ import pytest
 import trimesh
 
 from palpate.core.effects.engine.registry import effect, form_of, kind_of
+from palpate.core.gap.data_faults.data_fault import DataFault
 from palpate.core.gap.dataset.rig import Indenter
 from palpate.core.gap.fitting.least_squares import FRICTION_LEVEL, TrialView, fit, free_base_parameters, with_values
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.selection.base_model import friction_parameters_to_search
-from palpate.core.gap.selection.candidates import Candidate, scales_of
+from palpate.core.gap.selection.candidates import Candidate, candidates, scales_of
+from palpate.core.gap.selection.diagnosis import lasting_faults
 from palpate.core.gap.selection.direct_estimates import companding_starts, few_levels
 from palpate.core.gap.selection.quantities import friction_kinds
 from palpate.core.gap.selection.rao_score import ScoreTest
@@ -77,6 +80,28 @@ def test_friction_is_looked_for_where_forces_are(beside):
     assert not any(view.with_forces for view in seen)
 
 
+@pytest.mark.parametrize("swapped", [False, True])
+def test_a_fault_counts_if_displaced_texels_have_it_too(swapped):
+    """A shift makes channels follow the loads of other texels; two channels that are swapped do so after it as well."""
+    plain = cases.rig(trials=3, seconds=4.0)
+    moved = Model(SensorParameters(k=80.0, cn=0.0), (effect("misalignment", "shift", x=0.7 * cases.PITCH, y=0.0),))
+    trials = []
+    for trial in plain.trials:
+        trials.append(replace(trial, reading=Predictor(trial, plain).predict(moved).reading.copy()))
+    loads = np.concatenate([trial.reading for trial in trials])
+    first = int(np.argmax(loads.sum(axis=0)))
+    like = np.where(loads.sum(axis=0) > 0.3 * loads[:, first].sum(), loads.T @ loads[:, first], np.inf)
+    pair = [first, int(np.argmin(like))]
+    for trial in trials if swapped else ():
+        trial.reading[:, pair] = trial.reading[:, pair[::-1]]
+    rig = replace(plain, trials=tuple(trials))
+    fault = DataFault("swapped-channels", tuple(trial.name for trial in trials), "two channels follow each other's load")
+    result = SimpleNamespace(rig=rig, faults=[fault], best=SimpleNamespace(model=moved))
+    assert bool(lasting_faults(result)) is swapped
+    result.best.model = Model(moved.parameters)  # nothing displaced: faults were judged with these texels
+    assert lasting_faults(result) == [fault]
+
+
 def test_a_large_shift_under_a_flat_punch_is_found():
     """A shift changes nothing until an edge passes a texel, so that no derivative points to it."""
     half, shift = np.array([0.0062, 0.0081, 0.01]), np.array([0.0009, -0.0036])
@@ -96,6 +121,8 @@ def test_a_large_shift_under_a_flat_punch_is_found():
     base = Model(SensorParameters(k=80.0, cn=0.0))
     candidate = Candidate(kind_of("misalignment"), form_of("misalignment", "shift"))
     scales = scales_of([view.predictor for view in views], base)
+    fitted = [one.form for one in candidates([view.predictor for view in views], base) if one.label == "misalignment/rigid"]
+    assert [p.name for p in fitted[0].parameters] == ["z", "about_x", "about_y"]  # no fit moves an edge over a texel
     test = ScoreTest(views, fit(views, base, free_base_parameters(base.parameters, ("k",), 1.0)))
     _, best = starting_points(candidate, test, None, scales)[0]
     left, whole = (
