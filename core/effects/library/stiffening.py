@@ -51,6 +51,20 @@ def foam(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bo
     return texel.force * factor, texel.slope * factor + texel.force * factor_slope / length
 
 
+def bilinear(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
+    """``1 + g w (s((d−D)/w) − s(−D/w)) / d`` with ``s(x) = ln(1 + exp x)`` and ``w = D/p``. Constants: D, g, p."""
+    knee, growth, sharpness = constants[0], constants[1], constants[2]
+    depth = texel.depth
+    if depth <= 0.0:
+        return texel.force, texel.slope
+    width = knee / sharpness
+    x = (depth - knee) / width
+    risen = max(x, 0.0) + math.log1p(math.exp(-abs(x))) - math.log1p(math.exp(-sharpness))
+    share = growth * width * risen / depth
+    factor_slope = (growth * 0.5 * (1.0 + math.tanh(0.5 * x)) - share) / depth
+    return texel.force * (1.0 + share), texel.slope * (1.0 + share) + texel.force * factor_slope
+
+
 _DOUBLE = Parameter("depth", "m", 0.004, 1e-4, 0.1, "Depth D at which the force is twice the linear one.", log=True)
 _POWER = Parameter("exponent", "1", 1.0, 0.5, 4.0, "Exponent p: 1 adds a quadratic force, 2 a cubic one.")
 
@@ -91,7 +105,20 @@ KIND = Kind(
             neutral={"depth": math.inf},
             law=foam,
             constants=constants_from("depth", "exponent"),
-            error=0.005,  # of the other forms it leaves 0.0007 at most
+        ),
+        Form(
+            "bilinear",
+            "f = k (d + g w (s((d − D)/w) − s(−D/w))),  s(x) = ln(1 + eˣ),  w = D/p",
+            "Shaw and Holmes, J. Sound Vib. 90 (1983): piecewise linear spring, with a rounded knee",
+            (
+                Parameter("depth", "m", 0.002, 1e-4, 0.1, "Depth D of the knee.", log=True),
+                Parameter("growth", "1", 1.0, 0.0, 1000.0, "Growth g of the stiffness beyond the knee, as a share."),
+                Parameter("sharpness", "1", 3.0, 0.2, 60.0, "Sharpness p of the knee.", log=True),
+            ),
+            neutral={"growth": 0.0},
+            law=bilinear,
+            constants=constants_from("depth", "growth", "sharpness"),
+            error=0.005,  # of polynomials, exponentials, foam and piecewise linear springs it leaves 0.0016 at most
         ),
     ),
     experiment="press slowly to the largest permitted depth",
