@@ -28,7 +28,7 @@ def listed(signal: np.ndarray, time: np.ndarray, values: Values, transducers: Tr
 
 def relieved(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Add a given offset to each texel, which falls with the reading."""
-    return signal + np.asarray(values["offset"]) * np.exp(-np.abs(signal) / scalar(values, "level"))
+    return signal + np.asarray(values["offset"]) * np.exp(-np.abs(signal - transducers.zero) / scalar(values, "level"))
 
 
 _SECOND = np.linspace(0, 1, 501)
@@ -72,13 +72,13 @@ KIND = Kind(
         ),
         Form(
             "relieved",
-            "rᵢ = r₀ᵢ + bᵢ exp(−|r₀ᵢ| / L)",
+            "rᵢ = r₀ᵢ + bᵢ exp(−|r₀ᵢ − z| / L),  z the sensor's zero",
             "ISO/IEC Guide 99 (2007), 4.28: zero error; a cover that presses on the texels until the load takes over",
             (
                 Parameter("offset", "unit", 0.0, -1e5, 1e5, "Offset b of each texel without load.", per_texel=True),
                 Parameter("level", "unit", 1.0, 1e-3, 1e5, "Reading L at which an offset has fallen to 37 %.", log=True),
             ),
-            neutral={"offset": 0.0, "level": np.inf},
+            neutral={"offset": 0.0},
             memoryless=relieved,
             after_conversion=True,
             error=0.005,  # listed is a limit of it; of b / (1 + r/L) up to three L it leaves 0.003

@@ -13,6 +13,7 @@ from ...effects.engine.registry import form_of, library, names_found_by
 from ...effects.engine.specification import SCATTER, SILENT_TEXELS, STEPS, Form, Kind, TransducerArray
 from ...errors import EffectError
 from ...geometry.grid_layout import GridLayout
+from ...geometry.rotations import rotation_matrices
 from ...model.parameter import Parameter
 from ...model.sensor import Effect
 from ..fitting.identifiability import unidentifiable
@@ -50,6 +51,8 @@ START_COUNT = 8
 """Number of starting points of a candidate."""
 IN_PLANE = ("x", "y", "about_z")
 """Parameters of a displacement along the skin."""
+PARALLEL = 1e-3
+"""Angle (rad) up to which a face is parallel to texels: over ten millimetres it rises by 10 µm."""
 COUPLING_PITCH, COUPLING_LOAD = 0.003, 0.05
 """Distance (m) and load (N) of the texels on which :func:`is_spatial` tests a form."""
 
@@ -169,10 +172,20 @@ def search_range(parameter: Parameter, scales: Scales, form: Form) -> tuple[floa
 
 @dataclass(frozen=True)
 class Candidate:
-    """A form of an effect that may be missing in the model."""
+    """A form of an effect that may be missing in the model.
+
+    Attributes
+    ----------
+    kind : Kind
+    form : Form
+        With the parameters that are looked for.
+    held : tuple of str
+        Parameters that no fit changes.
+    """
 
     kind: Kind
     form: Form
+    held: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -192,7 +205,7 @@ class Candidate:
     def free_parameters(self, index: int, scales: Scales, gain: float) -> list[FreeParameter]:
         """Return its free parameters as those of the effect number `index` of a stack."""
         made = []
-        for raw in self.form.parameters:
+        for raw in (p for p in self.form.parameters if p.name not in self.held):
             p = raw.scaled(gain)
             _, top = search_range(p, scales, self.form)
             size = max(abs(p.default), 0.1 * top) if p.unit == "1" else 0.3 * top
@@ -310,8 +323,8 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
 
     A gain that changes by itself is a warm-up in a session, in which the time goes on from recording to recording. Elsewhere
     each recording begins with an untouched sensor, and such a gain is a form of drift. The height of displaced texels belongs
-    to the base model if contact heights are free. How far texels are displaced along the skin is not fitted under a box, whose
-    edges make steps of it: a scan finds it (:mod:`.starting_points`).
+    to the base model if contact heights are free. How far texels are displaced along the skin is not fitted where a box presses
+    flat on them, because a texel is under it or not: a scan finds it (:mod:`.starting_points`).
     """
     posed = any(p.trial.stimulus == "pose" for p in predictors)
     dragged = any(p.trial.force is not None and p.stimulus.slide_speed.any() for p in predictors)
@@ -323,8 +336,7 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
     on_clock = all(p.session is not None for p in predictors)
     warmed = _warmth(predictors) >= LEAST_WARMTH
     heights_open = all(isinstance(p.trial.contact_height, str) for p in predictors if p.trial.stimulus == "pose")
-    pressed_by = [p.rig.indenter_of(p.trial) for p in predictors]
-    has_edges = any(one is not None and one.edges is not None for one in pressed_by)
+    in_steps = posed and all(_is_flat_press(p) for p in predictors if p.trial.stimulus == "pose")
     signed = has_signed_channels(predictors, model)
     in_threes = signed and len(predictors[0].rig.texels) % 3 == 0
     lacking = {"temperature": not warmed, "clock": not on_clock, "no clock": on_clock}
@@ -348,15 +360,25 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
             if not acts_on_force and not read:
                 continue
             fitted = _without(form, kind.known_parameters)
-            if form.placement is not None:
-                fitted = _without(fitted, [*(["z"] if heights_open else []), *(IN_PLANE if has_edges else [])])
-            one = Candidate(kind, fitted)
+            moves = form.placement is not None
+            held = IN_PLANE if moves and in_steps else ()
+            one = Candidate(kind, _without(fitted, ("z",)) if moves and heights_open else fitted, held)
             if several and not in_rows and _needs_rows(form):
                 continue
             if not several and (one.has_texel_parameters or is_spatial(form)):
                 continue
             found.append(one)
     return found
+
+
+def _is_flat_press(predictor: Predictor) -> bool:
+    """True if a box presses on texels with a face that is parallel to all of them."""
+    trial, normal = predictor.trial, predictor.rig.surface.normal
+    indenter = predictor.rig.indenter_of(trial)
+    if indenter is None or indenter.edges is None or trial.quaternion is None:
+        return False
+    turned = np.abs(normal @ rotation_matrices(trial.quaternion))  # (T, n, 3), along the axes of the box
+    return bool(turned.max(axis=2).min() > np.cos(PARALLEL))
 
 
 def is_free_already(candidate: Candidate, free: Sequence[FreeParameter]) -> bool:

@@ -162,7 +162,7 @@ def _concluded(begun: _Begun, search: Search, named: Hypothesis, best: Hypothesi
     result.structure = _structure(view_set, result.best)
     result.line = strongest_line(view_set.whole, result.best.model)
     result.check = checked(search.under("")[0].blocks, search.score, search.base, best)
-    result.faults = lasting_faults(result)
+    result.faults = faults_of(result, named.fit.model)
     judge(search, named, best, result)
     _find_noise(result, view_set, search, best)
     result.intervals = parameter_intervals(result.best)
@@ -236,14 +236,14 @@ def _with_checked_data(rig: Rig) -> tuple[Rig, list[Predictor], list[DataFault]]
     return rig, predictors_of(rig.trials, rig), faults
 
 
-def lasting_faults(result: Diagnosis) -> list[DataFault]:
-    """Return faults that were put right, and those that the data also have with texels where the amended model puts them."""
-    model = result.best.model
-    if not model.placing_effects:
+def faults_of(result: Diagnosis, named: Model) -> list[DataFault]:
+    """Return the faults of the data: those that were put right, and others if texels where a model puts them show them, too."""
+    if not named.placing_effects:
         return result.faults
-    stimuli = [placed_stimulus(one, result.rig, model) for one in result.rig.trials]
-    kinds = {fault.kind for fault in find_faults(result.rig, stimuli)}
-    return [fault for fault in result.faults if fault.put_right or fault.kind in kinds]
+    stimuli = [placed_stimulus(one, result.rig, named) for one in result.rig.trials]
+    kinds = {fault.kind for fault in result.faults}
+    found = [fault for fault in find_faults(result.rig, stimuli) if fault.kind in kinds]
+    return [*(fault for fault in result.faults if fault.put_right), *found]
 
 
 def _stages(result: Diagnosis, view_set: ViewSet) -> list[Model]:

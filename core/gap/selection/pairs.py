@@ -110,8 +110,8 @@ def _fitted(screening: Screening, base: Hypothesis, pair: tuple[_Entry, _Entry])
     model, free = base.fit.model, tuple(base.fit.free)
     for one in pair:
         free = free_with(free, model, one.candidate, screening.scales)
-        is_far = one.candidate.form.placement is not None  # its change is not proportional to it
-        effect = one.effect if is_far else one.candidate.scaled(one.effect, one.length, abs(model.parameters.gain))
+        moves = one.candidate.form.placement is not None  # its change is not proportional to it
+        effect = one.effect if moves else one.candidate.scaled(one.effect, one.length, abs(model.parameters.gain))
         model = model.with_effect(effect)
     views = screening.view_set.few_samples
     quick = fit(views, model, free, max_steps=10, tolerance=1e-3, with_equations=False)

@@ -120,6 +120,11 @@ class ScoreTest:
             return 0.0, 0.0
         return own_dot**2 / own_square, own_dot / own_square
 
+    def decrease_with(self, model: Model) -> float:
+        """Return by how much the squares fall with another model as it is, if the free parameters follow, to first order."""
+        promise, length = self.score(model)
+        return promise * (2.0 * length - 1.0) / length**2 if length != 0.0 else 0.0
+
     def score_of_texels(self, model: Model) -> float:
         """Return by how much the squares fall at best if each texel has a length of its own, less what noise alone gives.
 

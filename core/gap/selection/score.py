@@ -26,7 +26,7 @@ from scipy.optimize import brentq
 from ...effects.engine.registry import form_of, kind_of
 from ..fitting.least_squares import BASE, Fit
 from .block_sums import Sums
-from .candidates import parameters_at_bounds
+from .candidates import IN_PLANE, parameters_at_bounds
 from .noise_level import NoiseLevel
 from .rule_numbers import (
     CLEAR_ERRORS,
@@ -77,9 +77,20 @@ class Hypothesis:
 
     @property
     def number_count(self) -> int:
-        """Number of fitted values of effects and recordings; one for each texel where each has its own."""
+        """Number of fitted values of effects and recordings; one for each texel where each has its own.
+
+        Displacements that a scan has found count, too.
+        """
+        scanned = [
+            (index, name)
+            for index, effect in enumerate(self.fit.model.effects)
+            if form_of(effect.name, effect.form).placement is not None
+            for name in IN_PLANE
+            if effect.values.get(name, 0.0) != 0.0
+            and not any(item.effect == index and item.name == name for item in self.fit.free)
+        ]
         texels = max([len(v) for e in self.fit.model.effects for v in e.values.values() if isinstance(v, tuple)] + [1])
-        return sum(texels if item.per_texel else 1 for item in self.fit.free if item.effect != BASE)
+        return len(scanned) + sum(texels if item.per_texel else 1 for item in self.fit.free if item.effect != BASE)
 
     @property
     def components(self) -> tuple[str, ...]:

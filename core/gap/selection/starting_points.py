@@ -97,7 +97,7 @@ def _texel_parameter_starts(candidate: Candidate, score_test: ScoreTest, scales:
 def _displacement_start(candidate: Candidate, score_test: ScoreTest, scales: Scales) -> tuple[float, Effect]:
     """The best small displacement of the texels: a joint score test of a small step of each parameter."""
     gain = abs(score_test.model.parameters.gain)
-    parameters = candidate.form.parameters
+    parameters = [q for q in candidate.form.parameters if q.name not in candidate.held]
     neutral = {name: 0.0 for name in candidate.form.neutral}
     steps = [SMALL_SHIFT * scales.pitch if q.unit == "m" else SMALL_TURN for q in parameters]
     models = [
@@ -120,25 +120,24 @@ def is_large_shift(effect: Effect, scales: Scales) -> bool:
 
 
 def _large_displacement(candidate: Candidate, score_test: ScoreTest, scales: Scales) -> list[tuple[float, Effect]]:
-    """The displacement along the skin that promises most in scans along each axis, for indenters other than spheres.
+    """The displacement along the skin that lowers the squares most in scans along each axis, for indenters other than spheres.
 
     Under a flat indenter it changes nothing until it adds or removes a texel, so no derivative points to it. Of those that
-    promise as much the middle one is taken.
+    do as much the middle one is taken.
     """
     gain = abs(score_test.model.parameters.gain)
-    first = score_test.views[0].predictor
-    indenter = first.rig.indenter_of(first.trial)
+    pressed_by = [view.predictor.rig.indenter_of(view.predictor.trial) for view in score_test.views]
     units = {"x": scales.pitch, "y": scales.pitch, "about_z": LARGEST_TURN}
     along = [name for name in IN_PLANE if name in candidate.form.neutral]
-    if not along or indenter is None or indenter.radius is not None:
+    if not along or all(one is None or one.radius is not None for one in pressed_by):
         return []
-    best, promise = dict.fromkeys(candidate.form.neutral, 0.0), 0.0
+    best, decrease = dict.fromkeys(candidate.form.neutral, 0.0), 0.0
     for step, count in DISPLACEMENT_SCANS:
         for name in along:
             tried = [{**best, name: best[name] + i * step * units[name]} for i in range(-count, count + 1)]
             effects = [candidate.effect(values, scales.texels, gain) for values in tried]
-            promises = [score_test.score(score_test.model.with_effect(effect))[0] for effect in effects]
-            promise = max(promises)
-            top = np.flatnonzero(np.isclose(promises, promise))
+            decreases = [score_test.decrease_with(score_test.model.with_effect(effect)) for effect in effects]
+            decrease = max(decreases)
+            top = np.flatnonzero(np.isclose(decreases, decrease))
             best = tried[top[len(top) // 2]]
-    return [(promise, candidate.effect(best, scales.texels, gain))]
+    return [(decrease, candidate.effect(best, scales.texels, gain))]

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Effects on readings against closed forms, SciPy and statistics."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import TransferFunction, lsim
@@ -360,8 +362,9 @@ def test_listed_values():
     assert np.log(exponent[0]).std() == pytest.approx(0.2, rel=0.25)
     np.testing.assert_allclose(read(powers, np.full((2, N), 0.5), TIME[:2]), 0.5)
     np.testing.assert_allclose(read(effect("offset", "listed", offset=factor), force, TIME[:9]), force + factor)
-    relieved = read(effect("offset", "relieved", offset=factor, level=0.5), force, TIME[:9])
-    np.testing.assert_allclose(relieved, force + factor * np.exp(-force / 0.5))
+    for zero in (0.0, 2.5):  # without load each texel has its whole offset
+        found = read(effect("offset", "relieved", offset=factor, level=0.5), force, TIME[:9], replace(GRID, zero=zero))
+        np.testing.assert_allclose(found, zero + force + factor * np.exp(-force / 0.5))
     moved = factor * (TIME[:9, None] / 60.0) ** 0.5
     np.testing.assert_allclose(read(effect("drift", "listed", amount=factor, exponent=0.5), force, TIME[:9]), force + moved)
     straight = read(effect("drift", "shifted-power", amount=12.0, time=30.0, exponent=1.0), force, TIME[:9])

@@ -10,7 +10,7 @@ import gap_cases as cases
 import numpy as np
 import pytest
 
-from palpate.core.effects.engine.registry import library
+from palpate.core.effects.engine.registry import effect, library
 from palpate.core.gap.fitting.least_squares import Fit
 from palpate.core.gap.forward.predictor import Model, number_name, predictors_of
 from palpate.core.gap.selection import blocks, diagnosis, noise_level, rule_numbers, score, search, verdict
@@ -63,6 +63,15 @@ def test_the_score_is_the_logarithm_of_what_is_left_and_allowed():
     allowed = rule_numbers.FREE_FORM_ERROR * 4.0  # numbers of recordings cost a name, and follow any gain and level
     assert rule().value(own) == pytest.approx(-0.5 * rule_numbers.STRETCHES * np.log(2.0 + allowed + 0.01) - PRICE)
     assert rule().value(model(0.5)) == pytest.approx(-0.5 * rule_numbers.STRETCHES * np.log(0.01))  # never below the noise
+
+
+def test_displacements_that_a_scan_has_found_are_numbers():
+    free = (SimpleNamespace(effect=0, name="z", per_texel=False),)
+    moved = effect("misalignment", "rigid", x=0.001, y=0.0, z=0.0, about_x=0.0, about_y=0.0, about_z=0.02)
+    one = Hypothesis(
+        SimpleNamespace(free=free, model=SimpleNamespace(effects=(moved,))), ("misalignment",), ("misalignment/rigid",), None
+    )
+    assert one.number_count == 3  # the height, and two of the motion along the skin
 
 
 @pytest.mark.parametrize(("left", "joins"), [(1.01, False), (1.2, True)])

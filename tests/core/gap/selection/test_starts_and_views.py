@@ -16,7 +16,7 @@ from palpate.core.gap.fitting.least_squares import FRICTION_LEVEL, TrialView, fi
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.selection.base_model import friction_parameters_to_search
 from palpate.core.gap.selection.candidates import Candidate, candidates, scales_of
-from palpate.core.gap.selection.diagnosis import lasting_faults
+from palpate.core.gap.selection.diagnosis import faults_of
 from palpate.core.gap.selection.direct_estimates import companding_starts, few_levels
 from palpate.core.gap.selection.quantities import friction_kinds
 from palpate.core.gap.selection.rao_score import ScoreTest
@@ -97,9 +97,9 @@ def test_a_fault_counts_if_displaced_texels_have_it_too(swapped):
     rig = replace(plain, trials=tuple(trials))
     fault = DataFault("swapped-channels", tuple(trial.name for trial in trials), "two channels follow each other's load")
     result = SimpleNamespace(rig=rig, faults=[fault], best=SimpleNamespace(model=moved))
-    assert bool(lasting_faults(result)) is swapped
+    assert bool(faults_of(result, result.best.model)) is swapped
     result.best.model = Model(moved.parameters)  # nothing displaced: faults were judged with these texels
-    assert lasting_faults(result) == [fault]
+    assert faults_of(result, result.best.model) == [fault]
 
 
 def test_a_large_shift_under_a_flat_punch_is_found():
@@ -121,8 +121,12 @@ def test_a_large_shift_under_a_flat_punch_is_found():
     base = Model(SensorParameters(k=80.0, cn=0.0))
     candidate = Candidate(kind_of("misalignment"), form_of("misalignment", "shift"))
     scales = scales_of([view.predictor for view in views], base)
-    fitted = [one.form for one in candidates([view.predictor for view in views], base) if one.label == "misalignment/rigid"]
-    assert [p.name for p in fitted[0].parameters] == ["z", "about_x", "about_y"]  # no fit moves an edge over a texel
+    all_forms = {one.label: one for one in candidates([view.predictor for view in views], base)}
+    free = all_forms["misalignment/rigid"].free_parameters(0, scales_of([view.predictor for view in views], base), 1.0)
+    assert [one.name for one in free] == ["z", "about_x", "about_y"]  # no fit moves an edge over a texel
+    rocked = replace(trials[0], quaternion=np.tile([np.cos(0.01), np.sin(0.01), 0.0, 0.0], (len(trials[0].time), 1)))
+    one = candidates([Predictor(rocked, rig)], base)
+    assert not any(candidate.held for candidate in one)  # a face that is not parallel meets texels one after another
     test = ScoreTest(views, fit(views, base, free_base_parameters(base.parameters, ("k",), 1.0)))
     _, best = starting_points(candidate, test, None, scales)[0]
     left, whole = (
