@@ -125,6 +125,10 @@ def _print_report(arguments: argparse.Namespace, gap: Gap, folder: Path) -> None
         owners = {least_squares.BASE: "base model", least_squares.RECORDING: "recordings"}
         owner = owners.get(one.effect) or result.best.model.effects[one.effect].name
         rows.append((owner, one.name, sentences.interval_text(one)))
+    known = {(one.effect, one.name) for one in result.intervals}
+    for index, effect in enumerate(result.best.model.effects):
+        found = {name: value for name, value in effect.values.items() if (index, name) not in known}
+        rows += [(effect.name, name, f"{value:.4g} (no interval)") for name, value in found.items() if isinstance(value, float)]
     print()
     print(console.text_table(rows, "<<<"))
     print()

@@ -112,7 +112,7 @@ KIND = Kind(
             "Shaw and Holmes, J. Sound Vib. 90 (1983): piecewise linear spring, with a rounded knee",
             (
                 Parameter("depth", "m", 0.002, 1e-4, 0.1, "Depth D of the knee.", log=True),
-                Parameter("growth", "1", 1.0, 0.0, 1000.0, "Growth g of the stiffness beyond the knee, as a share."),
+                Parameter("growth", "1", 1.0, 0.0, 30.0, "Growth g of the stiffness beyond the knee, as a share."),
                 Parameter("sharpness", "1", 3.0, 0.2, 60.0, "Sharpness p of the knee.", log=True),
             ),
             neutral={"growth": 0.0},

@@ -128,16 +128,16 @@ def _large_displacement(candidate: Candidate, score_test: ScoreTest, scales: Sca
     gain = abs(score_test.model.parameters.gain)
     pressed_by = [view.predictor.rig.indenter_of(view.predictor.trial) for view in score_test.views]
     units = {"x": scales.pitch, "y": scales.pitch, "about_z": LARGEST_TURN}
-    along = [name for name in IN_PLANE if name in candidate.form.neutral]
-    if not along or all(one is None or one.radius is not None for one in pressed_by):
+    along = [[name for name in axes if name in candidate.form.neutral] for axes in (IN_PLANE[:2], IN_PLANE[2:])]
+    if not along[0] or all(one is None or one.radius is not None for one in pressed_by):
         return []
     best, decrease = dict.fromkeys(candidate.form.neutral, 0.0), 0.0
-    for step, count in DISPLACEMENT_SCANS:
-        for name in along:
-            tried = [{**best, name: best[name] + i * step * units[name]} for i in range(-count, count + 1)]
-            effects = [candidate.effect(values, scales.texels, gain) for values in tried]
-            decreases = [score_test.decrease_with(score_test.model.with_effect(effect)) for effect in effects]
-            decrease = max(decreases)
-            top = np.flatnonzero(np.isclose(decreases, decrease))
-            best = tried[top[len(top) // 2]]
+    scans = [(step, count, name) for axes in along for step, count in DISPLACEMENT_SCANS for name in axes]
+    for step, count, name in scans:  # a turn last, because it imitates a shift that is not found yet
+        tried = [{**best, name: best[name] + i * step * units[name]} for i in range(-count, count + 1)]
+        effects = [candidate.effect(values, scales.texels, gain) for values in tried]
+        decreases = [score_test.decrease_with(score_test.model.with_effect(effect)) for effect in effects]
+        decrease = max(decreases)
+        top = np.flatnonzero(np.isclose(decreases, decrease))
+        best = tried[top[len(top) // 2]]
     return [(decrease, candidate.effect(best, scales.texels, gain))]
