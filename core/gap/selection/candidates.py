@@ -49,6 +49,8 @@ THREES = "axes"
 """What forms need, of :data:`.specification.NEEDS`, that are only defined for the channels of all magnetometers."""
 START_COUNT = 8
 """Number of starting points of a candidate."""
+SHARPNESS = "sharpness"
+"""Name of parameters that say how sharp a knee is."""
 IN_PLANE = ("x", "y", "about_z")
 """Parameters of a displacement along the skin."""
 PARALLEL = 1e-3
@@ -307,6 +309,7 @@ def parameters_at_bounds(model: Model, free: Sequence[FreeParameter], index: int
     neutral = form.neutral
     shares = [p for p in form.parameters if p.unit == "1" and p.low >= 0.0 and p.high <= 1.0]
     whole = {p.name: p.high for p in shares if p.low == neutral.get(p.name) == 0.0 or p.low > 0.0 and p.high == 1.0}
+    whole |= {p.name: p.high for p in form.parameters if p.name == SHARPNESS}
     found = {}
     for item in free:
         if item.effect == index and not item.per_texel:
