@@ -44,6 +44,13 @@ def test_stiffening():
     np.testing.assert_allclose(
         force(effect("stiffening", "foam", depth=0.01, exponent=2.0), d), K * d / (1 - (d / 0.01) ** 2), rtol=1e-12
     )
+    width = 0.002 / 3.0
+    bent = 1.5 * width * (np.logaddexp(0.0, (d - 0.002) / width) - np.logaddexp(0.0, -3.0))
+    spring = effect("stiffening", "bilinear", depth=0.002, growth=1.5, sharpness=3.0)
+    np.testing.assert_allclose(force(spring, d), K * (d + bent), rtol=1e-9, atol=1e-15)
+    sharp = effect("stiffening", "bilinear", depth=0.002, growth=1.5, sharpness=60.0)  # w ln 2 beside the corner at most
+    corner = K * (d + 1.5 * np.maximum(d - 0.002, 0.0))
+    np.testing.assert_allclose(force(sharp, d), corner, rtol=0, atol=1.01 * K * 1.5 * 0.002 / 60.0 * np.log(2.0))
 
 
 @pytest.mark.parametrize(("form", "edge"), [("exponential", 30.0), ("foam", 0.95)])

@@ -97,3 +97,10 @@ def test_a_share_of_all_is_no_bound():
 def test_a_loop_that_unloads_as_it_loads_is_no_bound(beta, at_bound):
     model = Model(SensorParameters(), (effect("hysteresis", "bouc-wen", beta=beta),))
     assert parameters_at_bounds(model, (FreeParameter(0, "beta", 0.5, 1.0),), 0) == at_bound
+
+
+@pytest.mark.parametrize(("sharpness", "at_bound"), [(20.0, {}), (1.2, {"sharpness": 1.2})])
+def test_a_corner_is_no_bound(sharpness, at_bound):
+    """A knee of the largest sharpness is a corner; a blunt one imitates a curve."""
+    model = Model(SensorParameters(), (effect("dead-zone", "knee", sharpness=sharpness),))
+    assert parameters_at_bounds(model, (FreeParameter(0, "sharpness", 1.2, 20.0),), 0) == at_bound
