@@ -16,6 +16,7 @@ from . import blender, checks, console
 
 if TYPE_CHECKING:
     from ..api.gap import Gap
+    from ..core.gap.selection.findings import Diagnosis
 
 OUTPUTS = ("gap.json", "sensor.toml", "report.html")
 """Files that are written beside the plots."""
@@ -115,20 +116,11 @@ def _plan(arguments: argparse.Namespace) -> int:
 
 def _print_report(arguments: argparse.Namespace, gap: Gap, folder: Path) -> None:
     """Print what was found and where it was written."""
-    from ..core.gap.fitting import least_squares
     from ..core.gap.report import sentences
 
     result = gap.diagnosis
     print(gap.headline)
-    rows = [("", "parameter", "value (95 % interval)")]
-    for one in result.intervals:
-        owners = {least_squares.BASE: "base model", least_squares.RECORDING: "recordings"}
-        owner = owners.get(one.effect) or result.best.model.effects[one.effect].name
-        rows.append((owner, one.name, sentences.interval_text(one)))
-    known = {(one.effect, one.name) for one in result.intervals}
-    for index, effect in enumerate(result.best.model.effects):
-        found = {name: value for name, value in effect.values.items() if (index, name) not in known}
-        rows += [(effect.name, name, f"{value:.4g} (no interval)") for name, value in found.items() if isinstance(value, float)]
+    rows = [("", "parameter", "value (95 % interval)"), *_parameter_rows(result)]
     print()
     print(console.text_table(rows, "<<<"))
     print()
@@ -138,6 +130,21 @@ def _print_report(arguments: argparse.Namespace, gap: Gap, folder: Path) -> None
     print(f"sensor: {folder / 'sensor.toml'}")
     if arguments.blend:
         print(f"saved:  {arguments.blend}")
+
+
+def _parameter_rows(result: Diagnosis) -> list[tuple[str, str, str]]:
+    """Owner, name and value of each fitted number with its interval, then of numbers of effects that have none."""
+    from ..core.gap.fitting import least_squares
+    from ..core.gap.report import sentences
+
+    owners = {least_squares.BASE: "base model", least_squares.RECORDING: "recordings"}
+    owners |= {index: effect.name for index, effect in enumerate(result.best.model.effects)}
+    rows = [(owners[one.effect], one.name, sentences.interval_text(one)) for one in result.intervals]
+    known = {(one.effect, one.name) for one in result.intervals}
+    for index, effect in enumerate(result.best.model.effects):
+        found = {name: value for name, value in effect.values.items() if (index, name) not in known}
+        rows += [(effect.name, name, f"{value:.4g} (no interval)") for name, value in found.items() if isinstance(value, float)]
+    return rows
 
 
 def _sensor_in_scene(arguments: argparse.Namespace) -> Any:

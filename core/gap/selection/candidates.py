@@ -53,8 +53,8 @@ SHARPNESS = "sharpness"
 """Name of parameters that say how sharp a knee is."""
 IN_PLANE = ("x", "y", "about_z")
 """Parameters of a displacement along the skin."""
-PARALLEL = 1e-3
-"""Angle (rad) up to which a face is parallel to texels: over ten millimetres it rises by 10 µm."""
+SMALL_SHIFT, SMALL_TURN = 0.02, 2e-3
+"""Test steps of displaced texels: a share of the pitch, and an angle in rad, up to which a face is parallel to texels."""
 COUPLING_PITCH, COUPLING_LOAD = 0.003, 0.05
 """Distance (m) and load (N) of the texels on which :func:`is_spatial` tests a form."""
 
@@ -381,7 +381,7 @@ def _is_flat_press(predictor: Predictor) -> bool:
     if indenter is None or indenter.edges is None or trial.quaternion is None:
         return False
     turned = np.abs(normal @ rotation_matrices(trial.quaternion))  # (T, n, 3), along the axes of the box
-    return bool(turned.max(axis=2).min() > np.cos(PARALLEL))
+    return bool(turned.max(axis=2).min() > np.cos(SMALL_TURN))
 
 
 def is_free_already(candidate: Candidate, free: Sequence[FreeParameter]) -> bool:

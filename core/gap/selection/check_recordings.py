@@ -13,7 +13,7 @@ import numpy as np
 
 from .blocks import Blocks
 from .quantities import FORCES, READINGS
-from .rule_numbers import CLEAR_ERRORS
+from .rule_numbers import SIGNIFICANT_ERRORS
 from .score import Hypothesis, Score
 
 
@@ -81,7 +81,7 @@ def checked(blocks: Blocks, score: Score, base: Hypothesis, best: Hypothesis) ->
         total = np.maximum(count.sum(axis=0), 1.0)
         apart = after - before - count * ((after - before).sum(axis=0) / total)
         error = np.sqrt((apart**2).sum(axis=0)) / total
-        rise = CLEAR_ERRORS * error + allowed
+        rise = SIGNIFICANT_ERRORS * error + allowed
         squares = before.sum(axis=0) / total, after.sum(axis=0) / total
         found.append(CheckedRecording(view.predictor.trial.name, *squares, count.sum(axis=0), rise, fitted))
     return CheckOutcome(tuple(found))

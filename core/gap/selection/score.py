@@ -29,7 +29,6 @@ from .block_sums import Sums
 from .candidates import IN_PLANE, parameters_at_bounds
 from .noise_level import NoiseLevel
 from .rule_numbers import (
-    CLEAR_ERRORS,
     DRAWS,
     FEWER_NUMBERS,
     FIT_TOLERANCE,
@@ -37,6 +36,7 @@ from .rule_numbers import (
     FREE_FORM_ERROR,
     LARGEST_FORMULA_ERROR,
     NEAR_ERRORS,
+    SIGNIFICANT_ERRORS,
     STRETCHES,
 )
 
@@ -81,14 +81,10 @@ class Hypothesis:
 
         Displacements that a scan has found count, too.
         """
-        scanned = [
-            (index, name)
-            for index, effect in enumerate(self.fit.model.effects)
-            if form_of(effect.name, effect.form).placement is not None
-            for name in IN_PLANE
-            if effect.values.get(name, 0.0) != 0.0
-            and not any(item.effect == index and item.name == name for item in self.fit.free)
-        ]
+        effects = enumerate(self.fit.model.effects)
+        moving = [(index, one) for index, one in effects if form_of(one.name, one.form).placement is not None]
+        moved = {(index, name) for index, one in moving for name in IN_PLANE if one.values.get(name, 0.0) != 0.0}
+        scanned = moved - {(item.effect, item.name) for item in self.fit.free}
         texels = max([len(v) for e in self.fit.model.effects for v in e.values.values() if isinstance(v, tuple)] + [1])
         return len(scanned) + sum(texels if item.per_texel else 1 for item in self.fit.free if item.effect != BASE)
 
@@ -184,7 +180,7 @@ class Score:
     def leaves_gap(self, one: Hypothesis, weights: np.ndarray | None = None) -> bool:
         """Return whether a model leaves more than noise and the error of its formulas account for, `weights` (1, b)."""
         excess, allowed = self.parts(one, self.weights[:1] if weights is None else weights)
-        return bool((excess[0] > np.maximum(CLEAR_ERRORS * self.noise.error, allowed[0]))[self.measured].any())
+        return bool((excess[0] > np.maximum(SIGNIFICANT_ERRORS * self.noise.error, allowed[0]))[self.measured].any())
 
     def is_refuted(self, forms: Sequence[Hypothesis]) -> bool:
         """Return whether a kind leaves a gap in all its forms that are free to follow any law, or in all if it has none."""

@@ -124,8 +124,8 @@ class Search:
         found: dict[str, list[Hypothesis]] = {one.names[index]: [one]}
         for other in list(self._longer[parent.key]):
             if other.key != one.key:
-                is_near = self.score.weight(other, one) * self.library[one.names[index]] > LEAST_WEIGHT
-                other = self.refined(other) if is_near else other
+                is_near = self.score.weight(other, one) * max(self.library[one.names[index]], 1) > LEAST_WEIGHT
+                other = self.refined(other) if is_near else other  # a kind counts by the mean over its library
                 found.setdefault(other.names[-1], []).append(other)
         best = {name: max(map(self.score.value, forms)) for name, forms in found.items()}
         screening = self.under(one.assumed)[0]

@@ -8,21 +8,19 @@ import numpy as np
 from ...effects.engine.registry import form_of
 from ...effects.engine.specification import SILENT_TEXELS, STEPS, scalar
 from ...model.sensor import Effect
-from .candidates import IN_PLANE, START_COUNT, Candidate, Scales
+from .candidates import IN_PLANE, SMALL_SHIFT, SMALL_TURN, START_COUNT, Candidate, Scales
 from .direct_estimates import few_levels, quantization_starts, unresponsive_texels
 from .rao_score import ScoreTest
 from .view_set import ViewSet
 
 VISIBLE_STEPS_PROMISE = 0.5
 """Promise of quantization whose steps are seen in the readings, as a share of the squares: it is always fitted."""
-SMALL_SHIFT, SMALL_TURN = 0.02, 2e-3
-"""Test steps of displaced texels: a share of the pitch, and an angle in rad."""
 LARGEST_SHIFT, LARGEST_TURN = 0.5, 0.1
-"""Bounds of their starting points, in the same units."""
+"""Bounds of the starting points of displaced texels: a share of the pitch, and an angle in rad."""
 DISPLACEMENT_SCANS = ((0.1, 12), (0.05, 5))
 """Step and number of steps to each side of the scans for a large displacement, first ones and second ones; steps are shares of
 the pitch and of `LARGEST_TURN`. Shifts of nine development rigs with flat punches are at most 0.9 pitches. Each gets the best
-of a grid of 0.05 pitches; a search with DIRECT misses it in two of them."""
+of a grid of 0.05 pitches, also with first steps of 0.08 and 0.15 and second ones of 0.03 and 0.04; DIRECT misses it in two."""
 TEXEL_STEP = 0.01
 """Test step of parameters of single texels, as a share of their scale."""
 
@@ -128,11 +126,11 @@ def _large_displacement(candidate: Candidate, score_test: ScoreTest, scales: Sca
     gain = abs(score_test.model.parameters.gain)
     pressed_by = [view.predictor.rig.indenter_of(view.predictor.trial) for view in score_test.views]
     units = {"x": scales.pitch, "y": scales.pitch, "about_z": LARGEST_TURN}
-    along = [[name for name in axes if name in candidate.form.neutral] for axes in (IN_PLANE[:2], IN_PLANE[2:])]
-    if not along[0] or all(one is None or one.radius is not None for one in pressed_by):
+    along = [name for name in IN_PLANE if name in candidate.form.neutral]
+    if not along or all(one is None or one.radius is not None for one in pressed_by):
         return []
     best, decrease = dict.fromkeys(candidate.form.neutral, 0.0), 0.0
-    scans = [(step, count, name) for axes in along for step, count in DISPLACEMENT_SCANS for name in axes]
+    scans = [(step, count, name) for axes in (along[:2], along[2:]) for step, count in DISPLACEMENT_SCANS for name in axes]
     for step, count, name in scans:  # a turn last, because it imitates a shift that is not found yet
         tried = [{**best, name: best[name] + i * step * units[name]} for i in range(-count, count + 1)]
         effects = [candidate.effect(values, scales.texels, gain) for values in tried]

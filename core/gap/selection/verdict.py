@@ -11,7 +11,7 @@ from ...effects.engine.registry import form_of, library
 from ..fitting.identifiability import curvature_ratio, indistinguishable, unidentifiable
 from .candidates import NOT_FITTED, parameters_at_bounds
 from .findings import ClosedShares, Diagnosis, Finding
-from .rule_numbers import CLEAR_ERRORS, LEAST_WEIGHT, SURE
+from .rule_numbers import LEAST_WEIGHT, SIGNIFICANT_ERRORS, SURE
 from .score import Hypothesis, Score
 from .search import Search
 
@@ -182,7 +182,7 @@ def _closed(score: Score, before: np.ndarray, after: np.ndarray, count: np.ndarr
     gap = before - level * count
     shares = [
         float(min((before[q] - after[q]) / gap[q], 1.0))
-        if gap[q] > CLEAR_ERRORS * score.noise.error[q] * count[q] > 0
+        if gap[q] > SIGNIFICANT_ERRORS * score.noise.error[q] * count[q] > 0
         else None
         for q in (0, 1)
     ]

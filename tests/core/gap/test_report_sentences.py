@@ -3,12 +3,17 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import gap_cases as cases
 import numpy as np
 import pytest
 
+from palpate.commands.gap import _parameter_rows
+from palpate.core.effects.engine.registry import effect
 from palpate.core.gap.dataset.rig import read_rig
+from palpate.core.gap.fitting.intervals import ParameterInterval
+from palpate.core.gap.fitting.least_squares import BASE
 from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.report.comparison import gap_errors
 from palpate.core.gap.report.sentences import headline
@@ -83,3 +88,17 @@ def test_the_end_of_a_release_is_no_death():
     views = view_set_of([one for one in predictors if one.trial.use == "fit"], (noise[0].deviation, noise[1].deviation))
     base = base_fit(rig, views.whole, full[0])
     assert not silenced_texels(predictors, base.model, noise[0].deviation)
+
+
+def test_numbers_without_an_interval_stand_below_the_others():
+    """A scan found the shift, and no fit says how well it is known."""
+    shift = effect("misalignment", "shift", x=-0.00119, y=0.00255)
+    result = SimpleNamespace(
+        intervals=[ParameterInterval(BASE, "k", 58.0, 57.0, 59.0), ParameterInterval(0, "y", 0.00255, 0.002, 0.003)],
+        best=SimpleNamespace(model=SimpleNamespace(effects=(shift,))),
+    )
+    assert _parameter_rows(result) == [
+        ("base model", "k", "58 (57 … 59)"),
+        ("misalignment", "y", "0.00255 (0.002 … 0.003)"),
+        ("misalignment", "x", "-0.00119 (no interval)"),
+    ]

@@ -42,7 +42,7 @@ def sums(left, changes=()):
 def model(left, *labels, changes=None, assumed="", numbers=1):
     """A model of some forms that leaves this much; its effects change the prediction by `changes`."""
     names = tuple(label.split("/")[0] for label in labels)
-    free = tuple(SimpleNamespace(effect=0, per_texel=False) for _ in range(numbers)) if labels else ()
+    free = tuple(SimpleNamespace(effect=0, name=f"number {i}", per_texel=False) for i in range(numbers)) if labels else ()
     fit = SimpleNamespace(free=free, model=SimpleNamespace(effects=()))
     one = Hypothesis(fit, names, labels, sums(left, (0.0,) * len(labels) if changes is None else changes), assumed)
     one.__dict__["is_bent"] = False

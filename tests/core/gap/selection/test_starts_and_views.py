@@ -85,9 +85,7 @@ def test_a_fault_counts_if_displaced_texels_have_it_too(swapped):
     """A shift makes channels follow the loads of other texels; two channels that are swapped do so after it as well."""
     plain = cases.rig(trials=3, seconds=4.0)
     moved = Model(SensorParameters(k=80.0, cn=0.0), (effect("misalignment", "shift", x=0.7 * cases.PITCH, y=0.0),))
-    trials = []
-    for trial in plain.trials:
-        trials.append(replace(trial, reading=Predictor(trial, plain).predict(moved).reading.copy()))
+    trials = [replace(trial, reading=Predictor(trial, plain).predict(moved).reading.copy()) for trial in plain.trials]
     loads = np.concatenate([trial.reading for trial in trials])
     first = int(np.argmax(loads.sum(axis=0)))
     like = np.where(loads.sum(axis=0) > 0.3 * loads[:, first].sum(), loads.T @ loads[:, first], np.inf)
@@ -96,10 +94,9 @@ def test_a_fault_counts_if_displaced_texels_have_it_too(swapped):
         trial.reading[:, pair] = trial.reading[:, pair[::-1]]
     rig = replace(plain, trials=tuple(trials))
     fault = DataFault("swapped-channels", tuple(trial.name for trial in trials), "two channels follow each other's load")
-    result = SimpleNamespace(rig=rig, faults=[fault], best=SimpleNamespace(model=moved))
-    assert bool(faults_of(result, result.best.model)) is swapped
-    result.best.model = Model(moved.parameters)  # nothing displaced: faults were judged with these texels
-    assert faults_of(result, result.best.model) == [fault]
+    result = SimpleNamespace(rig=rig, faults=[fault])
+    assert bool(faults_of(result, moved)) is swapped
+    assert faults_of(result, Model(moved.parameters)) == [fault]  # nothing displaced: faults were judged with these texels
 
 
 def test_a_large_shift_under_a_flat_punch_is_found():
@@ -121,12 +118,16 @@ def test_a_large_shift_under_a_flat_punch_is_found():
     base = Model(SensorParameters(k=80.0, cn=0.0))
     candidate = Candidate(kind_of("misalignment"), form_of("misalignment", "shift"))
     scales = scales_of([view.predictor for view in views], base)
-    all_forms = {one.label: one for one in candidates([view.predictor for view in views], base)}
-    free = all_forms["misalignment/rigid"].free_parameters(0, scales_of([view.predictor for view in views], base), 1.0)
-    assert [one.name for one in free] == ["z", "about_x", "about_y"]  # no fit moves an edge over a texel
+    flat = [view.predictor for view in views]
+    rigid = next(one for one in candidates(flat, base) if one.label == "misalignment/rigid")
+    assert [one.name for one in rigid.free_parameters(0, scales, 1.0)] == [
+        "z",
+        "about_x",
+        "about_y",
+    ]  # an edge stays where it is
     rocked = replace(trials[0], quaternion=np.tile([np.cos(0.01), np.sin(0.01), 0.0, 0.0], (len(trials[0].time), 1)))
-    one = candidates([Predictor(rocked, rig)], base)
-    assert not any(candidate.held for candidate in one)  # a face that is not parallel meets texels one after another
+    not_all_flat = candidates([*flat, Predictor(rocked, rig)], base)
+    assert not any(one.held for one in not_all_flat)  # a face that is not parallel meets texels one after another
     test = ScoreTest(views, fit(views, base, free_base_parameters(base.parameters, ("k",), 1.0)))
     _, best = starting_points(candidate, test, None, scales)[0]
     left, whole = (
