@@ -15,6 +15,7 @@ from ...core.errors import PalpateError, SceneError
 from ...core.geometry.mesh import TriangleMesh
 from ...core.geometry.texels import Texels
 from ...core.solver.time_step_adviser import Advice, advise
+from ..display import baked_scene
 from ..scene import mesh_arrays, participants, scene_fingerprint, scene_reader, sensor_reader
 from ..session import session_state, transforms
 from . import laid_sensors, problems, sensor_exchange
@@ -78,7 +79,8 @@ def known_report(obj, scene) -> Report | None:
 
 
 def fresh_report(obj, scene) -> Report:
-    """Compute the report of a sensor now."""
+    """Compute the report of a sensor now; a duplicate first loses its original's bake, as reading gives it an identity."""
+    baked_scene.clear_copies(scene)
     key = _key(obj, scene)
     report = _compute(obj, scene)
     _reports[obj.session_uid] = key, report
