@@ -376,6 +376,14 @@ class Kind:
         return form.needs or self.needs
 
 
+def where_loaded(change: Callable[[np.ndarray], np.ndarray], signal: np.ndarray) -> np.ndarray:
+    """Apply what leaves zero as it is to the rest of a signal: most texels carry no load most of the time."""
+    loaded = signal != 0.0
+    changed = np.zeros(signal.shape)
+    changed[loaded] = change(signal[loaded])
+    return changed
+
+
 def scalar(values: Values, name: str) -> float:
     """Return a value that is one number."""
     value = values[name]

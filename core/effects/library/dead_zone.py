@@ -7,7 +7,7 @@ import numpy as np
 
 from ...model.parameter import Parameter
 from ...model.sensor import Values
-from ..engine.specification import Drawing, Form, Kind, TransducerArray, scalar
+from ..engine.specification import Drawing, Form, Kind, TransducerArray, scalar, where_loaded
 
 
 def hard(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
@@ -31,10 +31,14 @@ def knee(signal: np.ndarray, time: np.ndarray, values: Values, transducers: Tran
     threshold, sharpness = scalar(values, "threshold"), scalar(values, "sharpness")
     if threshold == 0.0:
         return signal
-    ratio = np.abs(signal) / threshold
-    larger = np.maximum(ratio, 1.0)
-    grown = larger * ((ratio / larger) ** sharpness + larger**-sharpness) ** (1.0 / sharpness)
-    return np.sign(signal) * threshold * (grown - 1.0)
+
+    def beyond(force: np.ndarray) -> np.ndarray:
+        ratio = np.abs(force) / threshold
+        larger = np.maximum(ratio, 1.0)
+        grown = larger * (1.0 + (np.minimum(ratio, 1.0) / larger) ** sharpness) ** (1.0 / sharpness)
+        return np.asarray(np.sign(force) * threshold * (grown - 1.0))
+
+    return where_loaded(beyond, signal)
 
 
 _THRESHOLD = Parameter("threshold", "N", 0.01, 0.0, 100.0, "Largest force T that is not measured.")

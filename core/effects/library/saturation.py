@@ -9,7 +9,7 @@ import numpy as np
 
 from ...model.parameter import Parameter
 from ...model.sensor import Values
-from ..engine.specification import Drawing, Form, Kind, TransducerArray, scalar
+from ..engine.specification import Drawing, Form, Kind, TransducerArray, scalar, where_loaded
 
 _LEVEL = Parameter("level", "unit", 1.0, 1e-4, 1e5, "Largest reading L, counted from the reading without load.", log=True)
 
@@ -25,7 +25,7 @@ def tanh(signal: np.ndarray, time: np.ndarray, values: Values, transducers: Tran
     level = scalar(values, "level")
     if math.isinf(level):
         return signal
-    return transducers.zero + level * np.tanh((signal - transducers.zero) / level)
+    return transducers.zero + where_loaded(lambda change: level * np.tanh(change / level), signal - transducers.zero)
 
 
 def rational(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
@@ -37,8 +37,11 @@ def rational(signal: np.ndarray, time: np.ndarray, values: Values, transducers: 
 def power(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Flatten softly or sharply; the exponent says how sharply."""
     level, sharpness = scalar(values, "level"), scalar(values, "sharpness")
-    change = signal - transducers.zero
-    return transducers.zero + change / (1.0 + (np.abs(change) / level) ** sharpness) ** (1.0 / sharpness)
+
+    def flattened(change: np.ndarray) -> np.ndarray:
+        return np.asarray(change / (1.0 + (np.abs(change) / level) ** sharpness) ** (1.0 / sharpness))
+
+    return transducers.zero + where_loaded(flattened, signal - transducers.zero)
 
 
 KIND = Kind(

@@ -41,8 +41,10 @@ def image(texel, value=1.0):
         ("saturation", "clip", {"level": 0.8}, lambda f: np.clip(f, -0.8, 0.8)),
         ("saturation", "tanh", {"level": 0.8}, lambda f: 0.8 * np.tanh(f / 0.8)),
         ("saturation", "rational", {"level": 0.8}, lambda f: f / (1 + np.abs(f) / 0.8)),
+        ("saturation", "power", {"level": 0.8, "sharpness": 3.0}, lambda f: f / np.cbrt(1 + np.abs(f / 0.8) ** 3)),
         ("dead-zone", "hard", {"threshold": 0.3}, lambda f: np.sign(f) * np.maximum(np.abs(f) - 0.3, 0)),
         ("dead-zone", "soft", {"threshold": 0.3}, lambda f: np.sign(f) * f**2 / (np.abs(f) + 0.3)),
+        ("dead-zone", "knee", {"threshold": 0.3, "sharpness": 2.0}, lambda f: np.sign(f) * (np.hypot(f, 0.3) - 0.3)),
         ("dead-zone", "step", {"threshold": 0.3}, lambda f: np.where(np.abs(f) > 0.3, f, 0)),
         ("offset", "common", {"offset": -0.2}, lambda f: f - 0.2),
         ("quantization", "round", {"step": 0.25}, lambda f: 0.25 * np.round(f / 0.25)),
@@ -99,6 +101,15 @@ def image(texel, value=1.0):
 def test_formulas(name, form, values, formula):
     force = np.linspace(-0.5, 2.0, len(TIME))[:, None] * np.ones(N)
     np.testing.assert_allclose(read(effect(name, form, **values), force), formula(force), rtol=1e-12, atol=1e-14)
+
+
+@pytest.mark.parametrize(("name", "form"), [("saturation", "tanh"), ("saturation", "power"), ("dead-zone", "knee")])
+@pytest.mark.parametrize("zero", [0.0, 2.5])
+def test_no_load_changes_nothing_and_a_missing_reading_stays_missing(name, form, zero):
+    force = np.full((3, N), [[0.0], [5e-324], [np.nan]])
+    with np.errstate(divide="raise", over="raise", invalid="raise"):
+        found = read(effect(name, form), force, TIME[:3], replace(GRID, zero=zero))
+    np.testing.assert_allclose(found, np.full((3, N), [[zero], [zero], [np.nan]]), rtol=0.0, atol=1e-300)
 
 
 def test_a_recorded_temperature_counts_and_not_that_of_the_effect():
