@@ -8,12 +8,12 @@ effects.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Collection, Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from ...model.sensor import Effect
 from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
-from ..fitting.least_squares import Fit, FreeParameter, TrialView, fit
+from ..fitting.least_squares import BASE, Fit, FreeParameter, TrialView, fit
 from ..forward.predictor import Model
 from .blocks import Blocks, Views
 from .candidates import DIRECTLY_ESTIMATED, START_COUNT, Candidate, FittedCandidate, Scales, candidates, is_free_already
@@ -66,7 +66,7 @@ class FirstFit:
     left : float
         Share that it leaves of the parent's gap there.
     rank : float
-        The same share of what the parent's parameters leave there if they are fitted again. The candidate that leaves least
+        The same share of what the parameters of the start leave there after a linear step. The candidate that leaves least
         comes first: parts differ between kinds, and on the pressed texels alone the base model may fit better.
     """
 
@@ -113,11 +113,13 @@ class Screening:
         """Return the candidates that could show in the fitted recordings."""
         return candidates([view.predictor for view in self.view_set.whole], model)
 
-    def with_one_more(self, parent: Hypothesis, kinds: set[str] | None = None, most_left: float = 1.0) -> Making:
+    def with_one_more(
+        self, parent: Hypothesis, kinds: set[str] | None = None, most_left: float = 1.0, start: Hypothesis | None = None
+    ) -> Making:
         """Return the parent with one effect more, for the kinds that promise most, in one form of each.
 
         It is the form that is free to follow any law, if the kind has one that promises anything, so that kinds compete at
-        equal freedom. Alone, other kinds come in the best of all their forms, and the best kinds in all their forms.
+        equal freedom. Alone, a kind comes in the best of its free forms, or of all if it has none, and the best kinds in all.
 
         Parameters
         ----------
@@ -126,9 +128,11 @@ class Screening:
             Only these.
         most_left : float
             Share of the parent's gap that a fit to a part of the data may leave at most, for one to everything to follow.
+        start : Hypothesis, optional
+            The same effects with other numbers, from which the fits start instead.
         """
         is_first = not (parent.names or self.assumed)  # an assumption about recordings is like an effect
-        tests = _Tests(self.view_set, parent.fit)
+        parent, tests = start or parent, _Tests(self.view_set, (start or parent).fit, parent.fit)
         by_kind: dict[str, list[Candidate]] = {}
         for candidate in self._candidates_beside(parent):
             by_kind.setdefault(candidate.name, []).append(candidate)
@@ -142,7 +146,7 @@ class Screening:
         screened = sorted((own for own in screened if own), key=lambda own: -own[0].share)
         first_fits = []
         for own in screened[: None if is_first else TRIED_KINDS]:
-            for one in own if is_first and own[0].candidate.form.error is None else own[:1]:
+            for one in own if is_first else own[:1]:
                 yield f"fitting {one.candidate.name}"
                 first_fits.append(self._first_fit(one, tests))
         best_fits: dict[str, FirstFit] = {}
@@ -156,22 +160,32 @@ class Screening:
             made += yield from self.other_forms(parent, name, [one.forms[-1] for one in made])
         return made
 
-    def other_forms(self, parent: Hypothesis, name: str, done: Sequence[str], most_left: float = 1.0) -> Making:
+    def other_forms(
+        self, parent: Hypothesis, name: str, done: Collection[str], most_left: float = 1.0, start: Hypothesis | None = None
+    ) -> Making:
         """Return the parent with the forms of a kind that were not fitted yet, so that it is judged by its whole library.
 
-        Forms that leave more than `most_left` of the gap in a part of the data are left out, as in :meth:`with_one_more`.
+        Forms that leave more than `most_left` of the gap in a part of the data are left out, and fits begin at `start`, as in
+        :meth:`with_one_more`.
         """
-        tests = _Tests(self.view_set, parent.fit)
+        parent, tests = start or parent, _Tests(self.view_set, (start or parent).fit, parent.fit)
         own = [one for one in self._candidates_beside(parent) if one.name == name and one.label not in done]
         fitted = [self._first_fit(one, tests) for one in self._promises(parent, tests, own)]
         return (yield from self._final_fits([one for one in fitted if one.left <= most_left], parent))
 
     def without(self, one: Hypothesis, index: int) -> Hypothesis:
         """Return a model without one of its effects, fitted again."""
-        free = [_after_removal(item, index) for item in one.fit.free if item.effect != index]
-        again = fit(self.views.fitted, one.fit.model.without(index), free, max_steps=8, tolerance=1e-4)
+        again = fit(self.views.fitted, one.fit.model.without(index), _without(one, index), max_steps=8, tolerance=1e-4)
         names, forms = (tuple(x for i, x in enumerate(own) if i != index) for own in (one.names, one.forms))
         return self.hypothesis(again, names, forms)
+
+    def start_without(self, one: Hypothesis, index: int, parent: Hypothesis) -> Hypothesis:
+        """Return a model without one of its effects: the base model fitted again, other effects and numbers as they are."""
+        model, free = one.fit.model.without(index), _without(one, index)
+        base = [item for item in free if item.effect == BASE]
+        again = fit(self.views.fitted, model, base, max_steps=8, tolerance=1e-3, with_equations=False)
+        names, forms = (tuple(x for i, x in enumerate(own) if i != index) for own in (one.names, one.forms))
+        return replace(parent, fit=replace(again, free=tuple(free)), names=names, forms=forms)
 
     def refined(self, one: Hypothesis) -> Hypothesis:
         """Return a model at the end of its fit: final fits are cut short, as most models are far behind the best."""
@@ -223,7 +237,7 @@ class Screening:
             with_equations=False,
             initial_derivatives=None if is_far else test.initial_derivatives,
         )
-        left, rank = (share_left(found, before) for before in (test.total, test.least))
+        left, rank = (share_left(found, before) for before in (tests.gap(test), test.least))
         return FirstFit(left, rank, one.candidate, found)
 
     def _final_fits(self, first_fits: Iterable[FirstFit], parent: Hypothesis) -> Making:
@@ -240,11 +254,21 @@ class Screening:
 
 
 class _Tests:
-    """Score tests of one fit, on the views that candidates need."""
+    """Score tests of one fit, on the views that candidates need; `parent` is the fit whose gap is to be closed."""
 
-    def __init__(self, view_set: ViewSet, found: Fit):
-        self.view_set, self.found = view_set, found
+    def __init__(self, view_set: ViewSet, found: Fit, parent: Fit):
+        self.view_set, self.found, self.parent = view_set, found, parent
         self._made: dict[int, ScoreTest] = {}
+        self._gaps: dict[int, float] = {}
+
+    def gap(self, test: ScoreTest) -> float:
+        """Squares that the parent leaves on the views of a test."""
+        if self.parent is self.found:
+            return test.total
+        if id(test) not in self._gaps:
+            residuals = [view.residual(self.parent.model) for view in test.views]
+            self._gaps[id(test)] = float(sum(v.squares(r).sum() for v, r in zip(test.views, residuals, strict=True)))
+        return self._gaps[id(test)]
 
     def of(self, candidate: Candidate) -> ScoreTest:
         """Return the test on the smallest view in which a candidate can be tested."""
@@ -272,6 +296,7 @@ def _left(one: Hypothesis) -> float:
     return float((one.sums.left.sum(axis=0) / one.sums.count.sum(axis=0).clip(1.0)).sum())
 
 
-def _after_removal(item: FreeParameter, index: int) -> FreeParameter:
-    """A free parameter once an effect was removed."""
-    return replace(item, effect=item.effect - 1) if item.effect > index else item
+def _without(one: Hypothesis, index: int) -> list[FreeParameter]:
+    """The free parameters of a model once one of its effects was removed."""
+    free = [item for item in one.fit.free if item.effect != index]
+    return [replace(item, effect=item.effect - 1) if item.effect > index else item for item in free]

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Search for sets of effects: all alone, pairs on top of the best kinds, triples on top of the best pairs, then exchanges.
 
+An exchange tries every kind in the place of one effect and begins at the values of the others, so that equivalent models meet.
+
 Two assumptions about how recordings differ are candidates like any effect: a factor and a zero of each (which costs a name),
 and one session in their order (what the sensor remembers goes on, which costs none).
 """
@@ -52,8 +54,8 @@ class Search:
     starts: dict[str, Start]
     repeat_error: float | None = None
     tried: list[Hypothesis] = field(default_factory=list)
-    _longer: dict[object, list[Hypothesis]] = field(default_factory=dict)
-    _whole: set[tuple[object, str]] = field(default_factory=set)
+    _done: dict[object, set[str]] = field(default_factory=dict)
+    _begun: dict[object, Hypothesis] = field(default_factory=dict)
     _at_end: set[Hypothesis] = field(default_factory=set)
     _made: dict[str, tuple[Screening, Hypothesis]] = field(default_factory=dict)
 
@@ -78,7 +80,7 @@ class Search:
                 break
             yield from _in_stage("further effects", self._extend(size))
         self._weigh()
-        yield from _in_stage("reconsidered", self._reconsider(self.best()))
+        yield from _in_stage("reconsidered", self._reconsider())
         return self.best()
 
     def is_open(self, one: Hypothesis) -> bool:
@@ -120,23 +122,29 @@ class Search:
 
     def in_place_of(self, one: Hypothesis, index: int) -> tuple[Hypothesis, dict[str, list[Hypothesis]]]:
         """Return a model without one of its effects, and the fitted forms of each kind in its place, itself included."""
-        parent = _finished(self._grown_without(one, index))
-        found: dict[str, list[Hypothesis]] = {one.names[index]: [one]}
-        for other in list(self._longer[parent.key]):
-            if other.key != one.key:
+        parent = _finished(self._replaced(one, index))
+        found, place = self._forms_in_place(one, index, parent), _place(one, index, parent)
+        best = {name: max(map(self.score.value, forms)) for name, forms in found.items()}
+        for name in sorted(best, key=lambda name: -best[name])[:ALL_FORMS]:
+            if name not in self._done[place]:
+                screening, start = self.under(one.assumed)[0], self._start(one, index, parent)
+                labels = self._done[place] | {one.forms[index]}
+                made = _finished(screening.other_forms(parent, name, labels, self._most_left(parent), start))
+                self._note(place, made, name)
+        return parent, self._forms_in_place(one, index, parent)
+
+    def _forms_in_place(self, one: Hypothesis, index: int, parent: Hypothesis) -> dict[str, list[Hypothesis]]:
+        """The best fit of each form that was tried in the place of an effect, by kind."""
+        best = {one.forms[index]: one}
+        for other in [other for other in self.tried if other.names and other.key != one.key]:
+            if (*sorted(other.forms[:-1]), other.assumed) == parent.key:
                 is_near = self.score.weight(other, one) * max(self.library[one.names[index]], 1) > LEAST_WEIGHT
                 other = self.refined(other) if is_near else other  # a kind counts by the mean over its library
-                found.setdefault(other.names[-1], []).append(other)
-        best = {name: max(map(self.score.value, forms)) for name, forms in found.items()}
-        screening = self.under(one.assumed)[0]
-        for name in sorted(best, key=lambda name: -best[name])[:ALL_FORMS]:
-            if (parent.key, name) not in self._whole:
-                self._whole.add((parent.key, name))
-                done = [form for other in found[name] for form in other.forms]
-                made = _finished(screening.other_forms(parent, name, done, self._most_left(parent)))
-                found[name] += made
-                self._longer[parent.key] += made
-        return parent, found
+                best[other.forms[-1]] = max(best.get(other.forms[-1], other), other, key=self.score.value)
+        found: dict[str, list[Hypothesis]] = {}
+        for label, fitted in best.items():
+            found.setdefault(label.split("/")[0], []).append(fitted)
+        return found
 
     # --- stages
 
@@ -156,11 +164,10 @@ class Search:
         """Kinds that explain no more in a session than in recordings that begin untouched are left out of it."""
         made = yield from screening.with_one_more(base, self._remembering(screening))
         for one in [*map(screening.refined, made[:1]), *made[1:]]:
-            alone = [other for other in self._longer[self.base.key] if other.names == one.names]
+            alone = [other for other in self.tried if other.names == one.names and not other.assumed]
             leads = [self.score.lead(one, other) for other in alone]
             if all(apart > error for apart, error in leads):
-                self.tried.append(one)
-                self._longer.setdefault(base.key, []).append(one)
+                self._note(base.key, [one])
 
     def _remembering(self, screening: Screening) -> set[str]:
         """Kinds whose effects go on from recording to recording: they predict something else in a session."""
@@ -193,8 +200,7 @@ class Search:
         if not one.names or one in self._at_end:
             return one
         better = self.under(one.assumed)[0].refined(one)
-        for known in (self.tried, *self._longer.values()):
-            known[:] = [better if other is one else other for other in known]
+        self.tried[:] = [better if other is one else other for other in self.tried]
         self._at_end.add(better)
         return better
 
@@ -206,14 +212,17 @@ class Search:
                 chosen.setdefault((frozenset(one.names), one.assumed), one)
         return list(chosen.values())[: BEAMS[size]]
 
-    def _reconsider(self, best: Hypothesis) -> Steps:
-        """Try the best model without each of its effects, and with each other kind in its place."""
-        for index in range(len(best.names)):
-            yield from self._grown_without(best, index)
-        self._weigh()
+    def _reconsider(self) -> Steps:
+        """Try every kind in the place of each effect of the best model, until it stays the best."""
+        best = None
+        while best is not self.best():
+            best = self.refined(self.best())
+            for index in range(len(best.names)):
+                yield from self._replaced(best, index)
+            self._weigh()
 
-    def _grown_without(self, one: Hypothesis, index: int) -> Generator[str, None, Hypothesis]:
-        """The model without one of its effects, on top of which every kind was tried."""
+    def _replaced(self, one: Hypothesis, index: int) -> Generator[str, None, Hypothesis]:
+        """The model without one of its effects, fitted again; every kind is tried in the place of the effect."""
         forms = tuple(form for i, form in enumerate(one.forms) if i != index)
         key = (*sorted(forms), one.assumed)
         screening, base = self.under(one.assumed)
@@ -221,16 +230,36 @@ class Search:
         parent = max(known, key=self.score.value) if known else screening.without(one, index)
         if not known:
             self.tried.append(parent)
-        yield from self._grow(parent)
+        yield from self._grow(parent, _place(one, index, parent), self._start(one, index, parent))
         return parent
 
-    def _grow(self, parent: Hypothesis) -> Steps:
-        """Try one effect more on top of a model."""
-        if parent.key not in self._longer:
-            screening = self.under(parent.assumed)[0]
-            made = yield from screening.with_one_more(parent, most_left=self._most_left(parent) if parent.names else 1.0)
-            self._longer[parent.key] = made
-            self.tried += made
+    def _start(self, one: Hypothesis, index: int, parent: Hypothesis) -> Hypothesis:
+        """Where fits of what takes the place of an effect begin: the other effects of the model as they are.
+
+        Fitted again without it, as in the parent, they imitate it.
+        """
+        place = _place(one, index, parent)
+        if place == parent.key:
+            return parent
+        if place not in self._begun:
+            self._begun[place] = self.under(one.assumed)[0].start_without(one, index, parent)
+        return self._begun[place]
+
+    def _grow(self, parent: Hypothesis, place: object = None, start: Hypothesis | None = None) -> Steps:
+        """Try one effect more on top of a model, or, with numbers of another one to start from, in a place of that."""
+        place = parent.key if place is None else place
+        if place not in self._done:
+            most_left = self._most_left(parent) if parent.names else 1.0
+            made = yield from self.under(parent.assumed)[0].with_one_more(parent, most_left=most_left, start=start)
+            self._note(place, made)
+
+    def _note(self, place: object, made: list[Hypothesis], *names: str) -> None:
+        """Note models that were made in a place, and kinds of which all forms were tried there.
+
+        A place is the key of a model, on top of which they are, or that of an effect in a model.
+        """
+        self.tried += made
+        self._done.setdefault(place, set()).update(names, (one.forms[-1] for one in made))
 
     def _most_left(self, parent: Hypothesis) -> float:
         """Share of the parent's gap that one effect more may leave if it is to matter.
@@ -258,6 +287,11 @@ class Search:
         price = float(np.log(max(len(self.library) + len(self.starts) - 1, 1)))
         self.score = Score(noise, count.sum(axis=0) > 0, price, self._weights())
         self.score.measure_formula_errors(self.base, [one for one in self.tried if len(one.names) == one.price_count == 1])
+
+
+def _place(one: Hypothesis, index: int, parent: Hypothesis) -> object:
+    """The place of an effect in a model; alone, it is on top of the base model."""
+    return (one.key, one.forms[index]) if parent.names else parent.key
 
 
 def _holds(one: Hypothesis, best: Hypothesis) -> bool:

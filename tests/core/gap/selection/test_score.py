@@ -135,7 +135,7 @@ def test_an_effect_may_help_to_predict_without_paying_for_its_name(left, helps):
     more = model(left, "lag/first-order", "drift/sensitivity", changes=(20.0, 1.0))
     twice = model(1.0, "lag/first-order", "drift/sensitivity", "creep/power", changes=(20.0, 1.0, 1.0))
     found = search.Search({})
-    found.score, found.tried, found._longer = rule(), [named, more, twice], {one.key: [] for one in (named, more, twice)}
+    found.score, found.tried, found._done = rule(), [named, more, twice], {one.key: set() for one in (named, more, twice)}
     assert found.score.value(more) < found.score.value(named)
     work = found.predicting(named)
     with pytest.raises(StopIteration) as stop:
