@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from palpate.core.effects.engine.registry import effect, library
-from palpate.core.gap.fitting.least_squares import Fit
+from palpate.core.gap.fitting.least_squares import Fit, fit
 from palpate.core.gap.forward.predictor import Model, number_name, predictors_of
 from palpate.core.gap.selection import blocks, diagnosis, noise_level, rule_numbers, score, search, verdict
 from palpate.core.gap.selection.base_model import with_recording_numbers
@@ -143,6 +143,17 @@ def test_an_effect_may_help_to_predict_without_paying_for_its_name(left, helps):
     assert stop.value.value is ((twice if found.score.leaves_gap(more) else more) if helps else named)
 
 
+def test_what_was_tried_in_the_place_of_an_effect_counts_wherever_it_was_found():
+    """Of two fits of a form the better one counts, once; a model with another effect beside it does not."""
+    parent, one = model(3.0, "creep/power"), model(1.0, "creep/power", "lag/first-order")
+    worse, better = model(1.5, "creep/power", "hysteresis/play"), model(1.2, "creep/power", "hysteresis/play")
+    found = search.Search({})
+    found.score, found.library = rule(), Counter(creep=1, lag=1, hysteresis=1)
+    found.tried = [parent, one, better, model(1.1, "stiffening/foam", "hysteresis/play"), worse]
+    found._at_end = set(found.tried)
+    assert found._forms_in_place(one, 1, parent) == {"lag": [one], "hysteresis": [better]}
+
+
 def test_a_form_left_out_shows_the_error_of_formulas():
     """The second best form leaves a tenth of the change more: so may nature's. A form of its own statement keeps that."""
     found = rule()
@@ -268,6 +279,21 @@ def test_names_hold_and_no_number_is_idle_or_a_cliff(searches):
                     not np.allclose(after[sensor][1], before[sensor][1]) for sensor in SENSORS if len(before[sensor][1]) > 2
                 )
                 assert changed, name
+
+
+@pytest.mark.slow("whole diagnoses of three sensors")
+def test_what_takes_the_place_of_an_effect_begins_at_the_values_of_the_others(searches):
+    """The base model alone is fitted again, so that it leaves no more than with the stiffness that the effect asked for."""
+    _, one = searches["creep"]
+    (screening, _), alone = one.under(""), one.best()
+    views, lag = screening.views.fitted, Effect("lag", "first-order", {"time": 0.4})
+    both = fit(views, alone.fit.model.with_effect(lag), alone.fit.free, max_steps=3)
+    pair = screening.hypothesis(both, (*alone.names, "lag"), (*alone.forms, "lag/first-order"))
+    start = screening.start_without(pair, 1, alone)
+    assert start.fit.model.effects == both.model.effects[:1] != alone.fit.model.effects and start.forms == alone.forms
+    assert start.fit.free == alone.fit.free
+    kept = sum(view.squares(view.residual(both.model.without(1))).sum() for view in views)
+    assert alone.fit.sse.sum() < start.fit.sse.sum() < kept
 
 
 @pytest.mark.parametrize(
