@@ -79,7 +79,7 @@ def known_report(obj, scene) -> Report | None:
 
 
 def fresh_report(obj, scene) -> Report:
-    """Compute the report of a sensor now; a duplicate first loses its original's bake, as reading gives it an identity."""
+    """Compute the report of a sensor now. Reading gives duplicates their own uid, so their copied bake is removed first."""
     baked_scene.clear_copies(scene)
     key = _key(obj, scene)
     report = _compute(obj, scene)

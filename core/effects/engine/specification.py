@@ -377,7 +377,7 @@ class Kind:
 
 
 def where_loaded(change: Callable[[np.ndarray], np.ndarray], signal: np.ndarray) -> np.ndarray:
-    """Apply what leaves zero as it is to the rest of a signal: most texels carry no load most of the time."""
+    """Apply a function with f(0) = 0 to the non-zero samples of a signal only, because most samples are unloaded."""
     loaded = signal != 0.0
     changed = np.zeros(signal.shape)
     changed[loaded] = change(signal[loaded])

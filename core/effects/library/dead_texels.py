@@ -76,7 +76,7 @@ KIND = Kind(
             neutral={"dead": 0.0},
             memoryless=held,
             after_conversion=True,
-            error=0.005,  # every texel that stays at a reading is one of these
+            error=0.005,  # every stuck-at fault has this form
         ),
         Form(
             "stuck",

@@ -66,7 +66,7 @@ class FirstFit:
     left : float
         Share that it leaves of the parent's gap there.
     rank : float
-        The same share of what the parameters of the start leave there after a linear step. The candidate that leaves least
+        The same share of the squares there after one linear step of the initial parameters. The candidate that leaves least
         comes first: parts differ between kinds, and on the pressed texels alone the base model may fit better.
     """
 
@@ -129,7 +129,7 @@ class Screening:
         most_left : float
             Share of the parent's gap that a fit to a part of the data may leave at most, for one to everything to follow.
         start : Hypothesis, optional
-            The same effects with other numbers, from which the fits start instead.
+            The same effects with other parameter values, from which the fits start instead.
         """
         is_first = not (parent.names or self.assumed)  # an assumption about recordings is like an effect
         parent, tests = start or parent, _Tests(self.view_set, (start or parent).fit, parent.fit)
@@ -180,7 +180,7 @@ class Screening:
         return self.hypothesis(again, names, forms)
 
     def start_without(self, one: Hypothesis, index: int, parent: Hypothesis) -> Hypothesis:
-        """Return a model without one of its effects: the base model fitted again, other effects and numbers as they are."""
+        """Return a model without one of its effects: base model refitted, other values kept. Its sums are the parent's."""
         model, free = one.fit.model.without(index), _without(one, index)
         base = [item for item in free if item.effect == BASE]
         again = fit(self.views.fitted, model, base, max_steps=8, tolerance=1e-3, with_equations=False)
@@ -254,7 +254,7 @@ class Screening:
 
 
 class _Tests:
-    """Score tests of one fit, on the views that candidates need; `parent` is the fit whose gap is to be closed."""
+    """Score tests of one fit, on the views that candidates need; `parent` is the fit whose residual is to be reduced."""
 
     def __init__(self, view_set: ViewSet, found: Fit, parent: Fit):
         self.view_set, self.found, self.parent = view_set, found, parent
@@ -262,7 +262,7 @@ class _Tests:
         self._gaps: dict[int, float] = {}
 
     def gap(self, test: ScoreTest) -> float:
-        """Squares that the parent leaves on the views of a test."""
+        """Sum of squares of the parent's residual on the views of a test."""
         if self.parent is self.found:
             return test.total
         if id(test) not in self._gaps:
@@ -297,6 +297,6 @@ def _left(one: Hypothesis) -> float:
 
 
 def _without(one: Hypothesis, index: int) -> list[FreeParameter]:
-    """The free parameters of a model once one of its effects was removed."""
+    """Free parameters of a model after removal of one effect."""
     free = [item for item in one.fit.free if item.effect != index]
     return [replace(item, effect=item.effect - 1) if item.effect > index else item for item in free]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Search for sets of effects: all alone, pairs on top of the best kinds, triples on top of the best pairs, then exchanges.
 
-An exchange tries every kind in the place of one effect and begins at the values of the others, so that equivalent models meet.
+An exchange replaces one effect by every kind. Its fits start from the fitted values of the other effects.
 
 Two assumptions about how recordings differ are candidates like any effect: a factor and a zero of each (which costs a name),
 and one session in their order (what the sensor remembers goes on, which costs none).
@@ -134,7 +134,7 @@ class Search:
         return parent, self._forms_in_place(one, index, parent)
 
     def _forms_in_place(self, one: Hypothesis, index: int, parent: Hypothesis) -> dict[str, list[Hypothesis]]:
-        """The best fit of each form that was tried in the place of an effect, by kind."""
+        """The best fit of each form that replaces an effect, by kind."""
         best = {one.forms[index]: one}
         for other in [other for other in self.tried if other.names and other.key != one.key]:
             if (*sorted(other.forms[:-1]), other.assumed) == parent.key:
@@ -213,7 +213,7 @@ class Search:
         return list(chosen.values())[: BEAMS[size]]
 
     def _reconsider(self) -> Steps:
-        """Try every kind in the place of each effect of the best model, until it stays the best."""
+        """Replace each effect of the best model by every kind, until no replacement improves the model."""
         best = None
         while best is not self.best():
             best = self.refined(self.best())
@@ -222,7 +222,7 @@ class Search:
             self._weigh()
 
     def _replaced(self, one: Hypothesis, index: int) -> Generator[str, None, Hypothesis]:
-        """The model without one of its effects, fitted again; every kind is tried in the place of the effect."""
+        """Replace an effect by every kind; return the refitted model without it."""
         forms = tuple(form for i, form in enumerate(one.forms) if i != index)
         key = (*sorted(forms), one.assumed)
         screening, base = self.under(one.assumed)
@@ -234,9 +234,9 @@ class Search:
         return parent
 
     def _start(self, one: Hypothesis, index: int, parent: Hypothesis) -> Hypothesis:
-        """Where fits of what takes the place of an effect begin: the other effects of the model as they are.
+        """Initial model of the fits that replace an effect: the other effects keep their fitted values.
 
-        Fitted again without it, as in the parent, they imitate it.
+        In the parent, which was refitted without the effect, they compensate for it.
         """
         place = _place(one, index, parent)
         if place == parent.key:
@@ -246,7 +246,10 @@ class Search:
         return self._begun[place]
 
     def _grow(self, parent: Hypothesis, place: object = None, start: Hypothesis | None = None) -> Steps:
-        """Try one effect more on top of a model, or, with numbers of another one to start from, in a place of that."""
+        """Add one effect to a model.
+
+        With `place` and `start` it replaces an effect of another model, from whose values the fits start.
+        """
         place = parent.key if place is None else place
         if place not in self._done:
             most_left = self._most_left(parent) if parent.names else 1.0
@@ -254,10 +257,7 @@ class Search:
             self._note(place, made)
 
     def _note(self, place: object, made: list[Hypothesis], *names: str) -> None:
-        """Note models that were made in a place, and kinds of which all forms were tried there.
-
-        A place is the key of a model, on top of which they are, or that of an effect in a model.
-        """
+        """Record fitted models, and the kinds whose forms have all been tried, under a key from :func:`_place`."""
         self.tried += made
         self._done.setdefault(place, set()).update(names, (one.forms[-1] for one in made))
 
@@ -290,7 +290,7 @@ class Search:
 
 
 def _place(one: Hypothesis, index: int, parent: Hypothesis) -> object:
-    """The place of an effect in a model; alone, it is on top of the base model."""
+    """Key of an effect's position in a model; that of the model without it if no other effect remains."""
     return (one.key, one.forms[index]) if parent.names else parent.key
 
 

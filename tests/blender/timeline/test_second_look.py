@@ -73,7 +73,7 @@ def test_a_duplicate_of_a_baked_sensor_is_not_baked(tmp_path, linked, is_reporte
     assert any(shown)
     bpy.ops.object.duplicate(linked=linked)
     copy = bpy.context.object
-    if is_reported_first:  # the panel asks for it when it is drawn, which may be before the look
+    if is_reported_first:  # drawing the panel requests a report, which may be computed first
         sensor_report.fresh_report(copy, scene)
     second_look.look_again(scene)
     assert copy.palpate.is_baked == linked  # a linked duplicate shows the heat map of the shared mesh

@@ -105,7 +105,7 @@ def test_formulas(name, form, values, formula):
 
 @pytest.mark.parametrize(("name", "form"), [("saturation", "tanh"), ("saturation", "power"), ("dead-zone", "knee")])
 @pytest.mark.parametrize("zero", [0.0, 2.5])
-def test_no_load_changes_nothing_and_a_missing_reading_stays_missing(name, form, zero):
+def test_zero_load_gives_the_zero_reading_and_nan_stays_nan(name, form, zero):
     force = np.full((3, N), [[0.0], [5e-324], [np.nan]])
     with np.errstate(divide="raise", over="raise", invalid="raise"):
         found = read(effect(name, form), force, TIME[:3], replace(GRID, zero=zero))

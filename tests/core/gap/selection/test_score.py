@@ -143,8 +143,8 @@ def test_an_effect_may_help_to_predict_without_paying_for_its_name(left, helps):
     assert stop.value.value is ((twice if found.score.leaves_gap(more) else more) if helps else named)
 
 
-def test_what_was_tried_in_the_place_of_an_effect_counts_wherever_it_was_found():
-    """Of two fits of a form the better one counts, once; a model with another effect beside it does not."""
+def test_alternatives_to_an_effect_are_all_fitted_models_with_the_same_other_effects():
+    """Of two fits of one form the better is kept. Models with different other effects are ignored."""
     parent, one = model(3.0, "creep/power"), model(1.0, "creep/power", "lag/first-order")
     worse, better = model(1.5, "creep/power", "hysteresis/play"), model(1.2, "creep/power", "hysteresis/play")
     found = search.Search({})
@@ -282,8 +282,8 @@ def test_names_hold_and_no_number_is_idle_or_a_cliff(searches):
 
 
 @pytest.mark.slow("whole diagnoses of three sensors")
-def test_what_takes_the_place_of_an_effect_begins_at_the_values_of_the_others(searches):
-    """The base model alone is fitted again, so that it leaves no more than with the stiffness that the effect asked for."""
+def test_fits_of_alternatives_start_from_the_fitted_values_of_the_other_effects(searches):
+    """Only the base model is refitted, which lowers the sum of squares."""
     _, one = searches["creep"]
     (screening, _), alone = one.under(""), one.best()
     views, lag = screening.views.fitted, Effect("lag", "first-order", {"time": 0.4})
