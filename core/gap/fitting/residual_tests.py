@@ -46,6 +46,9 @@ class ResidualStructure:
         return max(self.shares, key=lambda name: self.shares[name]) if self.shares else ""
 
 
+NO_STRUCTURE = ResidualStructure(0.0, {})
+
+
 def residual_structure(predictors: Sequence[Predictor], residuals: Sequence[np.ndarray]) -> ResidualStructure:
     """Find out on which features residuals depend.
 

@@ -105,8 +105,7 @@ def _begun_with(
     fitted = [p for p in predictors if p.trial.use == "fit"]
     view_set = view_set_of(fitted, (noise[0].deviation, noise[1].deviation))
     base = base_fit(rig, view_set.whole, full[0])
-    structure, scales = _structure(view_set, base), scales_of(fitted, base.model)
-    return _Begun(Diagnosis(rig, predictors, noise, full, coverage(fitted), scales, base, base, structure, structure), view_set)
+    return _Begun(Diagnosis(rig, predictors, noise, full, coverage(fitted), scales_of(fitted, base.model), base, base), view_set)
 
 
 def _progress_of(
@@ -159,7 +158,7 @@ def _concluded(begun: _Begun, search: Search, named: Hypothesis, best: Hypothesi
     """The diagnosis of the model that the rule chose, `named`, and of the one that predicts best with its effects."""
     result, view_set = _under_assumption(begun, search, best)
     result.best = _with_base_refitted(result, view_set, best.fit)
-    result.structure = _structure(view_set, result.best)
+    result.base_structure, result.structure = (_structure(view_set, found) for found in (result.base, result.best))
     result.line = strongest_line(view_set.whole, result.best.model)
     result.check = checked(search.under("")[0].blocks, search.score, search.base, best)
     result.faults = faults_of(result, named.fit.model)
@@ -181,11 +180,7 @@ def _under_assumption(begun: _Begun, search: Search, best: Hypothesis) -> tuple[
     order = [by_name[one.trial.name] for one in plain.predictors]
     rig = replace(plain.rig, trials=tuple(one.trial for one in order))
     view_set, found = screening.view_set, base.fit
-    structure = _structure(view_set, found)
-    scales, faults = screening.scales, plain.faults
-    result = Diagnosis(
-        rig, order, plain.noise, plain.full, plain.coverage, scales, found, found, structure, structure, faults=faults
-    )
+    result = Diagnosis(rig, order, plain.noise, plain.full, plain.coverage, screening.scales, found, found, faults=plain.faults)
     result.assumed_session = best.assumed == ONE_SESSION
     if best.assumed == OWN_NUMBERS:
         result.alike = plain

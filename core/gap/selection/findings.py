@@ -12,7 +12,7 @@ from ..dataset.rig import Rig
 from ..fitting.intervals import ParameterInterval
 from ..fitting.least_squares import Fit
 from ..fitting.noise_floor import ChannelNoise, Coverage
-from ..fitting.residual_tests import ResidualStructure, SpectralLine
+from ..fitting.residual_tests import NO_STRUCTURE, ResidualStructure, SpectralLine
 from ..forward.predictor import Model, Predictor
 from .candidates import Scales
 from .check_recordings import CheckOutcome
@@ -136,8 +136,8 @@ class Diagnosis:
     scales: Scales
     base: Fit
     best: Fit
-    base_structure: ResidualStructure
-    structure: ResidualStructure
+    base_structure: ResidualStructure = NO_STRUCTURE
+    structure: ResidualStructure = NO_STRUCTURE
     stages: list[Model] = field(default_factory=list)
     intervals: list[ParameterInterval] = field(default_factory=list)
     verdict: str = "no gap"

@@ -213,14 +213,22 @@ class Screening:
         promises = []
         for one in own:
             test = tests.of(one)
-            starts = starting_points(one, test, self.view_set, self.scales, LATER_STARTS if parent.names else START_COUNT)
-            if one.label in self.alone:
-                effect = self.alone[one.label]
-                promise, _ = test.score(test.model.with_effect(effect))
-                starts = sorted([*starts, (promise, effect)], key=lambda entry: -entry[0])
+            known = self._known(one, abs(parent.fit.model.parameters.gain))
+            count = LATER_STARTS if parent.names or known else START_COUNT
+            starts = starting_points(one, test, self.view_set, self.scales, count)
+            starts += [(test.score(test.model.with_effect(effect))[0], effect) for effect in known]
+            starts.sort(key=lambda entry: -entry[0])
             if starts and starts[0][0] > 0:
                 promises.append(Promise(starts[0][0] / max(test.total, 1e-300), one, [effect for _, effect in starts]))
         return sorted(promises, key=lambda one: (one.candidate.has_texel_parameters, -one.share))
+
+    def _known(self, one: Candidate, gain: float) -> list[Effect]:
+        """What a form was fitted to alone; for a displacement with fewer parameters, a displacement with more."""
+        if one.label in self.alone or one.form.placement is None:
+            return [self.alone[one.label]] if one.label in self.alone else []
+        names = [parameter.name for parameter in one.form.parameters]
+        fuller = [e.values for e in self.alone.values() if e.name == one.name and set(names) <= set(e.values)]
+        return [one.effect({name: values[name] for name in names}, self.scales.texels, gain) for values in fuller]
 
     def _first_fit(self, one: Promise, tests: _Tests) -> FirstFit:
         """A candidate fitted to a part of the data, from the starting point that lowers the squares most as it is."""

@@ -68,9 +68,9 @@ class Search:
         if not self.is_open(self.base):
             return self.base
         yield from _in_stage("alone", self._grow(self.base))
-        self._weigh(is_noise_measured=True)
+        self._weigh()
         self.refined(self.best())
-        self._weigh(is_noise_measured=True)
+        self._weigh()
         if self.is_open(self.best()):
             yield from _in_stage("differing recordings", self._assume_differences())
             self.tried += yield from _in_stage("differing recordings", best_pairs(plain, self.base))
@@ -84,8 +84,8 @@ class Search:
         return self.best()
 
     def is_open(self, one: Hypothesis) -> bool:
-        """Return whether one effect more could raise the score of a model."""
-        return self.score.most_to_gain(one) > 0.0
+        """Return whether a model leaves a gap, and one effect more could raise its score."""
+        return self.score.leaves_gap(one) and self.score.most_to_gain(one) > 0.0
 
     def best(self) -> Hypothesis:
         """Return the smallest model within one standard error of the best.
