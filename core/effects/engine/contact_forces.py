@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...compiled.kernels import plain
+from ...compiled.kernels import kernel, plain
 from ...laws.contact_law import ContactLaw, contact_law
 from ...laws.normal_force import damped_force, elastic_force
 from ...model.sensor import Effect
@@ -64,18 +64,22 @@ def normal_forces(
         if form.law is None:
             continue
         if form.after_clip and not clipped:
-            force, clipped = _damped_and_clipped(force, inside, rate, law), True
+            damp_and_clip(force, inside, rate, law)
+            clipped = True
         memory = np.zeros((depth.shape[1], form.state_size))
         constants = constants_of(form, complete_values(item), lengths)
         force = law_over_time(form, force, step, constants, memory, inside, slide_step)
-    return force if clipped else _damped_and_clipped(force, inside, rate, law)
-
-
-def _damped_and_clipped(elastic: np.ndarray, depth: np.ndarray, rate: np.ndarray, law: ContactLaw) -> np.ndarray:
-    """Return elastic force and damping together, clipped at zero (Eq. 8, or Hunt and Crossley's law)."""
-    force: np.ndarray = np.maximum(plain(damped_force)(elastic, rate, law), 0.0)
-    np.copyto(force, 0.0, where=~(depth > 0.0))
+    if not clipped:
+        damp_and_clip(force, inside, rate, law)
     return force
+
+
+@kernel
+def damp_and_clip(force: np.ndarray, depth: np.ndarray, rate: np.ndarray, law: ContactLaw) -> None:
+    """Add damping to elastic forces (t, n), and clip the sums at zero (Eq. 8, or Hunt and Crossley's law)."""
+    for i in range(force.shape[0]):
+        for j in range(force.shape[1]):
+            force[i, j] = max(damped_force(force[i, j], rate[i, j], law), 0.0) if depth[i, j] > 0.0 else 0.0
 
 
 def friction_factors(effects: Sequence[Effect], speed: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -137,10 +137,12 @@ def _variance_and_autocovariance(part: np.ndarray) -> tuple[np.ndarray, np.ndarr
     Missing values are NaN. The autocovariance is computed up to lags of a quarter of the samples, over pairs of known values.
     """
     samples, columns = part.shape
+    kept_share = 1.0
     if columns >= MANY_TEXELS:
         together = np.isfinite(part).sum(axis=1) >= MANY_TEXELS // 2
         part = np.where(together[:, None], part, np.nan)
         part[together] -= np.nanmedian(part[together], axis=1, keepdims=True)
+        kept_share -= (2.0 - np.pi / 2.0) / columns  # of the variance: the median of the columns takes a part of each
     known = np.isfinite(part)
     part = part[:, known.sum(axis=0) >= SHORTEST_STRETCH]
     known = np.isfinite(part)
@@ -150,7 +152,8 @@ def _variance_and_autocovariance(part: np.ndarray) -> tuple[np.ndarray, np.ndarr
     t = np.where(known, t - t.sum(axis=0) / count, 0.0)
     part = np.where(known, part - part.sum(axis=0) / count, 0.0)
     part = part - t * (t * part).sum(axis=0) / (t * t).sum(axis=0)
-    variance = (part * part).sum(axis=0) / (count - 2)
+    freedom = count - 2
+    variance = (part * part).sum(axis=0) / (freedom * kept_share * (1.0 - 2.0 / (9.0 * freedom)) ** 3)
     curve = np.zeros(AUTOCOVARIANCE_LAGS)
     if len(variance) == 0:
         return variance, curve, count

@@ -68,9 +68,9 @@ class Search:
         if not self.is_open(self.base):
             return self.base
         yield from _in_stage("alone", self._grow(self.base))
-        self._weigh()
+        self._weigh(is_noise_measured=True)
         self.refined(self.best())
-        self._weigh()
+        self._weigh(is_noise_measured=True)
         if self.is_open(self.best()):
             yield from _in_stage("differing recordings", self._assume_differences())
             self.tried += yield from _in_stage("differing recordings", best_pairs(plain, self.base))

@@ -17,7 +17,7 @@ VISIBLE_STEPS_PROMISE = 0.5
 """Promise of quantization whose steps are seen in the readings, as a share of the squares: it is always fitted."""
 LARGEST_SHIFT, LARGEST_TURN = 0.5, 0.1
 """Bounds of the starting points of displaced texels: a share of the pitch, and an angle in rad."""
-DISPLACEMENT_SCANS = ((0.1, 12), (0.05, 5))
+DISPLACEMENT_SCANS = ((0.15, 8), (0.05, 3))
 """Step and number of steps to each side of the scans for a large displacement, first ones and second ones; steps are shares of
 the pitch and of `LARGEST_TURN`. Shifts of nine development rigs with flat punches are at most 0.9 pitches. Each gets the best
 of a grid of 0.05 pitches, also with first steps of 0.08 and 0.15 and second ones of 0.03 and 0.04; DIRECT misses it in two."""
