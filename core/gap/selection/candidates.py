@@ -47,7 +47,7 @@ Chosen by eye: of eFlesh's channels 12 rise and 3 fall under a normal force, and
 set of benchmarks/_foreign.py all go one way."""
 THREES = "axes"
 """What forms need, of :data:`.specification.NEEDS`, that are only defined for the channels of all magnetometers."""
-START_COUNT = 8
+START_COUNT = 6
 """Number of starting points of a candidate."""
 SHARPNESS = "sharpness"
 """Name of parameters that say how sharp a knee is."""
