@@ -35,8 +35,9 @@ FINAL_STEPS, FINAL_TOLERANCE = 10, 3e-4
 """Of the fits to everything."""
 REFINED_STEPS = 40
 """Of the fits of the best models: those on top of which a further effect is looked for, and rivals."""
-TRIED_KINDS, REFITTED_KINDS = 8, 5
-"""Kinds that are fitted to a part of the data on top of an effect, and to everything at most: for speed."""
+TRIED_KINDS = 5
+"""Kinds that are fitted to a part of the data on top of an effect, and to everything at most: for speed. Of 92 hidden effects
+that a model lacked, in 28 development rigs, 89 were among the five kinds that promise most."""
 TRIED_FORMS = 2
 """Forms of a kind that are fitted alone to a part of the data. On 82 development rigs 350 of 371 kinds left least in one of the
 two forms that promise most, and of the other kinds those that were hidden left 0.02 of the gap more at most."""
@@ -159,7 +160,7 @@ class Screening:
             best_fits.setdefault(fitted.candidate.name, fitted)
             if is_first:
                 self.alone.setdefault(fitted.candidate.label, fitted.fit.model.effects[-1])
-        made = yield from self._final_fits(list(best_fits.values())[:REFITTED_KINDS], parent)
+        made = yield from self._final_fits(list(best_fits.values())[:TRIED_KINDS], parent)
         made.sort(key=_left)
         for name in [one.names[-1] for one in made[:ALL_FORMS]] if is_first else []:
             made += yield from self.other_forms(parent, name, [one.forms[-1] for one in made])
