@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...compiled.kernels import kernel, plain
+from ...compiled.kernels import kernel, plain, with_plain_form
 from ...laws.contact_law import ContactLaw, contact_law
 from ...laws.normal_force import damped_force, elastic_force
 from ...model.sensor import Effect
@@ -55,6 +55,7 @@ def normal_forces(
     if rate is None:
         rate = np.zeros_like(depth)
         rate[1:] = np.diff(depth, axis=0) / np.diff(time)[:, None]
+    rate = np.ascontiguousarray(np.broadcast_to(rate, depth.shape), dtype=float)
     lengths, step = steps_of(time)
     inside = np.maximum(depth, 0.0)
     law = contact_law(parameters)
@@ -74,9 +75,19 @@ def normal_forces(
     return force
 
 
+def _damp_and_clip_plain(force: np.ndarray, depth: np.ndarray, rate: np.ndarray, law: ContactLaw) -> None:
+    """Do as :func:`damp_and_clip` without compiled code."""
+    np.maximum(plain(damped_force)(force, rate, law), 0.0, out=force)
+    force[~(depth > 0.0)] = 0.0
+
+
+@with_plain_form(_damp_and_clip_plain)
 @kernel
 def damp_and_clip(force: np.ndarray, depth: np.ndarray, rate: np.ndarray, law: ContactLaw) -> None:
-    """Add damping to elastic forces (t, n), and clip the sums at zero (Eq. 8, or Hunt and Crossley's law)."""
+    """Add damping to elastic forces (t, n) in place, and clip the sums at zero (Eq. 8, or Hunt and Crossley's law).
+
+    Where nothing touches the force is zero.
+    """
     for i in range(force.shape[0]):
         for j in range(force.shape[1]):
             force[i, j] = max(damped_force(force[i, j], rate[i, j], law), 0.0) if depth[i, j] > 0.0 else 0.0

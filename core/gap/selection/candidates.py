@@ -47,8 +47,8 @@ Chosen by eye: of eFlesh's channels 12 rise and 3 fall under a normal force, and
 set of benchmarks/_foreign.py all go one way."""
 THREES = "axes"
 """What forms need, of :data:`.specification.NEEDS`, that are only defined for the channels of all magnetometers."""
-START_COUNT = 6
-"""Number of starting points of a candidate."""
+START_COUNT = 7
+"""Number of starting points of a candidate, for speed: they divide the range of the first parameter into eighths."""
 SHARPNESS = "sharpness"
 """Name of parameters that say how sharp a knee is."""
 IN_PLANE = ("x", "y", "about_z")

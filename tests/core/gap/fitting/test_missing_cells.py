@@ -31,6 +31,19 @@ def test_missing_readings_leave_the_noise_as_it_is(share):
     assert found.correlation_time == pytest.approx(1.0, abs=0.3)
 
 
+@pytest.mark.parametrize("zeros", [0.0, 50.0])
+def test_neither_common_mode_nor_zeros_nor_the_median_bias_the_noise(zeros):
+    rng, rig, found = np.random.default_rng(14), cases.rig(trials=2, seconds=20.0), []
+    for _ in range(8):
+        trials = []
+        for one in rig.trials:
+            common = np.sin(one.time)[:, None] + zeros * NOISE * rng.normal(size=one.reading.shape[1])
+            trials.append(replace(one, reading=common + NOISE * rng.normal(size=one.reading.shape)))
+        found.append(reading_noise(predictors_of(trials, rig), 1.0).deviation / NOISE)
+    error = np.std(found, ddof=1) / np.sqrt(len(found))
+    assert error < 0.003 and np.mean(found) == pytest.approx(1.0, abs=3 * error)
+
+
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.4])
 def test_missing_forces_leave_the_noise_as_it_is(share):
     rng, rig = np.random.default_rng(12), cases.rig(trials=2, seconds=8.0)
