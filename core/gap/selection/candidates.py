@@ -47,8 +47,9 @@ Chosen by eye: of eFlesh's channels 12 rise and 3 fall under a normal force, and
 set of benchmarks/_foreign.py all go one way."""
 THREES = "axes"
 """What forms need, of :data:`.specification.NEEDS`, that are only defined for the channels of all magnetometers."""
-START_COUNT = 7
-"""Number of starting points of a candidate, for speed: they divide the range of the first parameter into eighths."""
+START_COUNT = 8
+"""Number of starting points of a candidate. Where only the six of largest promise were compared by the squares there, a load
+spreading was called crosstalk."""
 SHARPNESS = "sharpness"
 """Name of parameters that say how sharp a knee is."""
 IN_PLANE = ("x", "y", "about_z")

@@ -26,9 +26,6 @@ from .view_set import ViewSet
 
 LATER_STARTS = 1
 """Points of the search ranges that are tried on top of an effect, or in addition to the form's values alone: for speed."""
-BEST_STARTS = 6
-"""Number of starting points, those that promise most, at which a first fit evaluates the squares: for speed. Most points come as
-they are and scaled."""
 FIRST_STEPS, FIRST_TOLERANCE = 10, 1e-3
 """Of the fits to a part of the data. With 6 steps and 3e-3 they take a quarter less processor time, and rivals are left out
 before they are fitted to everything: in three of 74 rigs crosstalk was sure where load spreading explains as much."""
@@ -243,7 +240,7 @@ class Screening:
     def _first_fit(self, one: Promise, tests: _Tests) -> FirstFit:
         """A candidate fitted to a part of the data, from the starting point that lowers the squares most as it is."""
         test = tests.of(one.candidate)
-        start = max((test.model.with_effect(effect) for effect in one.starts[:BEST_STARTS]), key=test.decrease)
+        start = max((test.model.with_effect(effect) for effect in one.starts), key=test.decrease)
         is_far = is_large_shift(start.effects[-1], self.scales)  # texels meet another part of the indenter then
         found = fit(
             test.views,

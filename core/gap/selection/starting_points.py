@@ -20,7 +20,7 @@ LARGEST_SHIFT, LARGEST_TURN = 0.5, 0.1
 DISPLACEMENT_SCANS = ((0.15, 8), (0.05, 3))
 """Step and number of steps to each side of the scans for a large displacement, first ones and second ones; steps are shares of
 the pitch and of `LARGEST_TURN`. Shifts of nine development rigs with flat punches are at most 0.9 pitches. Each gets the best
-of a grid of 0.05 pitches, also with first steps of 0.08 and 0.15 and second ones of 0.03 and 0.04; DIRECT misses it in two."""
+of a grid of 0.05 pitches, also with first steps of 0.08 and 0.1 and second ones of 0.03 and 0.04; DIRECT misses it in two."""
 TEXEL_STEP = 0.01
 """Test step of parameters of single texels, as a share of their scale."""
 
