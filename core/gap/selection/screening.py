@@ -228,7 +228,7 @@ class Screening:
         return sorted(promises, key=lambda one: (one.candidate.has_texel_parameters, -one.share))
 
     def _known(self, one: Candidate, gain: float) -> list[Effect]:
-        """What a form was fitted to alone; for a displacement with fewer parameters, a displacement with more."""
+        """The effect that a form was fitted to alone; for a displacement with fewer parameters, from one with more."""
         if one.label in self.alone:
             return [self.alone[one.label]]
         if one.form.placement is None:

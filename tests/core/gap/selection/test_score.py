@@ -82,6 +82,14 @@ def test_an_effect_joins_if_it_pays_its_name(left, joins):
     assert (rule().most_to_gain(base) > 0.0) is joins
 
 
+@pytest.mark.parametrize(("left", "is_open"), [(1.015, False), (1.025, True)])
+def test_no_effect_is_looked_for_where_no_gap_is_significant(left, is_open):
+    """The error of the noise is 0.01, and two of it are significant; an effect that closed either would pay its name."""
+    found = search.Search({})
+    found.score = rule()
+    assert found.score.most_to_gain(model(left)) > 0.0 and found.is_open(model(left)) is is_open
+
+
 @pytest.mark.parametrize("least", [-5.0, -1.0, 1.0])
 def test_an_effect_more_reaches_a_score_where_it_leaves_no_more_than_this(least):
     base, share = model(3.0), rule().most_left(model(3.0), least)

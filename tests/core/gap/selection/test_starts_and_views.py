@@ -20,6 +20,7 @@ from palpate.core.gap.selection.diagnosis import faults_of
 from palpate.core.gap.selection.direct_estimates import companding_starts, few_levels
 from palpate.core.gap.selection.quantities import friction_kinds
 from palpate.core.gap.selection.rao_score import ScoreTest
+from palpate.core.gap.selection.screening import Screening
 from palpate.core.gap.selection.starting_points import starting_points
 from palpate.core.gap.selection.view_set import view_set_of
 from palpate.core.geometry.mesh import checked_mesh
@@ -138,3 +139,14 @@ def test_a_large_shift_under_a_flat_punch_is_found():
         for model in (base.with_effect(best), base)
     )
     assert left < 0.05 * whole
+
+
+def test_a_shift_starts_from_the_displacement_that_was_fitted_alone():
+    rigid = effect("misalignment", "rigid", x=1e-3, y=-2e-3, z=1e-4, about_x=0.01, about_y=0.0, about_z=0.02)
+    alone = {"misalignment/rigid": rigid, "lag/first-order": effect("lag", "first-order", time=0.1)}
+    screening = Screening(None, None, None, SimpleNamespace(texels=6), "", alone)
+    values = {}
+    for name, form in (("misalignment", "shift"), ("lag", "first-order"), ("lag", "second-order")):
+        candidate = Candidate(kind_of(name), form_of(name, form))
+        values[form] = [one.values for one in screening._known(candidate, 1.0)]
+    assert values == {"shift": [{"x": 1e-3, "y": -2e-3}], "first-order": [{"time": 0.1}], "second-order": []}
