@@ -105,7 +105,8 @@ def _begun_with(
     fitted = [p for p in predictors if p.trial.use == "fit"]
     view_set = view_set_of(fitted, (noise[0].deviation, noise[1].deviation))
     base = base_fit(rig, view_set.whole, full[0])
-    return _Begun(Diagnosis(rig, predictors, noise, full, coverage(fitted), scales_of(fitted, base.model), base, base), view_set)
+    scales = scales_of(fitted, base.model)
+    return _Begun(Diagnosis(rig, predictors, noise, full, coverage(fitted), scales, base, base), view_set)
 
 
 def _progress_of(

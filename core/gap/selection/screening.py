@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Collection, Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
 
+from ...effects.engine.specification import scalar
 from ...model.sensor import Effect
 from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
 from ..fitting.least_squares import BASE, Fit, FreeParameter, TrialView, fit
@@ -37,8 +38,8 @@ TRIED_KINDS = 5
 """Kinds that are fitted to a part of the data on top of an effect, and to everything at most: for speed. In 28 development
 rigs 89 of 92 effects that were missing from a model belonged to the five kinds that promise most."""
 TRIED_FORMS = 2
-"""Forms of a kind that are fitted alone to a part of the data. On 82 development rigs one of the two forms that promise most left
-least for 350 of 371 kinds; for hidden kinds among the others it left 0.02 of the gap more than the best form at most."""
+"""Forms of a kind that are fitted alone to a part of the data: for speed. On 82 development rigs one of the two forms that
+promise most left least for 350 of 371 kinds; for hidden kinds among the others it left at most 0.02 of the gap more."""
 ALL_FORMS = 2
 """Kinds of which all forms are fitted to everything, so that a kind is judged by its whole library: for speed."""
 
@@ -235,7 +236,7 @@ class Screening:
             return []
         names = [parameter.name for parameter in one.form.parameters]
         fuller = [e.values for e in self.alone.values() if e.name == one.name and set(names) <= set(e.values)]
-        return [one.effect({name: values[name] for name in names}, self.scales.texels, gain) for values in fuller]
+        return [one.effect({name: scalar(values, name) for name in names}, self.scales.texels, gain) for values in fuller]
 
     def _first_fit(self, one: Promise, tests: _Tests) -> FirstFit:
         """A candidate fitted to a part of the data, from the starting point that lowers the squares most as it is."""
