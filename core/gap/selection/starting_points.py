@@ -19,8 +19,8 @@ LARGEST_SHIFT, LARGEST_TURN = 0.5, 0.1
 """Bounds of the starting points of displaced texels: a share of the pitch, and an angle in rad."""
 DISPLACEMENT_SCANS = ((0.15, 8), (0.05, 3))
 """Step and number of steps to each side of the scans for a large displacement, first ones and second ones, which reach from one
-first step to the next; steps are shares of the pitch and of `LARGEST_TURN`. Shifts of 14 rigs with flat punches are at most 0.95
-pitches, and in each the squares fall as far as on a grid of 0.05 pitches (to four digits). DIRECT misses it in two of nine."""
+first step to the next; steps are shares of the pitch and of `LARGEST_TURN`. Shifts of 14 rigs with flat punches are 0.95
+pitches at most, and in each the squares fall as far as on a grid of 0.05 pitches (to four digits). DIRECT misses it in two."""
 TEXEL_STEP = 0.01
 """Test step of parameters of single texels, as a share of their scale."""
 
