@@ -16,13 +16,6 @@ from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.solver.simulation import run
 
 
-def test_one_point_is_the_vertex():
-    texels = pad()
-    points = contact_points(texels, 1)
-    assert np.array_equal(points.positions(texels.position), texels.position)
-    assert np.array_equal(points.texel, np.arange(84))
-
-
 @pytest.mark.parametrize("across", [2, 3, 5])
 def test_in_a_grid_they_form_a_finer_grid(across):
     texels = pad(4, 3, 0.01)

@@ -3,11 +3,10 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial.transform import Rotation
 
 from palpate.core.geometry import texture_maps
 from palpate.core.geometry.grid_layout import GridLayout, grid_layout
@@ -63,15 +62,9 @@ def shuffled(rng, position, triangles, quads):
     return position[old], triangles, quads, old
 
 
-def rotation(rng):
-    """Return a random rotation matrix."""
-    matrix, _ = np.linalg.qr(rng.normal(size=(3, 3)))
-    return matrix * np.sign(np.linalg.det(matrix))
-
-
 def about_z(angle):
     """Return the matrix of a turn about z."""
-    return np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+    return Rotation.from_euler("z", angle).as_matrix()
 
 
 # --- grids
@@ -122,7 +115,7 @@ def bent(places, how):
 def test_bent_pad_anywhere_in_space(how, diagonals):
     rng = np.random.default_rng(5)
     places, triangles, _ = grid_mesh(14, 8, diagonals)
-    surface = bent(places, how) @ rotation(rng).T * 0.01 + rng.normal(size=3)
+    surface = bent(places, how) @ Rotation.random(rng=rng).as_matrix().T * 0.01 + rng.normal(size=3)
     results = []
     for _ in range(3):
         position, faces, _, old = shuffled(rng, surface, triangles, None)
@@ -158,15 +151,6 @@ def test_upright_pad_has_rows_upwards_and_is_not_mirrored():
         grid[layout.row, layout.column] = np.arange(len(position))
         upwards = position[grid[1, 0]] - position[grid[0, 0]]
         np.testing.assert_allclose(np.cross(along[0], upwards / np.linalg.norm(upwards)), normal, atol=1e-12)
-
-
-def test_pad_that_faces_down_keeps_columns_along_x():
-    places, triangles, _ = grid_mesh(5, 3)
-    position = flat(places) * [1, -1, -1]
-    layout, along = grid_layout(position, normals_of(position, triangles), triangles)
-    np.testing.assert_allclose(along, np.tile([1.0, 0, 0], (15, 1)), atol=1e-12)
-    lowest = position[(layout.row == 0) & (layout.column == 0)][0]
-    assert lowest[0] == position[:, 0].min() and lowest[1] == position[:, 1].max()  # (−z) × x is −y
 
 
 def test_normals_decide_what_is_outside():
@@ -212,8 +196,6 @@ def not_grids():
     yield "corner cut off", position, triangles[~np.isin(triangles, 0).any(axis=1)]
     yield "one triangle missing", position, triangles[:-1]
     yield "one triangle turned over", position, np.vstack([triangles[:-1], triangles[-1:, ::-1]])
-    yield "one triangle twice", position, np.vstack([triangles[:-1], triangles[:1]])
-    yield "two pads", np.vstack([position, position + 1]), np.vstack([triangles, triangles + len(position)])
     yield "one triangle", np.eye(3), np.array([[0, 1, 2]])
     yield (
         "strip of three triangles",
@@ -224,9 +206,7 @@ def not_grids():
     yield "L", position, triangles[np.isin(triangles, ell).all(axis=1)]
     for name, mesh in (
         ("sphere", trimesh.creation.icosphere(subdivisions=2)),
-        ("globe", trimesh.creation.uv_sphere(count=[8, 8])),
         ("torus", trimesh.creation.torus(1, 0.3)),
-        ("cylinder", trimesh.creation.cylinder(1, 2)),
         ("box", trimesh.creation.box()),
     ):
         yield name, np.array(mesh.vertices), np.array(mesh.faces)
@@ -245,16 +225,6 @@ def test_no_grid_is_claimed(position, triangles):
     triangles = triangles.reshape(-1, 3)
     position = position[used].astype(float)
     assert grid_layout(position, normals_of(position, triangles), triangles) == (None, None)
-
-
-def test_large_grids_are_quick():
-    places, triangles, _ = grid_mesh(128, 130, "random")
-    position, triangles, _, old = shuffled(np.random.default_rng(0), flat(places), triangles, None)
-    normal = normals_of(position, triangles)
-    started = time.perf_counter()
-    layout, _ = grid_layout(position, normal, triangles)
-    assert time.perf_counter() - started < 1.0  # 0.03 s on an idle machine; a quadratic search takes minutes
-    np.testing.assert_array_equal(layout.row, places[old][:, 1])
 
 
 def test_grid_picture():
@@ -326,7 +296,7 @@ def lay_out(position, triangles, seed=3):
     """Return a shuffled, turned copy of a surface with its texture map."""
     rng = np.random.default_rng(seed)
     position, triangles = compact(position, triangles)
-    position, triangles, _, _ = shuffled(rng, position @ rotation(rng).T, triangles, None)
+    position, triangles, _, _ = shuffled(rng, position @ Rotation.random(rng=rng).as_matrix().T, triangles, None)
     normal = normals_of(position, triangles)
     layout, along = uv_layout(position, normal, triangles)
     assert isinstance(layout, UVLayout)
@@ -372,6 +342,8 @@ def test_map_is_valid(position, triangles, in_one_piece):
     assert (layout.cell == 0) == in_one_piece
     assert layout.corner_uv.shape == (len(triangles), 3, 2)
     np.testing.assert_array_equal(layout.triangles, triangles)
+    for texel, uv in enumerate(layout.uv()):
+        assert (layout.corner_uv[triangles == texel] == uv).all(axis=1).any()
     assert layout.shape == (layout.height, layout.width) and max(layout.shape) <= 2048
     corners = corner_pixels(layout)
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
@@ -410,46 +382,6 @@ def test_constant_field_never_bleeds(position, triangles, in_one_piece):
     assert (picture[y, x] != 0).all()
 
 
-@pytest.mark.parametrize(("position", "triangles", "in_one_piece"), SURFACES)
-def test_picture_is_linear_inside_triangles(position, triangles, in_one_piece):
-    position, triangles, _, layout, _ = lay_out(position, triangles)
-    value = np.random.default_rng(2).random(len(position)) - 0.5
-    picture, mask = layout.image(value), layout.mask()
-    corners = corner_pixels(layout)
-    solid = with_area(corners)
-    y, x = np.nonzero(np.ones(layout.shape, bool))
-    some = np.random.default_rng(3).permutation(len(x))[:3000]
-    weights = weights_at(corners[solid], np.column_stack([x, y])[some])
-    owner = weights.min(axis=-1).argmax(axis=0)
-    mine = weights[owner, np.arange(len(some))]
-    expected = (mine * value[triangles[solid][owner]]).sum(axis=-1)
-    covered = mine.min(axis=-1) > -1e-9
-    clear = np.abs(mine.min(axis=-1)) > 1e-7  # not on an edge
-    np.testing.assert_array_equal(mask[y, x][some][clear], covered[clear])
-    assert covered.sum() > 20
-    np.testing.assert_allclose(picture[y, x][some][covered], expected[covered], atol=1e-9)
-    assert picture.min() >= value.min() and picture.max() <= value.max() + 1e-15
-    assert (picture[~mask & (layout.image(np.ones(len(value))) == 0)] == 0).all()
-    many = layout.image(np.column_stack([value, 2 * value, 0 * value]))
-    np.testing.assert_allclose(many, picture[..., None] * [1, 2, 0], atol=1e-15)
-
-
-@pytest.mark.parametrize(("position", "triangles", "in_one_piece"), SURFACES)
-def test_texel_is_found_at_its_coordinate(position, triangles, in_one_piece):
-    position, triangles, _, layout, _ = lay_out(position, triangles)
-    value = position @ [1.0, -2.0, 0.5]  # smooth on the surface
-    uv = layout.uv()
-    assert uv.shape == (len(position), 2)
-    for texel in range(len(position)):
-        assert (np.abs(layout.corner_uv[triangles == texel] - uv[texel]).sum(axis=1) < 1e-12).any()
-    found = bilinear(layout.image(value), uv * (layout.width, layout.height) - 0.5)
-    steps = np.abs(value[triangles] - value[np.roll(triangles, 1, axis=1)]).max(axis=1)
-    reach = np.zeros(len(position))
-    for corner in range(3):
-        np.maximum.at(reach, triangles[:, corner], steps)
-    assert (np.abs(found - value) <= (1e-9 if layout.cell else 0.5) * reach + 1e-9).all()
-
-
 def test_flattened_map_keeps_shape_and_handedness():
     position, triangles = cap(height=0.8)
     position = position * [3.0, 1.0, 1.0]
@@ -463,19 +395,6 @@ def test_flattened_map_keeps_shape_and_handedness():
         assert fit[0, 0] > 0 and abs(fit[0, 1]) < 0.05 * fit[0, 0]  # +u along +x
         assert abs(fit[1, 1] / fit[0, 0] - 1) < 0.05  # v to the left of it, at the same scale
         assert layout.width > 2 * layout.height
-
-
-def test_round_region_is_not_turned_by_rounding():
-    position, triangles = cap(height=0.5)
-    rng = np.random.default_rng(0)
-    pictures = []
-    for _ in range(3):
-        moved, faces, _, old = shuffled(rng, position, triangles, None)
-        layout, along = uv_layout(moved, normals_of(moved, faces), faces)
-        np.testing.assert_allclose(along, np.tile([1.0, 0, 0], (len(moved), 1)), atol=1e-9)
-        pictures.append(layout.image(np.sin(np.arange(len(moved)))[old]))
-    np.testing.assert_allclose(pictures[0], pictures[1], atol=1e-9)
-    np.testing.assert_allclose(pictures[0], pictures[2], atol=1e-9)
 
 
 @pytest.mark.parametrize("subdivisions", [0, 1, 2])

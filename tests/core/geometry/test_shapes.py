@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from palpate.core.compiled.kernels import kernel, plain
+from palpate.core.compiled.kernels import kernel
 from palpate.core.errors import ParameterError
 from palpate.core.geometry import shapes
 
@@ -93,15 +93,6 @@ def test_the_normal_leads_straight_out(name):
     normals(SHAPES[name].kind, SHAPES[name].size, axes[met], points, out)
     assert np.linalg.norm(out, axis=1) == pytest.approx(1.0, abs=1e-11)
     assert distance(name, points + 1e-6 * out) == pytest.approx(1e-6, rel=1e-5)
-
-
-@pytest.mark.parametrize("name", SHAPES)
-def test_plain_python_gives_the_same_numbers(name):
-    starts, ways = lines(3, 120)
-    for one, other in zip(
-        computed(SHAPES[name], starts, ways), computed(SHAPES[name], starts, ways, plain(entries)), strict=True
-    ):
-        assert np.array_equal(one, other)
 
 
 @pytest.mark.parametrize("name", SHAPES)

@@ -47,17 +47,14 @@ def test_normals_come_from_all_adjoining_triangles_and_areas_from_the_region_alo
     assert (np.abs(texels.normal[:, :2]) > 0.3).all()  # the sides lean into the corners' normals
 
 
-def test_empty_region():
-    mesh = grid_mesh()
-    with pytest.raises(SensorError, match="region of sensor 'tip' is empty"):
-        texels_from_region(mesh, np.zeros(len(mesh.vertices), bool), "tip")
-
-
-def test_region_without_faces():
+@pytest.mark.parametrize(
+    ("vertices", "words"), [([], "region of sensor 'tip' is empty"), ([0, 30, 60], "3 vertices of sensor 'tip' span no face")]
+)
+def test_a_region_without_texels_is_refused(vertices, words):
     mesh = grid_mesh()
     region = np.zeros(len(mesh.vertices), bool)
-    region[[0, 30, 60]] = True
-    with pytest.raises(SensorError, match="3 vertices of sensor 'tip' span no face"):
+    region[vertices] = True
+    with pytest.raises(SensorError, match=words):
         texels_from_region(mesh, region, "tip")
 
 
