@@ -3,13 +3,22 @@
 
 import numpy as np
 import pytest
-from stepwise_forces import StepwiseNormalForces
 
 from palpate.core.effects.engine import specification
 from palpate.core.effects.engine.contact_forces import friction_factors, normal_forces
 from palpate.core.effects.engine.readout_chain import ReadoutChain, readings
-from palpate.core.effects.engine.registry import actual_placement, check, effect, form_of, from_dict, kind_of, library, to_dict
-from palpate.core.effects.engine.specification import TransducerArray
+from palpate.core.effects.engine.registry import (
+    actual_placement,
+    check,
+    complete_values,
+    effect,
+    form_of,
+    from_dict,
+    kind_of,
+    library,
+    to_dict,
+)
+from palpate.core.effects.engine.specification import TexelInput, TransducerArray
 from palpate.core.errors import EffectError
 from palpate.core.model.sensor import Effect
 from palpate.core.model.sensor_parameters import SensorParameters
@@ -52,12 +61,6 @@ def corners(form, gain=1.0):
     scaled = [parameter.scaled(gain) for parameter in form.parameters]
     for choice in range(2 ** len(scaled)):
         yield {p.name: (p.high if choice >> i & 1 else p.low) for i, p in enumerate(scaled)}
-
-
-def noticeable(form) -> dict[str, float]:
-    """The defaults, but nothing that is off."""
-    defaults = form.defaults()
-    return {p.name: 0.9 * p.low + 0.1 * p.high for p in form.parameters if defaults[p.name] == form.neutral.get(p.name)}
 
 
 @every_form
@@ -109,37 +112,34 @@ def test_numbers_stay_finite_at_the_bounds(name, form):
 
 
 @every_form
-def test_sample_by_sample_gives_what_the_whole_signal_gives(name, form):
+def test_a_reading_that_comes_in_pieces_is_that_of_the_whole_signal(name, form):
     """Both from the start, and after any pause; lengths of step are told apart to a billionth."""
     item = effect(name, form, seed=7)
-    time, depth, slide = presses()
-    whole = normal_forces((item,), PARAMETERS, time, depth, slide)
-    lengths = np.diff(time, prepend=time[0])
-    pad, single = StepwiseNormalForces((item,), PARAMETERS, lengths, depth.shape[1]), np.zeros_like(depth)
-    rate = np.diff(depth, axis=0, prepend=depth[:1]) / np.where(lengths > 0, lengths, 1.0)[:, None]
-    for i in range(len(time)):
-        asked, _, _ = pad.step(i, depth[i], rate[i], slide[i], commit=False)
-        single[i], _, _ = pad.step(i, depth[i], rate[i], slide[i])
-        np.testing.assert_array_equal(asked, single[i])
-    np.testing.assert_allclose(single, whole, rtol=1e-7, atol=1e-9)
-
+    time, depth, _ = presses()
     reader = ReadoutChain((item,), transducers())
     pieces = np.split(np.arange(len(time)), [1, 2, 17, 200])
-    stream = np.concatenate([reader.read(time[piece], whole[piece]) for piece in pieces])
-    np.testing.assert_allclose(stream, readings((item,), transducers(), time, whole), rtol=1e-7, atol=1e-9)
+    stream = np.concatenate([reader.read(time[piece], 1000.0 * depth[piece]) for piece in pieces])
+    np.testing.assert_allclose(stream, readings((item,), transducers(), time, 1000.0 * depth), rtol=1e-7, atol=1e-9)
 
 
-@every_form
-def test_the_tangent_is_the_derivative_of_the_force(name, form):
-    pad = StepwiseNormalForces((effect(name, form),), SensorParameters(k=1000.0, cn=0.0), [0.01], 1)
-    still = np.zeros(1)
+@pytest.mark.parametrize(("name", "form"), [names for names in FORMS if form_of(*names).law is not None])
+def test_a_law_may_be_asked_before_a_step_and_its_slope_is_the_derivative(name, form):
+    """A contact is solved by trials: they change no memory, and the step then gives the force of the last trial."""
+    found = form_of(name, form)
+    constants = found.constants(complete_values(effect(name, form)), np.array([0.01]))[0]
+    state = np.zeros(max(found.state_size, 1))
+
+    def felt(depth, commit=False):
+        return found.law(TexelInput(1000.0 * depth, 1000.0, depth, 0.0), constants, state, commit)
+
     for depth in (0.0, 5e-4, 1.5e-3, 1.2e-3):
-        pad.step(0, np.array([depth]), still)
+        felt(depth, commit=True)
     for depth in (1e-3, 1.9e-3):  # on the way back and on the way in
-        (below, _, _), (_, slope, _), (above, _, _) = (
-            pad.step(0, np.array([depth + change]), still, commit=False) for change in (-1e-9, 0.0, 1e-9)
-        )
+        before = state.copy()
+        (below, _), (force, slope), (above, _) = (felt(depth + change) for change in (-1e-9, 0.0, 1e-9))
         np.testing.assert_allclose(slope, (above - below) / 2e-9, rtol=1e-4, atol=1e-4)
+        assert np.array_equal(state, before) and felt(depth)[0] == force
+    assert felt(1.9e-3, commit=True)[0] == force
 
 
 @every_form
@@ -175,19 +175,3 @@ def test_a_value_outside_the_bounds_is_refused(name, form):
         for value in (parameter.low - 1.0, 2.0 * abs(parameter.high) + 1.0, np.nan):
             with pytest.raises(EffectError, match=f"{parameter.name} of effect '{name}'"):
                 effect(name, form, **{parameter.name: value})
-
-
-def test_forms_differ_from_one_another():
-    """Two forms with equal formulas would be one too many."""
-    time, depth, slide = presses()
-    for kind in library().values():
-        seen = []
-        for form in kind.forms:
-            item = effect(kind.name, form.name, seed=5, **noticeable(form))
-            force = normal_forces((item,), PARAMETERS, time, depth, slide)
-            reading = readings((item,), transducers(), time, force)
-            factor, viscous = friction_factors((item,), np.geomspace(1e-5, 1, 9), np.linspace(0.5, 2, 9))
-            moved = actual_placement((item,), transducers().position, np.ones((12, 3)), np.ones((12, 3)))
-            seen.append(np.concatenate([np.ravel(part) for part in (force, reading, factor, viscous, *moved)]))
-        for i, one in enumerate(seen):
-            assert not any(np.allclose(one, other, rtol=1e-6) for other in seen[:i]), kind.forms[i].name
