@@ -28,11 +28,8 @@ def test_version_is_one(project, manifest):
     assert project["project"]["version"] == manifest["version"] == palpate.__version__
 
 
-def test_manifest_asks_only_for_files(manifest):
-    assert set(manifest["permissions"]) == {"files"}
-    assert len(manifest["tagline"]) <= 64
-    assert not manifest["tagline"].endswith(".")
-    assert manifest["license"] == ["SPDX:GPL-3.0-or-later"]
+def test_types_are_shipped(repository, project):
+    assert "py.typed" in project["tool"]["setuptools"]["package-data"]["palpate"] and (repository / "py.typed").is_file()
 
 
 def test_every_package_folder_is_listed(repository, project):

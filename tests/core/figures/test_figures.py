@@ -39,11 +39,6 @@ def test_mobilised_friction_is_shear_over_limit_and_zero_without_contact():
     assert (ratio[~touching] == 0).all()
 
 
-@pytest.mark.parametrize(("value", "limit"), [(0.11, 0.15), (1.0, 1.0), (0.026, 0.03), (9.9, 10.0), (3e-7, 3e-7)])
-def test_scales_end_at_round_numbers(value, limit):
-    assert response.rounded_limit(value) == pytest.approx(limit)
-
-
 def test_frames_are_spread_over_what_happens():
     recording = recording_of(grid_texels())
     chosen = response.choose_frames(recording, 4)
