@@ -16,20 +16,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize
+from scipy.stats import binomtest
 
 HOUSE = Path(__file__).resolve().parent.parent
 PICTURE = HOUSE / "docs" / "images" / "gap-reliability.png"
 BINS = (0.0, 0.4, 0.5, 0.8, 0.9, 0.95, 0.98, 1.0)
 """Ends of the bins of confidence. Doubts without a rival are below 0.4, those with one above."""
-NEAREST = 1e-3
-"""Confidences nearer to 0 or 1 count as this near in the regression: a few hundred names say nothing of one in a thousand."""
 LEAST_DRAWN = 5
 """Names in a bin that is drawn; the table has the others, too."""
 TICKS = (0.1, 0.3, 0.5, 0.8, 0.9, 0.95, 0.98, 0.995, 0.999)
 """Confidences that are written at the axis."""
-DEVIATIONS = 1.96
-"""Standard deviations of a 95 % interval."""
 FAMILIES = (
     ("the library's formulas", ("own",), "#1f5fa8", "s"),
     ("other formulas", ("other", "two", "three", "poor"), "#c4541a", "o"),
@@ -56,10 +52,8 @@ class Bin:
     @property
     def interval(self) -> tuple[float, float]:
         """Wilson's 95 % interval of the share."""
-        square = DEVIATIONS**2 / self.count
-        half = DEVIATIONS * np.sqrt(self.share * (1.0 - self.share) / self.count + square / (4.0 * self.count))
-        middle = self.share + square / 2.0
-        return float((middle - half) / (1.0 + square)), float((middle + half) / (1.0 + square))
+        low, high = binomtest(self.right, self.count).proportion_ci(method="wilson")
+        return float(low), float(high)
 
 
 def read(paths: Sequence[Path]) -> list[dict[str, Any]]:
@@ -84,24 +78,6 @@ def binned(confidence: np.ndarray, right: np.ndarray) -> list[Bin]:
     return found
 
 
-def calibration(confidence: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return level and slope of a logistic regression on the log odds of the confidence, and their standard errors, (2,) each.
-
-    A level of 0 and a slope of 1 mean that names are right as often as the confidence says (Cox, Biometrika 45, 1958). The
-    targets are drawn towards one half by one name each (Platt, Probabilistic outputs for support vector machines, 1999).
-    """
-    inside = np.clip(confidence, NEAREST, 1.0 - NEAREST)
-    x = np.column_stack([np.ones(len(inside)), np.log(inside / (1.0 - inside))])
-    target = np.where(right, (right.sum() + 1.0) / (right.sum() + 2.0), 1.0 / ((~right).sum() + 2.0))
-
-    def loss(at: np.ndarray) -> float:
-        return float((np.logaddexp(0.0, x @ at) - target * (x @ at)).sum())
-
-    found = np.asarray(minimize(loss, [0.0, 1.0]).x)
-    p = 1.0 / (1.0 + np.exp(-x @ found))
-    return found, np.sqrt(np.diag(np.linalg.pinv((x.T * (p * (1.0 - p))) @ x)))
-
-
 def group_coverage(rows: Sequence[dict[str, Any]]) -> tuple[int, int]:
     """Return how many groups that were called ambiguous contain a hidden effect, and how many groups there are."""
     groups = [(row["answer"], group) for row in rows for group in row["ambiguous"]]
@@ -115,10 +91,8 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
         low, high = one.interval
         ends = f"{one.low:.2f} – {one.high:.2f} | {one.mean:.3f}"
         text.append(f"| {ends} | {one.right} of {one.count} | {one.share:.0%} ({low:.0%} – {high:.0%}) |")
-    (level, slope), errors = calibration(*named(rows))
     covered, groups = group_coverage(rows)
-    text += ["", f"Level {level:.2f} ± {errors[0]:.2f}, slope {slope:.2f} ± {errors[1]:.2f}."]
-    return "\n".join([*text, f"Of {groups} ambiguous groups {covered} contain a hidden effect."])
+    return "\n".join([*text, "", f"Of {groups} ambiguous groups {covered} contain a hidden effect."])
 
 
 def draw(rows: Sequence[dict[str, Any]], path: Path) -> None:
@@ -129,7 +103,7 @@ def draw(rows: Sequence[dict[str, Any]], path: Path) -> None:
     figure = Figure(figsize=(5.0, 4.4), dpi=150, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
-    line = np.linspace(0.02, 1.0 - NEAREST, 1000)
+    line = np.linspace(0.02, 0.999, 1000)
     axes.plot(line, line, color="0.6", linewidth=1.0, label="right as often as said")
     for words, kinds, colour, mark in FAMILIES:
         found = binned(*named([row for row in rows if row["kind"] in kinds]))
