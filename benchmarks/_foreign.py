@@ -18,7 +18,7 @@ from palpate.core.gap.dataset.column_names import GRAVITY
 from palpate.core.gap.dataset.second_logger import interpolated
 
 from ._handmade import HandmadeModel, low_pass
-from ._recordings import SETS, Columns, Recording, sheet, thinned
+from ._recordings import Columns, Recording, adhesive, brake, foam, insole, sheet, thinned, tube, tube_by_place
 
 RUNS = (("20250401_014340_probe", "fit"), ("20250401_015037_probe", "check"))
 """Of eFlesh's normal force: whole runs."""
@@ -280,35 +280,35 @@ FOREIGN: dict[str, ForeignSet] = {
         "capacitive texels on foam",
         "BSD-3-Clause",
         "two days, three others",
-        SETS["insole"],
+        insole,
         HandmadeModel(_insole, (), (), (), "parabola"),
     ),
     "tube": ForeignSet(
         "fluid-filled tube",
         "CC BY 4.0",
         "two depths of water, two others",
-        SETS["tube"],
+        tube,
         HandmadeModel(_tube, (0.5,), (0.02,), (5.0,), "one low pass"),
     ),
     "tube-by-place": ForeignSet(
         "fluid-filled tube",
         "CC BY 4.0",
         "two depths of water, two others",
-        SETS["tube-by-place"],
+        tube_by_place,
         HandmadeModel(_tube, (0.5,), (0.02,), (5.0,), "one low pass, a gain for each place"),
     ),
     "adhesive": ForeignSet(
         "acrylic adhesive",
         "MIT",
         "two rates, a third",
-        SETS["adhesive"],
+        adhesive,
         HandmadeModel(_adhesive, (5.0, 100.0), (0.1, 5.0), (50.0, 5000.0), "spring and two Maxwell branches"),
     ),
     "foam": ForeignSet(
         "shoe foam",
         "MIT",
         "one foam, another",
-        SETS["foam"],
+        foam,
         HandmadeModel(_foam, (6.0,), (1.5,), (30.0,), "spring and a power"),
     ),
     "tape": ForeignSet(
@@ -325,7 +325,7 @@ FOREIGN: dict[str, ForeignSet] = {
         "band brake",
         "CC BY-SA 4.0",
         "0.5 Hz, 1 Hz",
-        SETS["brake"],
+        brake,
         HandmadeModel(_brake, (1.0,), (0.01,), (20.0,), "Dahl and viscous friction"),
     ),
     "oscillator": ForeignSet(

@@ -6,9 +6,7 @@ from __future__ import annotations
 import json
 import struct
 import zipfile
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -18,12 +16,6 @@ Columns = dict[str, np.ndarray]
 
 PLACES = 9
 """Where the tube is pressed, in turn."""
-LAST = {
-    "tube": ("30mm",),
-    "tube-by-place": ("30mm",),
-    "insole": ("experiment_Inf_15September_dynamic_1",),
-}
-"""Held-out recordings of some sets that were opened only when rigs and workflow were as they are."""
 
 
 @dataclass(frozen=True)
@@ -55,36 +47,32 @@ def thinned(values: np.ndarray, by: int) -> np.ndarray:
     return values[:whole].reshape(-1, by, *values.shape[1:]).mean(axis=1)
 
 
-def insole(data: Path, cleaned: bool = True) -> Recording:
-    """280 texels under air pressure (bar → newtons on a texel of 1 cm²); two recordings fitted, two held out.
+def insole(data: Path) -> Recording:
+    """280 texels under air pressure (bar → newtons on a texel of 1 cm²); two recordings fitted, three held out.
 
-    Each texel rests at counts of its own, and some jump between 0 and 255. `cleaned` takes off the median of the first second
-    of each recording, and leaves out the texels whose counts do not follow the pressure in the recordings to be fitted
-    (correlation above -0.85).
+    Each texel rests at counts of its own, and some jump between 0 and 255. The median of the first second of each recording is
+    subtracted, and texels are left out whose counts do not follow the pressure in the recordings to be fitted (correlation
+    above -0.85).
     """
     from scipy.io import loadmat
 
     names = (("calibration_dataset", "fit"), ("validation_dataset_1", "fit"))
     names += (("validation_dataset_2", "check"), ("validation_dataset_3", "check"))
-    if cleaned:
-        names += tuple((name, "check") for name in LAST["insole"])
+    names += (("experiment_Inf_15September_dynamic_1", "check"),)
     found: list[tuple[str, str, np.ndarray, np.ndarray, np.ndarray]] = []
     for name, use in names:
         content = loadmat(data / "insole_iit_280taxel" / f"{name}.mat", squeeze_me=True, struct_as_record=False)
         recording = next(value for key, value in content.items() if not key.startswith("__"))
         count = min(len(recording.C), len(recording.P))  # the pressure has no clock of its own
         counts, bar = np.asarray(recording.C, float)[:count], np.asarray(recording.P, float)[:count]
-        if cleaned:
-            counts[:, 2:] -= np.median(counts[:50, 2:], axis=0)
+        counts[:, 2:] -= np.median(counts[:50, 2:], axis=0)
         by = max(1, count // 900)
         time = thinned(counts[:, 1], by)
         found.append((name, use, time - time[0], thinned(bar, by), thinned(counts[:, 2:], by)))
-    keep = np.ones(280, bool)
-    if cleaned:
-        bars, counts = (np.concatenate([entry[i] for entry in found if entry[1] == "fit"]) for i in (3, 4))
-        bars, counts = bars - bars.mean(), counts - counts.mean(axis=0)
-        follows = bars @ counts / (np.linalg.norm(bars) * np.maximum(np.linalg.norm(counts, axis=0), 1e-12))
-        keep = follows < -0.85
+    bars, counts = (np.concatenate([entry[i] for entry in found if entry[1] == "fit"]) for i in (3, 4))
+    bars, counts = bars - bars.mean(), counts - counts.mean(axis=0)
+    follows = bars @ counts / (np.linalg.norm(bars) * np.maximum(np.linalg.norm(counts, axis=0), 1e-12))
+    keep = follows < -0.85
     trials: list[tuple[str, str, Columns]] = []
     for name, use, time, bar, counts in found:
         columns = {"time": time, "force": bar * 1e5 * 1e-4 * keep.sum()}
@@ -173,18 +161,6 @@ def brake(data: Path) -> Recording:
         trials.append((name.replace(".", "_"), use, columns | {"force_x": table[:, 2] * 4448.22}))
     words = "k = 3e7\nsigma0 = 5e6\nsigma1 = 1e4\nmax_penetration = 0.1"  # of its friction nothing is known
     return Recording("band brake", f"grid = {{ rows = 1, columns = 1, pitch = 0.05 }}\n{words}", trials)
-
-
-SETS: dict[str, Callable[[Path], Recording]] = {
-    "insole-counts": partial(insole, cleaned=False),
-    "insole": insole,
-    "tube": tube,
-    "tube-by-place": tube_by_place,
-    "adhesive": adhesive,
-    "foam": foam,
-    "brake": brake,
-}
-"""How each set is read from the folder of all data."""
 
 
 def timetable(path: Path) -> list[np.ndarray]:

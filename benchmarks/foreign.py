@@ -32,11 +32,9 @@ import numpy as np
 from ._foreign import FOREIGN
 from ._handmade import predict_by_hand, responses
 from ._recordings import Recording
-from ._rows import outcome, sure_names
+from ._rows import HOUSE, outcome, sure_names
 from .gap import carried_out
-from .real import diagnosed
 
-HOUSE = Path(__file__).resolve().parent.parent
 GOAL, MEDIAN_GOAL = 1.3, 1.1
 """Largest error on the check recordings of a set, and the median of all, in units of that of the model by hand."""
 SYNONYMS = {"warmup": "warm-up", "softening": "wear"}
@@ -45,14 +43,18 @@ SYNONYMS = {"warmup": "warm-up", "softening": "wear"}
 
 def run() -> Iterator[dict]:
     """Yield, for each set, the error on check recordings by the amended model over that by the model made by hand."""
+    from palpate.core.gap.dataset.rig import read_rig
     from palpate.core.gap.report import gap_table
+    from palpate.core.gap.selection.diagnosis import diagnose
+    from palpate.core.jobs import run_job
 
     rows = []
     for name, recording, by_hand in _sets():
         yield {"name": f"foreign.{name}.by_hand", "value": by_hand, "unit": "of the range"}
         if os.environ.get("PALPATE_FOREIGN_BY_HAND"):
             continue
-        row = gap_table.row_of(diagnosed(recording, HOUSE / "build" / "foreign" / name), by_hand)
+        result = run_job(diagnose(read_rig(recording.write(HOUSE / "build" / "foreign" / name / "rig"))))
+        row = gap_table.row_of(result, by_hand)
         rows.append(row)
         yield {"name": f"foreign.{name}.amended_over_by_hand", "value": row.ratio, "unit": "error / error", "goal": GOAL}
     if rows:

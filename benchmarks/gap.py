@@ -74,14 +74,9 @@ def results_folder() -> Path:
 
 def _results(plan: list[tuple[str, int]]) -> list[dict]:
     path = results_folder() / f"results-{fingerprint()}.jsonl"
-    done = done_in(path)
+    done = {(r["kind"], r["number"]): r for r in results_in(path)} if path.is_file() else {}
     done |= carried_out(examine, [entry for entry in plan if entry not in done], path)
     return [done[entry] for entry in plan]
-
-
-def done_in(path: Path) -> dict[tuple[str, int], dict]:
-    """Return the results in a file by kind and number, the last of each; none if there is no file."""
-    return {(r["kind"], r["number"]): r for r in results_in(path)} if path.is_file() else {}
 
 
 def carried_out(work: Callable[..., dict], todo: list[tuple], path: Path) -> dict[tuple[str, int], dict]:
@@ -109,17 +104,13 @@ def carried_out(work: Callable[..., dict], todo: list[tuple], path: Path) -> dic
 
 def examine(kind: str, number: int) -> dict[str, Any]:
     """Draw a case, have it diagnosed from its files, and hold the outcome against the answer."""
-    return examined(cases.draw(kind, number))
-
-
-def examined(case: cases.Case, write: Callable[[cases.Case, Path], Path] = cases.write) -> dict[str, Any]:
-    """Have a case diagnosed from the files that `write` makes in a folder, and hold the outcome against the answer."""
     from palpate.core.gap.dataset.rig import read_rig
     from palpate.core.gap.selection.diagnosis import diagnose
     from palpate.core.jobs import run_job
 
+    case = cases.draw(kind, number)
     with tempfile.TemporaryDirectory() as folder:
-        rig_path = write(case, Path(folder))
+        rig_path = cases.write(case, Path(folder))
         began, used = time.perf_counter(), time.process_time()
         result, failed = None, ""
         try:

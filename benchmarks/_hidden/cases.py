@@ -9,7 +9,6 @@ not drown all else.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -111,20 +110,9 @@ def names_for(kind: str) -> list[str]:
     return list({"other": MAKERS, "own": OWN, "third": THIRD, "outside": OUTSIDE}.get(kind, {"": None}))
 
 
-def draw(kind: str, number: int, names: Sequence[str] | None = None, coloured: bool | None = None) -> Case:
-    """Return case `number` of a kind; the same every time.
-
-    Parameters
-    ----------
-    kind : str
-    number : int
-    names : sequence of str, optional
-        Of what is hidden, instead of what the number stands for.
-    coloured : bool, optional
-        Whether the noise is coloured, instead of what the kind and the number say.
-    """
-    rng, pad, probe, drawn = _begun(kind, number)
-    names = drawn if names is None else names
+def draw(kind: str, number: int) -> Case:
+    """Return case `number` of a kind; the same every time."""
+    rng, pad, probe, names = _begun(kind, number)
     makers = {"own": OWN, "simulated": OWN, "third": THIRD}.get(kind, {**MAKERS, **OUTSIDE})
     way = list(POOR)[number % len(POOR)] if kind == "poor" else ""
     times, paths = _poor(way, rng, probe) if way in PROGRAMMES else _trials(rng, probe, pad)
@@ -135,8 +123,7 @@ def draw(kind: str, number: int, names: Sequence[str] | None = None, coloured: b
     signals = [respond(contact, pad, hidden) for contact in contacts]
     full = max(float(np.abs(s.reading - pad.zero).max()) for s in signals)
     noise = rng.uniform(0.003, 0.01) * full * (30.0 if way == "too noisy" else 1.0)
-    if coloured is None:
-        coloured = kind in ("none", "simulated") and number % 3 == 2
+    coloured = kind in ("none", "simulated") and number % 3 == 2
     readings = [converted(s.reading + noise * _noise(rng, s.reading.shape, coloured), pad, hidden) for s in signals]
     largest = max(float(np.abs(net_force(s)).max()) for s in signals)
     forces = [net_force(s) + 0.003 * largest * _noise(rng, (len(s.time), 3), coloured) for s in signals]
@@ -195,14 +182,9 @@ def _names(kind: str, number: int, rng, ball: bool) -> list[str]:
     if kind not in SEVERAL:
         name = pool[number % len(pool)]
         return [name if name not in blind else pool[(number + 7) % len(pool)]]
-    return several_names(rng, SEVERAL[kind], ball)
-
-
-def several_names(rng: np.random.Generator, count: int, ball: bool) -> list[str]:
-    """Return so many effects that can be told apart in the recordings of one sensor, in the order in which they act."""
     unclear = ("noise", "quantization", "offset", "dead-texels")
-    clear = [name for name in ORDER if name not in unclear and (ball or name not in BALL_ONLY)]
-    return sorted(map(str, rng.choice(clear, size=count, replace=False)), key=ORDER.index)
+    clear = [name for name in ORDER if name not in unclear and name not in blind]
+    return sorted(map(str, rng.choice(clear, size=SEVERAL[kind], replace=False)), key=ORDER.index)
 
 
 def _words(rng, pad: Pad, kind: str, number: int) -> dict:
@@ -421,11 +403,8 @@ GRID = f"grid = {{ rows = {ROWS}, columns = {COLUMNS}, pitch = [{PITCH!r}, {PITC
 """What a rig says of where the texels are."""
 
 
-def write(case: Case, folder: Path, name: str = "", places: str = GRID) -> Path:
-    """Write a case as a rig and return the path of its TOML file; only the number, in the name, says anything of the answer.
-
-    A reading that is not a number becomes an empty cell. `places` is the rig's line on where the texels are.
-    """
+def write(case: Case, folder: Path, name: str = "") -> Path:
+    """Write a case as a rig and return the path of its TOML file; only the number, in the name, says anything of the answer."""
     folder.mkdir(parents=True, exist_ok=True)
     if case.probe.radius is not None:
         shape = f"{{ sphere = {case.probe.radius!r} }}"
@@ -437,14 +416,14 @@ def write(case: Case, folder: Path, name: str = "", places: str = GRID) -> Path:
     uses = [use for use, count in TRIALS for _ in range(count)]
     lines = [
         'format = "palpate-rig/1"', f'name = "{name or f"case {case.number}"}"', "[sensor]",
-        places, words, "[indenter]", f"shape = {shape}",
+        GRID, words, "[indenter]", f"shape = {shape}",
     ]  # fmt: skip
     header = ["time", "x", "y", "z", *(f"texel_{i}" for i in range(ROWS * COLUMNS)), "force_x", "force_y", "force_z"]
     for i, use in enumerate(uses):
         lines += ["[[trial]]", f'file = "trial_{i}.csv"', f'use = "{use}"']
         table = np.hstack([case.times[i][:, None], case.paths[i], case.readings[i], case.forces[i]])
         rows = ["%.7g," * (table.shape[1] - 1) % tuple(row[:-1]) + f"{row[-1]:.7g}" for row in table.tolist()]
-        text = "\n".join([",".join(header), *rows]).replace("nan", "") + "\n"
+        text = "\n".join([",".join(header), *rows]) + "\n"
         (folder / f"trial_{i}.csv").write_text(text, encoding="utf-8")
     path = folder / "rig.toml"
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -3,6 +3,7 @@
 
 import ast
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from palpate.benchmarks import _rows, gap
-from palpate.benchmarks import sessions as sessions_group
-from palpate.benchmarks._hidden import cases, other, own, sessions, third, world
+from palpate.benchmarks._hidden import cases, other, own, third, world
 from palpate.core.effects.engine.registry import effect, library, names_where
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.forward.predictor import Model, Predictor
@@ -32,8 +32,8 @@ def test_the_generator_shares_nothing_with_the_package(path):
 def test_every_effect_is_hidden_in_some_case():
     """The three families of formulas hide the same effects: all that need nothing but readings and forces.
 
-    What needs more, as a clock or a column, is hidden by the sessions and by test_temperature.py. A new effect is hidden
-    once somebody who did not write its file has written other formulas of it.
+    What needs more, as a clock or a column, is hidden by test_warm_up.py and test_temperature.py. A new effect is hidden once
+    somebody who did not write its file has written other formulas of it.
     """
     hidden = set(other.MAKERS)
     assert hidden == set(own.OWN) == set(third.THIRD) and len(hidden) >= 20
@@ -208,57 +208,15 @@ def test_a_wrongly_mounted_sensor_is_that_of_the_other_code(tmp_path):
     """The generator moves the ball into the sensor's frame, the library moves the texels: the six numbers mean the same."""
     values = {"x": 2e-3, "y": -1.5e-3, "z": 0.6e-3, "about_x": 0.04, "about_y": -0.03, "about_z": 0.1}
     frame = Rotation.from_euler("xyz", [values["about_x"], values["about_y"], values["about_z"]])
-    case = sessions.draw("healthy", "own", 7)
-    middles = [frame.inv().apply(path - [values["x"], values["y"], values["z"]]) for path in case.paths]
-    k = case.words["k"]
-    readings = [
-        sessions.pressed(sessions.places_of(), middle, case.radius, k, time)
-        for middle, time in zip(middles, case.times, strict=True)
-    ]
-    rig = read_rig(sessions.write(replace(case, readings=readings), tmp_path))
+    case = next(case for case in map(partial(cases.draw, "none"), range(9)) if case.probe.radius is not None)
+    readings = []
+    for time, path in zip(case.times, case.paths, strict=True):
+        middle = frame.inv().apply(path - [values["x"], values["y"], values["z"]])
+        readings.append(world.respond(world.touch(case.probe, case.pad, time, middle), case.pad, slides=False).reading)
+    rig = read_rig(cases.write(replace(case, readings=readings), tmp_path))
     plain = Model(rig.parameters)
     model = plain.with_effect(effect("misalignment", "rigid", **values))
     for trial, reading in zip(rig.trials, readings, strict=True):
         predictor = Predictor(trial, rig)
         agree, moved = (np.corrcoef(predictor.predict(one).reading.ravel(), reading.ravel())[0, 1] for one in (model, plain))
         assert agree > 0.995 > moved
-
-
-@pytest.mark.parametrize("clock", sessions.CLOCKS)
-def test_a_session_is_told_in_three_ways_and_never_its_answer(tmp_path, clock):
-    case = sessions.draw("wear", clock, 3)
-    path = sessions.write(case, tmp_path)
-    rig = read_rig(path)
-    starts = [float(trial.time[0]) for trial in rig.trials]
-    expected = [0.0] * len(starts) if clock == "own" else case.starts
-    np.testing.assert_allclose(starts, expected, atol=1e-3)
-    assert {bool(trial.session) for trial in rig.trials} == {clock != "own"}
-    assert [i for i, trial in enumerate(rig.trials) if trial.use == "check"] == list(case.checked)
-    assert not any(word in path.read_text(encoding="utf-8") for word in ("wear", "drift", "soft", "warm"))
-
-
-@pytest.mark.parametrize("number", [3, 5000, 5001])
-@pytest.mark.parametrize("kind", sessions.KINDS)
-def test_what_goes_on_does_so_across_the_pauses_between_recordings(kind, number):
-    """Without noise, a healthy recording has the same response to the same load whenever it is made, and no other has."""
-    forms = sessions.DEVELOPMENT if number < sessions.FIRST_SEALED else sessions.SEALED
-    force = np.clip(np.sin(np.arange(200) / 8.0), 0.0, None)[:, None] * np.ones((1, sessions.ROWS * sessions.COLUMNS))
-    times = [start + np.arange(200) / sessions.RATE for start in (0.0, 60.0, 200.0)]
-    if kind == "healthy":
-        assert sessions.draw(kind, "own", number).answer == ()
-        return
-    act = forms[kind][number % len(forms[kind])](np.random.default_rng(number), 1.0, 208.0)
-    found = act([force.copy() for _ in times], times)
-    assert np.abs(found[1] - found[0]).max() > 0.03
-    assert kind == "softening" or np.abs(found[2] - found[1]).max() > 0.02
-
-
-def test_outcomes_of_sessions():
-    say = sessions_group.outcome
-    assert say(("wear",), {"wear"}, "explained", False) == "right"
-    assert say(("softening", "wear"), {"wear"}, "explained", False) == "right"
-    assert say(("wear",), {"softening"}, "explained", False) == "wrong"
-    assert say((), set(), "no gap", False) == "right" and say((), {"drift"}, "explained", False) == "wrong"
-    assert (
-        say(("wear",), set(), "unexplained", False) == "unexplained" and say((), set(), "unexplained", False) == "unexplained"
-    )
