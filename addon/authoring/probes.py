@@ -12,6 +12,7 @@ from mathutils import Matrix, Vector
 from mathutils.bvhtree import BVHTree
 
 from ...core.errors import SensorError
+from ..display import materials
 from ..session import fcurves, transforms
 from . import sensor_report
 
@@ -79,9 +80,7 @@ def _show_sparsely(probe, shape: str) -> None:
     if material is None:
         material = bpy.data.materials.new("Palpate Probe")
         material[MATERIAL_KEY] = 1
-        if material.node_tree is None:
-            material.use_nodes = True
-        surface = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+        surface = next(node for node in materials.tree_of(material).nodes if node.type == "BSDF_PRINCIPLED")
         surface.inputs["Alpha"].default_value = OPACITY
         surface.inputs["Roughness"].default_value = 0.1
         material.diffuse_color = (0.8, 0.8, 0.8, OPACITY)

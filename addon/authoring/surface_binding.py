@@ -137,18 +137,14 @@ def _binding_nodes():
 
 def _bound_position(add: materials.NodeAdder, a, b, c):
     """Return the socket of a texel's position: weighted corners of its triangle, plus the offset along the triangle's axes."""
-
-    def vector(operation: str, *given, **scale):
-        return add("ShaderNodeVectorMath", {**dict(enumerate(given)), **scale}, operation=operation)
-
-    edge, other = vector("SUBTRACT", b, a), vector("SUBTRACT", c, a)
-    along, normal = vector("NORMALIZE", edge), vector("NORMALIZE", vector("CROSS_PRODUCT", edge, other))
-    axes = (along, vector("CROSS_PRODUCT", normal, along), normal)
+    edge, other = add.vector("SUBTRACT", b, a), add.vector("SUBTRACT", c, a)
+    along, normal = add.vector("NORMALIZE", edge), add.vector("NORMALIZE", add.vector("CROSS_PRODUCT", edge, other))
+    axes = (along, add.vector("CROSS_PRODUCT", normal, along), normal)
     weights, offset = (add.end("ShaderNodeSeparateXYZ", {0: add.attribute(name)}).outputs for name in (WEIGHTS, OFFSET))
     total = None
     for source, factor in zip((a, b, c, *axes), (*weights, *offset), strict=True):
-        scaled = vector("SCALE", source, Scale=factor)
-        total = scaled if total is None else vector("ADD", total, scaled)
+        scaled = add.vector("SCALE", source, Scale=factor)
+        total = scaled if total is None else add.vector("ADD", total, scaled)
     return total
 
 

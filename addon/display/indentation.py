@@ -147,8 +147,8 @@ def _nodes(uid: str, name: str, play: PlayedTable, levels: int, factor: float):
     rest = add.stored(add("NodeGroupInput"), REST_POSITION, add("GeometryNodeInputPosition"), "FLOAT_VECTOR")
     coarse = add.stored(rest, depth_name, play.lookup(add), "FLOAT")
     fine, depth = _subdivided(add, coarse, add.attribute(depth_name, "FLOAT"), levels)
-    depth = _math(add, "MAXIMUM", depth, 0.0)
-    inward = add("ShaderNodeVectorMath", {0: add.attribute(_attributes(uid)[0]), "Scale": depth}, operation="SCALE")
+    depth = add.math("MAXIMUM", depth, 0.0)
+    inward = add.vector("SCALE", add.attribute(_attributes(uid)[0]), Scale=depth)
     moved = add("ShaderNodeVectorMath", {0: inward, "Scale": factor}, operation="SCALE", label=FACTOR_LABEL)
     move = add("GeometryNodeSetPosition", {"Geometry": fine, "Offset": moved})
     add.end("NodeGroupOutput", {0: move})
@@ -163,13 +163,13 @@ def _subdivided(add, geometry, values, levels: int):
     """
     if not levels:
         return geometry, values
-    is_large = _math(add, "GREATER_THAN", add("GeometryNodeInputMeshFaceNeighbors"), float(MOST_CORNERS))
+    is_large = add.math("GREATER_THAN", add("GeometryNodeInputMeshFaceNeighbors"), float(MOST_CORNERS))
     geometry = add("GeometryNodeTriangulate", {"Mesh": geometry, "Selection": is_large})
     sharp = values
     for _ in range(SHARPENINGS):
         blurred = {"Value": sharp, "Iterations": 1, "Weight": NEIGHBOUR_WEIGHT}
-        lost = _math(add, "SUBTRACT", values, add("GeometryNodeBlurAttribute", blurred, data_type="FLOAT"))
-        sharp = _math(add, "ADD", sharp, lost)
+        lost = add.math("SUBTRACT", values, add("GeometryNodeBlurAttribute", blurred, data_type="FLOAT"))
+        sharp = add.math("ADD", sharp, lost)
     place = add("ShaderNodeCombineXYZ", {"X": sharp})
     graph = add("GeometryNodeSetPosition", {"Geometry": geometry, "Position": place})
     smooth = add("GeometryNodeSubdivisionSurface", {"Mesh": graph, "Level": levels})
@@ -178,7 +178,3 @@ def _subdivided(add, geometry, values, levels: int):
     given = {"Geometry": smooth, "Value": position, "Index": index}
     found = add("GeometryNodeSampleIndex", given, data_type="FLOAT_VECTOR", domain="POINT")
     return even, add("ShaderNodeSeparateXYZ", {0: found})
-
-
-def _math(add, operation: str, first, second):
-    return add("ShaderNodeMath", {0: first, 1: second}, operation=operation)

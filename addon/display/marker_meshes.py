@@ -7,6 +7,8 @@ import math
 
 import bpy
 
+from . import materials
+
 SHAPE_KEY = "palpate_arrow"
 """Custom property of a shared mesh: its name in :data:`PROFILES`."""
 SHAFT, HEAD, HEAD_START = 0.025, 0.07, 0.75
@@ -70,17 +72,14 @@ def surface_of_revolution(profile) -> tuple[list, list, list]:
 
 def marker_material(name: str):
     """Return the material of a shape, which emits some light of its own."""
-    full = f"Palpate {name}"
     found = next((block for block in bpy.data.materials if block.get(SHAPE_KEY) == name), None)
     if found is not None:
         return found
-    made = bpy.data.materials.new(full)
+    made = bpy.data.materials.new(f"Palpate {name}")
     made[SHAPE_KEY] = name
     color = (*COLORS[name], 1.0)
     made.diffuse_color = color
-    if made.node_tree is None:
-        made.use_nodes = True
-    surface = next(node for node in made.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    surface = next(node for node in materials.tree_of(made).nodes if node.type == "BSDF_PRINCIPLED")
     surface.inputs["Base Color"].default_value = color
     surface.inputs["Emission Color"].default_value = color
     surface.inputs["Emission Strength"].default_value = 0.5

@@ -115,14 +115,13 @@ def heat_map_material(
     """
     material = find_block(bpy.data.materials, uid) or bpy.data.materials.new(f"Palpate {name}")
     material[SENSOR_KEY] = uid
-    if material.node_tree is None:
-        material.use_nodes = True
-    material.node_tree.nodes.clear()
-    add = NodeAdder(material.node_tree)
+    tree = tree_of(material)
+    tree.nodes.clear()
+    add = NodeAdder(tree)
     value, missing = _value(add, image, frames, scale, mapping)
     color = _colors(add, value, scale)
     if missing is not None:
-        color = _missing_color(add, color, missing)
+        color = add.mix(missing, color, (*MISSING_COLOR, 1.0), label="Magenta: no image")
     _add_surface(add, color)
     return material
 
@@ -150,19 +149,9 @@ def _colors(add, value, scale: Scale):
     return color
 
 
-def _missing_color(add, color, missing):
-    """Return the socket of a colour that turns to :data:`MISSING_COLOR` where there is no image."""
-    mix = add("ShaderNodeMix", data_type="RGBA", label="Magenta: no image").node
-    factor, below, above = (next(s for s in mix.inputs if s.identifier == key) for key in MIX_SOCKETS)
-    add.tree.links.new(missing, factor)
-    add.tree.links.new(color, below)
-    above.default_value = (*MISSING_COLOR, 1.0)
-    return next(s for s in mix.outputs if s.identifier == "Result_Color")
-
-
 def _add_surface(add, color) -> None:
     """Add a surface that shows a colour mostly by its own light, and its shape by little of the scene's light."""
-    shaded = add("ShaderNodeVectorMath", {0: color, "Scale": 1.0 - GLOW}, operation="SCALE")
+    shaded = add.vector("SCALE", color, Scale=1.0 - GLOW)
     dull = {"Roughness": 1.0, "Specular IOR Level": 0.0}  # gloss would brighten the dark end of the colours
     light = {"Base Color": shaded, "Emission Color": color, "Emission Strength": GLOW}
     add.end("ShaderNodeOutputMaterial", {"Surface": add("ShaderNodeBsdfPrincipled", {**light, **dull})})
@@ -170,8 +159,14 @@ def _add_surface(add, color) -> None:
 
 def add_missing_test(add, color):
     """Return a socket that is 1 where Blender found no image: the colour shown there must not be read as a large force."""
-    distance = add("ShaderNodeVectorMath", {0: color, 1: MISSING_COLOR}, "Value", operation="DISTANCE")
-    return add("ShaderNodeMath", {0: distance, 1: 1e-6}, operation="LESS_THAN")
+    return add.math("LESS_THAN", add.vector("DISTANCE", color, MISSING_COLOR, output="Value"), 1e-6)
+
+
+def tree_of(block):
+    """Return the node tree of a material or world; it is made where there is none, as in Blenders before 5.0."""
+    if block.node_tree is None:
+        block.use_nodes = True
+    return block.node_tree
 
 
 class NodeAdder:
@@ -191,12 +186,31 @@ class NodeAdder:
             setattr(node, key, value)
         node.location = self.x, 0.0
         self.x += 300.0
-        for place, value in (given or {}).items():
+        self.feed(node, given or {})
+        return node
+
+    def feed(self, node, given: dict) -> None:
+        """Give inputs of a node, by name or number, the sockets that lead to them, or their values."""
+        for place, value in given.items():
             if isinstance(value, bpy.types.NodeSocket):
                 self.tree.links.new(value, node.inputs[place])
             else:
                 node.inputs[place].default_value = value
-        return node
+
+    def math(self, operation: str, *given):
+        """Return the socket of a calculation with numbers."""
+        return self("ShaderNodeMath", dict(enumerate(given)), operation=operation)
+
+    def vector(self, operation: str, *given, output: int | str = 0, **scale):
+        """Return the socket of a calculation with vectors; `scale` is the factor ``Scale`` of the operation ``SCALE``."""
+        return self("ShaderNodeVectorMath", {**dict(enumerate(given)), **scale}, output, operation=operation)
+
+    def mix(self, factor, below, above, **settings):
+        """Return the socket of a mixture of two colours."""
+        node = self.end("ShaderNodeMix", data_type="RGBA", **settings)
+        sockets = {socket.identifier: number for number, socket in enumerate(node.inputs)}
+        self.feed(node, dict(zip(map(sockets.get, MIX_SOCKETS), (factor, below, above), strict=True)))
+        return next(socket for socket in node.outputs if socket.identifier == "Result_Color")
 
     def attribute(self, name: str, data_type: str = "FLOAT_VECTOR"):
         """Return the socket of a named attribute."""

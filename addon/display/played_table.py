@@ -72,8 +72,7 @@ class PlayedTable:
         column = add("ShaderNodeSeparateXYZ", {0: add.attribute(self.column)})
         given = {"Image": self.image, "Vector": add("ShaderNodeCombineXYZ", {"X": column, "Y": row})}
         color = add("GeometryNodeImageTexture", given, interpolation="Linear", extension="EXTEND")
-        chosen = {0: color, 1: add.attribute(self.channel)}
-        return add("ShaderNodeVectorMath", chosen, output="Value", operation="DOT_PRODUCT")
+        return add.vector("DOT_PRODUCT", color, add.attribute(self.channel), output="Value")
 
 
 @dataclass(frozen=True)
@@ -104,16 +103,11 @@ class PlayedPictures:
 
     def place(self, add, uv):
         """Return the socket of texture coordinates in the image at the frame in view; `uv` is that of them in one picture."""
-
-        def math(operation: str, *given):
-            return add("ShaderNodeMath", dict(enumerate(given)), operation=operation)
-
-        passed = math("SUBTRACT", _frame(add, self.first, self.last), self.first)
-        number = math("FLOOR", math("DIVIDE", passed, self.step))
-        row = math("FLOOR", math("DIVIDE", number, self.across))
-        corner = add("ShaderNodeCombineXYZ", {"X": math("MODULO", number, self.across), "Y": row})
-        moved = add("ShaderNodeVectorMath", {0: uv, 1: corner}, operation="ADD")
-        return add("ShaderNodeVectorMath", {0: moved, 1: (self.across, self.down, 1.0)}, operation="DIVIDE")
+        passed = add.math("SUBTRACT", _frame(add, self.first, self.last), self.first)
+        number = add.math("FLOOR", add.math("DIVIDE", passed, self.step))
+        row = add.math("FLOOR", add.math("DIVIDE", number, self.across))
+        corner = add("ShaderNodeCombineXYZ", {"X": add.math("MODULO", number, self.across), "Y": row})
+        return add.vector("DIVIDE", add.vector("ADD", uv, corner), (self.across, self.down, 1.0))
 
 
 def _packed_image(mark: str, name: str, pixels: np.ndarray):

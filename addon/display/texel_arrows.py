@@ -87,26 +87,22 @@ def _nodes(mark: str, name: str, image, frames, kind: str, length: float, longes
     """Return geometry nodes that compute a vector per texel and put an arrow along it where it is long enough."""
     group = materials.empty_node_group(mark, name)
     add = materials.NodeAdder(group)
-
-    def vector(operation: str, *given, output: int | str = 0, **scale):
-        return add("ShaderNodeVectorMath", {**dict(enumerate(given)), **scale}, output, operation=operation)
-
     start = add("NodeGroupInput")
     color = materials.add_image_lookup(add, image, frames)
     parts = add.end("FunctionNodeSeparateColor", {"Color": color}).outputs
 
     def times(key: str, channel: str):
-        return vector("SCALE", add.attribute(key), Scale=parts[channel])
+        return add.vector("SCALE", add.attribute(key), Scale=parts[channel])
 
     if kind == "NORMALS":
         force = times(NORMAL, "Red")
     else:  # the reaction: the negative of the shear on the sensor
-        force = vector("SCALE", vector("ADD", times(X_AXIS, "Green"), times(Y_AXIS, "Blue")), Scale=-1.0)
-    arrow = vector("SCALE", force, Scale=length)
-    size = vector("LENGTH", arrow, output="Value")
-    long_enough = add("ShaderNodeMath", {0: size, 1: MIN_ARROW_SHARE * longest}, operation="GREATER_THAN")
-    is_drawn = add("ShaderNodeMath", {0: long_enough, 1: materials.add_missing_test(add, color)}, operation="SUBTRACT")
-    lift = vector("SCALE", add.attribute(NORMAL), Scale=0.04 * longest if kind == "SHEARS" else 0.0)
+        force = add.vector("SCALE", add.vector("ADD", times(X_AXIS, "Green"), times(Y_AXIS, "Blue")), Scale=-1.0)
+    arrow = add.vector("SCALE", force, Scale=length)
+    size = add.vector("LENGTH", arrow, output="Value")
+    long_enough = add.math("GREATER_THAN", size, MIN_ARROW_SHARE * longest)
+    is_drawn = add.math("SUBTRACT", long_enough, materials.add_missing_test(add, color))
+    lift = add.vector("SCALE", add.attribute(NORMAL), Scale=0.04 * longest if kind == "SHEARS" else 0.0)
     given = {
         "Points": add("GeometryNodeSetPosition", {"Geometry": start, "Offset": lift}),
         "Selection": is_drawn,

@@ -14,6 +14,7 @@ import numpy as np
 from mathutils import Vector
 
 from ...core.io.hidden_folder import temporary_folder
+from ..display import materials
 from . import render
 
 LAMPS = (((-35.0, 50.0), 1.15, (1.0, 0.97, 0.93)), ((70.0, 30.0), 0.5, (0.9, 0.95, 1.0)), ((170.0, 45.0), 0.8, (1.0, 1.0, 1.0)))
@@ -82,9 +83,7 @@ def set_studio(scene, changes, backdrops, frame: int, bottom: np.ndarray, transp
 def bright_world():
     """Return a new world that lights softly and is seen as it lights."""
     world = bpy.data.worlds.new("Palpate World")
-    if world.node_tree is None:
-        world.use_nodes = True
-    background = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
+    background = next(node for node in materials.tree_of(world).nodes if node.type == "BACKGROUND")
     background.inputs["Color"].default_value = (0.86, 0.88, 0.92, 1.0)
     background.inputs["Strength"].default_value = 0.7
     return world
@@ -92,21 +91,16 @@ def bright_world():
 
 def _fill_world(world):
     """Make a world that lights softly and shows a plain background; return the function that sets its grey."""
-    if world.node_tree is None:
-        world.use_nodes = True
-    tree = world.node_tree
+    tree = materials.tree_of(world)
     tree.nodes.clear()
-    light, plain, mix = (tree.nodes.new(kind) for kind in ("ShaderNodeBackground",) * 2 + ("ShaderNodeMixShader",))
-    path, output = tree.nodes.new("ShaderNodeLightPath"), tree.nodes.new("ShaderNodeOutputWorld")
-    light.inputs["Color"].default_value = (*WORLD_COLOR, 1.0)
-    light.inputs["Strength"].default_value = WORLD_STRENGTH
-    tree.links.new(path.outputs["Is Camera Ray"], mix.inputs[0])
-    tree.links.new(light.outputs[0], mix.inputs[1])
-    tree.links.new(plain.outputs[0], mix.inputs[2])
-    tree.links.new(mix.outputs[0], output.inputs["Surface"])
+    add = materials.NodeAdder(tree)
+    light = add("ShaderNodeBackground", {"Color": (*WORLD_COLOR, 1.0), "Strength": WORLD_STRENGTH})
+    plain = add("ShaderNodeBackground")
+    mix = add("ShaderNodeMixShader", {0: add("ShaderNodeLightPath", output="Is Camera Ray"), 1: light, 2: plain})
+    add.end("ShaderNodeOutputWorld", {"Surface": mix})
 
     def set_background(grey: float) -> None:
-        plain.inputs["Color"].default_value = (grey, grey, grey, 1.0)
+        plain.node.inputs["Color"].default_value = (grey, grey, grey, 1.0)
         world.color = (grey, grey, grey)  # Workbench shows this one
 
     set_background(LIGHT_BACKGROUND)
@@ -139,23 +133,13 @@ def _add_floor(scene, changes, bottom: np.ndarray, grey: float) -> None:
 def _floor_material(grey: float, size: float):
     """Return a dull material that is as bright as the background in studio light and transparent far from the middle."""
     material = bpy.data.materials.new("Palpate Floor")
-    if material.node_tree is None:
-        material.use_nodes = True
-    tree = material.node_tree
+    tree = materials.tree_of(material)
     tree.nodes.clear()
-    kinds = ("TexCoord", "VectorMath", "MapRange", "BsdfDiffuse", "BsdfTransparent", "MixShader", "OutputMaterial")
-    place, length, fade, dull, clear, mix, output = (tree.nodes.new(f"ShaderNode{kind}") for kind in kinds)
-    length.operation = "LENGTH"
-    dull.inputs["Color"].default_value = (*(grey / FLOOR_LIGHT,) * 3, 1.0)
-    fade.interpolation_type = "SMOOTHSTEP"
-    fade.inputs["From Min"].default_value, fade.inputs["From Max"].default_value = FLOOR_FADE * size, FLOOR_END * size
-    for source, target in (
-        (place.outputs["Object"], length.inputs[0]),
-        (length.outputs["Value"], fade.inputs["Value"]),
-        (fade.outputs["Result"], mix.inputs[0]),
-        (dull.outputs[0], mix.inputs[1]),
-        (clear.outputs[0], mix.inputs[2]),
-        (mix.outputs[0], output.inputs["Surface"]),
-    ):
-        tree.links.new(source, target)
+    add = materials.NodeAdder(tree)
+    distance = add.vector("LENGTH", add("ShaderNodeTexCoord", output="Object"), output="Value")
+    ends = {"From Min": FLOOR_FADE * size, "From Max": FLOOR_END * size}
+    fade = add("ShaderNodeMapRange", {"Value": distance, **ends}, interpolation_type="SMOOTHSTEP")
+    dull = add("ShaderNodeBsdfDiffuse", {"Color": (*(grey / FLOOR_LIGHT,) * 3, 1.0)})
+    mix = add("ShaderNodeMixShader", {0: fade, 1: dull, 2: add("ShaderNodeBsdfTransparent")})
+    add.end("ShaderNodeOutputMaterial", {"Surface": mix})
     return material
