@@ -47,24 +47,21 @@ def build(scene) -> None:
     rubber = scene_builder.material("Rubber", (0.035, 0.036, 0.04), roughness=0.55)
     black = scene_builder.material("Black anodised", (0.012, 0.012, 0.014), metallic=0.6, roughness=0.32)
     screw = scene_builder.material("Screw", (0.55, 0.56, 0.58), metallic=1.0, roughness=0.25)
-    paper = scene_builder.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
 
     pad_a = _finger(scene, PAD_A, PITCH_A, (-44.0, -22.0), math.radians(24), rubber, black, screw)
     pad_b = _finger(scene, PAD_B, PITCH_B, (26.0, 10.0), math.radians(24), rubber, black, screw)
 
-    ball = scene_builder.ball(scene, BALL, BALL_RADIUS)
-    ball.data.materials.append(scene_builder.see_through_steel("Steel, seen through (ball)", clear=0.85, groove=0.45))
+    steel = scene_builder.see_through_steel("Steel, seen through (ball)", clear=0.85, groove=0.45)
+    ball = scene_builder.ball(scene, BALL, BALL_RADIUS, look=steel)
     _slide(ball, pad_a)
 
     cube = scene_builder.box(scene, CUBE, (CUBE_EDGE,) * 3, bevel=1.2, flat_bottom=True)
-    cube.data.materials.append(scene_builder.clear_block("Steel, seen through"))
-    cube.data.materials.append(scene_builder.material("Steel", scene_builder.STEEL, metallic=1.0, roughness=0.16))
-    cube.modifiers["Bevel"].material = 1  # its edges stay solid
+    scene_builder.clear_sides(cube, "Steel", scene_builder.STEEL, metallic=1.0, roughness=0.16)
     cube.location = (pad_b.location.x, pad_b.location.y, PAD_HEIGHT + CUBE_EDGE / 2 + DROP)
     cube.rotation_euler = (0.0, 0.0, pad_b.rotation_euler.z + math.radians(18))
 
-    _author(scene, pad_a, pad_b, ball, cube)
-    scene_builder.add_stage(scene, paper, aim=(0.0, 0.0, 20.0), camera=(60.0, -300.0, 190.0))
+    _author(scene, pad_b, ball, cube)
+    scene_builder.add_stage(scene, aim=(0.0, 0.0, 20.0), camera=(60.0, -300.0, 190.0))
     frame_picture(scene, (1280, 720))
     scene_builder.add_readme(TEXT)
     scene_builder.open_at(scene, pad_a, STRIP_FRAMES[3])
@@ -73,23 +70,17 @@ def build(scene) -> None:
 def _finger(scene, name: str, pitch: float, location, turn: float, rubber, black, screw):
     """Return the pad of a gripper finger, with its base as a child. The vertex group "tactile" holds the texels."""
     margin, thickness = 0.9 * pitch + 0.6, 6.0
-    vertices, faces, texels = scene_builder.pad_mesh(PAD_ROWS, PAD_COLUMNS, pitch, margin, thickness)
-    pad = scene_builder.mesh_object(scene, name, vertices, faces)
+    pad = scene_builder.pad(scene, name, rubber, PAD_ROWS, PAD_COLUMNS, pitch, margin, thickness)
     pad.location, pad.rotation_euler = (*location, PAD_HEIGHT), (0.0, 0.0, turn)
-    pad.data.materials.append(rubber)
-    pad.vertex_groups.new(name="tactile").add(texels, 1.0, "REPLACE")
 
     wide = (PAD_COLUMNS - 1) * pitch + 2 * margin
     long = (PAD_ROWS - 1) * pitch + 2 * margin
     height = PAD_HEIGHT - thickness + 1.0
-    base = scene_builder.box(scene, f"{name} base", (wide + 5, long + 22, height), bevel=2.2)
-    base.location, base.parent = (0.0, 6.0, 0.5 * height - PAD_HEIGHT), pad
-    base.data.materials.append(black)
+    size, place = (wide + 5, long + 22, height), (0.0, 6.0, 0.5 * height - PAD_HEIGHT)
+    scene_builder.box(scene, f"{name} base", size, bevel=2.2, look=black, parent=pad, location=place)
     for side in (-1, 1):
-        head = scene_builder.cylinder(scene, f"{name} screw", 1.9, 1.4, bevel=0.3)
-        head.location = (side * (wide / 2 - 3.2), long / 2 + 11, height - PAD_HEIGHT + 0.4)
-        head.parent = pad
-        head.data.materials.append(screw)
+        place = (side * (wide / 2 - 3.2), long / 2 + 11, height - PAD_HEIGHT + 0.4)
+        scene_builder.cylinder(scene, f"{name} screw", 1.9, 1.4, bevel=0.3, look=screw, parent=pad, location=place)
     return pad
 
 
@@ -111,18 +102,12 @@ def _slide(ball, pad) -> None:
         (96, 8.5, -0.2, 680.0),
         (108, 8.5, -9.0, 690.0),
     ):
-        ball.location = (pad.location.x + along * direction.x, pad.location.y + along * direction.y, up - depth)
-        ball.rotation_euler = (math.radians(turn), 0.0, pad.rotation_euler.z)
-        ball.keyframe_insert("location", frame=frame)
-        ball.keyframe_insert("rotation_euler", frame=frame)
+        place = (pad.location.x + along * direction.x, pad.location.y + along * direction.y, up - depth)
+        scene_builder.keyframe(ball, frame, place, (math.radians(turn), 0.0, pad.rotation_euler.z))
 
 
-def _author(scene, pad_a, pad_b, ball, cube) -> None:
+def _author(scene, pad_b, ball, cube) -> None:
     """Give the objects their roles and parameters, as the panel in the Physics tab would."""
-    for pad in (pad_a, pad_b):
-        pad.palpate.role = "SENSOR"
-        pad.palpate.region = "GROUP"
-        pad.palpate.vertex_group = "tactile"
     pad_b.palpate.k, pad_b.palpate.cn = 1000.0, 10.0
     for target in (ball, cube):
         target.palpate.role = "TARGET"

@@ -7,6 +7,8 @@ import math
 
 import numpy as np
 
+from .scene_builder import finger_faces
+
 SIDES, STEP = 28, 2.0  # texels around a finger; mm between rings of texels
 
 
@@ -50,17 +52,9 @@ class Tube:
             for centre, size, (ahead, inner) in zip(centres, sizes, turns, strict=True)
         ]
         vertices = np.vstack([*rings, centres[-1] + heading * (tip - tip * math.sin(cap[-1]))])
-        last = len(rings) - 1
-        faces = [
-            (j * SIDES + i, j * SIDES + (i + 1) % SIDES, (j + 1) * SIDES + (i + 1) % SIDES, (j + 1) * SIDES + i)
-            for j in range(last)
-            for i in range(SIDES)
-        ]
-        faces += [(last * SIDES + i, last * SIDES + (i + 1) % SIDES, len(vertices) - 1) for i in range(SIDES)]
-        faces.append(tuple(range(SIDES - 1, -1, -1)))
         feels = np.flatnonzero(np.concatenate([along, np.full(len(cap) - 2, along[-1])]) > along[-1] - pad_length)
         near = np.flatnonzero(np.cos(angle) > math.cos(math.radians(80)))
-        return vertices, faces, (feels[:, None] * SIDES + near).ravel()
+        return vertices, finger_faces(len(rings), SIDES), (feels[:, None] * SIDES + near).ravel()
 
     def bones(self, cut: float) -> np.ndarray:
         """Return points and radii from the root up to a length in mm before the tip's centre, (n, 4)."""

@@ -29,35 +29,24 @@ def build(scene) -> None:
     """Fill `scene`, which is emptied first; the add-on's classes must be registered."""
     scene_builder.prepare(scene, FRAME_END, FPS)
     vertices, faces = capsule()
-    finger = scene_builder.mesh_object(scene, FINGER, vertices, faces)
-    finger.data.materials.append(scene_builder.material("Rubber", (0.035, 0.036, 0.04), roughness=0.55))
+    rubber = scene_builder.material("Rubber", (0.035, 0.036, 0.04), roughness=0.55)
+    finger = scene_builder.mesh_object(scene, FINGER, vertices, faces, rubber, location=(0.0, 0.0, 30.0))
     # The upper side, down to 60 degrees from the top, without the rim of the flat end: its face would belong to the sensor.
-    group = finger.vertex_groups.new(name="tactile")
-    group.add([int(i) for i in np.flatnonzero((vertices[:, 2] > 0.5 * RADIUS) & (vertices[:, 1] > -LENGTH))], 1.0, "REPLACE")
-    finger.location = (0.0, 0.0, 30.0)
+    feels = np.flatnonzero((vertices[:, 2] > 0.5 * RADIUS) & (vertices[:, 1] > -LENGTH))
+    # the penetration is less than the radius, or the texels' segments would end on the other side
+    scene_builder.make_tactile(finger, feels, max_penetration=0.006, k=20.0, cn=0.2)
 
-    finger.palpate.max_penetration = 0.006  # less than the radius, or the texels' segments would end on the other side
-
-    rod = scene_builder.cylinder(scene, ROD, ROD_RADIUS, 40.0)
-    rod.data.materials.append(scene_builder.see_through_steel("Steel, seen through", clear=0.8, edge=0.6))
+    steel = scene_builder.see_through_steel("Steel, seen through", clear=0.8, edge=0.6)
+    rod = scene_builder.cylinder(scene, ROD, ROD_RADIUS, 40.0, look=steel)
     rod.rotation_mode = "XYZ"
     top = 30.0 + RADIUS + ROD_RADIUS
     for frame, y, depth in ((1, -4.0, -2.0), (12, -4.0, 1.5), (36, 6.0, 1.5), (48, 6.0, -3.0)):
-        rod.location = (0.0, y, top - depth)
         # It lies across the finger and rolls without slipping.
-        rod.rotation_euler = (-(y + 4.0) / ROD_RADIUS, math.pi / 2, 0.0)
-        rod.keyframe_insert("location", frame=frame)
-        rod.keyframe_insert("rotation_euler", frame=frame)
-
-    finger.palpate.role = "SENSOR"
-    finger.palpate.region = "GROUP"
-    finger.palpate.vertex_group = "tactile"
-    finger.palpate.k, finger.palpate.cn = 20.0, 0.2
+        scene_builder.keyframe(rod, frame, (0.0, y, top - depth), (-(y + 4.0) / ROD_RADIUS, math.pi / 2, 0.0))
     rod.palpate.role = "TARGET"
     scene.palpate.overlays = {"FORCE", "SHEARS"}
 
-    paper = scene_builder.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
-    scene_builder.add_stage(scene, paper, aim=(0.0, -3.0, 32.0), camera=(95.0, 90.0, 85.0), size=0.3)
+    scene_builder.add_stage(scene, aim=(0.0, -3.0, 32.0), camera=(95.0, 90.0, 85.0), size=0.3)
     scene_builder.add_readme(TEXT)
     scene_builder.open_at(scene, finger, 24)
 
@@ -70,13 +59,4 @@ def capsule():
     angle = np.arange(sides) * 2 * math.pi / sides
     rings = [np.stack([r * np.sin(angle), np.full(sides, y), r * np.cos(angle)], axis=1) for y, r in profile]
     vertices = np.concatenate([*rings, [[0.0, RADIUS, 0.0]]])
-    tip, count = len(vertices) - 1, len(profile)
-    faces = [
-        (j * sides + i, j * sides + (i + 1) % sides, (j + 1) * sides + (i + 1) % sides, (j + 1) * sides + i)
-        for j in range(count - 1)
-        for i in range(sides)
-    ]
-    last = (count - 1) * sides
-    faces += [(last + i, last + (i + 1) % sides, tip) for i in range(sides)]
-    faces.append(tuple(range(sides - 1, -1, -1)))
-    return vertices, faces
+    return vertices, scene_builder.finger_faces(len(profile), sides)

@@ -39,8 +39,8 @@ def build(scene) -> None:
     """Fill `scene`, which is emptied first; the add-on's classes must be registered."""
     scene_builder.prepare(scene, FRAME_END, FPS)
     gel = _gel(scene)
-    nut = scene_builder.mesh_object(scene, NUT, *nut_mesh(), smooth=False)
-    nut.data.materials.append(scene_builder.material("Steel", scene_builder.STEEL, metallic=1.0, roughness=0.25))
+    steel = scene_builder.material("Steel", scene_builder.STEEL, metallic=1.0, roughness=0.25)
+    nut = scene_builder.mesh_object(scene, NUT, *nut_mesh(), steel, smooth=False)
     bevel = nut.modifiers.new("Bevel", "BEVEL")
     bevel.width, bevel.segments, bevel.limit_method, bevel.angle_limit = ROUNDING, 4, "ANGLE", math.radians(45.0)
     nut.rotation_mode = "XYZ"
@@ -52,22 +52,14 @@ def build(scene) -> None:
         (40, -0.5, DEPTH, 14.0),
         (48, -0.5, -1.5, 14.0),
     ):
-        nut.location = (x, 0.3, HEIGHT - depth)
-        nut.rotation_euler = (math.radians(2.0), 0.0, math.radians(8.0 + turn))
-        nut.keyframe_insert("location", frame=frame)
-        nut.keyframe_insert("rotation_euler", frame=frame)
+        turned = (math.radians(2.0), 0.0, math.radians(8.0 + turn))
+        scene_builder.keyframe(nut, frame, (x, 0.3, HEIGHT - depth), turned)
 
-    gel.palpate.role, gel.palpate.region, gel.palpate.vertex_group = "SENSOR", "GROUP", "tactile"
-    gel.palpate.k, gel.palpate.cn = STIFFNESS, DAMPING
-    gel.palpate.sigma0, gel.palpate.sigma1 = BRISTLES, 0.01 * BRISTLES
-    gel.palpate.mus, gel.palpate.mud = 0.9, 0.7
-    gel.palpate.max_penetration = 0.75e-3 * THICKNESS
     nut.palpate.role = "TARGET"
     scene.palpate.overlays = {"FORCE"}
     scene.palpate.figures.kinds = {"SCENE", "STRIP", "CURVES", "GEL"}
 
-    paper = scene_builder.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
-    scene_builder.add_stage(scene, paper, aim=(0.0, 0.0, HEIGHT), camera=(35.0, -55.0, 55.0), size=0.2)
+    scene_builder.add_stage(scene, aim=(0.0, 0.0, HEIGHT), camera=(35.0, -55.0, 55.0), size=0.2)
     scene.frame_set(28)
     scene_builder.frame_objects(scene, (gel, nut, scene.objects["Housing"]))
     scene_builder.add_readme(TEXT)
@@ -76,16 +68,16 @@ def build(scene) -> None:
 
 def _gel(scene):
     """Return the gel on its housing; the vertex group "tactile" holds the texels."""
-    vertices, faces, texels = scene_builder.pad_mesh(ROWS, COLUMNS, PITCH, 1.5, THICKNESS, rounding=0.8)
-    gel = scene_builder.mesh_object(scene, GEL, vertices, faces)
+    look = scene_builder.material("Gel", (0.45, 0.46, 0.48), roughness=0.45)
+    foam = {"k": STIFFNESS, "cn": DAMPING, "max_penetration": 0.75e-3 * THICKNESS}
+    friction = {"sigma0": BRISTLES, "sigma1": 0.01 * BRISTLES, "mus": 0.9, "mud": 0.7}
+    gel = scene_builder.pad(scene, GEL, look, ROWS, COLUMNS, PITCH, 1.5, THICKNESS, rounding=0.8, **foam, **friction)
     gel.location = (0.0, 0.0, HEIGHT)
-    gel.data.materials.append(scene_builder.material("Gel", (0.45, 0.46, 0.48), roughness=0.45))
-    gel.vertex_groups.new(name="tactile").add(texels, 1.0, "REPLACE")
     height = HEIGHT - THICKNESS + 0.5
     sides = ((count - 1) * PITCH + 2 * 1.5 + 3.0 for count in (COLUMNS, ROWS))
-    housing = scene_builder.box(scene, "Housing", (*sides, height), bevel=1.0)
-    housing.location, housing.parent = (0.0, 0.0, 0.5 * height - HEIGHT), gel
-    housing.data.materials.append(scene_builder.material("Black anodised", (0.012, 0.012, 0.014), metallic=0.6, roughness=0.32))
+    black = scene_builder.material("Black anodised", (0.012, 0.012, 0.014), metallic=0.6, roughness=0.32)
+    place = (0.0, 0.0, 0.5 * height - HEIGHT)
+    scene_builder.box(scene, "Housing", (*sides, height), bevel=1.0, look=black, parent=gel, location=place)
     return gel
 
 
@@ -100,8 +92,4 @@ def nut_mesh():
         np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(sides, z)], axis=1)
         for radius, z in ((outer, 0.0), (outer, NUT_HEIGHT), (0.5 * HOLE, NUT_HEIGHT), (0.5 * HOLE, 0.0))
     ]
-    faces = []
-    for ring in range(4):
-        low, high = ring * sides, (ring + 1) % 4 * sides
-        faces += [(low + i, low + (i + 1) % sides, high + (i + 1) % sides, high + i) for i in range(sides)]
-    return np.concatenate(rings), faces
+    return np.concatenate(rings), scene_builder.tube_faces(len(rings), sides, closed=True)

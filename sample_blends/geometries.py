@@ -14,6 +14,7 @@ FRAME_END = 24
 GRID, SPHERE, TIP = "Grid", "Sphere", "Fingertip"
 SPHERE_RADIUS, BALL_RADIUS = 12.0, 7.0  # mm
 NEEDLE = 5.0  # mm, as long as the deepest penetration
+FOAM = {"max_penetration": 1e-3 * NEEDLE, "k": 30.0, "cn": 0.3}
 
 TEXT = """\
 Any mesh is a sensor (paper, section 3.1, Fig. 1 to 3)
@@ -28,59 +29,44 @@ def build(scene) -> None:
     scene_builder.prepare(scene, FRAME_END, FPS)
     rubber = scene_builder.material("Rubber", (0.10, 0.16, 0.22), roughness=0.6)
     needle = scene_builder.material("Normals", (0.85, 0.35, 0.06), roughness=0.5)
-    sensors = [_grid(scene), _sphere(scene), _tip(scene)]
+    sensors = [_grid(scene, rubber), _sphere(scene, rubber), _tip(scene, rubber)]
     steel = scene_builder.see_through_steel("Steel, seen through", clear=0.75, edge=0.8)
     for sensor, top in sensors:
-        sensor.data.materials.append(rubber)
-        settings = sensor.palpate
-        settings.role, settings.max_penetration = "SENSOR", 1e-3 * NEEDLE
-        settings.k, settings.cn = 30.0, 0.3
         scene_builder.add_normal_needles(scene, sensor, NEEDLE, needle)
-        ball = scene_builder.ball(scene, f"Ball on {sensor.name}", BALL_RADIUS)
-        ball.data.materials.append(steel)
+        ball = scene_builder.ball(scene, f"Ball on {sensor.name}", BALL_RADIUS, look=steel)
         ball.palpate.role = "TARGET"
         for frame, depth in ((1, -16.0), (14, 2.0), (24, 2.0)):
-            ball.location = (sensor.location.x, sensor.location.y, top + BALL_RADIUS - depth)
-            ball.keyframe_insert("location", frame=frame)
-    paper = scene_builder.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
-    scene_builder.add_stage(scene, paper, aim=(0.0, 0.0, 15.0), camera=(60.0, -230.0, 150.0), size=0.6)
+            scene_builder.keyframe(ball, frame, (sensor.location.x, sensor.location.y, top + BALL_RADIUS - depth))
+    scene_builder.add_stage(scene, aim=(0.0, 0.0, 15.0), camera=(60.0, -230.0, 150.0), size=0.6)
     scene.frame_set(scene.frame_start)
     scene_builder.frame_objects(scene, [sensor for sensor, _ in sensors], region=(0.06, 0.06, 0.94, 0.70), size=(1100, 600))
     scene_builder.add_readme(TEXT)
     scene_builder.open_at(scene, scene.objects[GRID], FRAME_END)
 
 
-def _grid(scene):
-    vertices, faces, texels = scene_builder.pad_mesh(10, 10, 3.0, 4.0, 6.0)
-    sensor = scene_builder.mesh_object(scene, GRID, vertices, faces)
+def _grid(scene, rubber):
+    sensor = scene_builder.pad(scene, GRID, rubber, 10, 10, 3.0, 4.0, 6.0, **FOAM)
     sensor.location = (-26.0, 16.0, 14.0)
-    _choose(sensor, texels)
     return sensor, 14.0
 
 
-def _sphere(scene):
+def _sphere(scene, rubber):
     import bmesh
 
     made = bmesh.new()
     bmesh.ops.create_icosphere(made, subdivisions=3, radius=SPHERE_RADIUS)
-    sensor = scene_builder.mesh_object(
-        scene, SPHERE, [v.co for v in made.verts], [[v.index for v in f.verts] for f in made.faces]
-    )
+    vertices, faces = [v.co for v in made.verts], [[v.index for v in f.verts] for f in made.faces]
+    sensor = scene_builder.mesh_object(scene, SPHERE, vertices, faces, rubber, location=(25.0, 20.0, 14.0))
     made.free()
-    sensor.location = (25.0, 20.0, 14.0)
     up = [v.index for v in sensor.data.vertices if v.co.z > -0.2 * SPHERE_RADIUS]
-    _choose(sensor, up)
+    scene_builder.make_tactile(sensor, up, **FOAM)
     return sensor, 14.0 + SPHERE_RADIUS
 
 
-def _tip(scene):
+def _tip(scene, rubber):
     vertices, faces = fingertip.capsule()
-    sensor = scene_builder.mesh_object(scene, TIP, vertices, faces)
-    sensor.location, sensor.rotation_euler = (10.0, -26.0, 14.0), (0.0, 0.0, math.radians(-110.0))
-    _choose(sensor, np.flatnonzero((vertices[:, 2] > 0.2 * fingertip.RADIUS) & (vertices[:, 1] > -14.0)))
+    sensor = scene_builder.mesh_object(scene, TIP, vertices, faces, rubber, location=(10.0, -26.0, 14.0))
+    sensor.rotation_euler = (0.0, 0.0, math.radians(-110.0))
+    feels = np.flatnonzero((vertices[:, 2] > 0.2 * fingertip.RADIUS) & (vertices[:, 1] > -14.0))
+    scene_builder.make_tactile(sensor, feels, **FOAM)
     return sensor, 14.0 + fingertip.RADIUS
-
-
-def _choose(sensor, vertices) -> None:
-    sensor.vertex_groups.new(name="tactile").add([int(i) for i in vertices], 1.0, "REPLACE")
-    sensor.palpate.region, sensor.palpate.vertex_group = "GROUP", "tactile"

@@ -21,6 +21,8 @@ MASS = 0.288  # kg: steel of 7,800 kg/m³
 SQUEEZE = 1.6  # mm, by which each pad is pressed
 OPEN, LIFT = 7.0, 32.0  # mm
 MIDDLE = 42.0  # mm, height of the fingers' middle above the table
+FOAM = {"k": 300.0, "cn": 3.0, "sigma0": 300.0, "sigma1": 3.0, "mus": 0.6, "mud": 0.5}
+"""Of fingers and table; the bristles are as stiff as the foam."""
 LEFT, RIGHT, CYLINDER, TABLE = "Left finger", "Right finger", "Cylinder", "Table"
 
 TEXT = """\
@@ -38,54 +40,35 @@ def build(scene) -> None:
     scene_builder.prepare(scene, FRAME_END, FPS)
     rubber = scene_builder.material("Rubber", (0.035, 0.036, 0.04), roughness=0.55)
     grey = scene_builder.material("Grey anodised", (0.21, 0.22, 0.24), metallic=0.6, roughness=0.4)
-    paper = scene_builder.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
 
     for name, side in ((LEFT, -1), (RIGHT, 1)):
         _finger(scene, name, side, rubber, grey)
-    cylinder = scene_builder.cylinder(scene, CYLINDER, RADIUS, HEIGHT, bevel=0.0)
+    steel = scene_builder.see_through_steel("Steel, seen through", clear=0.8, edge=0.5)
+    cylinder = scene_builder.cylinder(scene, CYLINDER, RADIUS, HEIGHT, look=steel, location=(0.0, 0.0, HEIGHT / 2))
     cylinder.modifiers.clear()  # its rim stays sharp: the lower one stands on the table
-    cylinder.data.materials.append(scene_builder.see_through_steel("Steel, seen through", clear=0.8, edge=0.5))
-    cylinder.location.z = HEIGHT / 2
-
-    vertices, faces, texels = scene_builder.pad_mesh(9, 9, 5.0, 4.0, 4.0)
-    table = scene_builder.mesh_object(scene, TABLE, vertices, faces)
-    table.data.materials.append(rubber)
-    table.vertex_groups.new(name="tactile").add(texels, 1.0, "REPLACE")
-
-    for obj in (scene.objects[LEFT], scene.objects[RIGHT], table):
-        settings = obj.palpate
-        settings.role = "PAD" if obj == table else "SENSOR"
-        settings.region, settings.vertex_group = "GROUP", "tactile"
-        settings.k, settings.cn = 300.0, 3.0
-        settings.sigma0, settings.sigma1 = 300.0, 3.0  # bristles as stiff as the foam
-        settings.mus, settings.mud = 0.6, 0.5
+    scene_builder.pad(scene, TABLE, rubber, 9, 9, 5.0, 4.0, 4.0, role="PAD", **FOAM)
     cylinder.palpate.role, cylinder.palpate.body, cylinder.palpate.mass = "TARGET", "FREE", MASS
     scene.palpate.color_map = "VIRIDIS"
     scene.palpate.overlays = {"FORCE", "SHEARS"}
 
-    scene_builder.add_stage(scene, paper, aim=(0.0, 0.0, 50.0), camera=(190.0, -330.0, 130.0))
+    scene_builder.add_stage(scene, aim=(0.0, 0.0, 50.0), camera=(190.0, -330.0, 130.0))
     scene.objects["Key"].visible_glossy = False  # else its reflection in the steel covers a pad
     scene.objects["Key"].data.specular_factor = 0.0
-    backdrop = scene.objects["Backdrop"]
-    backdrop.location.z = -4.0
+    scene.objects["Backdrop"].location.z = -4.0
     scene_builder.add_readme(TEXT)
     scene_builder.open_at(scene, scene.objects[LEFT], 20)
 
 
 def _finger(scene, name: str, side: int, rubber, grey) -> None:
     """Add a finger at x < 0 (side −1) or x > 0 whose pad faces the middle; it closes and lifts."""
-    vertices, faces, texels = scene_builder.pad_mesh(ROWS, COLUMNS, PITCH, 2.5, THICKNESS)
-    pad = scene_builder.mesh_object(scene, name, vertices, faces)
-    pad.data.materials.append(rubber)
-    pad.vertex_groups.new(name="tactile").add(texels, 1.0, "REPLACE")
+    pad = scene_builder.pad(scene, name, rubber, ROWS, COLUMNS, PITCH, 2.5, THICKNESS, **FOAM)
     pad.rotation_mode = "XYZ"
     # the pad's normal (its z) points to the middle, its rows (its y) run upwards
     pad.rotation_euler = (math.pi / 2, 0.0, -side * math.pi / 2)
     closed = RADIUS - SQUEEZE
     for frame, gap, height in ((1, OPEN, 0.0), (14, 0.0, 0.0), (20, 0.0, 0.0), (46, 0.0, LIFT), (60, 0.0, LIFT)):
-        pad.location = (side * (closed + gap + (SQUEEZE if frame == 1 else 0.0)), 0.0, MIDDLE + height)
-        pad.keyframe_insert("location", frame=frame)
+        apart = side * (closed + gap + (SQUEEZE if frame == 1 else 0.0))
+        scene_builder.keyframe(pad, frame, (apart, 0.0, MIDDLE + height))
     long = ROWS * PITCH + 5.0
-    back = scene_builder.box(scene, f"{name} back", (COLUMNS * PITCH + 6.0, long + 30.0, 9.0), bevel=2.2)
-    back.location, back.parent = (0.0, 14.0, -THICKNESS - 4.0), pad
-    back.data.materials.append(grey)
+    size, place = (COLUMNS * PITCH + 6.0, long + 30.0, 9.0), (0.0, 14.0, -THICKNESS - 4.0)
+    scene_builder.box(scene, f"{name} back", size, bevel=2.2, look=grey, parent=pad, location=place)

@@ -20,6 +20,7 @@ SPEED, MAX_FORCE = 0.03, 20.0  # m/s, N
 TABLE = "Table"
 HEIGHT = 60.0  # mm, of the pads' middle
 START = 10.0  # mm, between object and pads at the first frame
+STEEL = ("Steel, seen through", 0.8, 0.6)
 
 
 @dataclass(frozen=True)
@@ -37,24 +38,15 @@ class Object:
 
 
 def _sphere(scene, name):
-    made = scene_builder.ball(scene, name, 20.0)
-    made.data.materials.append(scene_builder.see_through_steel("Steel, seen through", clear=0.8, edge=0.6))
-    return made
+    return scene_builder.ball(scene, name, 20.0, look=scene_builder.see_through_steel(*STEEL))
 
 
 def _box(scene, name):
-    made = scene_builder.box(scene, name, (30.0, 44.0, 64.0), bevel=1.2)
-    made.data.materials.append(scene_builder.clear_block("Wood, seen through"))  # else it would hide the heat maps
-    made.data.materials.append(scene_builder.material("Wood", (0.55, 0.36, 0.19), roughness=0.55))
-    made.modifiers["Bevel"].material = 1
-    made.data.polygons[4].material_index = 1  # the bottom, which lies in the table's surface: both would be drawn in spots
-    return made
+    return scene_builder.wooden_box(scene, name, (30.0, 44.0, 64.0), bevel=1.2)
 
 
 def _cylinder(scene, name):
-    made = scene_builder.cylinder(scene, name, 16.0, 70.0, bevel=0.8)
-    made.data.materials.append(scene_builder.see_through_steel("Steel, seen through", clear=0.8, edge=0.6))
-    return made
+    return scene_builder.cylinder(scene, name, 16.0, 70.0, bevel=0.8, look=scene_builder.see_through_steel(*STEEL))
 
 
 OBJECTS = {
@@ -83,14 +75,10 @@ def build(scene, kind: str) -> None:
     obj = thing.make(scene, thing.name)
     obj.location = (0.0, 0.0, HEIGHT)
     obj.palpate.role, obj.palpate.body, obj.palpate.mass = "TARGET", "FREE", thing.mass
-    table = gripper.table(scene, TABLE, HEIGHT + thing.foot)
-    for frame, drop in ((1, 0.0), (TABLE_STARTS, 0.0), (TABLE_GONE, 45.0)):
-        table.location.z = HEIGHT + thing.foot - drop
-        table.keyframe_insert("location", frame=frame)
+    gripper.table(scene, TABLE, HEIGHT + thing.foot, sinks=(TABLE_STARTS, TABLE_GONE))
     scene.palpate.use_auto_dt, scene.palpate.dt = False, 5e-4
     scene.palpate.color_map = "MAGMA"
-    paper = scene_builder.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
-    scene_builder.add_stage(scene, paper, aim=(0.0, 0.0, HEIGHT), camera=(150.0, -270.0, 150.0), size=0.8)
+    scene_builder.add_stage(scene, aim=(0.0, 0.0, HEIGHT), camera=(150.0, -270.0, 150.0), size=0.8)
     scene.frame_set(scene.frame_start)
     shown = [obj, *obj.children, *fingers, *(part for pad in fingers for part in pad.children)]
     scene_builder.frame_objects(scene, shown, (0.04, 0.04, 0.96, 0.96))

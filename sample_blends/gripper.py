@@ -51,10 +51,8 @@ def finger(scene, side: int, gap: float, height: float, look: dict, room: float 
     from mathutils import Matrix
 
     name = LEFT if side < 0 else RIGHT
-    vertices, faces, texels = scene_builder.pad_mesh(ROWS, COLUMNS, PITCH, MARGIN, THICKNESS, rounding=0.8)
-    pad = scene_builder.mesh_object(scene, name, vertices, faces)
-    pad.data.materials.append(look["rubber"])
-    pad.vertex_groups.new(name="tactile").add(texels, 1.0, "REPLACE")
+    grid = (ROWS, COLUMNS, PITCH, MARGIN, THICKNESS)
+    pad = scene_builder.pad(scene, name, look["rubber"], *grid, rounding=0.8, k=K, cn=CN, sigma0=SIGMA0, sigma1=SIGMA1)
     # Columns of the rotation: the pad's own x, y and z axis in the world. The pad faces inwards, and its rows run upwards.
     inwards = -float(side)
     turn = Matrix(((0.0, 0.0, inwards), (inwards, 0.0, 0.0), (0.0, 1.0, 0.0)))
@@ -62,53 +60,23 @@ def finger(scene, side: int, gap: float, height: float, look: dict, room: float 
     pad.location = (side * gap, 0.0, height)
 
     tall = PAD_TALL + 2 * MARGIN
-    block = scene_builder.box(scene, f"{name} block", (PAD_WIDE + 2 * MARGIN + 3, tall + 34 + room, 9.0), bevel=1.6)
-    block.parent, block.location = pad, (0.0, 15.0 + 0.5 * room, -THICKNESS - 4.0)
-    block.data.materials.append(look["grey"])
-    foot = scene_builder.box(scene, f"{name} foot", (PAD_WIDE + 2 * MARGIN + 3, 14.0, 26.0), bevel=1.6)
-    foot.parent, foot.location = pad, (0.0, tall / 2 + 27.0 + room, -THICKNESS - 6.0)
-    foot.data.materials.append(look["aluminium"])
-
-    settings = pad.palpate
-    settings.role, settings.region, settings.vertex_group = "SENSOR", "GROUP", "tactile"
-    settings.k, settings.cn, settings.sigma0, settings.sigma1 = K, CN, SIGMA0, SIGMA1
+    wide = PAD_WIDE + 2 * MARGIN + 3
+    for part, kind, size, place in (
+        ("block", "grey", (wide, tall + 34 + room, 9.0), (0.0, 15.0 + 0.5 * room, -THICKNESS - 4.0)),
+        ("foot", "aluminium", (wide, 14.0, 26.0), (0.0, tall / 2 + 27.0 + room, -THICKNESS - 6.0)),
+    ):
+        scene_builder.box(scene, f"{name} {part}", size, bevel=1.6, look=look[kind], parent=pad, location=place)
     return pad
 
 
 def housing(scene, height: float, look: dict):
     """Return the gripper's body, which carries both fingers; `height` (mm) is the height of the pads' centres."""
     z = height + (PAD_TALL + 2 * MARGIN) / 2 + 27.0 + 7.0 + 21.0
-    body = scene_builder.box(scene, "Gripper", (150.0, 56.0, 42.0), bevel=4.0)
-    body.location = (0.0, 0.0, z)
-    body.data.materials.append(look["aluminium"])
-    rail = scene_builder.box(scene, "Gripper rail", (140.0, 30.0, 8.0), bevel=1.0)
-    rail.parent, rail.location = body, (0.0, 0.0, -20.0)
-    rail.data.materials.append(look["grey"])
-    flange = scene_builder.cylinder(scene, "Gripper flange", 24.0, 20.0, bevel=1.5)
-    flange.parent, flange.location = body, (0.0, 0.0, 30.0)
-    flange.data.materials.append(look["grey"])
+    body = scene_builder.box(scene, "Gripper", (150.0, 56.0, 42.0), bevel=4.0, look=look["aluminium"], location=(0.0, 0.0, z))
+    below, above = ({"look": look["grey"], "parent": body, "location": (0.0, 0.0, height)} for height in (-20.0, 30.0))
+    scene_builder.box(scene, "Gripper rail", (140.0, 30.0, 8.0), bevel=1.0, **below)
+    scene_builder.cylinder(scene, "Gripper flange", 24.0, 20.0, bevel=1.5, **above)
     return body
-
-
-def surface_of_revolution(profile, sides: int = 64):
-    """Return vertices and faces of a body of revolution about z, closed at both ends.
-
-    Parameters
-    ----------
-    profile : (m, 2) float, mm
-        Radius and height, from the bottom up; radii above zero.
-    """
-    profile = np.asarray(profile, float)
-    angle = np.arange(sides) * 2 * math.pi / sides
-    rings = [np.stack([r * np.cos(angle), r * np.sin(angle), np.full(sides, z)], axis=1) for r, z in profile]
-    faces = [
-        (j * sides + i, j * sides + (i + 1) % sides, (j + 1) * sides + (i + 1) % sides, (j + 1) * sides + i)
-        for j in range(len(profile) - 1)
-        for i in range(sides)
-    ]
-    top = (len(profile) - 1) * sides
-    faces += [tuple(range(sides - 1, -1, -1)), tuple(range(top, top + sides))]
-    return np.concatenate(rings), faces
 
 
 def spray_bottle(scene, name: str):
@@ -119,23 +87,18 @@ def spray_bottle(scene, name: str):
     body += [(24.0 - 6.5 * math.sin(math.pi * s) ** 2 - 2.0 * s, -44.0 + 78.0 * s) for s in t[1:]]
     body += [(8.0 + 14.0 * math.cos(a), 34.0 + 10.0 * math.sin(a)) for a in np.linspace(0.0, math.pi / 2, 9)[1:]]
     body += [(8.0, 52.0)]
-    vertices, faces = surface_of_revolution(body)
-    bottle = scene_builder.mesh_object(scene, name, vertices, faces)
     plastic = scene_builder.see_through_steel("Blue plastic, seen through", clear=0.75, edge=0.8)
     shader = plastic.node_tree.nodes["Principled BSDF"]
     shader.inputs["Base Color"].default_value, shader.inputs["Metallic"].default_value = (0.05, 0.22, 0.6, 1.0), 0.0
-    bottle.data.materials.append(plastic)
+    bottle = scene_builder.mesh_object(scene, name, *scene_builder.surface_of_revolution(body), plastic)
     white = scene_builder.material("White plastic", (0.8, 0.8, 0.78), roughness=0.4)
-    cap = scene_builder.cylinder(scene, f"{name} cap", 10.5, 12.0, (0.0, 0.0, 57.0), bevel=0.8)
-    head = scene_builder.box(scene, f"{name} head", (13.0, 42.0, 13.0), bevel=3.0)
-    head.location = (0.0, -9.0, 69.0)
-    trigger = scene_builder.box(scene, f"{name} trigger", (6.0, 4.0, 24.0), bevel=1.2)
-    trigger.location, trigger.rotation_euler = (0.0, -21.0, 54.0), (math.radians(-24), 0.0, 0.0)
-    nozzle = scene_builder.cylinder(scene, f"{name} nozzle", 3.4, 7.0, (0.0, -32.5, 69.0), bevel=0.5)
+    place = {"look": white, "parent": bottle}
+    scene_builder.cylinder(scene, f"{name} cap", 10.5, 12.0, bevel=0.8, location=(0.0, 0.0, 57.0), **place)
+    scene_builder.box(scene, f"{name} head", (13.0, 42.0, 13.0), bevel=3.0, location=(0.0, -9.0, 69.0), **place)
+    trigger = scene_builder.box(scene, f"{name} trigger", (6.0, 4.0, 24.0), bevel=1.2, location=(0.0, -21.0, 54.0), **place)
+    trigger.rotation_euler = (math.radians(-24), 0.0, 0.0)
+    nozzle = scene_builder.cylinder(scene, f"{name} nozzle", 3.4, 7.0, bevel=0.5, location=(0.0, -32.5, 69.0), **place)
     nozzle.rotation_euler = (math.pi / 2, 0.0, 0.0)
-    for part in (cap, head, trigger, nozzle):
-        part.parent = bottle
-        part.data.materials.append(white)
     return bottle
 
 
@@ -183,14 +146,15 @@ def mount(arm, fingers) -> None:
         pad.matrix_parent_inverse = arm.matrix_world.inverted()
 
 
-def table(scene, name: str, height: float):
-    """Return a table with its top at `height` (mm): a compliant pad that is not read out."""
-    vertices, faces, texels = scene_builder.pad_mesh(15, 15, 4.0, 8.0, 8.0, rounding=1.0)
-    made = scene_builder.mesh_object(scene, name, vertices, faces)
+def table(scene, name: str, height: float, sinks: tuple[int, int] | None = None):
+    """Return a table with its top at `height` (mm): a compliant pad that is not read out.
+
+    `sinks` are the frames between which it sinks away.
+    """
+    look = scene_builder.material("Table", (0.2, 0.21, 0.23), roughness=0.6)
+    given = {"role": "PAD", "group": "top", "k": 300.0, "cn": 6.0, "sigma0": 150.0, "sigma1": 1.5}
+    made = scene_builder.pad(scene, name, look, 15, 15, 4.0, 8.0, 8.0, rounding=1.0, **given)
     made.location = (0.0, 0.0, height)
-    made.vertex_groups.new(name="top").add(texels, 1.0, "REPLACE")
-    made.data.materials.append(scene_builder.material("Table", (0.2, 0.21, 0.23), roughness=0.6))
-    settings = made.palpate
-    settings.role, settings.region, settings.vertex_group = "PAD", "GROUP", "top"
-    settings.k, settings.cn, settings.sigma0, settings.sigma1 = 300.0, 6.0, 150.0, 1.5
+    for frame, drop in () if sinks is None else ((1, 0.0), (sinks[0], 0.0), (sinks[1], 45.0)):
+        scene_builder.keyframe(made, frame, (0.0, 0.0, height - drop))
     return made

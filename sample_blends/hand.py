@@ -40,21 +40,12 @@ def build(scene) -> None:
     """Fill `scene`, which is emptied first; the add-on's classes must be registered."""
     scene_builder.prepare(scene, FRAME_END, FPS)
     index, thumb, cylinder = bodies(scene)
-    for finger in (index, thumb):
-        settings = finger.palpate
-        settings.role, settings.region, settings.vertex_group = "SENSOR", "GROUP", "tactile"
-        settings.max_penetration = 0.006
-        settings.k, settings.cn, settings.sigma0, settings.sigma1 = K, CN, SIGMA0, SIGMA1
     gripper.drive((index, thumb), FORCE, SPEED, MAX_FORCE, ("-X", "X"))
     cylinder.palpate.role, cylinder.palpate.body, cylinder.palpate.mass = "TARGET", "FREE", MASS
-    table = gripper.table(scene, "Support", -HEIGHT / 2)
-    for frame, drop in ((1, 0.0), (TABLE_STARTS, 0.0), (TABLE_GONE, 45.0)):
-        table.location.z = -HEIGHT / 2 - drop
-        table.keyframe_insert("location", frame=frame)
+    gripper.table(scene, "Support", -HEIGHT / 2, sinks=(TABLE_STARTS, TABLE_GONE))
     scene.palpate.use_auto_dt, scene.palpate.dt = False, 5e-4
     scene.palpate.color_map = "MAGMA"
-    paper = scene_builder.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
-    scene_builder.add_stage(scene, paper, aim=(0.0, 0.0, 0.0), camera=(-150.0, -210.0, 150.0), size=0.8)
+    scene_builder.add_stage(scene, aim=(0.0, 0.0, 0.0), camera=(-150.0, -210.0, 150.0), size=0.8)
     scene.objects["Backdrop"].location.z = -90.0
     scene.frame_set(scene.frame_start)
     scene_builder.frame_objects(scene, (index, thumb, cylinder), (0.05, 0.05, 0.95, 0.95))
@@ -71,14 +62,12 @@ def bodies(scene):
         spine = np.array([(x - joints[-1][0], y, 0.0, r) for x, y, r in joints])
         tube = finger_tube.Tube(spine, inwards=(-side, 0.0, 0.0))
         vertices, faces, pad = tube.mesh(PAD_LENGTH, cut + hand_skin.OVERLAP)
-        finger = scene_builder.mesh_object(scene, name, vertices, faces)
-        finger.location = (joints[-1][0] + side * GAP, 0.0, 0.0)
-        finger.data.materials.append(skin)
-        finger.vertex_groups.new(name="tactile").add([int(i) for i in pad], 1.0, "REPLACE")
+        place = (joints[-1][0] + side * GAP, 0.0, 0.0)
+        finger = scene_builder.mesh_object(scene, name, vertices, faces, skin, location=place)
+        scene_builder.make_tactile(finger, pad, max_penetration=0.006, k=K, cn=CN, sigma0=SIGMA0, sigma1=SIGMA1)
         hand_skin.add_nail(scene, f"{name} nail", tube, finger, nail)
         fingers.append(finger)
         bones.append(tube.bones(cut) + (*finger.location, 0.0))
     hand_skin.add_hand(scene, fingers, bones, skin, nail)
-    cylinder = scene_builder.cylinder(scene, CYLINDER, RADIUS, HEIGHT, bevel=0.6)
-    cylinder.data.materials.append(scene_builder.see_through_steel("Steel, seen through", clear=0.8, edge=0.6))
-    return *fingers, cylinder
+    steel = scene_builder.see_through_steel("Steel, seen through", clear=0.8, edge=0.6)
+    return *fingers, scene_builder.cylinder(scene, CYLINDER, RADIUS, HEIGHT, bevel=0.6, look=steel)

@@ -11,6 +11,7 @@ import math
 import bpy
 import numpy as np
 
+from ..addon.display.materials import NodeAdder
 from . import hand_surface, scene_builder
 from .finger_tube import Tube
 
@@ -51,27 +52,17 @@ SLEEVE = ((-1.0, 204.0), (0.5, 196.0), (2.0, 194.5), (3.2, 196.0), (3.6, 204.0),
 
 def skin_material():
     """Return a material of skin: light goes into it, and its colour and height vary a little."""
-    made = scene_builder.material("Skin", (0.55, 0.30, 0.20), roughness=0.5)
-    nodes, links = made.node_tree.nodes, made.node_tree.links
-    shader, place = nodes["Principled BSDF"], nodes.new("ShaderNodeTexCoord")
-    for name, value in (("Subsurface Weight", 0.25), ("Subsurface Radius", (3.0, 1.0, 0.5)), ("Subsurface Scale", 1.0)):
-        shader.inputs[name].default_value = value
-
-    def noise(scale: float):
-        made = nodes.new("ShaderNodeTexNoise")
-        made.inputs["Scale"].default_value, made.inputs["Detail"].default_value = scale, 4.0
-        links.new(place.outputs["Object"], made.inputs["Vector"])
-        return made.outputs[0]
-
-    bump, ramp = nodes.new("ShaderNodeBump"), nodes.new("ShaderNodeValToRGB")
-    bump.inputs["Strength"].default_value, bump.inputs["Distance"].default_value = 0.25, 0.3
-    links.new(noise(1.6), bump.inputs["Height"])
-    links.new(bump.outputs["Normal"], shader.inputs["Normal"])
+    depth = {"Subsurface_Weight": 0.25, "Subsurface_Radius": (3.0, 1.0, 0.5), "Subsurface_Scale": 1.0}
+    made = scene_builder.material("Skin", (0.55, 0.30, 0.20), roughness=0.5, **depth)
+    add, shader = NodeAdder(made.node_tree), made.node_tree.nodes["Principled BSDF"]
+    place = add("ShaderNodeTexCoord", output="Object")
+    fine, coarse = (add("ShaderNodeTexNoise", {"Scale": scale, "Detail": 4.0, "Vector": place}) for scale in (1.6, 0.045))
+    bump = add("ShaderNodeBump", {"Strength": 0.25, "Distance": 0.3, "Height": fine}, "Normal")
+    color = add("ShaderNodeValToRGB", {"Fac": coarse}, "Color")
     colors = ((0.35, (0.47, 0.22, 0.15, 1.0)), (0.70, (0.60, 0.35, 0.25, 1.0)))
-    for element, (share, color) in zip(ramp.color_ramp.elements, colors, strict=True):
-        element.position, element.color = share, color
-    links.new(noise(0.045), ramp.inputs["Fac"])
-    links.new(ramp.outputs["Color"], shader.inputs["Base Color"])
+    for element, (share, value) in zip(color.node.color_ramp.elements, colors, strict=True):
+        element.position, element.color = share, value
+    add.feed(shader, {"Normal": bump, "Base Color": color})
     return made
 
 
@@ -94,8 +85,7 @@ def add_hand(scene, fingers, bones, skin, nail):
     """
     curled = [_curled(*row) for row in CURLED]
     vertices, faces = hand_surface.surface_net(_field(bones, curled), LOW, HIGH, CELL)
-    hand = scene_builder.mesh_object(scene, "Hand", vertices, faces)
-    hand.data.materials.append(skin)
+    hand = scene_builder.mesh_object(scene, "Hand", vertices, faces, skin)
     bpy.context.view_layer.update()
     for finger, chain in zip(fingers, bones, strict=True):
         _follow(hand, finger, _weights(vertices, chain))
@@ -103,7 +93,7 @@ def add_hand(scene, fingers, bones, skin, nail):
     smooth.levels, smooth.render_levels = 0, 1
     for name, (joints, inwards) in zip(("Middle finger", "Ring finger", "Little finger"), curled, strict=True):
         add_nail(scene, f"{name} nail", Tube(joints[-2:], inwards), hand, nail)
-    _add_sleeve(scene).parent = hand
+    _add_sleeve(scene, hand)
 
 
 def add_nail(scene, name: str, tube: Tube, parent, nail) -> None:
@@ -129,9 +119,7 @@ def add_nail(scene, name: str, tube: Tube, parent, nail) -> None:
         for i in range(len(along) - 1)
         for j in range(count - 1)
     ]
-    plate = scene_builder.mesh_object(scene, name, vertices, faces)
-    plate.parent = parent
-    plate.data.materials.append(nail)
+    scene_builder.mesh_object(scene, name, vertices, faces, nail, parent=parent)
 
 
 def _curled(knuckle, lengths, radius: float, angle: float) -> tuple[np.ndarray, np.ndarray]:
@@ -174,8 +162,8 @@ def _follow(hand, finger, weights: np.ndarray) -> None:
     hook.matrix_inverse = finger.matrix_world.inverted()
 
 
-def _add_sleeve(scene):
-    """Add the end of a sleeve around the forearm; return it."""
+def _add_sleeve(scene, hand) -> None:
+    """Add the end of a sleeve around the forearm, as a part of the hand."""
     (x0, y0, top, *_), (x1, y1, high, radius) = PALM[-2]
     low = PALM[-1][1][2]
     angle = np.arange(48) * 2 * math.pi / 48
@@ -185,12 +173,7 @@ def _add_sleeve(scene):
         wide, tall = radius + 2.5 + out, 0.5 * (high - low) + radius + 2.5 + out
         z = 0.5 * (high + low) + 1.5
         vertices += [(middle + wide * math.cos(a), y, z + tall * math.sin(a)) for a in angle]
-    faces = [
-        (j * 48 + i, (j + 1) * 48 + i, (j + 1) * 48 + (i + 1) % 48, j * 48 + (i + 1) % 48)
-        for j in range(len(SLEEVE) - 1)
-        for i in range(48)
-    ]
+    faces = [(a, d, c, b) for a, b, c, d in scene_builder.tube_faces(len(SLEEVE), 48)]
     faces.append(tuple((len(SLEEVE) - 1) * 48 + i for i in range(48)))
-    sleeve = scene_builder.mesh_object(scene, "Sleeve", vertices, faces)
-    sleeve.data.materials.append(scene_builder.material("Cloth", (0.05, 0.09, 0.16), roughness=0.9))
-    return sleeve
+    cloth = scene_builder.material("Cloth", (0.05, 0.09, 0.16), roughness=0.9)
+    scene_builder.mesh_object(scene, "Sleeve", vertices, faces, cloth, parent=hand)

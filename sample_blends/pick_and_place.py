@@ -48,19 +48,14 @@ def build(scene) -> None:
         arm.location.z = rest + above
         arm.keyframe_insert("location", frame=frame)
 
-    cube = scene_builder.box(scene, CUBE, (EDGE,) * 3, bevel=0.6)
+    cube = scene_builder.wooden_box(scene, CUBE, (EDGE,) * 3, bevel=0.6)
     cube.location = (0.0, 0.0, EDGE / 2)
-    cube.data.materials.append(scene_builder.clear_block("Wood, seen through"))  # else it would hide the heat maps
-    cube.data.materials.append(scene_builder.material("Wood", (0.55, 0.36, 0.19), roughness=0.55))
-    cube.modifiers["Bevel"].material = 1
-    cube.data.polygons[4].material_index = 1  # the bottom, which lies in the table's surface: both would be drawn in spots
     cube.palpate.role, cube.palpate.body, cube.palpate.mass = "TARGET", "FREE", MASS
     table = gripper.table(scene, TABLE, 0.0)
     scene.palpate.use_auto_dt, scene.palpate.dt = False, 5e-4
     scene.palpate.color_map = "MAGMA"
 
-    paper = scene_builder.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
-    scene_builder.add_stage(scene, paper, aim=(0.0, 0.0, 60.0), camera=(190.0, -330.0, 190.0), size=0.9)
+    scene_builder.add_stage(scene, aim=(0.0, 0.0, 60.0), camera=(190.0, -330.0, 190.0), size=0.9)
     scene.objects["Backdrop"].location.z = -8.0
     scene.frame_set(scene.frame_start)
     scene_builder.frame_objects(scene, [*fingers, arm, table], (0.04, 0.04, 0.96, 0.96), size=(720, 720))

@@ -11,6 +11,8 @@ import math
 import bpy
 import numpy as np
 
+from ..addon.display.materials import NodeAdder
+
 
 def prepare(scene, frame_end: int, fps: int = 24) -> None:
     """Empty `scene`, and set units to millimetres, the frame rate to `fps`, and a view transform that keeps colours."""
@@ -35,8 +37,8 @@ def prepare(scene, frame_end: int, fps: int = 24) -> None:
     cycles.caustics_reflective = cycles.caustics_refractive = False
 
 
-def mesh_object(scene, name: str, vertices, faces, smooth: bool = True):
-    """Return a new object of `scene` made of plain arrays."""
+def mesh_object(scene, name: str, vertices, faces, look=None, smooth: bool = True, parent=None, location=(0.0, 0.0, 0.0)):
+    """Return a new object of `scene` made of plain arrays, with a material, at a place in the frame of its parent."""
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata([tuple(map(float, v)) for v in vertices], [], [tuple(map(int, f)) for f in faces])
     mesh.validate()
@@ -44,15 +46,53 @@ def mesh_object(scene, name: str, vertices, faces, smooth: bool = True):
     mesh.update()
     obj = bpy.data.objects.new(name, mesh)
     scene.collection.objects.link(obj)
+    obj.parent, obj.location = parent, location
+    if look is not None:
+        mesh.materials.append(look)
     return obj
 
 
-def box(scene, name: str, size, bevel: float, flat_bottom: bool = False):
-    """Return a box of full `size` centred on its origin, with rounded edges; `flat_bottom` keeps the lower ones sharp."""
+def tube_faces(rings: int, sides: int, closed: bool = False) -> list[tuple[int, ...]]:
+    """Return the faces between rings of vertices, which follow one another; `closed` joins the last ring to the first."""
+    return [
+        (j * sides + i, j * sides + (i + 1) % sides, (j + 1) % rings * sides + (i + 1) % sides, (j + 1) % rings * sides + i)
+        for j in range(rings if closed else rings - 1)
+        for i in range(sides)
+    ]
+
+
+def finger_faces(rings: int, sides: int) -> list[tuple[int, ...]]:
+    """Return the faces of a tube with a flat end at its first ring, and a tip at the vertex after its last one."""
+    last, tip = (rings - 1) * sides, rings * sides
+    faces = tube_faces(rings, sides) + [(last + i, last + (i + 1) % sides, tip) for i in range(sides)]
+    return [*faces, tuple(range(sides - 1, -1, -1))]
+
+
+def surface_of_revolution(profile, sides: int = 64):
+    """Return vertices and faces of a body of revolution about z, closed at both ends.
+
+    Parameters
+    ----------
+    profile : (m, 2) float, mm
+        Radius and height, from the bottom up; radii above zero.
+    """
+    profile = np.asarray(profile, float)
+    angle = np.arange(sides) * 2 * math.pi / sides
+    rings = [np.stack([r * np.cos(angle), r * np.sin(angle), np.full(sides, z)], axis=1) for r, z in profile]
+    top = (len(profile) - 1) * sides
+    ends = [tuple(range(sides - 1, -1, -1)), tuple(range(top, top + sides))]
+    return np.concatenate(rings), tube_faces(len(profile), sides) + ends
+
+
+def box(scene, name: str, size, bevel: float, flat_bottom: bool = False, **place):
+    """Return a box of full `size` centred on its origin, with rounded edges; `flat_bottom` keeps the lower ones sharp.
+
+    `place` are further arguments of :func:`mesh_object`, here and below.
+    """
     x, y, z = (s / 2 for s in size)
     vertices = [(i, j, k) for i in (-x, x) for j in (-y, y) for k in (-z, z)]
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    obj = mesh_object(scene, name, vertices, faces)
+    obj = mesh_object(scene, name, vertices, faces, **place)
     modifier = obj.modifiers.new("Bevel", "BEVEL")
     modifier.width, modifier.segments, modifier.harden_normals = bevel, 4, True
     if flat_bottom:
@@ -63,28 +103,21 @@ def box(scene, name: str, size, bevel: float, flat_bottom: bool = False):
     return obj
 
 
-def cylinder(scene, name: str, radius: float, height: float, location=(0.0, 0.0, 0.0), bevel: float = 0.0):
+def cylinder(scene, name: str, radius: float, height: float, bevel: float = 0.0, **place):
     """Return an upright cylinder centred on its origin."""
-    n = 48
-    angle = np.arange(n) * 2 * math.pi / n
-    ring = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
-    vertices = [(*p, -height / 2) for p in ring] + [(*p, height / 2) for p in ring]
-    faces = [(i, (i + 1) % n, n + (i + 1) % n, n + i) for i in range(n)]
-    faces += [tuple(range(n - 1, -1, -1)), tuple(range(n, 2 * n))]
-    obj = mesh_object(scene, name, vertices, faces)
-    obj.location = location
+    obj = mesh_object(scene, name, *surface_of_revolution([(radius, -height / 2), (radius, height / 2)], sides=48), **place)
     modifier = obj.modifiers.new("Bevel", "BEVEL")
     modifier.width, modifier.segments, modifier.limit_method = max(bevel, 0.05), 3, "ANGLE"
     modifier.harden_normals = True
     return obj
 
 
-def ball(scene, name: str, radius: float):
+def ball(scene, name: str, radius: float, **place):
     """Return a sphere: a cube that modifiers subdivide and push onto the sphere exactly, so the file stays small."""
     x = radius / math.sqrt(3)
     vertices = [(i, j, k) for i in (-x, x) for j in (-x, x) for k in (-x, x)]
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    obj = mesh_object(scene, name, vertices, faces)
+    obj = mesh_object(scene, name, vertices, faces, **place)
     divide = obj.modifiers.new("Subdivide", "SUBSURF")
     divide.levels = divide.render_levels = 6
     cast = obj.modifiers.new("To Sphere", "CAST")
@@ -132,6 +165,30 @@ def pad_mesh(rows: int, columns: int, pitch: float, margin: float, thickness: fl
     faces.append(tuple(reversed(bottom)))
     texels = [index[i, j] for j in range(rows) for i in range(columns)]
     return np.array(vertices), faces, texels
+
+
+def pad(scene, name: str, look, *grid, rounding: float = 1.5, **settings):
+    """Return an object with the mesh of :func:`pad_mesh` of `grid`, whose texels :func:`make_tactile` gets."""
+    vertices, faces, texels = pad_mesh(*grid, rounding)
+    made = mesh_object(scene, name, vertices, faces, look)
+    make_tactile(made, texels, **settings)
+    return made
+
+
+def make_tactile(obj, vertices, role: str = "SENSOR", group: str = "tactile", **settings) -> None:
+    """Make vertices of an object the region of a sensor, as a vertex group; further settings as in ``Object.palpate``."""
+    obj.vertex_groups.new(name=group).add([int(i) for i in vertices], 1.0, "REPLACE")
+    for key, value in {"role": role, "region": "GROUP", "vertex_group": group, **settings}.items():
+        setattr(obj.palpate, key, value)
+
+
+def keyframe(obj, frame: int, location, turn=None) -> None:
+    """Put an object in its place at a frame, with an Euler rotation if one is given."""
+    obj.location = location
+    obj.keyframe_insert("location", frame=frame)
+    if turn is not None:
+        obj.rotation_euler = turn
+        obj.keyframe_insert("rotation_euler", frame=frame)
 
 
 def _ring(rows: int, columns: int, ring: int) -> list[tuple[int, int]]:
@@ -188,56 +245,26 @@ def see_through_steel(name: str, clear: float, edge: float = 1.0, groove: float 
     show the rotation of a ball.
     """
     made = material(name, STEEL, metallic=1.0, roughness=0.16)
-    nodes, links = made.node_tree.nodes, made.node_tree.links
-    shader, output = nodes["Principled BSDF"], nodes["Material Output"]
-    facing = nodes.new("ShaderNodeLayerWeight")
-    facing.inputs["Blend"].default_value = 0.35
-    solid = nodes.new("ShaderNodeMapRange")  # facing 0 (face on) → mostly clear; 1 (grazing) → solid
-    solid.inputs["From Min"].default_value, solid.inputs["From Max"].default_value = 0.0, 0.8
-    solid.inputs["To Min"].default_value, solid.inputs["To Max"].default_value = 1.0 - clear, edge
-    links.new(facing.outputs["Facing"], solid.inputs["Value"])
-    opacity = solid.outputs["Result"]
+    add, shader = NodeAdder(made.node_tree), made.node_tree.nodes["Principled BSDF"]
+    facing = add("ShaderNodeLayerWeight", {"Blend": 0.35}, "Facing")
+    # facing 0 (face on) → mostly clear; 1 (grazing) → solid
+    ends = {"From Min": 0.0, "From Max": 0.8, "To Min": 1.0 - clear, "To Max": edge}
+    opacity = add("ShaderNodeMapRange", {"Value": facing, **ends})
     if groove > 0:
-        coordinates = nodes.new("ShaderNodeTexCoord")
-        split = nodes.new("ShaderNodeSeparateXYZ")
-        links.new(coordinates.outputs["Object"], split.inputs["Vector"])
-        lines = []
-        for axis in ("X", "Y"):
-            size = nodes.new("ShaderNodeMath")
-            size.operation = "ABSOLUTE"
-            links.new(split.outputs[axis], size.inputs[0])
-            inside = nodes.new("ShaderNodeMath")
-            inside.operation = "LESS_THAN"
-            inside.inputs[1].default_value = groove
-            links.new(size.outputs[0], inside.inputs[0])
-            lines.append(inside.outputs[0])
-        either = nodes.new("ShaderNodeMath")
-        either.operation = "MAXIMUM"
-        links.new(lines[0], either.inputs[0])
-        links.new(lines[1], either.inputs[1])
-        dark = nodes.new("ShaderNodeMix")
-        dark.data_type = "RGBA"
-        links.new(either.outputs[0], dark.inputs["Factor"])
-        a, b = [s for s in dark.inputs if s.type == "RGBA"]
-        a.default_value, b.default_value = (*STEEL, 1.0), (0.03, 0.03, 0.035, 1.0)
-        links.new(next(s for s in dark.outputs if s.type == "RGBA"), shader.inputs["Base Color"])
+        split = add.end("ShaderNodeSeparateXYZ", {"Vector": add("ShaderNodeTexCoord", output="Object")})
+        lines = [add.math("LESS_THAN", add.math("ABSOLUTE", split.outputs[axis]), groove) for axis in "XY"]
+        color = add.mix(add.math("MAXIMUM", *lines), (*STEEL, 1.0), (0.03, 0.03, 0.035, 1.0))
+        add.feed(shader, {"Base Color": color})
     # Only the near side of the object is drawn, because the far side would cover the pad a second time.
-    geometry = nodes.new("ShaderNodeNewGeometry")
-    front = nodes.new("ShaderNodeMath")
-    front.operation = "SUBTRACT"
-    front.inputs[0].default_value = 1.0
-    links.new(geometry.outputs["Backfacing"], front.inputs[1])
-    visible = nodes.new("ShaderNodeMath")
-    visible.operation = "MULTIPLY"
-    links.new(opacity, visible.inputs[0])
-    links.new(front.outputs[0], visible.inputs[1])
-    clear_shader = nodes.new("ShaderNodeBsdfTransparent")
-    mix = nodes.new("ShaderNodeMixShader")
-    links.new(visible.outputs[0], mix.inputs[0])
-    links.new(clear_shader.outputs[0], mix.inputs[1])
-    links.new(shader.outputs[0], mix.inputs[2])
-    links.new(mix.outputs[0], output.inputs["Surface"])
+    front = add.math("SUBTRACT", 1.0, add("ShaderNodeNewGeometry", output="Backfacing"))
+    _show_share(made, add, add.math("MULTIPLY", opacity, front), add("ShaderNodeBsdfTransparent"), shader.outputs[0])
     return made
+
+
+def _show_share(made, add: NodeAdder, share, clear, solid) -> None:
+    """Let a share of a material's surface be solid, and the rest clear."""
+    surface = add("ShaderNodeMixShader", {0: share, 1: clear, 2: solid})
+    add.feed(made.node_tree.nodes["Material Output"], {"Surface": surface})
 
 
 def clear_block(name: str):
@@ -247,23 +274,30 @@ def clear_block(name: str):
     looks like a lid.
     """
     made = material(name, (0.8, 0.85, 0.9), roughness=0.08)
-    nodes, links = made.node_tree.nodes, made.node_tree.links
-    clear, shine = nodes.new("ShaderNodeBsdfTransparent"), nodes.new("ShaderNodeBsdfAnisotropic")
-    clear.inputs["Color"].default_value, shine.inputs["Roughness"].default_value = (0.96, 0.98, 1.0, 1.0), 0.08
-    facing, geometry = nodes.new("ShaderNodeFresnel"), nodes.new("ShaderNodeNewGeometry")
-    facing.inputs["IOR"].default_value = 1.3
-    share, mix = nodes.new("ShaderNodeMath"), nodes.new("ShaderNodeMixShader")
-    share.operation = "MULTIPLY_ADD"  # sides that face away reflect nothing
-    share.use_clamp = True
-    for node in (facing, shine):  # smooth shading bends the other normal at sharp edges, where the side would be a dark mirror
-        links.new(geometry.outputs["True Normal"], node.inputs["Normal"])
-    links.new(geometry.outputs["Backfacing"], share.inputs[0])
-    share.inputs[1].default_value = -1.0
-    links.new(facing.outputs[0], share.inputs[2])
-    links.new(share.outputs[0], mix.inputs[0])
-    links.new(clear.outputs[0], mix.inputs[1])
-    links.new(shine.outputs[0], mix.inputs[2])
-    links.new(mix.outputs[0], nodes["Material Output"].inputs["Surface"])
+    add = NodeAdder(made.node_tree)
+    side = add.end("ShaderNodeNewGeometry").outputs
+    true = {"Normal": side["True Normal"]}  # smooth shading bends the other at sharp edges, where a side would be a dark mirror
+    facing = add("ShaderNodeFresnel", {"IOR": 1.3, **true})
+    # sides that face away reflect nothing
+    sum_of = {0: side["Backfacing"], 1: -1.0, 2: facing}
+    share = add("ShaderNodeMath", sum_of, operation="MULTIPLY_ADD", use_clamp=True)
+    clear = add("ShaderNodeBsdfTransparent", {"Color": (0.96, 0.98, 1.0, 1.0)})
+    _show_share(made, add, share, clear, add("ShaderNodeBsdfAnisotropic", {"Roughness": 0.08, **true}))
+    return made
+
+
+def clear_sides(obj, name: str, color, **look) -> None:
+    """Give a box sides of :func:`clear_block`, and bevelled edges of a solid material."""
+    obj.data.materials.append(clear_block(f"{name}, seen through"))
+    obj.data.materials.append(material(name, color, **look))
+    obj.modifiers["Bevel"].material = 1
+
+
+def wooden_box(scene, name: str, size, bevel: float):
+    """Return a box of wood for a table: its sides are clear, else they would hide the heat maps."""
+    made = box(scene, name, size, bevel)
+    clear_sides(made, "Wood", (0.55, 0.36, 0.19), roughness=0.55)
+    made.data.polygons[4].material_index = 1  # the bottom, which lies in the table's surface: both would be drawn in spots
     return made
 
 
@@ -275,7 +309,8 @@ def backdrop(scene, width: float = 4000.0, front: float = -1500.0, back: float =
     profile.append((back + radius, height))
     vertices = [(x, y, z) for y, z in profile for x in (-width / 2, width / 2)]
     faces = [(2 * i, 2 * i + 1, 2 * i + 3, 2 * i + 2) for i in range(len(profile) - 1)]
-    return mesh_object(scene, "Backdrop", vertices, faces)
+    look = material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
+    return mesh_object(scene, "Backdrop", vertices, faces, look)
 
 
 def area_lamp(scene, name: str, location, target, size: float, power: float, color=(1.0, 1.0, 1.0)):
@@ -306,9 +341,9 @@ def world(scene, color=(0.9, 0.92, 1.0), strength: float = 0.35) -> None:
     scene.world = made
 
 
-def add_stage(scene, paper, aim, camera, size: float = 1.0) -> None:
+def add_stage(scene, aim, camera, size: float = 1.0) -> None:
     """Add backdrop, world, three soft lamps and a camera that points at `aim`; `size` 1 suits objects of 20 cm."""
-    backdrop(scene).data.materials.append(paper)
+    backdrop(scene)
     world(scene)
     lamps = (
         ("Key", (-320, -260, 420), 260, 1.3e6, (1.0, 0.97, 0.93)),
@@ -383,10 +418,7 @@ def add_normal_needles(scene, sensor, length: float, look, radius: float = 0.26)
     points = np.stack([*corners, foot + length * texels.normal], axis=1).reshape(-1, 3)
     first = 4 * np.arange(len(texels))
     faces = np.concatenate([np.stack([first + i, first + (i + 1) % 3, first + 3], axis=1) for i in range(3)])
-    made = mesh_object(scene, f"Normals of {sensor.name}", points, faces, smooth=False)
-    made.parent = sensor
-    made.data.materials.append(look)
-    return made
+    return mesh_object(scene, f"Normals of {sensor.name}", points, faces, look, smooth=False, parent=sensor)
 
 
 def use_constant_interpolation(obj) -> None:

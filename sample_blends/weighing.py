@@ -39,29 +39,21 @@ def weigh(scene, mass: float, tilt: float, frame_end: int = FRAME_END, fps: int 
     """Put a cube of `mass` (kg) on a pad that is tilted by `tilt` degrees about x, so along its rows."""
     scene_builder.prepare(scene, frame_end, fps)
     rubber = scene_builder.material("Rubber", (0.035, 0.036, 0.04), roughness=0.55)
-    vertices, faces, texels = scene_builder.pad_mesh(ROWS, COLUMNS, PITCH, 0.9 * PITCH + 0.6, 6.0)
-    pad = scene_builder.mesh_object(scene, PAD, vertices, faces)
-    pad.data.materials.append(rubber)
-    pad.vertex_groups.new(name="tactile").add(texels, 1.0, "REPLACE")
+    foam = {"k": K, "cn": CN, "sigma0": SIGMA0, "sigma1": SIGMA1}
+    pad = scene_builder.pad(scene, PAD, rubber, ROWS, COLUMNS, PITCH, 0.9 * PITCH + 0.6, 6.0, **foam)
     turn = math.radians(tilt)
     pad.location, pad.rotation_euler = (0.0, 0.0, HEIGHT), (turn, 0.0, 0.0)
 
     cube = scene_builder.box(scene, CUBE, (EDGE,) * 3, bevel=1.2, flat_bottom=True)
-    cube.data.materials.append(scene_builder.clear_block("Steel, seen through"))
-    cube.data.materials.append(scene_builder.material("Steel", scene_builder.STEEL, metallic=1.0, roughness=0.16))
-    cube.modifiers["Bevel"].material = 1
+    scene_builder.clear_sides(cube, "Steel", scene_builder.STEEL, metallic=1.0, roughness=0.16)
     up = EDGE / 2 + 0.1
     cube.location = (0.0, -up * math.sin(turn), HEIGHT + up * math.cos(turn))
     cube.rotation_euler = (turn, 0.0, 0.0)
 
-    pad.palpate.role, pad.palpate.region, pad.palpate.vertex_group = "SENSOR", "GROUP", "tactile"
-    pad.palpate.k, pad.palpate.cn = K, CN
-    pad.palpate.sigma0, pad.palpate.sigma1 = SIGMA0, SIGMA1
     cube.palpate.role, cube.palpate.body, cube.palpate.mass = "TARGET", "FREE", mass
     scene.palpate.use_auto_dt, scene.palpate.dt = False, 1e-4  # the paper's step
     scene.palpate.color_map = "MAGMA"
 
-    paper = scene_builder.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
-    scene_builder.add_stage(scene, paper, aim=(0.0, 0.0, 25.0), camera=(190.0, -170.0, 110.0), size=0.5)
+    scene_builder.add_stage(scene, aim=(0.0, 0.0, 25.0), camera=(190.0, -170.0, 110.0), size=0.5)
     scene_builder.frame_objects(scene, (pad, cube))
     scene_builder.open_at(scene, pad, min(24, frame_end))
