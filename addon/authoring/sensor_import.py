@@ -119,8 +119,7 @@ def _keep_normals(obj, item) -> None:
     own = vertex_normals(TriangleMesh(np.asarray(item.position, float), np.asarray(item.faces)))
     angle = np.degrees(np.arccos(np.clip(np.einsum("ij,ij->i", own, item.normal), -1.0, 1.0)).max())
     if not angle <= SAME_NORMAL:
-        attribute = obj.data.attributes.new(STATED_NORMAL, "FLOAT_VECTOR", "POINT")
-        attribute.data.foreach_set("vector", np.asarray(item.normal, np.float32).ravel())
+        mesh_arrays.store(obj.data, STATED_NORMAL, np.asarray(item.normal))
 
 
 def _read_gentact(context, path) -> list:

@@ -137,9 +137,8 @@ def _region(obj, source: str) -> tuple[np.ndarray, dict]:
         material = obj.active_material
         if material is None:
             raise SensorError(f"'{obj.name}' has no active material: give the sensor's faces one in the Material tab.")
-        index = np.empty(len(obj.data.polygons), dtype=np.int32)
-        obj.data.polygons.foreach_get("material_index", index)
-        chosen = sensor_regions.vertices_of_faces(obj.data, index == obj.active_material_index)
+        faces = mesh_arrays.face_numbers(obj.data, "material_index") == obj.active_material_index
+        chosen = sensor_regions.vertices_of_faces(obj.data, faces)
         return chosen, {"region": source, "material": material.name}
     if source == "FACE_SET":
         sets, active = sensor_regions.face_sets(obj.data), obj.data.polygons.active

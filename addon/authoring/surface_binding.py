@@ -103,10 +103,9 @@ def _store_bound_positions(context, sensor, carrier) -> None:
     axes = np.stack([along, np.cross(normal, along), normal], axis=1)
     offset = np.einsum("nij,nj->ni", axes, points - foot)
     for name, values in zip(CORNER_ATTRIBUTES, corners.T, strict=True):
-        sensor.data.attributes.new(name, "INT", "POINT").data.foreach_set("value", values.astype(np.int32))
+        mesh_arrays.store(sensor.data, name, values, kind="INT")
     for name, table in ((WEIGHTS, weights), (OFFSET, offset)):
-        attribute = sensor.data.attributes.new(name, "FLOAT_VECTOR", "POINT")
-        attribute.data.foreach_set("vector", table.astype(np.float32).ravel())
+        mesh_arrays.store(sensor.data, name, table)
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
@@ -191,7 +190,7 @@ def transfer_painted_values(sensor, before: PaintedMesh) -> None:
             if weight > 1e-6:
                 group.add([vertex], weight, "REPLACE")
     for name, values in before.attributes.items():
-        sensor.data.attributes.new(name, "FLOAT", "POINT").data.foreach_set("value", interpolated(values))
+        mesh_arrays.store(sensor.data, name, interpolated(values), kind="FLOAT")
 
 
 def _attribute_values(attribute) -> np.ndarray:

@@ -48,7 +48,7 @@ def apply(sensor: BakedSensor, image, scale: Scale) -> None:
         if uv is not None:
             pictures = _pictures(sensor, scale)
             column, _ = _table_attributes(uid)
-            played_table.store_vectors(mesh, column, texels.vertex, np.column_stack([uv, np.zeros(len(uv))]))
+            mesh_arrays.store(mesh, column, np.column_stack([uv, np.zeros(len(uv))]), texels.vertex)
             value = pictures.place(add, add.attribute(column))
             image, mapping = pictures.image, materials.ImageMapping(attribute)
         elif is_in_image:
@@ -134,27 +134,21 @@ def _write_uv(mesh, texels: Texels, uv: np.ndarray) -> None:
 
 
 def _store_texel_uv(mesh, texels: Texels) -> None:
-    attribute = mesh.attributes.get(materials.TEXEL_UV) or mesh.attributes.new(materials.TEXEL_UV, "FLOAT_VECTOR", "POINT")
-    table = np.zeros((len(mesh.vertices), 3), dtype=np.float32)
-    table[texels.vertex, :2] = texels.layout.uv()
-    attribute.data.foreach_set("vector", table.ravel())
+    uv = np.column_stack([texels.layout.uv(), np.zeros(len(texels))])
+    mesh_arrays.store(mesh, materials.TEXEL_UV, uv, texels.vertex)
 
 
 def region_faces(mesh, texels: Texels) -> np.ndarray:
     """(nf,) bool: faces whose corners are all texels."""
     inside = np.zeros(len(mesh.vertices), dtype=bool)
     inside[texels.vertex] = True
-    start = np.empty(len(mesh.polygons), dtype=np.int32)
-    mesh.polygons.foreach_get("loop_start", start)
-    return np.logical_and.reduceat(inside[mesh_arrays.corner_vertices(mesh)], start)
+    return np.logical_and.reduceat(inside[mesh_arrays.corner_vertices(mesh)], mesh_arrays.face_numbers(mesh, "loop_start"))
 
 
 def _assign(obj, texels: Texels, material) -> None:
     """Assign the material to the region's faces, in a slot of the object, because its mesh may have other users."""
     mesh = obj.data
-    count = len(mesh.polygons)
-    index = np.empty(count, dtype=np.int32)
-    mesh.polygons.foreach_get("material_index", index)
+    index = mesh_arrays.face_numbers(mesh, "material_index")
     faces = region_faces(mesh, texels)
     old = mesh.attributes.get(OLD_MATERIAL)
     if old is None:
@@ -203,9 +197,8 @@ def _unassign(obj) -> None:
         obj.material_slots[slot].link = "DATA"
     if _slot_of(mesh) is not None:
         return
-    count = len(mesh.polygons)
-    index, old = np.empty(count, dtype=np.int32), np.zeros(count, dtype=np.int32)
-    mesh.polygons.foreach_get("material_index", index)
+    index = mesh_arrays.face_numbers(mesh, "material_index")
+    old = np.zeros_like(index)
     if attribute is not None:  # Remesh and similar tools remove the attribute
         attribute.data.foreach_get("value", old)
         mesh.attributes.remove(attribute)

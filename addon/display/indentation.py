@@ -77,7 +77,7 @@ def _apply(sensor: BakedSensor, touched: np.ndarray, factor: float) -> None:
     vertices, mark = sensor.texels.vertex[touched], f"{uid}:{MARK}"
     inward_name, *attributes = _attributes(uid)
     inward = -sensor.texels.normal[touched] @ np.linalg.inv(_body_from_object(sensor)).T
-    played_table.store_vectors(obj.data, inward_name, vertices, inward)
+    mesh_arrays.store(obj.data, inward_name, inward, vertices)
     step = played_table.frame_step(len(sensor.frames), len(vertices))
     depth = np.maximum(sensor.readings.depth[::step][:, touched], 0.0)
     play = PlayedTable.packed(mark, f"Palpate {obj.name} depth", obj.data, vertices, depth, sensor.frames, attributes)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ..scene import mesh_arrays
 from . import materials
 
 MOST_PIXELS = 4_000_000
@@ -57,8 +58,8 @@ class PlayedTable:
             pixels[:, : own.shape[1], channel] = own
         image = _packed_image(mark, name, pixels)
         place = np.arange(len(vertices))
-        store_vectors(mesh, attributes[0], vertices, np.outer((place // 3 + 0.5) / width, (1.0, 0.0, 0.0)))
-        store_vectors(mesh, attributes[1], vertices, np.eye(3)[place % 3])
+        mesh_arrays.store(mesh, attributes[0], np.outer((place // 3 + 0.5) / width, (1.0, 0.0, 0.0)), vertices)
+        mesh_arrays.store(mesh, attributes[1], np.eye(3)[place % 3], vertices)
         return cls(image, int(frames[0]), int(frames[-1]), frame_step(len(frames), len(vertices)), *attributes)
 
     def lookup(self, add):
@@ -130,10 +131,3 @@ def _frame(add, first: int, last: int):
 def frame_step(frames: int, vertices: int) -> int:
     """Return the least distance of kept frames at which the image has no more than :data:`MOST_PIXELS`."""
     return max(1, -(-frames * -(-vertices // 3) // MOST_PIXELS))
-
-
-def store_vectors(mesh, name: str, vertices: np.ndarray, values: np.ndarray) -> None:
-    """Give a mesh a vector attribute with values at some vertices and zero at the others."""
-    table = np.zeros((len(mesh.vertices), 3), dtype=np.float32)
-    table[vertices] = values
-    mesh.attributes.new(name, "FLOAT_VECTOR", "POINT").data.foreach_set("vector", table.ravel())

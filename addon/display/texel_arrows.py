@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ..scene import mesh_arrays
 from ..scene.stored_names import ARROWS_MODIFIER
 from ..session import transforms
 from . import marker_meshes, markers, materials
@@ -77,8 +78,7 @@ def _points(sensor: BakedSensor, name: str):
     for key, table in (
         (materials.TEXEL_UV, uv), (NORMAL, texels.normal), (X_AXIS, texels.tangent), (Y_AXIS, texels.bitangent)
     ):  # fmt: skip
-        attribute = mesh.attributes.new(key, "FLOAT_VECTOR", "POINT")
-        attribute.data.foreach_set("vector", table.astype(np.float32).ravel())
+        mesh_arrays.store(mesh, key, table)
     mesh.update()
     return mesh
 

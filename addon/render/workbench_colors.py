@@ -75,9 +75,7 @@ def workbench_colors(folders: dict, bake: Bake, style: FigureStyle) -> Iterator[
 def _in_material_colours(obj) -> np.ndarray:
     """Give an object a copy of its mesh with a colour at each corner; return the colours, (nc, 4) float32."""
     obj.data = mesh = obj.data.copy()
-    sides, material = np.empty(len(mesh.polygons), dtype=np.int32), np.empty(len(mesh.polygons), dtype=np.int32)
-    mesh.polygons.foreach_get("loop_total", sides)
-    mesh.polygons.foreach_get("material_index", material)
+    sides, material = (mesh_arrays.face_numbers(mesh, name) for name in ("loop_total", "material_index"))
     slots = [DEFAULT_COLOR if slot.material is None else tuple(slot.material.diffuse_color) for slot in obj.material_slots] or [
         DEFAULT_COLOR
     ]
@@ -113,8 +111,7 @@ def _opacity(material) -> float:
 
 def _corners_of_region(mesh, texels: Texels) -> tuple[np.ndarray, np.ndarray]:
     """Return the corners of the faces in a sensor's region, and the texel at each of these corners."""
-    corner, sides = mesh_arrays.corner_vertices(mesh), np.empty(len(mesh.polygons), dtype=np.int32)
-    mesh.polygons.foreach_get("loop_total", sides)
+    corner, sides = mesh_arrays.corner_vertices(mesh), mesh_arrays.face_numbers(mesh, "loop_total")
     number = np.full(len(mesh.vertices), -1)
     number[texels.vertex] = np.arange(len(texels))
     (chosen,) = np.nonzero(np.repeat(heat_map.region_faces(mesh, texels), sides))

@@ -54,15 +54,13 @@ def _undo_indentation(mesh, base) -> None:
     """Give an indented mesh the vertices and faces of the object's own mesh, and the places that these had before."""
     rest = np.empty(3 * len(mesh.vertices), dtype=np.float32)
     mesh.attributes[REST_POSITION].data.foreach_get("vector", rest)
-    starts = np.empty(len(base.polygons), dtype=np.int32)
-    base.polygons.foreach_get("loop_start", starts)
     mesh.clear_geometry()
     mesh.vertices.add(len(base.vertices))
     mesh.vertices.foreach_set("co", rest[: 3 * len(base.vertices)])
     mesh.loops.add(len(base.loops))
     mesh.loops.foreach_set("vertex_index", corner_vertices(base))
     mesh.polygons.add(len(base.polygons))
-    mesh.polygons.foreach_set("loop_start", starts)
+    mesh.polygons.foreach_set("loop_start", face_numbers(base, "loop_start"))
     mesh.update(calc_edges=True)
 
 
@@ -71,11 +69,8 @@ def read_arrays(mesh) -> MeshArrays:
     mesh.calc_loop_triangles()
     triangles = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
     mesh.loop_triangles.foreach_get("vertices", triangles)
-    corner_counts = np.empty(len(mesh.polygons), dtype=np.int32)
-    first_corners = np.empty(len(mesh.polygons), dtype=np.int32)
-    mesh.polygons.foreach_get("loop_total", corner_counts)
-    mesh.polygons.foreach_get("loop_start", first_corners)
-    quads = corner_vertices(mesh)[first_corners[corner_counts == 4, None] + np.arange(4)]
+    first_corners = face_numbers(mesh, "loop_start")[face_numbers(mesh, "loop_total") == 4]
+    quads = corner_vertices(mesh)[first_corners[:, None] + np.arange(4)]
     return MeshArrays(vertices(mesh), triangles.reshape(-1, 3).astype(np.int64), quads.astype(np.int64))
 
 
@@ -107,6 +102,24 @@ def corner_vertices(mesh) -> np.ndarray:
     else:
         attribute.data.foreach_get("value", found)
     return found
+
+
+def face_numbers(mesh, name: str) -> np.ndarray:
+    """Return a property of the faces, as ``material_index``, (nf,) int32."""
+    found = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.polygons.foreach_get(name, found)
+    return found
+
+
+def store(mesh, name: str, values: np.ndarray, vertices: np.ndarray | None = None, kind: str = "FLOAT_VECTOR") -> None:
+    """Give the vertices of a mesh an attribute; with `vertices` the values are those of these, and the others have zero."""
+    table = values
+    if vertices is not None:
+        table = np.zeros((len(mesh.vertices), *values.shape[1:]), dtype=np.float32)
+        table[vertices] = values
+    attribute = mesh.attributes.get(name) or mesh.attributes.new(name, kind, "POINT")
+    key = "vector" if kind == "FLOAT_VECTOR" else "value"
+    attribute.data.foreach_set(key, table.astype(np.int32 if kind == "INT" else np.float32).ravel())
 
 
 def point_vectors(mesh, name: str) -> np.ndarray | None:

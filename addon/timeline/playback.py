@@ -14,7 +14,7 @@ from ...core.errors import PalpateError
 from ...core.jobs import Progress
 from ..display import baked_scene, overlays
 from ..properties import object_properties
-from ..scene import moved_bodies, participants, scene_fingerprint, stored_names
+from ..scene import mesh_arrays, moved_bodies, participants, scene_fingerprint, stored_names
 from ..session import fcurves, first_use, frame_status, session_state
 from . import baked_frames, live_cache
 
@@ -272,10 +272,7 @@ def _write_force(obj, vertex: np.ndarray, force: np.ndarray) -> None:
     mesh = obj.data
     if obj.mode == "EDIT" or not mesh.is_editable:
         return
-    attribute = mesh.attributes.get(stored_names.FORCE) or mesh.attributes.new(stored_names.FORCE, "FLOAT", "POINT")
-    values = np.zeros(len(mesh.vertices), dtype=np.float32)
-    values[vertex] = force
-    attribute.data.foreach_set("value", values)
+    mesh_arrays.store(mesh, stored_names.FORCE, force, vertex, "FLOAT")
     mesh.update_tag()
 
 
