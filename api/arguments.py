@@ -13,6 +13,7 @@ import numpy as np
 from ..core.errors import ArgumentError, suggestion
 from ..core.geometry.mesh import TriangleMesh, checked_mesh
 from ..core.model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters, with_dependent_defaults
+from ..core.simulators.sensor_on_mesh import SensorOnMesh
 
 LARGEST_SENSOR, LARGEST_BODY = 5.0, 10.0
 """Metres. Larger values were almost certainly given in millimetres."""
@@ -122,6 +123,13 @@ def size_checked(points: np.ndarray, largest: float, argument: str, what: str) -
         )
     if len(points) > 1 and span < SMALLEST:
         raise ArgumentError(f"{argument} makes {what} only {span:.3g} m large: lengths are in metres.")
+
+
+def sensor_on_mesh(value: Any) -> SensorOnMesh:
+    """Return a sensor, of a file or made here."""
+    if not isinstance(value, SensorOnMesh):
+        raise ArgumentError(f"sensor is {brief(value)}: give a Sensor.")
+    return value
 
 
 def name_from(value: Any, name: str | None, otherwise: str) -> str:

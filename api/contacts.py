@@ -7,7 +7,6 @@ from ..core.simulators import contact_translation
 from ..core.simulators.contact_translation import CONTACTS, REFERENCE_MASS, MujocoContact, NewtonContact
 from ..core.simulators.sensor_on_mesh import SensorOnMesh
 from . import arguments
-from .arguments import ArgumentError
 
 
 def mujoco_contact(
@@ -37,7 +36,9 @@ def mujoco_contact(
         An argument has a wrong type or value.
     """
     number = arguments.number(mass, "mass", above_zero=True)
-    return contact_translation.mujoco_contact(_checked(sensor), _depth(depth), number, arguments.count(contacts, "contacts"))
+    return contact_translation.mujoco_contact(
+        arguments.sensor_on_mesh(sensor), _depth(depth), number, arguments.count(contacts, "contacts")
+    )
 
 
 def newton_contact(sensor: SensorOnMesh, depth: float | None = None) -> NewtonContact:
@@ -60,13 +61,7 @@ def newton_contact(sensor: SensorOnMesh, depth: float | None = None) -> NewtonCo
     PalpateError
         An argument has a wrong type or value.
     """
-    return contact_translation.newton_contact(_checked(sensor), _depth(depth))
-
-
-def _checked(sensor: SensorOnMesh) -> SensorOnMesh:
-    if not isinstance(sensor, SensorOnMesh):
-        raise ArgumentError(f"sensor is {arguments.brief(sensor)}: give a Sensor.")
-    return sensor
+    return contact_translation.newton_contact(arguments.sensor_on_mesh(sensor), _depth(depth))
 
 
 def _depth(depth: float | None) -> float | None:

@@ -49,12 +49,9 @@ class PressedSensor(pressed_sensor.PressedSensor):
         sensor_pose: Pose | None = None,
         target_pose: Pose | None = None,
     ):
-        if not isinstance(sensor, SensorOnMesh):
-            raise ArgumentError(f"sensor is {arguments.brief(sensor)}: give a Sensor.")
+        arguments.sensor_on_mesh(sensor)
         prepare_solver()
-        surface = (target.shape or target.mesh) if isinstance(target, Body) else target
-        if not isinstance(surface, TriangleMesh | Shape):
-            raise ArgumentError(f"target is {arguments.brief(target)}: give a Body.")
+        surface = _surface(target)
         step = arguments.number(dt, "dt", above_zero=True)
         if sensor_pose is None and target_pose is not None:
             sensor_pose = sensor.world_pose() if isinstance(sensor, Sensor) else (sensor.position, sensor.quaternion)
@@ -95,11 +92,16 @@ class PressedSensors(pressed_sensors.PressedSensors):
         threads: int | None = None,
         parameters: Columns | None = None,
     ):
-        if not isinstance(sensor, SensorOnMesh):
-            raise ArgumentError(f"sensor is {arguments.brief(sensor)}: give a Sensor.")
-        surface = (target.shape or target.mesh) if isinstance(target, Body) else target
-        if not isinstance(surface, TriangleMesh | Shape):
-            raise ArgumentError(f"target is {arguments.brief(target)}: give a Body.")
+        arguments.sensor_on_mesh(sensor)
+        surface = _surface(target)
         count = arguments.count(environments, "environments")
         prepare_solver()
         super().__init__(sensor, surface, dt, count, threads, parameters)
+
+
+def _surface(target: Body | TriangleMesh | Shape) -> TriangleMesh | Shape:
+    """Return what presses on a sensor: in closed form where there is one."""
+    surface = (target.shape or target.mesh) if isinstance(target, Body) else target
+    if not isinstance(surface, TriangleMesh | Shape):
+        raise ArgumentError(f"target is {arguments.brief(target)}: give a Body.")
+    return surface

@@ -46,7 +46,7 @@ class ModalJob(support.PalpateOperator):
         manager.progress_begin(0.0, 1.0)
         manager.modal_handler_add(self)
         session_state.session.jobs[type(self).__name__] = self._running.progress
-        redraw_panels(context)
+        session_state.redraw_views()
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
@@ -78,7 +78,7 @@ class ModalJob(support.PalpateOperator):
         progress = session_state.session.jobs[type(self).__name__] = self._running.progress
         context.window_manager.progress_update(progress.share)
         context.workspace.status_text_set(f"{progress.text}, {progress.share:.0%}    ESC: stop")
-        redraw_panels(context)
+        session_state.redraw_views()
         return {"RUNNING_MODAL"}
 
     def cancel(self, context):
@@ -93,11 +93,4 @@ class ModalJob(support.PalpateOperator):
         context.window_manager.event_timer_remove(self._timer)
         context.window_manager.progress_end()
         context.workspace.status_text_set(None)
-        redraw_panels(context)
-
-
-def redraw_panels(context):
-    """Redraw the areas that show the progress."""
-    for area in context.screen.areas:
-        if area.type in {"PROPERTIES", "VIEW_3D"}:
-            area.tag_redraw()
+        session_state.redraw_views()

@@ -123,10 +123,7 @@ def _work() -> float | None:
             fresh_report(obj, scene)
     _requested.difference_update(wanted)
     _last_duration = time.perf_counter() - start
-    for window in manager.windows:
-        for area in window.screen.areas:
-            if area.type in {"VIEW_3D", "PROPERTIES"}:
-                area.tag_redraw()
+    session_state.redraw_views()
     return DELAY if _requested else None
 
 

@@ -115,17 +115,15 @@ def show_bake(scene, found: Bake) -> Job[None]:
     PalpateError
         The bake is not of this scene as it is now, it has no images, or the scene cannot show it.
     """
+    from ..display import bake_identity
+
     manifest = next(iter(found.manifests.values()))
     place = next(iter(found.folders.values())).parent
     sensors = {obj.name: obj for obj in scene.objects if obj.palpate.role == "SENSOR"}
-    for name, own in found.manifests.items():
+    for name in found.manifests:
         if name not in sensors:
             raise SceneError(f"The bake in '{place}' has a sensor '{name}', which '{scene.name}' has not: choose another.")
-        if not own.has_images:
-            raise SceneError(
-                f"The bake of sensor '{name}' in '{found.folders[name]}' has no tactile images, which the scene would show: "
-                "bake again with images."
-            )
+    bake_identity.require_images(found)
     if missing := [name for name in manifest.sensors if name not in found.manifests]:
         raise SceneError(f"The bake in '{place}' also has the sensor '{missing[0]}': give the folder of the whole bake.")
     with session_state.suspended():

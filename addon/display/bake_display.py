@@ -155,12 +155,7 @@ def refresh(scene, places: dict) -> None:
     bake_identity.require_own_bake(scene)
     bake: Bake = read_sensors(list(places.values()))
     names = {place: name for name, place in bake.folders.items()}
-    for name, manifest in bake.manifests.items():
-        if not manifest.has_images:
-            raise SceneError(
-                f"The bake of sensor '{name}' in '{bake.folders[name]}' has no tactile images, which the scene would show: "
-                "bake again with images."
-            )
+    bake_identity.require_images(bake)
     recording = bake.recording
     baked_sensors = []
     for obj, place in places.items():

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from ...core.errors import FileError, SceneError
 from ...core.io.bake_folder import MANIFEST_NAME, Manifest, read_manifest
+from ...core.io.bake_reader import Bake
 from . import baked_scene
 
 _manifests: dict[Path, tuple[tuple[int, ...], Manifest | None]] = {}
@@ -42,6 +43,16 @@ def require_own_bake(scene) -> None:
     text = other_bake(scene)
     if text:
         raise SceneError(text)
+
+
+def require_images(bake: Bake) -> None:
+    """Raise SceneError if a bake has no tactile images, which a scene would show."""
+    for name, manifest in bake.manifests.items():
+        if not manifest.has_images:
+            raise SceneError(
+                f"The bake of sensor '{name}' in '{bake.folders[name]}' has no tactile images, which the scene would show: "
+                "bake again with images."
+            )
 
 
 def manifest_stamp(folder: Path) -> tuple[int, ...]:

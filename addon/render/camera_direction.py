@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import bpy
@@ -122,15 +122,18 @@ def _size(scene, corners: np.ndarray, view: tuple[float, float]) -> float:
 
 def first_object(scene, depsgraph, start, way):
     """Return the first object on a ray that is neither a target, with what hangs on it, nor what a bake adds; None if none."""
-    place, way = Vector(start), Vector(way).normalized()
+    seen = _objects_on_ray(scene, depsgraph, Vector(start), Vector(way).normalized())
+    return next((obj for obj in seen if obj is None or _kind(obj) == "OTHER"), None)
+
+
+def _objects_on_ray(scene, depsgraph, place: Vector, way: Vector) -> Iterator:
+    """Yield the objects that a ray meets, one after the other and :data:`MOST_HITS` at most; None where it meets no more."""
     for _ in range(MOST_HITS):
         hit, where, _, _, obj, _ = scene.ray_cast(depsgraph, place, way)
+        yield obj.original if hit else None
         if not hit:
-            return None
-        if _kind(obj.original) == "OTHER":
-            return obj.original
+            return
         place = where + 1e-4 * max(obj.dimensions) * way
-    return None
 
 
 def _share_seen(scene, sight: _Sight, towards: np.ndarray, see_through: bool) -> float:
@@ -155,17 +158,15 @@ def _share_seen(scene, sight: _Sight, towards: np.ndarray, see_through: bool) ->
 
 def _clearness(scene, depsgraph, start: np.ndarray, towards: np.ndarray, see_through: bool) -> float:
     """Return 1 for a free line of sight, less for one through targets, and 0 for one that something blocks."""
-    clear, place, way = 1.0, Vector(start), Vector(towards)
-    for _ in range(MOST_HITS):
-        hit, where, _, _, obj, _ = scene.ray_cast(depsgraph, place, way)
-        if not hit:
+    clear = 1.0
+    for obj in _objects_on_ray(scene, depsgraph, Vector(start), Vector(towards)):
+        if obj is None:
             return clear
-        kind = _kind(obj.original)
+        kind = _kind(obj)
         if kind == "TARGET" and see_through:
             clear = TARGET_SHARE
         elif kind != "MARKER":
             return 0.0
-        place = where + 1e-4 * max(obj.dimensions) * way
     return 0.0
 
 
