@@ -107,20 +107,12 @@ def mujoco_warp_step(shape: str, tactile: bool) -> Callable[[], None]:
     import mujoco
     import mujoco_warp
 
-    rows, columns = solver.GRIDS[84]
-    pitch = solver.SIDE / (max(rows, columns) - 1)
-    x, y, half = (columns - 1) * pitch / 2, (rows - 1) * pitch / 2, solver.CUBE / 2
+    half = solver.CUBE / 2
     geom, height = (f'type="box" size="{half} {half} {half}"', half)
     if shape == "sphere":
         geom, height = f'type="sphere" size="{solver.BALL}"', solver.BALL
-    sensor = '<sensor><tactile geom="pad" mesh="pad"/></sensor>' if tactile else ""
-    model = mujoco.MjModel.from_xml_string(
-        f"""<mujoco><option timestep="0.001"/>
-        <asset><mesh name="pad" builtin="plate" params="{columns} {rows}" scale="{x} {y} 0.001"/></asset>
-        <worldbody><body><geom name="pad" type="mesh" mesh="pad" quat="0 1 0 0" contype="0" conaffinity="0"/>
-        <geom type="box" size="{x} {y} 0.005" pos="0 0 -0.005"/></body>
-        <body pos="0 0 {height}"><freejoint/><geom {geom} mass="1"/></body></worldbody>{sensor}</mujoco>"""
-    )
+    body = f'<body pos="0 0 {height}"><freejoint/><geom {geom} mass="1"/></body>'
+    model = solver.mujoco_pad(84, body, tactile=tactile)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     on_device = mujoco_warp.put_model(model), mujoco_warp.put_data(model, data, nworld=ENVIRONMENTS)

@@ -111,30 +111,34 @@ def _bytes(part: object) -> int:
     return part.nbytes if isinstance(part, np.ndarray) else sum(map(_bytes, part)) if isinstance(part, tuple) else 0
 
 
-def mujoco_model(texels: int, solid: trimesh.Trimesh, slope: float = 0.0, gap: float = 0.0):
-    """Return MuJoCo's model of the same, with its tactile sensor and at its usual step of 1 ms."""
+def mujoco_pad(texels: int, body: str, asset: str = "", option: str = "", more: str = "", tactile: bool = True):
+    """Return MuJoCo's model of the pad at its usual step of 1 ms, with its tactile sensor, below a body; both are MJCF."""
     import mujoco
 
     rows, columns = GRIDS[texels]
     pitch = SIDE / (max(rows, columns) - 1)
     half_x, half_y = (columns - 1) * pitch / 2, (rows - 1) * pitch / 2
+    sensor = '<sensor><tactile geom="pad" mesh="pad"/></sensor>' if tactile else ""
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option timestep="0.001" {option}/>
+        <asset><mesh name="pad" builtin="plate" params="{columns} {rows}" scale="{half_x} {half_y} 0.001"/>{asset}</asset>
+        <worldbody><body><geom name="pad" type="mesh" mesh="pad" quat="0 1 0 0" contype="0" conaffinity="0"/>
+        <geom type="box" size="{half_x} {half_y} 0.005" pos="0 0 -0.005"/></body>{body}</worldbody>{more}{sensor}</mujoco>"""
+    )
+    if tactile and model.nsensordata != 3 * texels:
+        raise RuntimeError(f"MuJoCo has {model.nsensordata // 3} texels instead of {texels}")
+    return model
+
+
+def mujoco_model(texels: int, solid: trimesh.Trimesh, slope: float = 0.0, gap: float = 0.0):
+    """Return MuJoCo's model of the same."""
+    body = f"""<body pos="0 0 {CUBE / 2 + gap}"><freejoint/><geom type="mesh" mesh="cube" mass="1"/>
+        <geom type="sdf" mesh="cube" contype="0" conaffinity="0" mass="0"/></body>"""
     pull = " ".join(map(str, gravity(slope)))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "cube.obj"
         solid.export(path)
-        model = mujoco.MjModel.from_xml_string(
-            f"""<mujoco><option timestep="0.001" gravity="{pull}"/>
-            <asset><mesh name="pad" builtin="plate" params="{columns} {rows}" scale="{half_x} {half_y} 0.001"/>
-            <mesh name="cube" file="{path}"/></asset>
-            <worldbody><body><geom name="pad" type="mesh" mesh="pad" quat="0 1 0 0" contype="0" conaffinity="0"/>
-            <geom type="box" size="{half_x} {half_y} 0.005" pos="0 0 -0.005"/></body>
-            <body pos="0 0 {CUBE / 2 + gap}"><freejoint/><geom type="mesh" mesh="cube" mass="1"/>
-            <geom type="sdf" mesh="cube" contype="0" conaffinity="0" mass="0"/></body></worldbody>
-            <sensor><tactile geom="pad" mesh="pad"/></sensor></mujoco>"""
-        )
-    if model.nsensordata != 3 * texels:
-        raise RuntimeError(f"MuJoCo has {model.nsensordata // 3} texels instead of {texels}")
-    return model
+        return mujoco_pad(texels, body, f'<mesh name="cube" file="{path}"/>', f'gravity="{pull}"')
 
 
 def mujoco_step(texels: int, solid: trimesh.Trimesh) -> Callable[[], float]:

@@ -43,7 +43,7 @@ from palpate.sweep.report import write_report
 from palpate.sweep.study_folder import OpenStudy, begin_study
 from palpate.sweep.worker import compute_batch
 
-from .solver import GRIDS, pad
+from .solver import GRIDS, mujoco_pad, pad
 
 RADIUS = 0.006
 """Of the ball, m."""
@@ -57,8 +57,6 @@ STUDIES = {"presses": (0.55, 84, 200), "long": (19.9, 1024, 5)}
 ROUNDS = 5
 STIFFNESS = 1000.0
 """Of a texel, N/m."""
-STEP = 1e-3
-"""MuJoCo's usual step, s."""
 FEW, MANY = 1_000, int(os.environ.get("PALPATE_BENCH_RUNS", "20000"))
 """Runs of the studies whose memory is compared."""
 
@@ -140,24 +138,14 @@ def mujoco_rollout(seconds: float, texels: int) -> tuple[Callable[[range], None]
     import mujoco
     import mujoco.rollout
 
-    rows, columns = GRIDS[texels]
-    pitch = 0.047 / (max(rows, columns) - 1)
-    half_x, half_y = (columns - 1) * pitch / 2, (rows - 1) * pitch / 2
-    model = mujoco.MjModel.from_xml_string(
-        f"""<mujoco><option timestep="{STEP}" gravity="0 0 0"/>
-        <asset><mesh name="pad" builtin="plate" params="{columns} {rows}" scale="{half_x} {half_y} 0.001"/>
-        <mesh name="ball" builtin="sphere" params="3" scale="{RADIUS} {RADIUS} {RADIUS}"/></asset>
-        <worldbody><body><geom name="pad" type="mesh" mesh="pad" quat="0 1 0 0" contype="0" conaffinity="0"/>
-        <geom type="box" size="{half_x} {half_y} 0.005" pos="0 0 -0.005"/></body>
-        <body pos="0 0 {RADIUS + 5e-4}"><joint name="down" type="slide" axis="0 0 -1" damping="5"/>
+    body = f"""<body pos="0 0 {RADIUS + 5e-4}"><joint name="down" type="slide" axis="0 0 -1" damping="5"/>
         <geom type="sphere" size="{RADIUS}" mass="0.1"/>
-        <geom type="sdf" mesh="ball" contype="0" conaffinity="0" mass="0"/></body></worldbody>
-        <actuator><position joint="down" kp="2000"/></actuator>
-        <sensor><tactile geom="pad" mesh="pad"/></sensor></mujoco>"""
-    )
-    if model.nsensordata != 3 * texels:
-        raise RuntimeError(f"MuJoCo has {model.nsensordata // 3} texels instead of {texels}")
-    times = np.arange(1, round(seconds / STEP) + 1) * STEP
+        <geom type="sdf" mesh="ball" contype="0" conaffinity="0" mass="0"/></body>"""
+    ball = f'<mesh name="ball" builtin="sphere" params="3" scale="{RADIUS} {RADIUS} {RADIUS}"/>'
+    motor = '<actuator><position joint="down" kp="2000"/></actuator>'
+    model = mujoco_pad(texels, body, ball, 'gravity="0 0 0"', motor)
+    step = model.opt.timestep
+    times = np.arange(1, round(seconds / step) + 1) * step
     way = DEPTH + 5e-4
     target = np.interp(times, [0.0, way / SPEED, seconds - way / SPEED, seconds], [0.0, way, way, 0.0]).reshape(1, -1, 1)
     data = [mujoco.MjData(model) for _ in range(count_of_cores())]
