@@ -21,7 +21,7 @@ import numpy as np
 
 from ..core.errors import FileError, PalpateError, os_error_reason
 from ..core.geometry.rotations import rotation_matrices
-from ..core.io.bake_folder import folder_names, manifest_of, write_arrays_of, write_images, write_manifest
+from ..core.io.bake_folder import folder_names, manifest_of, write_arrays_of, write_image_of, write_manifest
 from ..core.io.hidden_folder import temporary_folder
 from ..core.io.scenario_npz import load_scenario
 from ..core.jobs import run_job
@@ -162,7 +162,8 @@ def write_run_folder(folder: Path, scenario: Scenario, recording: Recording, ima
         own = folder / names[sensor.name]
         own.mkdir()
         for part in recording.blocks() if images else ():
-            write_images(own, sensor, [part.at(int(number)) for number in part.frames], recording.digest)
+            for number in part.frames:
+                write_image_of(own, sensor, part.at(int(number)), recording.digest)
         write_manifest(own, manifest_of(scenario, sensor, recording, write_arrays_of(own, sensor, recording)))
 
 

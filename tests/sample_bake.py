@@ -23,7 +23,7 @@ from palpate.core.io.bake_folder import (
 )
 from palpate.core.io.file_writing import file_sha256
 from palpate.core.io.recording_npz import SENSOR_NAME, save_recording, save_sensor
-from palpate.core.io.tactile_exr import write_exrs
+from palpate.core.io.tactile_exr import write_exr
 from palpate.core.model.recording import Recording, SensorFrame, SensorRecording
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
 
@@ -95,12 +95,9 @@ def write_sensor(
     save_sensor(own / SENSOR_NAME, texels, painted)
     frames = [recording.at(int(number)) for number in recording.frames]
     about = {"sensor": name, "digest": recording.digest, "unit": parameters.unit}
-    write_exrs(
-        [own / frame_file(frame.frame) for frame in frames],
-        texels.layout,
-        [frame.sensors[name] for frame in frames],
-        [{**about, "frame": str(frame.frame), "time": repr(frame.time)} for frame in frames],
-    )
+    for frame in frames:
+        metadata = {**about, "frame": str(frame.frame), "time": repr(frame.time)}
+        write_exr(own / frame_file(frame.frame), texels.layout, frame.sensors[name], metadata)
     images = [frame_file(frame.frame) for frame in frames]
     (own / IMAGE_LIST_NAME).write_bytes("".join(f"{file_sha256(own / image)}  {image}\n" for image in images).encode())
     manifest = Manifest(

@@ -8,9 +8,7 @@ import json
 import math
 import os
 import shutil
-from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -31,75 +29,21 @@ from ...core.io.bake_folder import (
     publish_bake,
     read_manifest,
     write_arrays_of,
-    write_images,
+    write_image_of,
     write_manifest,
 )
 from ...core.io.file_writing import require_space, writable_folder
 from ...core.io.hidden_folder import PRIVATE_FOLDER, FolderLock, is_private_folder
 from ...core.io.input_files import read_bytes
-from ...core.io.row_tables import FrameTable, row_type
+from ...core.io.row_tables import FrameTable
+from ...core.io.tactile_exr import CHANNELS
 from ...core.model.recording import Frame, Recording
 from ...core.model.scenario import Scenario
-from ...core.model.sensor import Sensor
 
-# The tactile images of a bake: a thread writes them, some frames together, while the solver computes the next ones.
-#
-# A list in each folder has their SHA-256 (:func:`.bake_folder.read_checksums`).
-
-MAX_BATCH_IMAGES, MAX_BATCH_PIXELS = 16, 16384
-"""Most images of one sensor that are written together, and most pixels in them: one call for many small images is faster."""
+TEXEL_BYTES = 64
+"""Most bytes of a texel at one frame: seven numbers, and whether it is in contact."""
 IMAGE_BYTES, PIXEL_BYTES = 7000, 4
 """Most bytes of an image apart from its pixels: header, line in the list, rest of a block. And of a channel of a pixel."""
-MAX_WAITING_BATCHES = 8
-"""Batches that may wait. Each keeps its frames in memory, so that a slow disk has to slow the solver down."""
-
-
-class BakeImages:
-    """The images of all sensors of one bake. Its methods raise OSError and FileError where a file cannot be written.
-
-    Parameters
-    ----------
-    sensors : mapping of str to Sensor
-        By the name of the sensor.
-    folders : mapping of str to Path
-        Where the images are written, likewise.
-    digest : str
-        Of the scenario.
-    """
-
-    def __init__(self, sensors: Mapping[str, Sensor], folders: Mapping[str, Path], digest: str):
-        self._sensors, self._folders, self._digest = sensors, folders, digest
-        pixels = max((math.prod(sensor.texels.layout.shape) for sensor in sensors.values()), default=1)
-        self._batch = max(1, min(MAX_BATCH_IMAGES, MAX_BATCH_PIXELS // pixels))
-        self._frames: list[Frame] = []
-        self._thread = ThreadPoolExecutor(1, "palpate-images")
-        self._waiting: deque[Future[None]] = deque()
-
-    def write(self, frame: Frame) -> None:
-        """Write the images of a frame; while :data:`MAX_WAITING_BATCHES` are waiting, block."""
-        self._frames.append(frame)
-        if len(self._frames) >= self._batch:
-            self._submit(MAX_WAITING_BATCHES)
-
-    def finish(self) -> None:
-        """Return once all images are written."""
-        self._submit(0)
-
-    def stop(self) -> None:
-        """Drop the waiting batches and end the thread."""
-        self._thread.shutdown(cancel_futures=True)
-
-    def _submit(self, may_wait: int) -> None:
-        """Hand the frames so far to the thread, and return when no more batches wait than may."""
-        self._waiting.append(self._thread.submit(self._write, self._frames))
-        self._frames = []
-        while len(self._waiting) > may_wait:
-            self._waiting.popleft().result()
-
-    def _write(self, frames: list[Frame]) -> None:
-        """Write the images of some frames, and their checksums."""
-        for name, sensor in self._sensors.items():
-            write_images(self._folders[name], sensor, frames, self._digest)
 
 
 def bake_folder(scene) -> Path:
@@ -133,16 +77,20 @@ def writable_bake_folder(scene) -> Path:
 
 def check_space(folder: Path, scenario: Scenario, images: bool = True) -> None:
     """Raise FileError if the disk cannot hold a new bake: its frames as they grow, recordings and images, uncompressed."""
-    read_out = [sensor for sensor in scenario.sensors if sensor.readout]
-    channels = {one.name: one.channels.no_frames() for one in read_out if one.channels is not None}
-    texels = {one.name: len(one.texels) for one in read_out}
-    tables = [texels, *({name: count} for name, count in texels.items())]
-    sizes = [row_type(len(scenario.bodies), table, channels).itemsize for table in tables]
-    for sensor in read_out if images else ():
-        layers = 7 + (len(channels[sensor.name].names) if sensor.name in channels else 0)
-        sizes.append(IMAGE_BYTES + PIXEL_BYTES * layers * math.prod(sensor.texels.layout.shape))
-    needed = float(len(scenario.frames) * sum(sizes))
-    require_space(folder, needed, "The bake")
+    motion = 8 * (2 + 13 * len(scenario.bodies))  # bytes of a frame: its number and time, poses and velocities
+    needed = motion
+    for sensor in scenario.sensors:
+        if not sensor.readout:
+            continue
+        layers, own = len(CHANNELS), TEXEL_BYTES * len(sensor.texels) + 8 * 9  # with force, torque and centre of pressure
+        if sensor.channels is not None:
+            none = sensor.channels.no_frames()
+            layers += len(none.names)
+            own += 9 * math.prod(none.values.shape[1:])  # values, and which are clipped
+        needed += motion + 2 * own
+        if images:
+            needed += IMAGE_BYTES + PIXEL_BYTES * layers * math.prod(sensor.texels.layout.shape)
+    require_space(folder, float(len(scenario.frames) * needed), "The bake")
 
 
 @dataclass(frozen=True)
@@ -236,25 +184,23 @@ class BakeFiles:
         except BaseException:
             self._lock.release()
             raise
-        self._frames = FrameTable.of(scenario, self._lock.private)
-        self._images = BakeImages(self._sensors, self._new, self._digest) if images else None
+        self._frames = FrameTable([body.name for body in scenario.bodies], self._lock.private)
+        self._images = images
 
     def __enter__(self) -> BakeFiles:
         return self
 
     def __exit__(self, *_) -> None:
-        if self._images is not None:
-            self._images.stop()
         with suppress(OSError):  # the next bake tries again
             discard_bake(self.folder)
         self._lock.release()
 
     def write(self, frame: Frame) -> None:
-        """Write a frame: its row, and the tactile image of every sensor, some frames together, while the solver continues."""
+        """Write a frame: its row, and the tactile image of every sensor."""
         with _refusals_named(self.folder):
             self._frames.append(frame)
-            if self._images is not None:
-                self._images.write(frame)
+            for name, sensor in self._sensors.items() if self._images else ():
+                write_image_of(self._new[name], sensor, frame, self._digest)
 
     def recording(self, dt: float, warnings: Sequence[str], step_reason: str) -> Recording:
         """Return the recording of the frames that were written; see :meth:`.FrameTable.recording`."""
@@ -269,8 +215,6 @@ class BakeFiles:
             A file cannot be written.
         """
         with _refusals_named(self.folder):
-            if self._images is not None:
-                self._images.finish()
             files = {name: write_arrays_of(self._new[name], sensor, recording) for name, sensor in self._sensors.items()}
             table = json.dumps([self._digest, *(sorted(own.items()) for own in files.values())])
             self.bake_id = hashlib.sha256(table.encode("utf-8", "surrogatepass")).hexdigest()[:32]
@@ -340,7 +284,7 @@ def _is_bake(folder: Path) -> bool:
 
 @contextmanager
 def _refusals_named(folder: Path) -> Iterator[None]:
-    """Raise FileError where the system refuses to write; the images' thread may have met it some frames ago."""
+    """Raise FileError where the system refuses to write."""
     try:
         yield
     except OSError as error:

@@ -34,7 +34,7 @@ from .hidden_folder import PRIVATE_FOLDER
 from .input_files import open_regular
 from .recording_npz import SENSOR_NAME, described, save_recording, save_sensor
 from .schema import read_json
-from .tactile_exr import describe, nearest_places, write_exrs
+from .tactile_exr import describe, nearest_places, write_exr
 
 MANIFEST_FORMAT = "palpate-bake/1"
 MANIFEST_NAME = "manifest.json"
@@ -184,14 +184,14 @@ def check_sha256(path: Path, sha256: str) -> None:
         raise FileError(f"'{path}' is damaged (its content is not what was baked): bake again.")
 
 
-def write_images(folder: Path, sensor: Sensor, frames: Sequence[Frame], digest: str) -> None:
-    """Write the tactile images of some frames of a sensor into its folder, and add their SHA-256 to the list there.
+def write_image_of(folder: Path, sensor: Sensor, frame: Frame, digest: str) -> None:
+    """Write the tactile image of a frame of a sensor into its folder, and add its SHA-256 to the list there.
 
     Parameters
     ----------
     folder : Path
     sensor : Sensor
-    frames : sequence of Frame
+    frame : Frame
     digest : str
         Of the scenario.
 
@@ -200,13 +200,11 @@ def write_images(folder: Path, sensor: Sensor, frames: Sequence[Frame], digest: 
     FileError, OSError
         A file cannot be written.
     """
-    paths = [folder / frame_file(frame.frame) for frame in frames]
-    headers = [describe(sensor, frame, digest) for frame in frames]
+    path = folder / frame_file(frame.frame)
     nearest = nearest_places(sensor.texels, None if sensor.channels is None else sensor.channels.no_frames())
-    if frames:
-        write_exrs(paths, sensor.texels.layout, [frame.sensors[sensor.name] for frame in frames], headers, nearest)
+    write_exr(path, sensor.texels.layout, frame.sensors[sensor.name], describe(sensor, frame, digest), nearest)
     with (folder / IMAGE_LIST_NAME).open("a", encoding="ascii", newline="\n") as file:
-        file.writelines(f"{file_sha256(path)}  {path.name}\n" for path in paths)
+        file.write(f"{file_sha256(path)}  {path.name}\n")
 
 
 def write_arrays_of(folder: Path, sensor: Sensor, recording: Recording) -> dict[str, str]:

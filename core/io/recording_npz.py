@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -25,7 +25,16 @@ from ..errors import FileError, PalpateError, ParameterError, os_error_reason
 from ..geometry.grid_layout import GridLayout
 from ..geometry.texels import Texels
 from ..geometry.texture_maps import UVLayout
-from ..model.recording import CLIPPED, SENSOR_FIELDS, VALUES, Recording, SensorRecording, VectorReadings, row_blocks
+from ..model.recording import (
+    CLIPPED,
+    SENSOR_FIELDS,
+    VALUES,
+    Recording,
+    SensorArrays,
+    SensorRecording,
+    VectorReadings,
+    row_blocks,
+)
 from ..model.sensor_parameters import Painted, SensorParameters, stated_parameters
 from .file_writing import atomic_write
 from .input_files import open_regular
@@ -123,16 +132,16 @@ def load_sensor(path: str | os.PathLike) -> tuple[Texels, Painted]:
         return sensor_in(members)
 
 
-def sensor_in(members: Any) -> tuple[Texels, Painted]:
+def sensor_in(members: Mapping[str, np.ndarray]) -> tuple[Texels, Painted]:
     """Return the sensor whose members an archive gives by name; raises anything where these are damaged."""
     if str(members["format"]) != SENSOR_FORMAT:
         raise ValueError(f"its format is not '{SENSOR_FORMAT}'")
     cls = _LAYOUTS[str(members["layout"])]
     stored = {item.name: f"layout/{item.name}" for item in fields(cls)}
-    layout: Any = cls(**{name: _plain(members[key]) for name, key in stored.items() if key in members.files})
+    layout: Any = cls(**{name: _plain(members[key]) for name, key in stored.items() if key in members})
     texels = Texels(**{name: members[name] for name in _ARRAYS}, layout=layout)
     found = {item.name: f"painted/{item.name}" for item in fields(Painted)}
-    return texels, Painted(**{name: np.asarray(members[key], float) for name, key in found.items() if key in members.files})
+    return texels, Painted(**{name: np.asarray(members[key], float) for name, key in found.items() if key in members})
 
 
 def _plain(value: np.ndarray) -> Any:
@@ -166,12 +175,7 @@ def recording_arrays(recording: Recording) -> dict[str, np.ndarray]:
     arrays = {"header": np.array(json.dumps(_header(recording), allow_nan=False))}
     for name in ("frames", "times", "poses", "velocities"):
         arrays[name] = np.asarray(getattr(recording, name))
-    for i, sensor in enumerate(recording.sensors.values()):
-        for name in SENSOR_FIELDS:
-            arrays[f"sensor_{i}/{name}"] = np.asarray(getattr(sensor, name))
-        if sensor.channels is not None:
-            arrays |= {f"sensor_{i}/{VALUES}": np.asarray(sensor.channels.values)}
-            arrays |= {f"sensor_{i}/{CLIPPED}": np.asarray(sensor.channels.clipped)}
+    arrays |= sensor_members(recording.sensors.values())
     for name, array in arrays.items():
         if name != "header" and len(array) != len(recording.frames):
             raise ValueError(f"'{name}' has {len(array)} frames, the recording {len(recording.frames)}")
@@ -180,6 +184,17 @@ def recording_arrays(recording: Recording) -> dict[str, np.ndarray]:
         if array.dtype.kind not in "fiubU":
             raise ValueError(f"'{name}' of the recording has type {array.dtype}")
     return arrays
+
+
+def sensor_members(sensors: Iterable[SensorArrays]) -> dict[str, np.ndarray]:
+    """Return the arrays of sensors, at one frame or of a recording, under the names that they have in its file."""
+    members = {}
+    for i, sensor in enumerate(sensors):
+        members |= {f"sensor_{i}/{name}": np.asarray(getattr(sensor, name)) for name in SENSOR_FIELDS}
+        if sensor.channels is not None:
+            members[f"sensor_{i}/{VALUES}"] = np.asarray(sensor.channels.values)
+            members[f"sensor_{i}/{CLIPPED}"] = np.asarray(sensor.channels.clipped)
+    return members
 
 
 def load_recording(path: str | os.PathLike) -> Recording:
@@ -191,8 +206,6 @@ def load_recording(path: str | os.PathLike) -> Recording:
         There is no such file, or it is damaged or something else.
     """
     with open_arrays(path, "recording", "bake again") as members:
-        if "header" not in members.files:
-            raise FileError(f"'{path}' is not a recording of Palpate: choose a recording.npz of a bake.")
         return _recording(path, members)
 
 
@@ -228,7 +241,9 @@ def _channels(members: Any, i: int, about: dict[str, Any] | None) -> VectorReadi
     return VectorReadings(values, clipped, str(about["unit"]), names, place)
 
 
-def _recording(path: str | os.PathLike, members: Any) -> Recording:
+def _recording(path: str | os.PathLike, members: Mapping[str, np.ndarray]) -> Recording:
+    if "header" not in members:
+        raise FileError(f"'{path}' is not a recording of Palpate: choose a recording.npz of a bake.")
     header = json.loads(str(members["header"]))
     if header["format"] != RECORDING_FORMAT:
         raise FileError(
@@ -283,14 +298,15 @@ def load_with_sensors(path: str | os.PathLike) -> tuple[Recording, Sensors]:
     FileError
         There is no such file, or it is damaged or something else.
     """
-    recording = load_recording(path)
     sensors: Sensors = {}
     try:
         with open_arrays(path, "recording", "write it again") as members:
+            recording = _recording(path, members)
             for i, name in enumerate(recording.sensors):
-                if f"sensor_{i}/parameters" not in members.files:
+                if f"sensor_{i}/parameters" not in members:
                     continue
-                texels, painted = sensor_in(_Part(members, f"sensor_{i}/texels/"))
+                start = f"sensor_{i}/texels/"
+                texels, painted = sensor_in({key.removeprefix(start): members[key] for key in members if key.startswith(start)})
                 words = json.loads(str(members[f"sensor_{i}/parameters"]))
                 parameters = SensorParameters(**stated_parameters(words, f"'{name}'"))
                 parameters.check(name)
@@ -301,15 +317,3 @@ def load_with_sensors(path: str | os.PathLike) -> tuple[Recording, Sensors]:
     except ParameterError as error:
         raise FileError(f"'{path}' is damaged ({error}): write it again.") from error
     return recording, sensors
-
-
-class _Part:
-    """The members of an archive whose names begin alike, without that beginning."""
-
-    def __init__(self, members: Any, start: str):
-        self._members, self._start = members, start
-        self.files = [name.removeprefix(start) for name in members.files if name.startswith(start)]
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        found: np.ndarray = self._members[self._start + name]
-        return found

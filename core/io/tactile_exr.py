@@ -122,30 +122,27 @@ _PREFIX = "palpate."  # OpenEXR has header attributes of its own, some with a ty
 
 
 def _pictures(
-    layout: GridLayout | UVLayout, frames: Sequence[SensorFrame], names: Sequence[str], nearest: np.ndarray | None = None
+    layout: GridLayout | UVLayout, frame: SensorFrame, names: Sequence[str], nearest: np.ndarray | None = None
 ) -> np.ndarray:
-    """(f, channels, height, width) float32 of frames and channels in order, from the top."""
+    """(channels, height, width) float32 of the channels of a frame, from the top."""
     columns = {
-        "R": [frame.normal_force for frame in frames],
-        "G": [frame.shear[:, 0] for frame in frames],
-        "B": [frame.shear[:, 1] for frame in frames],
-        **{name: [getattr(frame, name) for frame in frames] for name in ("reading", "depth", "slip", "contact")},
+        "R": frame.normal_force,
+        "G": frame.shear[:, 0],
+        "B": frame.shear[:, 1],
+        **{name: getattr(frame, name) for name in ("reading", "depth", "slip", "contact")},
     }
     if nearest is not None:
-        vectors = np.array([_channels_of(frame).values[nearest] for frame in frames])  # (frames, texels, c)
-        layers = layer_names(_channels_of(frames[0]))
-        columns |= {name: list(vectors[:, :, i]) for i, name in enumerate(layers)}
-    table = np.array([columns[name] for name in names], dtype=float)  # (channels, frames, texels)
+        channels = _channels_of(frame)
+        columns |= dict(zip(layer_names(channels), channels.values[nearest].T, strict=True))
+    table = np.array([columns[name] for name in names], dtype=float)  # (channels, texels)
     bad = ~(np.abs(table) <= np.finfo(np.float32).max)  # NaN compares false
     if bad.any():
-        channel, i, texel = np.argwhere(bad)[0]
-        value = table[channel, i, texel]
-        raise ValueError(f"channel '{names[channel]}' of texel {texel} is {value}: no 32-bit number")
-    image = layout.image(table.reshape(-1, table.shape[2]).T)
-    image = image.reshape(*layout.shape, len(names), len(frames))
+        channel, texel = np.argwhere(bad)[0]
+        raise ValueError(f"channel '{names[channel]}' of texel {texel} is {table[channel, texel]}: no 32-bit number")
+    image = layout.image(table.T)
     contact = names.index("contact")
     image[:, :, contact] = image[:, :, contact] >= 0.5
-    return np.ascontiguousarray(np.moveaxis(image[::-1], (3, 2, 0, 1), (0, 1, 2, 3)), dtype=np.float32)
+    return np.ascontiguousarray(np.moveaxis(image[::-1], 2, 0), dtype=np.float32)
 
 
 def describe(sensor: Sensor, frame: Frame, digest: str) -> dict[str, str]:
@@ -171,22 +168,22 @@ def describe(sensor: Sensor, frame: Frame, digest: str) -> dict[str, str]:
     return about
 
 
-def write_exrs(
-    paths: Sequence[str | os.PathLike],
+def write_exr(
+    path: str | os.PathLike,
     layout: GridLayout | UVLayout,
-    frames: Sequence[SensorFrame],
-    metadata: Sequence[Mapping[str, str]],
+    frame: SensorFrame,
+    metadata: Mapping[str, str],
     nearest: np.ndarray | None = None,
 ) -> None:
-    """Write frames of one sensor, each image whole or not at all.
+    """Write a frame of one sensor as an image, whole or not at all.
 
     Parameters
     ----------
-    paths : (f,) sequence of path
+    path : path
     layout : GridLayout or UVLayout
         Of the sensor's texels.
-    frames : (f,) sequence of SensorFrame
-    metadata : (f,) sequence of mapping of str to str
+    frame : SensorFrame
+    metadata : mapping of str to str
         Become header attributes named ``palpate.<key>``, see :func:`describe`.
     nearest : (n,) int, optional
         Of a sensor with several channels: the place whose channels the layer shows at each texel (:func:`nearest_places`).
@@ -194,15 +191,14 @@ def write_exrs(
     Raises
     ------
     FileError
-        A file cannot be written.
+        The file cannot be written.
     ValueError
         A value is not finite or too large for 32 bits (a fault of the program, not of the user). Nothing is written then.
     """
-    names = CHANNELS if nearest is None else (*CHANNELS, *layer_names(_channels_of(frames[0])))
-    pictures = _pictures(layout, frames, names, nearest)
-    for path, own, about in zip(paths, pictures, metadata, strict=True):
-        with atomic_write(path) as temporary:
-            write_image(temporary, dict(zip(names, own)), {_PREFIX + key: str(value) for key, value in about.items()})
+    names = CHANNELS if nearest is None else (*CHANNELS, *layer_names(_channels_of(frame)))
+    pictures = _pictures(layout, frame, names, nearest)
+    with atomic_write(path) as temporary:
+        write_image(temporary, dict(zip(names, pictures)), {_PREFIX + key: str(value) for key, value in metadata.items()})
 
 
 def layer_names(channels: VectorReadings) -> list[str]:

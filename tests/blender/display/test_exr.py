@@ -13,7 +13,7 @@ from sample_bake import pictures_of, read_exr, tactile_frame
 
 from palpate.core.geometry.grid_layout import GridLayout
 from palpate.core.geometry.texture_maps import uv_layout
-from palpate.core.io.tactile_exr import write_exrs
+from palpate.core.io.tactile_exr import write_exr
 
 ROWS, COLUMNS = 5, 7
 
@@ -40,7 +40,7 @@ def as_blender_sees(image):
 
 def assert_blender_reads_it(path, layout, frame):
     """Write a frame, and compare what Blender makes of it."""
-    write_exrs([path], layout, [frame], [{"unit": "kPa"}])
+    write_exr(path, layout, frame, {"unit": "kPa"})
     expected = pictures_of(layout, frame)
     image = bpy.data.images.load(str(path))
     pixels = as_blender_sees(image)
@@ -77,7 +77,7 @@ def test_both_libraries_work_after_a_render(tmp_path, scene):
 
 @pytest.mark.parametrize("first", ["OpenEXR", "bpy"])
 def test_either_library_may_come_first(tmp_path, first):
-    write_exrs([tmp_path / "a.exr"], grid(), [tactile_frame(ROWS * COLUMNS)], [{}])
+    write_exr(tmp_path / "a.exr", grid(), tactile_frame(ROWS * COLUMNS), {})
     program = (
         f"import sys, {first}\nimport bpy, OpenEXR\n"
         "image = bpy.data.images.load(sys.argv[1])\n"

@@ -34,7 +34,7 @@ def frames(count, seed=3):
 
 
 def written(folder, wanted):
-    rows = FrameTable(BODIES, TEXELS, folder=folder)
+    rows = FrameTable(BODIES, folder)
     for frame in wanted:
         rows.append(frame)
     return rows

@@ -110,7 +110,7 @@ def test_parts_of_a_recording_keep_the_channels(run):
 def test_a_file_of_a_recording_and_a_table_of_frames_keep_them(run, tmp_path):
     scenario, readout, recording = run
     save_recording(tmp_path / "recording.npz", recording)
-    rows = FrameTable.of(scenario)
+    rows = FrameTable([body.name for body in scenario.bodies])
     for frame in recording.frames:
         rows.append(recording.at(int(frame)))
     for found in (load_recording(tmp_path / "recording.npz"), rows.recording(1e-4, "", (), "")):
