@@ -15,7 +15,8 @@ from ..core.figures.figure_style import FigureStyle
 from ..core.figures.picture_labels import Label, label_picture
 from ..core.figures.tactile_strip import tactile_strip
 from ..core.figures.time_curves import force_curves
-from ..core.io.file_writing import remove_unfinished_files, writable_folder
+from ..core.io.file_writing import writable_folder
+from ..core.io.hidden_folder import remove_own_files
 from . import blender, console, figure_options
 from .bake import bake_with_progress, report
 
@@ -123,7 +124,7 @@ def _render_picture(scene: Any, path: Path, arguments: argparse.Namespace) -> No
     stopped = "palpate demo: stopped while rendering; the bake and the scene are finished."
     with (
         console.progress_bar("Rendering the picture", 1, unit="picture") as bar,
-        console.exit_on_interrupt(stopped, remove_unfinished_files),
+        console.exit_on_interrupt(stopped, remove_own_files),
         console.blender_output_hidden(),
     ):
         render.render_frame(scene, path, demo.PICTURE_FRAME, samples=arguments.samples, size=arguments.size)

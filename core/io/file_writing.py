@@ -22,8 +22,8 @@ from pathlib import Path
 from ..errors import FileError, os_error_reason
 from .input_files import open_regular
 
-_unfinished: set[Path] = set()
-"""Temporary files that this process is writing."""
+unfinished: set[Path] = set()
+"""Temporary files and folders of this process, which :func:`.hidden_folder.remove_own_files` removes."""
 
 
 @contextmanager
@@ -50,7 +50,7 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
     target = Path(os.path.realpath(path))
     _require_folder(target.parent)
     temporary = _new_file_in(target.parent, target.stem, target.suffix)
-    _unfinished.add(temporary)
+    unfinished.add(temporary)
     try:
         yield temporary
         os.replace(temporary, target)
@@ -61,14 +61,7 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
             raise FileError(f"'{path}' could not be written ({os_error_reason(error)}): {_remedy(error)}.") from error
         raise
     finally:
-        _unfinished.discard(temporary)
-
-
-def remove_unfinished_files() -> None:
-    """Remove the temporary files that this process is writing, because it is about to end."""
-    for temporary in list(_unfinished):
-        with suppress(OSError):
-            temporary.unlink()
+        unfinished.discard(temporary)
 
 
 def require_replaceable(path: str | os.PathLike) -> None:

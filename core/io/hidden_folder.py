@@ -15,12 +15,11 @@ import tempfile
 import threading
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import FileError, os_error_reason
-from . import file_writing
-from .file_writing import atomic_write, file_sha256, require_replaceable, writable_folder
+from .file_writing import atomic_write, file_sha256, require_replaceable, unfinished, writable_folder
 from .input_files import read_bytes
 
 if TYPE_CHECKING:
@@ -34,8 +33,6 @@ _EARLIER_MARKER = "palpate-folder.json"
 """Until version 0.2.0."""
 _FILES = "files"
 """Folder in a temporary folder, beside the lock."""
-_in_use: set[Path] = set()
-"""Temporary folders of this process."""
 
 
 def is_private_folder(folder: Path) -> bool:
@@ -111,14 +108,14 @@ def temporary_folder(parent: Path, purpose: str) -> Iterator[Path]:
         raise FileError(
             f"No folder can be made in '{parent}' ({os_error_reason(error)}): check its permissions and the space left."
         ) from error
-    _in_use.add(folder)
+    unfinished.add(folder)
     try:
         yield folder / _FILES
     finally:
         if lock is not None:
             lock.release()
         _remove(folder)
-        _in_use.discard(folder)
+        unfinished.discard(folder)
 
 
 def remove_abandoned(parent: Path) -> None:
@@ -132,13 +129,6 @@ def remove_abandoned(parent: Path) -> None:
                     _remove(folder)
             else:
                 folder.rmdir()  # of a kill before the lock; raises if it holds anything
-
-
-def remove_unfinished() -> None:
-    """Remove the temporary files and folders of this process, because it is about to end."""
-    file_writing.remove_unfinished_files()
-    for folder in list(_in_use):
-        _remove(folder)
 
 
 def _remove(folder: Path) -> None:
@@ -238,9 +228,7 @@ class FileList:
         for kind, those in names.items():
             before = self._kinds.get(kind, {"files": {}, "source": ""})
             earlier = {name: digest for name, digest in before["files"].items() if name not in every}
-            kept = {}
-            if source and source == before["source"]:
-                kept = {name: digest for name, digest in earlier.items() if self._is_own_file(name, digest)}
+            kept = earlier if source and source == before["source"] else {}
             removed |= {name: digest for name, digest in earlier.items() if name not in kept}
             kinds[kind] = {"files": kept | {name: file_sha256(new / name) for name in those}, "source": source}
         with _moving:
@@ -268,7 +256,7 @@ class FileList:
             writable_folder(folder)
 
     def _is_own_file(self, name: str, digest: str) -> bool:
-        """Return True if a listed file is in the folder and has the content that it was listed with."""
+        """Return True if a listed file is in the folder, as a list from elsewhere may not say, and has the listed content."""
         path = self._folder / name
         try:
             inside = not path.is_symlink() and path.resolve().is_relative_to(self._folder.resolve())
@@ -294,9 +282,14 @@ class FileList:
 
 
 def remove_own_files() -> None:
-    """Remove what this process has begun, because it is about to end; files that are being moved are waited for."""
+    """Remove the temporary files and folders of this process, because it is about to end; moves of files are waited for."""
     with _moving:
-        remove_unfinished()
+        for path in list(unfinished):
+            if path.is_dir():
+                _remove(path)
+            else:
+                with suppress(OSError):
+                    path.unlink()
 
 
 def _move(new: Path, target: Path) -> None:
@@ -325,18 +318,7 @@ def _read(path: Path) -> dict[str, dict[str, Any]]:
         if content["format"] != LIST_FORMAT:
             return {}
         return {
-            str(kind): {
-                "files": {name: str(digest) for name, digest in own["files"].items() if _is_safe(name)},
-                "source": str(own.get("source", "")),
-            }
-            for kind, own in content["exports"].items()
+            kind: {"files": {**own["files"]}, "source": str(own.get("source", ""))} for kind, own in content["exports"].items()
         }
     except (OSError, ValueError, RecursionError, KeyError, TypeError, AttributeError, FileError):
         return {}
-
-
-def _is_safe(name: str) -> bool:
-    """Return True for a name of a file in the folder of the list, or in a folder in it."""
-    parts = PurePosixPath(name).parts
-    hidden = any(part in ("..", LIST_NAME) or "\\" in part or "\0" in part for part in parts)
-    return 0 < len(parts) <= 2 and not PurePosixPath(name).is_absolute() and not hidden

@@ -188,7 +188,7 @@ def recording_arrays(recording: Recording) -> dict[str, np.ndarray]:
 
 def sensor_members(sensors: Iterable[SensorArrays]) -> dict[str, np.ndarray]:
     """Return the arrays of sensors, at one frame or of a recording, under the names that they have in its file."""
-    members = {}
+    members: dict[str, np.ndarray] = {}
     for i, sensor in enumerate(sensors):
         members |= {f"sensor_{i}/{name}": np.asarray(getattr(sensor, name)) for name in SENSOR_FIELDS}
         if sensor.channels is not None:
@@ -241,7 +241,7 @@ def _channels(members: Any, i: int, about: dict[str, Any] | None) -> VectorReadi
     return VectorReadings(values, clipped, str(about["unit"]), names, place)
 
 
-def _recording(path: str | os.PathLike, members: Mapping[str, np.ndarray]) -> Recording:
+def _recording(path: str | os.PathLike, members: Any) -> Recording:
     if "header" not in members:
         raise FileError(f"'{path}' is not a recording of Palpate: choose a recording.npz of a bake.")
     header = json.loads(str(members["header"]))

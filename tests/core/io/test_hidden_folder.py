@@ -8,8 +8,15 @@ import sys
 import pytest
 
 from palpate.core.errors import FileError
-from palpate.core.io import hidden_folder
-from palpate.core.io.hidden_folder import LOCK_NAME, PRIVATE_FOLDER, FolderLock, remove_abandoned, temporary_folder
+from palpate.core.io.file_writing import atomic_write
+from palpate.core.io.hidden_folder import (
+    LOCK_NAME,
+    PRIVATE_FOLDER,
+    FolderLock,
+    remove_abandoned,
+    remove_own_files,
+    temporary_folder,
+)
 
 PROGRAM = """
 import os, sys
@@ -70,8 +77,8 @@ def test_what_killed_processes_have_left_is_removed_and_nothing_else(other, tmp_
 
 
 def test_a_process_that_ends_leaves_nothing(tmp_path):
-    with temporary_folder(tmp_path, "export") as folder, hidden_folder.file_writing.atomic_write(tmp_path / "a.txt") as file:
-        hidden_folder.remove_unfinished()
+    with temporary_folder(tmp_path, "export") as folder, atomic_write(tmp_path / "a.txt") as file:
+        remove_own_files()
         assert not folder.exists() and not file.exists()
         file.write_text("again")
 
