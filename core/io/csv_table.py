@@ -11,10 +11,11 @@ import math
 import os
 import re
 from array import array
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -66,24 +67,38 @@ def read_table(path: str | os.PathLike) -> Table:
         The file cannot be read, is too large, has no header or no data, or a cell is not a finite number.
     """
     path = Path(path)
+    with open_table(path) as file:
+        lines = csv.reader(file, strict=True)
+        names = _header(next((cells for cells in lines if _is_filled(cells)), []), path)
+        values = _values(lines, names, path)
+    if len(values) == 0:
+        raise FileError(f"'{path.name}' has a header and no data: there are no measurements below its header, add them.")
+    return Table(names, values)
+
+
+@contextmanager
+def open_table(path: Path) -> Iterator[IO[str]]:
+    """Open a file whose text is a table.
+
+    Raises
+    ------
+    FileError
+        It cannot be read or is too large, or the body of the ``with`` statement meets bytes that are no UTF-8, or a
+        :class:`csv.Error`.
+    """
     try:
-        with read_errors_said(path), open_regular(path, "r", encoding="utf-8-sig", newline="") as file:
+        with read_errors_said(path), open_regular(path, "r", encoding="utf-8-sig") as file:
             size = path.stat().st_size
             if size > LARGEST_TABLE:
                 raise FileError(
                     f"'{path.name}' holds {size / 1e9:.1f} GB and at most {LARGEST_TABLE / 1e9:.1f} GB are read: "
                     "cut it into several files, or keep fewer samples per second."
                 )
-            lines = csv.reader(file, strict=True)
-            names = _header(next((cells for cells in lines if _is_filled(cells)), []), path)
-            values = _values(lines, names, path)
+            yield file
     except UnicodeDecodeError as error:
         raise FileError(f"'{path.name}' is not a text file in UTF-8: export the table as CSV.") from error
     except csv.Error as error:
         raise FileError(f"'{path.name}' is not a table ({error}): export it as CSV, with quotation marks closed.") from error
-    if len(values) == 0:
-        raise FileError(f"'{path.name}' has a header and no data: there are no measurements below its header, add them.")
-    return Table(names, values)
 
 
 def harmless_cell(text: str) -> str:

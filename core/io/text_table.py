@@ -19,12 +19,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import FileError, read_errors_said
-from .csv_table import LARGEST_NUMBER, UNITS
-from .input_files import open_regular
+from ..errors import FileError
+from .csv_table import LARGEST_NUMBER, UNITS, open_table
 
-LARGEST_TEXT = 512 * 2**20
-"""Bytes of a file."""
 LONGEST_LINE = 1 << 20
 """Characters."""
 SAMPLE = 400
@@ -81,16 +78,8 @@ def read_text_table(path: str | os.PathLike, most_values: int = 100_000_000) -> 
         The file cannot be read, is too large, is no text in UTF-8, or holds no lines of numbers.
     """
     path = Path(path)
-    with read_errors_said(path):
-        if path.stat().st_size > LARGEST_TEXT:
-            raise FileError(f"'{path.name}' holds more than {LARGEST_TEXT >> 20} MB: cut it into several files.")
-        try:
-            with open_regular(path, "r", encoding="utf-8-sig", errors="strict", newline=None) as file:
-                lines, comments = _lines(file, path)
-        except UnicodeDecodeError as error:
-            raise FileError(f"'{path.name}' is not a text file in UTF-8: export the table as CSV.") from error
-        except csv.Error as error:
-            raise FileError(f"'{path.name}' is not a table ({error}): close its quotation marks.") from error
+    with open_table(path) as file:
+        lines, comments = _lines(file, path)
     if not lines:
         raise FileError(f"'{path.name}' is empty: it needs lines of numbers, and above them a line that names the columns.")
     form, first = _form([text for _, text in lines[:SAMPLE]], path)
