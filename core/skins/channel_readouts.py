@@ -4,11 +4,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from ..errors import ParameterError, SensorError
+from ..errors import SensorError
 from ..geometry.texels import Texels
 from ..model.recording import AXES, Recording, SensorArrays, VectorReadings
 from .magnetic_skin import MagneticSkin, texel_displacements
@@ -20,35 +19,17 @@ class ReadoutMatrix:
 
     Attributes
     ----------
-    matrix : (c, n·q) ndarray or scipy.sparse matrix, or None
-        Channel per load, the q loads of a texel side by side. None: each load is a channel, and nothing is computed.
+    matrix : (c, n·q) float
+        Channel per load, the q loads of a texel side by side.
     offset : (c,) float or float
     """
 
-    matrix: Any = None
+    matrix: np.ndarray
     offset: np.ndarray | float = 0.0
 
     def channels(self, loads: np.ndarray) -> np.ndarray:
-        """Return the channels, (T, c) float.
-
-        Parameters
-        ----------
-        loads : (T, n) or (T, n, q) float
-            Forces, or displacements, of the texels.
-
-        Raises
-        ------
-        ParameterError
-            The matrix has another number of columns.
-        """
-        flat = loads.reshape(len(loads), -1)
-        if self.matrix is None:
-            return flat if np.isscalar(self.offset) and self.offset == 0.0 else flat + self.offset
-        if self.matrix.shape[1] != flat.shape[1]:
-            raise ParameterError(
-                f"The read-out has {self.matrix.shape[1]} columns and the texels have {flat.shape[1]} loads: make them agree."
-            )
-        found: np.ndarray = np.asarray((self.matrix @ flat.T).T) + self.offset
+        """Return the channels, (c,) float, of the loads (n, q) of the texels at one frame."""
+        found: np.ndarray = (self.matrix @ loads.reshape(1, -1).T).T[0] + self.offset
         return found
 
 
@@ -114,8 +95,7 @@ class LinearReadout:
         """Return the channels, which have no range."""
         loads = np.concatenate([recorded.normal_force[..., None], recorded.shear], axis=2)
         none = self.no_frames()
-        rows = [self.readout.channels(one[None]).reshape(1, *none.values.shape[1:]) for one in loads]
-        values = np.concatenate([none.values, *rows])
+        values = np.array([self.readout.channels(one) for one in loads]).reshape(-1, *none.values.shape[1:])
         return replace(none, values=values, clipped=np.zeros(values.shape, bool))
 
 

@@ -34,26 +34,30 @@ def write_png(bake: Bake, folder: Path, style: FigureStyle) -> Job[list[Path]]:
         texels = bake.texels[name]
         layout, recorded = texels.layout, recording.sensors[name]
         mask = layout.mask()
-        magnified = max(1, -(-_LEAST_PIXELS // max(layout.shape)))
         for i, frame in enumerate(recording.frames):
             own = shown.values(recorded.at(i), texels)
             color = shown.colors(layout.image(own).ravel()).reshape(*layout.shape, 3)
-            pixels = np.dstack([color, mask])[::-1]
-            pixels = np.repeat(np.repeat(pixels, magnified, axis=0), magnified, axis=1)
             path = own_folder / f"tactile_{frame:04d}.png"
-            save_pixels((pixels * 255 + 0.5).astype(np.uint8), path)
+            _save(path, np.dstack([color, mask]), layout.shape)
             written.append(path)
-        scale = {
-            "quantity": " ".join(shown.label),
-            "first_colour": shown.low,
-            "last_colour": shown.high,
-            "colour_map": shown.colour_map,
-        }
         written += _write_channels(bake, name, own_folder)
-        with atomic_write(own_folder / "scale.json") as temporary:
-            temporary.write_text(json.dumps(scale, indent=2) + "\n", encoding="utf-8")
+        _write_scale(own_folder / "scale.json", " ".join(shown.label), (shown.low, shown.high), shown.colour_map)
         written.append(own_folder / "scale.json")
     return written
+
+
+def _save(path: Path, pixels: np.ndarray, shape: tuple[int, ...]) -> None:
+    """Write a picture (height, width, 4) of colours from 0 to 1, its lowest row first, magnified as images of a shape are."""
+    magnified = max(1, -(-_LEAST_PIXELS // max(shape)))
+    pixels = np.repeat(np.repeat(pixels[::-1], magnified, axis=0), magnified, axis=1)
+    save_pixels((pixels * 255 + 0.5).astype(np.uint8), path)
+
+
+def _write_scale(path: Path, quantity: str, ends: tuple[float, float], colour_map: str) -> None:
+    """Write the colour scale of pictures as JSON."""
+    scale = {"quantity": quantity, "first_colour": ends[0], "last_colour": ends[1], "colour_map": colour_map}
+    with atomic_write(path) as temporary:
+        temporary.write_text(json.dumps(scale, indent=2) + "\n", encoding="utf-8")
 
 
 def _write_channels(bake: Bake, name: str, folder: Path) -> list[Path]:
@@ -65,24 +69,15 @@ def _write_channels(bake: Bake, name: str, folder: Path) -> list[Path]:
     layout = channel_layout(bake.texels[name], channels)
     mask, rest = layout.mask(), channels.values[0]
     top = max((float(np.abs(channels.values[rows] - rest).max()) for rows in row_blocks(channels.values)), default=0.0) or 1.0
-    magnified = max(1, -(-_LEAST_PIXELS // max(layout.shape)))
     written = []
     for values, frame in zip(channels.values, recording.frames, strict=True):
         images = np.moveaxis(layout.image((values - rest) / top), 2, 0)
         color = color_maps.colors(color_maps.SIGNED, 0.5 + 0.5 * images.ravel()).reshape(*images.shape, 3)
         tiles = np.concatenate([color, np.broadcast_to(mask[None, ..., None], (*images.shape, 1))], axis=3)
-        pixels = np.concatenate(list(tiles), axis=1)[::-1]
-        pixels = np.repeat(np.repeat(pixels, magnified, axis=0), magnified, axis=1)
         written.append(folder / f"channels_{frame:04d}.png")
-        save_pixels((pixels * 255 + 0.5).astype(np.uint8), written[-1])
-    scale = {
-        "quantity": f"change of {', '.join(channels.names)} since frame {recording.frames[0]} ({channels.unit}), left to right",
-        "first_colour": -top,
-        "last_colour": top,
-        "colour_map": "blue, white, red",
-    }
-    with atomic_write(folder / "channels_scale.json") as temporary:
-        temporary.write_text(json.dumps(scale, indent=2) + "\n", encoding="utf-8")
+        _save(written[-1], np.concatenate(list(tiles), axis=1), layout.shape)
+    quantity = f"change of {', '.join(channels.names)} since frame {recording.frames[0]} ({channels.unit}), left to right"
+    _write_scale(folder / "channels_scale.json", quantity, (-top, top), "blue, white, red")
     return [*written, folder / "channels_scale.json"]
 
 

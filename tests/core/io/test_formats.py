@@ -9,9 +9,7 @@ import importlib.util
 import json
 import math
 import os
-import signal
 import stat
-import subprocess
 import sys
 import zipfile
 from dataclasses import fields, replace
@@ -56,24 +54,6 @@ def one_sentence(error, *words):
 
 
 # --- writing whole files
-
-
-def test_equal_arrays_give_equal_bytes(tmp_path):
-    random = np.random.default_rng(5)
-    arrays = {
-        "header": np.array("Ü"), "sensor_0/force": random.random((7, 84, 2)), "empty": np.zeros((0, 3)),
-        "number": np.array(3.0), "ü": np.arange(5), "touch": random.random(9) > 0.5, "turned": random.random((4, 5)).T,
-    }  # fmt: skip
-    written = []
-    for name in ("a.npz", "b.npz"):
-        recording_npz.write_arrays(tmp_path / name, arrays)
-        written.append((tmp_path / name).read_bytes())
-    assert written[0] == written[1]
-    with zipfile.ZipFile(tmp_path / "a.npz") as archive:
-        assert {one.date_time for one in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
-    with recording_npz.open_arrays(tmp_path / "a.npz", "test", "try again") as members:
-        for name, array in arrays.items():
-            np.testing.assert_array_equal(members[name], array)
 
 
 def test_objects_are_not_written(tmp_path):
@@ -211,21 +191,6 @@ def test_writable_folder(tmp_path):
             writable_folder(tmp_path / place, create=True)
         one_sentence(error, tmp_path / "file")
     assert sorted(os.listdir(tmp_path)) == ["file", "new", "x"]
-
-
-def test_kill_in_the_middle_leaves_the_old_file(tmp_path):
-    target = tmp_path / "manifest.json"
-    target.write_text("old")
-    program = (
-        "import os, signal, sys\n"
-        "from palpate.core.io.file_writing import atomic_write\n"
-        "with atomic_write(sys.argv[1]) as temporary:\n"
-        "    temporary.write_text('half')\n"
-        "    os.kill(os.getpid(), signal.SIGKILL)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", program, str(target)], check=False)
-    assert done.returncode == -signal.SIGKILL
-    assert target.read_text() == "old"
 
 
 # --- names
@@ -460,19 +425,10 @@ def cannot_load(read, path):
     return one_sentence(error, path)
 
 
-def test_damaged_recording(tmp_path):
-    path = tmp_path / "recording.npz"
-    assert "does not exist" in cannot_load(load_recording, path)
-    cannot_load(load_recording, tmp_path)
-    save_recording(path, recording())
-    whole = path.read_bytes()
-    for length in (0, 1, 100, len(whole) // 2, len(whole) - 1):
-        path.write_bytes(whole[:length])
-        cannot_load(load_recording, path)
-
-
 def test_other_files_are_no_recordings(tmp_path):
     path = tmp_path / "other.npz"
+    assert "does not exist" in cannot_load(load_recording, path)
+    cannot_load(load_recording, tmp_path)
     np.savez(path, a=np.zeros(3))
     assert "not a recording" in cannot_load(load_recording, path)
     np.savez(path, header=np.array([{"a": 1}], dtype=object))  # a pickle is never opened
@@ -525,19 +481,6 @@ def test_an_image_comes_back(tmp_path, shape):
         **{name: getattr(frame, name) for name in ("reading", "depth", "slip", "contact")},
     }.items():
         np.testing.assert_array_equal(channels[name][layout.row, layout.column], values.astype(np.float32))
-
-
-def test_exr_as_any_other_program_reads_it(tmp_path):
-    layout, frame = grid_of(3, 5), tactile_frame(15)
-    write_exr(tmp_path / "a.exr", layout, frame, METADATA)
-    with OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True) as file:
-        header, channels = file.header(), file.channels()
-        assert header["compression"] == OpenEXR.ZIP_COMPRESSION and header["type"] == OpenEXR.scanlineimage
-        assert header["palpate.unit"] == "kPa"
-        assert list(channels) == sorted(channels)  # the order that the format asks for
-        last = channels["R"].pixels[-1]  # the lowest scan line is row 0
-    order = np.argsort(layout.column[layout.row == 0])
-    np.testing.assert_array_equal(last, frame.normal_force[layout.row == 0][order].astype(np.float32))
 
 
 def test_exr_of_a_texture_map(tmp_path):
@@ -602,6 +545,7 @@ def test_the_library_reads_what_an_image_says_of_itself(tmp_path):
     with OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True) as file:
         assert set(file.channels()) == set(CHANNELS)
         assert all(channel.type() == OpenEXR.FLOAT for channel in file.channels().values())
+        assert file.header()["compression"] == OpenEXR.ZIP_COMPRESSION and file.header()["type"] == OpenEXR.scanlineimage
         about = {key[8:]: value for key, value in file.header().items() if key.startswith("palpate.")}
     assert (about["sensor"], about["frame"], float(about["time"])) == ("Daumen ü/1", "12", 0.5)
     assert {name: about[f"unit.{name}"] for name in CHANNELS} == {
