@@ -24,7 +24,7 @@ DPI = 160
 
 @dataclass(frozen=True)
 class Label:
-    """Words on a picture, with a thin line to what they describe.
+    """Words on a picture.
 
     Attributes
     ----------
@@ -32,13 +32,10 @@ class Label:
         Its first line is set bold.
     at : (2,) float
         Where the words stand, as shares of the picture's width and height from its lower left corner.
-    to : (2,) float or None
-        Where the line ends, likewise.
     """
 
     text: str
     at: tuple[float, float]
-    to: tuple[float, float] | None = None
 
 
 def label_picture(
@@ -104,9 +101,3 @@ def _draw_label(figure: Figure, label: Label, width: float, height: float) -> No
     x, y = label.at
     figure.text(x, y, first, fontsize=FONT + 1.5, color="white", weight="bold", va="bottom", ha="left")
     figure.text(x, y - 0.03 / height, rest, fontsize=FONT, color="#e3e8ee", va="top", ha="left", linespacing=1.35)
-    if label.to is not None:
-        from matplotlib.lines import Line2D
-
-        figure.add_artist(
-            Line2D([x, label.to[0]], [label.at[1] + 0.22 / height, label.to[1]], color="white", lw=0.8, alpha=0.8)
-        )

@@ -244,7 +244,7 @@ def test_labels_keep_the_size_of_the_picture(tmp_path):
         recording_of(texels),
         {"pad": texels},
         6,
-        labels=[Label("Pad\n1 N", (0.1, 0.8), (0.3, 0.5))],
+        labels=[Label("Pad\n1 N", (0.1, 0.8))],
     )
     out = imread(tmp_path / "out.png")
     assert out.shape[:2] == (360, 640)
