@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whose bake it is: told by the id of the scene and the path of its .blend, wherever both lie."""
 
-import os
-
 import pytest
 
 from palpate.core.io.bake_folder import BakeOwner, Manifest, other_owner
@@ -122,12 +120,3 @@ def test_a_path_from_a_hostile_manifest(project, path):
     folder, blend = project
     left = Manifest(**{**vars(manifest(folder, BakeOwner("a", None))), "scene_path": path})
     assert other_owner(left, folder, BakeOwner("b", blend)) == ""
-
-
-@pytest.mark.skipif(os.name == "nt", reason="the file systems of Windows ignore case")
-def test_names_that_differ_in_case_are_two_files(project):
-    folder, blend = project
-    other = blend.with_name("FIRST.blend")
-    other.write_text("")
-    if not other.samefile(blend):
-        assert other_owner(manifest(folder, BakeOwner("", blend)), folder, BakeOwner("", other)) == f"'{blend}'"

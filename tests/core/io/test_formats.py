@@ -33,7 +33,7 @@ from palpate.core.io.bake_folder import (
     read_manifest,
     write_manifest,
 )
-from palpate.core.io.file_writing import atomic_write, writable_file, writable_folder
+from palpate.core.io.file_writing import atomic_write, require_space, writable_file, writable_folder
 from palpate.core.io.recording_npz import load_recording, save_recording
 from palpate.core.io.tactile_exr import CHANNELS, describe, write_exr
 from palpate.core.model.recording import Frame, Recording, SensorRecording, VectorReadings
@@ -191,6 +191,12 @@ def test_writable_folder(tmp_path):
             writable_folder(tmp_path / place, create=True)
         one_sentence(error, tmp_path / "file")
     assert sorted(os.listdir(tmp_path)) == ["file", "new", "x"]
+
+
+def test_a_disk_that_is_too_small_is_named(tmp_path):
+    require_space(tmp_path / "not" / "yet", 1.0, "The bake")
+    with pytest.raises(FileError, match=r"^The bake needs up to 1\d+ MB and the disk of '.*yet' has \d+ MB left: free"):
+        require_space(tmp_path / "not" / "yet", 1e24, "The bake")
 
 
 # --- names

@@ -22,11 +22,6 @@ def test_each_frame_is_an_image_with_one_layer(tmp_path):
             np.testing.assert_array_equal(channels[name][::-1].ravel(), VALUES[frame, :, axis].astype(np.float32))
 
 
-def test_equal_readings_give_equal_bytes(tmp_path):
-    one, other = (write_vector_exrs(tmp_path / name, VALUES, (2, 3), "T") for name in "ab")
-    assert [path.read_bytes() for path in one] == [path.read_bytes() for path in other]
-
-
 def test_a_shorter_recording_leaves_no_image_of_the_longer_one(tmp_path):
     write_vector_exrs(tmp_path, VALUES, (2, 3), "T")
     (tmp_path / "field_0009.exr").write_bytes(b"of the user")
