@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,18 +13,11 @@ from palpate.core.geometry.grid_layout import GridLayout
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.texels import Texels, texels_from_region
 from palpate.core.geometry.texture_maps import UVLayout
-from palpate.core.io.bake_folder import (
-    IMAGE_LIST_NAME,
-    RECORDING_NAME,
-    Manifest,
-    folder_names,
-    frame_file,
-    write_manifest,
-)
-from palpate.core.io.file_writing import file_sha256
-from palpate.core.io.recording_npz import SENSOR_NAME, save_recording, save_sensor
-from palpate.core.io.tactile_exr import write_exr
+from palpate.core.io.bake_folder import folder_names, manifest_of, write_arrays_of, write_image_of, write_manifest
+from palpate.core.model.body import Body, Motion
 from palpate.core.model.recording import Recording, SensorFrame, SensorRecording
+from palpate.core.model.scenario import Scenario
+from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
 
 ROWS, COLUMNS, PITCH = 5, 3, 0.004
@@ -86,38 +79,17 @@ def write_sensor(
     sensors: tuple[str, ...] = (),
 ) -> Recording:
     """Write the folder of one sensor as a bake leaves it, with a made-up recording if none is given; return its recording."""
-    parameters = parameters or SensorParameters()
+    sensor = Sensor(name, 0, texels, parameters or SensorParameters(), painted=painted or Painted())
     recording = recording or recording_of(texels, 7)
     recording = replace(recording, sensors={name: recording.sensors["pad"]}, digest=recording.digest or "d")
     own = bake / folder_names([name])[name]
     own.mkdir(parents=True)
-    save_recording(own / RECORDING_NAME, recording)
-    save_sensor(own / SENSOR_NAME, texels, painted)
-    frames = [recording.at(int(number)) for number in recording.frames]
-    about = {"sensor": name, "digest": recording.digest, "unit": parameters.unit}
-    for frame in frames:
-        metadata = {**about, "frame": str(frame.frame), "time": repr(frame.time)}
-        write_exr(own / frame_file(frame.frame), texels.layout, frame.sensors[name], metadata)
-    images = [frame_file(frame.frame) for frame in frames]
-    (own / IMAGE_LIST_NAME).write_bytes("".join(f"{file_sha256(own / image)}  {image}\n" for image in images).encode())
-    manifest = Manifest(
-        sensor=name,
-        palpate="0",
-        frame_start=frames[0].frame,
-        frame_end=frames[-1].frame,
-        fps=24.0,
-        dt=recording.dt,
-        digest=recording.digest,
-        unit=parameters.unit,
-        shape=tuple(texels.layout.shape),
-        parameters=asdict(parameters),
-        warnings=(),
-        complete=True,
-        body="pad",
-        sensors=sensors,
-        files={file: file_sha256(own / file) for file in (IMAGE_LIST_NAME, RECORDING_NAME, SENSOR_NAME)},
-    )
-    write_manifest(own, manifest)
+    for number in recording.frames:
+        write_image_of(own, sensor, recording.at(int(number)), recording.digest)
+    first, last = (int(recording.frames[end]) for end in (0, -1))
+    scenario = Scenario((Body("pad", Motion.at_rest()),), (sensor,), (), first, last)
+    manifest = manifest_of(scenario, sensor, recording, write_arrays_of(own, sensor, recording))
+    write_manifest(own, replace(manifest, sensors=sensors))
     return recording
 
 
