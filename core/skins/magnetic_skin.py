@@ -147,28 +147,6 @@ class DipoleSum:
         return field, square
 
 
-def dipole_gradient(offset: np.ndarray, moment: np.ndarray) -> np.ndarray:
-    """Return how the flux density of dipoles changes with the place, ``∂Bᵢ/∂rⱼ``.
-
-    Parameters
-    ----------
-    offset : (..., 3) float, m
-    moment : (..., 3) float, A·m²
-
-    Returns
-    -------
-    (..., 3, 3) float, T/m
-        Symmetric and of trace zero: outside of a dipole its field has neither curl nor divergence.
-    """
-    square = np.sum(offset**2, axis=-1)[..., None, None]
-    along = np.sum(moment * offset, axis=-1)[..., None, None]
-    r_i, r_j = offset[..., :, None], offset[..., None, :]
-    m_i, m_j = moment[..., :, None], moment[..., None, :]
-    both = m_j * r_i + m_i * r_j + along * np.eye(3)
-    gradient: np.ndarray = 3.0 * MU0_4PI * (both - 5.0 * along * r_i * r_j / square) / square**2.5
-    return gradient
-
-
 BLOCK_NUMBERS = 1 << 14
 """Offsets between magnets and magnetometers that are worked on at once: their arrays stay in a processor's cache."""
 FULL_SCALE = 50e-3
@@ -295,23 +273,6 @@ class MagneticSkin:
     def places(self, displacement: np.ndarray) -> np.ndarray:
         """Return where the magnets are, (T, m, 3) float, m, from the texels' displacements (T, n, 3)."""
         found: np.ndarray = self.magnets.place + np.matmul(self.weights, displacement)  # each frame by itself: the same bits
-        return found
-
-    def jacobian(self, displacement: np.ndarray) -> np.ndarray:
-        """Return how each reading changes with each texel's displacement at one moment, without clipping.
-
-        Parameters
-        ----------
-        displacement : (n, 3) float, m
-
-        Returns
-        -------
-        (k, 3, n, 3) float, T/m
-        """
-        place = self.places(displacement[None])[0]
-        gradient = dipole_gradient(self.magnetometers.place[:, None] - place, self.magnets.moment)
-        seen = -np.einsum("kij,kmjl->kiml", self.magnetometers.axes, gradient)  # a magnet that moves takes its field along
-        found: np.ndarray = np.einsum("kiml,mn->kinl", seen, self.weights)
         return found
 
     def _seen(self, place: np.ndarray, refuses_near: bool = True) -> tuple[np.ndarray, np.ndarray]:
