@@ -1,65 +1,128 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Faults of the data are found with evidence, put right on request, and no healthy rig is accused."""
 
-import re
 from dataclasses import replace
-from pathlib import Path
 
-import faulty_rigs as made
 import gap_cases as cases
 import numpy as np
 import pytest
+from rig_files import RIG, write
+from scipy.signal import lfilter
 
-from palpate.benchmarks import _recordings
 from palpate.benchmarks._handmade import low_pass
 from palpate.benchmarks._recordings import Recording
-from palpate.core.errors import PalpateError
 from palpate.core.gap.data_faults.clocks import refined_shifts, shift_of, with_shift
 from palpate.core.gap.data_faults.search import find_faults, put_right
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.dataset.trial import FAULT_KINDS
 from palpate.core.gap.forward.stimulus import stimulus_of
 
+TEXELS = cases.ROWS * cases.COLUMNS
+RAIL = 0.08
+"""N; about half of the largest reading."""
+
 
 def stimuli_of(rig):
     return [stimulus_of(trial, rig) for trial in rig.trials]
 
 
-def with_correction(path, words='"all"'):
-    path.write_text(path.read_text().replace("[sensor]", f"[data]\ncorrect = {words}\n[sensor]", 1))
-    return path
+def with_readings(change):
+    """A fault of the readings (T, n) alone."""
+    return lambda trial: replace(trial, reading=change(trial.reading))
 
 
-def test_the_generator_shares_nothing_with_the_package_but_a_writer_of_files():
-    for module, allowed in ((made, ["from palpate.benchmarks._recordings import Recording"]), (_recordings, [])):
-        text = Path(module.__file__).read_text(encoding="utf-8")
-        assert re.findall(r"^\s*((?:from|import) (?:palpate|\.).*)$", text, re.MULTILINE) == allowed
+def earlier(trial):
+    """The stimulus comes half a second too early, so that the response is late."""
+    late = int(0.5 * cases.RATE)
+    return replace(trial, position=np.concatenate([trial.position[late:], np.repeat(trial.position[-1:], late, axis=0)]))
 
 
-def test_every_kind_of_fault_is_made():
-    assert set(made.KINDS) == set(FAULT_KINDS)
+def swapped(reading):
+    """Two texels that different places of the ball load."""
+    order = np.arange(TEXELS)
+    order[[5, 14]] = 14, 5
+    return reading[:, order]
 
 
-@pytest.mark.parametrize("kind", made.KINDS)
-def test_a_fault_is_found_and_put_right(tmp_path, kind):
-    case = made.draw("gel", kind, 0, tmp_path)
-    rig = read_rig(case.path)
-    found = find_faults(rig, stimuli_of(rig))
-    assert made.is_right(case, [(fault.kind, fault.trials) for fault in found])
-    assert found[0].sentence.endswith("puts it right.") and "\n" not in found[0].sentence
-    rig = read_rig(with_correction(case.path))
-    mended, faults = put_right(rig, stimuli_of(rig))
-    assert [(fault.kind, fault.put_right) for fault in faults] == [(kind, True)]
+def stuck(reading):
+    """The logger repeats one sample for 2 s."""
+    reading = reading.copy()
+    reading[120:200] = reading[119]
+    return reading
+
+
+EVERY, ONE = tuple(f"t{i}" for i in range(5)), ("t1",)
+FAULTS = {
+    "clock-shift": (earlier, (EVERY, ONE)),
+    "swapped-channels": (with_readings(swapped), (EVERY,)),
+    "reversed-channels": (with_readings(lambda reading: reading[:, ::-1]), (EVERY,)),
+    "stuck-logger": (with_readings(stuck), (ONE,)),
+    "repeated-samples": (with_readings(lambda reading: reading[np.arange(len(reading)) // 3 * 3]), (EVERY, ONE)),
+    "unit": (with_readings(lambda reading: 9.81 * reading), (EVERY, ONE)),
+    "saturated-converter": (with_readings(lambda reading: np.minimum(reading, RAIL)), (EVERY,)),
+    "sign": (with_readings(lambda reading: -reading), (EVERY, ONE)),
+}
+"""Faults, and the recordings that have them."""
+
+
+def faulty(kind, names):
+    """A sensor that creeps, of which some recordings have a fault."""
+    rig = cases.rig(contact=cases.relaxing(), seed=2)
+    return replace(rig, trials=tuple(FAULTS[kind][0](one) if one.name in names else one for one in rig.trials))
+
+
+@pytest.mark.parametrize(("kind", "names"), [(kind, names) for kind, (_, all_names) in FAULTS.items() for names in all_names])
+def test_a_fault_is_found_and_put_right(kind, names):
+    assert set(FAULTS) == set(FAULT_KINDS)
+    rig = faulty(kind, names)
+    (fault,) = find_faults(rig, stimuli_of(rig))
+    assert fault.kind == kind and set(fault.trials) == set(names)
+    assert fault.sentence.endswith("puts it right.") and "\n" not in fault.sentence
+    mended, faults = put_right(replace(rig, correct=(kind,)), stimuli_of(rig))
+    assert [(one.kind, one.put_right) for one in faults] == [(kind, True)]
     assert "this was put right" in faults[0].sentence
     assert not find_faults(mended, stimuli_of(mended))
 
 
-@pytest.mark.parametrize(("family", "numbers"), [("foam", range(3)), ("counts", range(3, 6)), ("gel", range(6, 10))])
-def test_a_healthy_rig_is_not_accused(tmp_path, family, numbers):
-    """Whatever effect its sensor has: the numbers go through all of them."""
-    for number in numbers:
-        rig = read_rig(made.draw(family, "", number, tmp_path).path)
-        assert not find_faults(rig, stimuli_of(rig))
+def low_passed(reading, time):
+    keep = np.exp(-1.0 / (0.1 * cases.RATE))
+    return lfilter([1.0 - keep], [1.0, -keep], reading, axis=0)
+
+
+def played(reading, _time):
+    """A quarter of the reading trails behind by a play of an eighth of the largest."""
+    held, width = np.zeros(TEXELS), 0.12 * reading.max()
+    found = np.empty_like(reading)
+    for i, now in enumerate(reading):
+        held = np.clip(held, now - width, now + width)
+        found[i] = 0.75 * now + 0.25 * np.maximum(held, 0.0)
+    return found
+
+
+HEALTHY = {
+    "nothing": {},
+    "relaxes": {"contact": cases.relaxing()},
+    "late": {"change": low_passed},
+    "loop": {"change": played},
+    "gains": {"change": lambda reading, time: reading * np.linspace(0.7, 1.3, TEXELS)},
+    "offsets": {"change": lambda reading, time: reading + 0.01 * np.sin(7.0 * np.arange(TEXELS))},
+    "drifts": {"change": lambda reading, time: reading + 0.02 * (1.0 - np.exp(-time / 8.0))[:, None]},
+    "bends": {"change": lambda reading, time: 0.1 * np.tanh(reading / 0.1)},
+    "steps": {"change": lambda reading, time: np.round(reading / 0.002) * 0.002, "noise": 0.0},
+    "falls in counts": {"change": lambda reading, time: np.round(3200.0 - 2400.0 * reading / (0.1 + reading)), "noise": 0.001},
+}
+
+
+@pytest.mark.parametrize("effect", HEALTHY)
+def test_a_healthy_rig_is_not_accused(effect):
+    """Whatever effect its sensor has, and with the net force that its readings sum to."""
+    rig = cases.rig(**HEALTHY[effect], seed=3)
+    if effect == "falls in counts":
+        rig = replace(rig, parameters=replace(rig.parameters, unit="counts"))
+    else:
+        net = [np.outer(trial.reading.sum(axis=1), [0.0, 0.0, -1.0]) for trial in rig.trials]
+        rig = replace(rig, trials=tuple(replace(one, force=force) for one, force in zip(rig.trials, net, strict=True)))
+    assert not find_faults(rig, stimuli_of(rig))
 
 
 @pytest.mark.parametrize(("late", "kinds"), [(False, []), (True, ["clock-shift"])])
@@ -111,26 +174,25 @@ def test_friction_never_drives_a_slide(tmp_path, sign, kinds):
         force = sign * (2.0 * np.tanh(50.0 * np.cos(2 * np.pi * beat * time)) + 0.2)
         trials.append((name, use, {"time": time, "depth": np.full(len(time), 1e-3), "slide_x": slide, "force_x": force}))
     rubbed = Recording("rubbed", "grid = { rows = 1, columns = 1, pitch = 0.01 }\nk = 1e4", trials)
-    path = rubbed.write(tmp_path)
-    rig = read_rig(path)
+    rig = read_rig(rubbed.write(tmp_path))
     faults = find_faults(rig, stimuli_of(rig))
     assert [fault.kind for fault in faults] == kinds
     assert all(fault.trials == ("slow", "fast") and "drives the slide" in fault.sentence for fault in faults)
-    mended, _ = put_right(read_rig(with_correction(path, '["sign"]')), stimuli_of(rig))
+    mended, _ = put_right(replace(rig, correct=("sign",)), stimuli_of(rig))
     np.testing.assert_allclose(mended.trials[0].force[:, 0], sign * rig.trials[0].force[:, 0])
 
 
-def test_only_what_is_asked_for_is_put_right(tmp_path):
-    rig = read_rig(with_correction(made.draw("gel", "stuck-logger", 0, tmp_path).path, '["sign", "unit"]'))
-    assert rig.correct == ("sign", "unit")
+def test_only_what_is_asked_for_is_put_right():
+    rig = replace(faulty("stuck-logger", ONE), correct=("sign", "unit"))
     mended, faults = put_right(rig, stimuli_of(rig))
     assert mended is rig and [fault.put_right for fault in faults] == [False]
 
 
-@pytest.mark.parametrize("words", ['"some"', "3", '["signs"]', "[1]"])
-def test_unknown_corrections_are_refused(tmp_path, words):
-    with pytest.raises(PalpateError, match="clock-shift"):
-        read_rig(with_correction(made.draw("foam", "", 0, tmp_path).path, words))
+def test_a_rig_says_what_is_put_right(tmp_path):
+    def read(words):
+        return read_rig(write(tmp_path, RIG.replace("[sensor]", f"[data]\ncorrect = {words}\n[sensor]")))
+
+    assert read('["sign", "unit"]').correct == ("sign", "unit") and set(read('"all"').correct) == set(FAULT_KINDS)
 
 
 def test_shifts_are_refined_and_taken_back_to_a_fraction_of_a_sample():
