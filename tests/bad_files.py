@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import random_rigs
 import tomli_w
 from exported_sensors import pad
 from hypothesis import strategies as st
@@ -35,6 +34,7 @@ from palpate.core.gap.logs.answers import answers_of, read_answers
 from palpate.core.gap.logs.log_file import read_log
 from palpate.core.gap.logs.new_rig import write_rig
 from palpate.core.gap.logs.proposal import propose
+from palpate.core.gap.selection.diagnosis import SELECTION_BEGINS, diagnose
 from palpate.core.io.csv_table import read_table
 from palpate.core.io.recording_npz import load_recording, load_sensor, save_recording, save_sensor
 from palpate.core.io.scenario_npz import load_scenario, save_scenario
@@ -306,6 +306,33 @@ TABLE = (
     "time,x,y,z,texel_0,texel_1,force_z\n"
     + "".join(f"{0.02 * i:.2f},0,0,{0.006 - 0.0001 * i:.4f},{0.1 * i:.1f},{0.2 * i:.1f},{-0.3 * i:.1f}\n" for i in range(12))
 ).encode()
+EVERY_WORD = {
+    "format": "palpate-rig/1",
+    "clock": "own",
+    "sensor": {
+        "sensors": [[-0.005, 0.0], [0.005, 0.002]],
+        "cover": {"size": [0.02, 0.012], "pitch": 0.004, "depth": 0.004},
+        "k": 80.0,
+        "contact_height": "free",
+        "unit": "counts",
+    },
+    "indenter": {"shape": {"sphere": 0.008}},
+    "probe": [{"name": "other", "shape": {"box": [0.004, 0.004, 0.01]}}],
+    "data": {"correct": "all"},
+    "trial": [
+        {"file": "a.csv", "specimen": "A", "factor": "free", "zero": "free", "force_zero": "free", "probe": "other"},
+        {"file": "b.csv", "specimen": "B", "factor": "free", "contact_height": 2e-4, "tared": True, "session": "s"},
+        {"file": "c.csv", "use": "check"},
+    ],
+}
+"""A rig with every word that belongs to none of the others, or to no grid."""
+PRESSES = (
+    "time,x,y,z,texel_0,texel_1,force_z\n"
+    + "".join(
+        f"{0.05 * i:.2f},0.001,0,{0.009 - 0.0015 * np.sin(0.2 * i):.5f},{0.1 * (i % 15)},{0.05 * (i % 15)},{-0.2 * (i % 15)}\n"
+        for i in range(45)
+    )
+).encode()
 FOAM = b"compression (mm),force [N],mass_g\n# typed\n0.1,1,2\n0.2,2,3\n0.4,3,4\n"
 PLY = b"""ply
 format ascii 1.0
@@ -477,6 +504,15 @@ def _read_rig(folder: Path) -> None:
         assert np.isfinite(trial.time).all() and (np.diff(trial.time) > 0).all(), "times that do not rise"
 
 
+def _fit_rig(folder: Path) -> None:
+    """Read a rig, look for faults of its data and fit the base model."""
+    job = diagnose(read_rig(folder / "rig.toml"))
+    for progress in job:
+        if progress.done >= SELECTION_BEGINS:
+            break
+    job.close()
+
+
 def _read_study(folder: Path) -> None:
     study = read_study(folder / "study.toml")
     runs = Runs(study, {"pad": plan_for(study, scenario())}, {"pad": "d"})
@@ -532,11 +568,12 @@ def readers() -> dict[str, Reader]:
 
     study = STUDY.format(runs=6, seed=1, more="", hold=0.0)
     scene = later(lambda: files_of(lambda folder: save_scenario(folder / "pad.npz", scenario())))
+    recordings = dict.fromkeys(("a.csv", "b.csv", "c.csv"), PRESSES)
     answers = st.deferred(lambda: _toml("answers.toml", ANSWERS, log_files("csv")))
     found = {
         "sensor.toml": Reader(_toml("sensor.toml", SENSOR), lambda folder: read_sensor(folder / "sensor.toml")),
         "rig": Reader(_rigs(), _read_rig),
-        "rig of any words": Reader(st.integers(0, 2**32).map(random_rigs.random_rig), random_rigs.read_and_fit),
+        "rig of every word": Reader(_toml("rig.toml", EVERY_WORD, recordings), _fit_rig),
         "recorded table": Reader(damaged({"table.csv": TABLE}), _read_table),
         "typed table": Reader(damaged({"foam.csv": FOAM}), _read_typed),
         "study": Reader(_toml("study.toml", tomllib.loads(study)), _read_study),

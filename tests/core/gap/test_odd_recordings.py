@@ -5,7 +5,6 @@ import json
 
 import numpy as np
 import pytest
-from random_rigs import random_rig, read_and_diagnose
 
 from palpate.benchmarks._recordings import Recording
 from palpate.core.errors import PalpateError
@@ -50,13 +49,10 @@ FAULTS = {
     "one press shorter than the others": lambda columns: {name: values[20:28] for name, values in columns.items()},
     "at the rail": responses(lambda values: np.clip(values, 0.0, 0.02)),
     "stuck": responses(lambda values: 0.0 * values + 0.3),
-    "one stuck": one(lambda values: 0.0 * values + 0.3),
     "one empty": one(lambda values: values * np.nan),
     "empty but three": responses(lambda values: np.where(np.arange(len(TIME)) < 3, values, np.nan)),
     "nothing but noise": responses(lambda values: np.cos(1e4 * values)),
-    "two levels": responses(lambda values: np.round(values / values.max())),
     "huge": responses(lambda values: 1e25 * values),
-    "tiny": responses(lambda values: 1e-25 * values),
     "days of pause": lambda columns: columns | {"time": TIME + 1e6 * (TIME > 2.0)},
     "nanoseconds": lambda columns: columns | {"time": 1e-9 * TIME},
     "always the same depth": lambda columns: columns | {"depth": 0.0 * TIME + 1e-3},
@@ -90,7 +86,10 @@ def test_rigs_with_nothing_else_are_refused(tmp_path, name):
 
 
 def test_a_rig_of_which_nothing_is_left_to_be_fitted(tmp_path):
-    """Of those that once ended in a traceback, by the generator that found it."""
-    for name, content in random_rig(12).items():
-        (tmp_path / name).write_bytes(content)
-    assert read_and_diagnose(tmp_path) in ("explained", "no gap", "unexplained")
+    """The net force is the known force: no parameter of the sensor changes a response."""
+    load = np.maximum(recording(0)["depth"], 0.0)
+    known = {"time": TIME, "force": 1e3 * load, "force_z": -1e3 * load + 1e-3 * np.sin(50.0 * TIME)}
+    sensor = "grid = { rows = 1, columns = 2, pitch = 0.004 }\nk = 70.0"
+    rig = Recording("odd", sensor, [("a", "fit", known), ("b", "check", known)]).write(tmp_path)
+    result = run_job(diagnose(read_rig(rig)))
+    assert result.verdict in ("explained", "no gap", "unexplained") and np.isfinite(result.best.sse).all()
