@@ -2,6 +2,10 @@
 """A small rig as files, whose recordings a test replaces."""
 
 import numpy as np
+import pytest
+
+from palpate.core.errors import PalpateError
+from palpate.core.gap.dataset.rig import read_rig
 
 TEXELS = 6
 RIG = """
@@ -44,3 +48,12 @@ def write(folder, rig=RIG, **files):
     path = folder / "rig.toml"
     path.write_text(rig)
     return path
+
+
+def refusal(folder, rig=RIG, **files):
+    """Write a rig that is refused; return the sentence that says why."""
+    with pytest.raises(PalpateError) as caught:
+        read_rig(write(folder, rig, **files))
+    message = str(caught.value)
+    assert message.endswith(".") and "\n" not in message and len(message) < 400
+    return message

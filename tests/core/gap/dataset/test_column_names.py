@@ -3,9 +3,8 @@
 
 import numpy as np
 import pytest
-from rig_files import RIG, TEXELS, table, write
+from rig_files import RIG, TEXELS, refusal, table, write
 
-from palpate.core.errors import PalpateError
 from palpate.core.gap.dataset.column_names import read_column
 from palpate.core.gap.dataset.rig import read_rig
 
@@ -91,18 +90,13 @@ BAD = {
 @pytest.mark.parametrize("name", BAD)
 def test_what_does_not_fit_gets_a_sentence(tmp_path, name):
     words, said = BAD[name]
-    with pytest.raises(PalpateError) as caught:
-        read_rig(write(tmp_path, with_columns(words), press=logged(), again=logged()))
-    message = str(caught.value)
-    assert said in message and message.endswith(".") and "\n" not in message
+    assert said in refusal(tmp_path, with_columns(words), press=logged(), again=logged())
 
 
 def test_zero_has_no_inverse_and_two_columns_are_one_too_many(tmp_path):
     rows = logged()
     rows[4][rows[0].index("R3")] = "0"
-    with pytest.raises(PalpateError, match="Line 5 of 'press.csv' has zero for R3"):
-        read_rig(write(tmp_path, with_columns(), press=rows, again=logged()))
+    assert "Line 5 of 'press.csv' has zero for R3" in refusal(tmp_path, with_columns(), press=rows, again=logged())
     rows = logged()
     double = [[*rows[0], "z"], *([*row, "1"] for row in rows[1:])]
-    with pytest.raises(PalpateError, match="remove one of them"):
-        read_rig(write(tmp_path, with_columns(), press=double, again=logged()))
+    assert "remove one of them" in refusal(tmp_path, with_columns(), press=double, again=logged())

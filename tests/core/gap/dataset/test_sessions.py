@@ -3,9 +3,8 @@
 
 import numpy as np
 import pytest
-from rig_files import RIG, table, write
+from rig_files import RIG, refusal, table, write
 
-from palpate.core.errors import PalpateError
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.dataset.trial import ONE_CLOCK, UNKNOWN_PAUSE
 
@@ -64,34 +63,8 @@ def test_time_stamps_that_go_on_are_one_session(tmp_path):
     assert names == ["", ""] and not warnings
 
 
-BAD = {
-    "overlap": ('session = "s"\nstarted = 1', 'session = "s"\nstarted = 1.1', "", "before 'press.csv' has ended"),
-    "some without": ('session = "s"\nstarted = 1', 'session = "s"', "", "have no started"),
-    "dates and seconds": ('session = "s"\nstarted = 1', 'session = "s"\nstarted = "2026-05-04"', "", "have no started"),
-    "no session": ("started = 1", "", "", "has started and no session"),
-    "no date": ('session = "s"\nstarted = "soon"', "", "", "started of Trial 1"),
-    "a list": ('session = "s"\nstarted = [1]', "", "", "started of Trial 1"),
-    "huge": ('session = "s"\nstarted = 1e300', "", "", "started of Trial 1"),
-    "empty name": ('session = " "', "", "", "session of Trial 1"),
-    "no name": ("session = 3", "", "", "session of Trial 1"),
-    "no truth": ("tared = 1", "", "", "tared of Trial 1"),
-    "clock": ("", "", 'clock = "wall"', 'write "absolute" or "own"'),
-    "one clock that overlaps": ("", "", 'clock = "absolute"', "overlap in time"),
-}
-
-
-@pytest.mark.parametrize("name", BAD)
-def test_contradictions_get_a_sentence(tmp_path, name):
-    first, second, top, words = BAD[name]
-    with pytest.raises(PalpateError) as caught:
-        read_rig(write(tmp_path, with_words(first, second, top)))
-    message = str(caught.value)
-    assert words in message and message.endswith(".") and "\n" not in message
-
-
 def test_forces_and_depths_have_no_common_state(tmp_path):
     rig = with_words('session = "s"', 'session = "s"')
-    with pytest.raises(PalpateError, match="known force"):
-        read_rig(write(tmp_path, rig, press=table(names=("force",)), again=table(names=("depth",))))
+    assert "known force" in refusal(tmp_path, rig, press=table(names=("force",)), again=table(names=("depth",)))
     starts, names, _ = begins(tmp_path, RIG, press=table(names=("force",)), again=table(names=("depth",), start=40.0))
     assert names == ["", ""] and starts == [0.0, 40.0]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a further recording would separate: against least squares over all samples, and as files of a plan."""
+"""What a further recording would separate: against least squares over all samples, as files of a plan, and from end to end."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import gap_cases as cases
 import numpy as np
 import pytest
 
+from palpate.benchmarks._recordings import Recording
 from palpate.commands import main
 from palpate.core.errors import ParameterError
 from palpate.core.gap.fitting.least_squares import free_base_parameters
@@ -21,7 +22,7 @@ from palpate.core.gap.report.plan_files import planned_sentence, table_rows, wri
 from palpate.core.gap.selection.candidates import candidates, scales_of
 from palpate.core.jobs import run_job
 
-NOISE = ChannelNoise(0.005, 1.0, "given"), ChannelNoise(0.05, 1.0, "given")
+NOISES = ChannelNoise(0.005, 1.0, "given"), ChannelNoise(0.05, 1.0, "given")
 
 
 @pytest.fixture(scope="module")
@@ -41,14 +42,14 @@ def test_what_a_rival_leaves_is_that_of_least_squares_over_all_samples(rig):
     model = Model(replace(rig.parameters, cn=0.0))
     labels = ("gain-mismatch/listed", "saturation/tanh", "creep/power")
     forms = [one for one in candidates(fitted, model) if one.label in labels]
-    signals = Signals(model, free_base_parameters(model.parameters, ["k"], 1.0), forms, fitted, NOISE)
+    signals = Signals(model, free_base_parameters(model.parameters, ["k"], 1.0), forms, fitted, NOISES)
     found = {(one.kind, one.other): one for one in signals.separations(signals.products(fitted), signals.pairs)}
     scales = scales_of(fitted, model)
 
     def changes(form):
         effects = [form.effect(values, scales.texels, 1.0) for values in form.starting_values(scales, 1.0, STARTS)]
         readings = [fitted[0].predict(model.with_effect(effect)).reading for effect in effects]
-        return np.stack([(one - fitted[0].predict(model).reading).ravel() / NOISE[0].deviation for one in readings], axis=1)
+        return np.stack([(one - fitted[0].predict(model).reading).ravel() / NOISES[0].deviation for one in readings], axis=1)
 
     load = fitted[0].predict(model).reading
     each = np.zeros((*load.shape, load.shape[1]))
@@ -117,3 +118,69 @@ def test_options_of_a_plan_that_do_not_go_together_are_refused(rig, tmp_path, ca
         assert said in capsys.readouterr().err
     with pytest.raises(ParameterError):
         run_job(plan_experiment(rig, Wishes(area=(5.0, 6.0, 5.0, 6.0))))
+
+
+# --- what recordings leave ambiguous, a recording along the written trajectory resolves
+
+
+ROWS, COLUMNS, PITCH, RADIUS, K = 5, 3, 4e-3, 14e-3, 60.0
+RATE, DEEP = 25.0, 2.5e-3
+SENSOR = f"""
+grid = {{ rows = {ROWS}, columns = {COLUMNS}, pitch = {PITCH} }}
+thickness = 6e-3
+k = {K}
+cn = 0.0
+unit = "N"
+gain = 1.0
+zero = 0.0
+[indenter]
+shape = {{ sphere = {RADIUS} }}
+"""
+SHARE, TAU, POWER = 0.35, 2.5, 0.6
+"""Of the stress that relaxes: by a stretched exponential (Kohlrausch), which the library does not have."""
+NOISE = 0.003
+"""Of full load."""
+
+
+def loads(path):
+    """Forces (T, n) N of springs under a ball whose centre follows a path (T, 3), m."""
+    row, column = np.divmod(np.arange(ROWS * COLUMNS), COLUMNS)
+    x, y = (column - 0.5 * (COLUMNS - 1)) * PITCH, (row - 0.5 * (ROWS - 1)) * PITCH
+    across = (path[:, :1] - x) ** 2 + (path[:, 1:2] - y) ** 2
+    high = np.sqrt(np.maximum(RADIUS**2 - across, 0.0))  # of the ball's middle above the point where it meets the texel's line
+    return K * np.maximum(high - path[:, 2:], 0.0) * high / RADIUS  # across the ball's surface
+
+
+def recorded(path, rng):
+    """A recording of the pad, whose stress relaxes, under a ball whose centre follows a path (T, 3), m."""
+    force, time = loads(path), np.arange(len(path)) / RATE
+    lost = SHARE * (1.0 - np.exp(-((time / TAU) ** POWER)))
+    rises = np.diff(force, axis=0, prepend=0.0)
+    relaxed = np.stack([np.convolve(rises[:, i], lost)[: len(path)] for i in range(force.shape[1])], axis=1)
+    readings = np.maximum(force - relaxed, 0.0) + NOISE * K * DEEP * rng.normal(size=force.shape)
+    texels = {f"texel_{i}": one for i, one in enumerate(readings.T)}
+    return {"time": time, **dict(zip("xyz", path.T, strict=True)), **texels}
+
+
+def said_of(trials, folder, out):
+    rig = Recording("pad that relaxes", SENSOR, trials).write(folder)
+    assert main(["gap", str(rig), "--out", str(folder / out)]) == 0
+    return json.loads((folder / out / "gap.json").read_text())
+
+
+@pytest.mark.long("palpate gap twice, from a rig to its report")
+def test_the_trajectory_that_is_written_resolves_what_was_ambiguous(tmp_path):
+    """Three slow presses, without a hold or another speed, and then what is planned."""
+    rng, time = np.random.default_rng(5), np.arange(int(14 * RATE)) / RATE
+    depth = np.interp(time, [0.0, 1.0, 7.0, 13.0, 14.0], [-1e-3, -1e-3, DEEP, -1e-3, -1e-3])
+    slow = np.stack([0.0 * time, 0.0 * time, RADIUS - depth], axis=1)
+    trials = [(f"press_{i}", "check" if i == 2 else "fit", recorded(slow, rng)) for i in range(3)]
+    before = said_of(trials, tmp_path, "before")
+    assert any("creep" in group for group in before["ambiguous"])
+    assert before["planned_experiment"]["separation_after"] > before["planned_experiment"]["separation_before"]
+    table = np.genfromtxt(tmp_path / "before" / "next_experiment.csv", delimiter=",", names=True)
+    time = np.arange(0.0, table["time"][-1], 1.0 / RATE)
+    planned = np.stack([np.interp(time, table["time"], table[axis]) for axis in "xyz"], axis=1)
+    after = said_of([*trials, ("planned", "fit", recorded(planned, rng))], tmp_path, "after")
+    assert not after["ambiguous"] and after["verdict"] == "explained"
+    assert [one["effect"] for one in after["found"] if one["confidence"] >= 0.5] == ["creep"]
