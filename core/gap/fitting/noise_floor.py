@@ -39,7 +39,7 @@ LEAST_NOISY_SHARE = 0.2
 """Share of the loaded samples in which a load has to change its rate, or it has no noise: weights that are put down change it
 in few samples. Of 200 simulated rows of weights the share was at most 0.13, of 390 noisy loads with steps of up to four
 deviations at least 0.29. Of two other families, 60 piles of weights and 60 slow waves, all were judged right
-(tests/core/gap/fitting/test_load_noise.py)."""
+(tests/core/gap/fitting/test_noise.py)."""
 PRESSED_SHARE, UNLOADING_SHARE = 0.05, 0.1
 """Shares of the largest load: above the first the sensor counts as pressed; a decrease by the second is an unloading."""
 LEAST_SLIDING_SPEED = 1e-5
