@@ -13,8 +13,8 @@ from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
 from palpate.core.effects.engine.registry import effect, kind_of
+from palpate.core.errors import FileError
 from palpate.core.gap.fitting.least_squares import FreeParameter, TrialView, cross_fitted, fit, free_base_parameters
-from palpate.core.gap.fitting.noise_floor import reading_noise
 from palpate.core.gap.fitting.residual_tests import residual_structure
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.report import summary
@@ -25,6 +25,7 @@ from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.findings import Diagnosis
 from palpate.core.gap.selection.rao_score import ScoreTest
 from palpate.core.gap.selection.starting_points import starting_points
+from palpate.core.io.hidden_folder import FileList
 from palpate.core.io.sensor_toml import read_sensor
 from palpate.core.jobs import run_job
 
@@ -63,22 +64,6 @@ def test_the_fit_is_that_of_scipy():
     assert found.sse.sum() == pytest.approx(2 * other.cost, rel=1e-6)
 
 
-def test_a_gain_per_texel_is_found_with_the_common_numbers():
-    gains = np.exp(np.random.default_rng(3).normal(0, 0.2, cases.ROWS * cases.COLUMNS))
-    rig = cases.rig(change=lambda reading, time: reading * gains, noise=0.001, seed=3, trials=6)
-    views = views_of(rig, 1e-4)
-    ones = tuple([1.0] * len(gains))
-    free = [
-        *free_base_parameters(rig.parameters, ("cn",), 1.0),
-        FreeParameter(0, "factor", 0, 100, per_texel=True, resting_value=1.0),
-    ]
-    start = Model(replace(rig.parameters, k=80.0, cn=0.5), (effect("gain-mismatch", "listed", factor=ones),))
-    found = fit(views, start, free, max_steps=20, tolerance=1e-8)
-    touched = np.any([(s.predictor.stimulus.depth > 5e-4).any(axis=0) for s in views], axis=0)
-    factor = np.array(found.model.effects[0].values["factor"])
-    np.testing.assert_allclose(factor[touched], gains[touched], rtol=0.02)
-
-
 def test_cross_fitting_is_nearly_fitting_without_every_other_stretch():
     rig = cases.rig(contact=cases.relaxing(), seed=2, trials=4, seconds=8.0)
     views = [replace(view, stretch_count=4) for view in views_of(rig)]
@@ -96,17 +81,6 @@ def test_cross_fitting_is_nearly_fitting_without_every_other_stretch():
             r = view.residual(without.model)
             for part in view.stretches(r)[fold::2]:
                 assert (own[part] ** 2).sum() == pytest.approx(float((r[part] ** 2).sum()), rel=0.05)
-
-
-@pytest.mark.parametrize("colour", [0.0, 0.9])
-def test_noise_is_measured_where_nothing_is_pressed(colour):
-    rig = cases.rig(noise=0.006, colour=colour, seed=4)
-    predictors = [Predictor(trial, rig) for trial in rig.trials]
-    full = max(trial.reading.max() for trial in rig.trials)
-    noise = reading_noise(predictors, full)
-    assert noise.deviation / full == pytest.approx(0.006, rel=0.12)
-    expected = (1 + colour) / (1 - colour)  # of an autoregressive process; short stretches hide the slow part of it
-    assert 0.5 * expected < noise.correlation_time < 1.3 * expected
 
 
 def test_noise_has_no_structure_and_hum_has():
@@ -172,14 +146,11 @@ def test_loads_spread_alike_on_a_mesh_whose_rim_has_small_vertices():
     near = (apart < 1.1 * cases.PITCH).sum(axis=0)  # with the vertex itself: 3 at a corner, 4 at a side
     texels = replace(rig.texels, area=rig.texels.area * np.where(near == 3, 0.25, np.where(near == 4, 0.5, 1.0)))
     rig = replace(rig, texels=texels)
-    form = kind_of("load-spreading").forms[0]
-    start = Model(rig.parameters, (effect("load-spreading", form.name, width=0.8 * width),))
-    free = [*free_base_parameters(rig.parameters, ("k", "cn"), 1.0), FreeParameter(0, "width", 1e-4, 0.1)]
-    noise = 1e-4 * max(float(trial.reading.max()) for trial in rig.trials)
-    found = fit(views_of(rig, noise), start, free, max_steps=40, tolerance=1e-8)
-    assert found.mean < 1.5  # the noise alone is 1; by areas of the vertices it was 8e5
-    assert found.model.parameters.k == pytest.approx(80.0, rel=0.005)
-    assert found.model.effects[0].values["width"] == pytest.approx(width, rel=0.005)
+    shape = kind_of("load-spreading").forms[0].name
+    model = Model(replace(rig.parameters, cn=0.8), (effect("load-spreading", shape, width=width),))
+    for trial in rig.trials:
+        error = Predictor(trial, rig).predict(model).reading - trial.reading
+        assert np.sqrt(np.mean(error**2)) < 0.005 * trial.reading.max()
 
 
 def test_nothing_hidden_but_wrong_parameters_is_no_gap():
@@ -189,13 +160,27 @@ def test_nothing_hidden_but_wrong_parameters_is_no_gap():
 
 
 @pytest.mark.slow("a whole diagnosis, the one that names an effect in this tier")
-def test_creep_is_named_and_the_gap_closes(tmp_path):
+def test_creep_is_named_and_the_gap_closes(tmp_path, monkeypatch):
+    """The report takes the place of an earlier one, and a plan that fails takes no finished result with it."""
+    earlier = FileList(tmp_path)
+    with earlier.new_files("report") as new:
+        (new / "next_experiment.csv").write_text("of the earlier one")
+        earlier.replace(new, {"gap": [new / "next_experiment.csv"]})
+    (tmp_path / "notes.txt").write_text("mine")
+
+    def plan_after(_result):
+        raise FileError("0.1 N do not rest on the sensor.")
+        yield  # as the real one is a job
+
+    monkeypatch.setattr(summary, "plan_after", plan_after)
     result = diagnosed(cases.rig(contact=cases.relaxing(), seed=7))
     assert [named.name for named in result.findings] == ["creep"]
     assert result.verdict == "explained" and result.findings[0].confidence > 0.6
     for _ in summary.write_report(result, tmp_path):
         pass
     found = json.loads((tmp_path / "gap.json").read_text())
+    assert not (tmp_path / "next_experiment.csv").exists() and (tmp_path / "notes.txt").exists()
+    assert "No further recording was planned: 0.1 N do not rest on the sensor." in found["warnings"]
     assert found["format"] == "palpate-gap/1" and found["found"][0]["effect"] == "creep"
     floor, before, after = found["gap"]["noise_floor"], found["gap"]["before"]["check"], found["gap"]["after"]["check"]
     assert max(after**2 - floor**2, 0) < 0.2**2 * (before**2 - floor**2)  # four fifths of the gap, noise removed
@@ -216,7 +201,7 @@ def test_creep_is_named_and_the_gap_closes(tmp_path):
 @pytest.mark.long("a whole diagnosis")
 def test_hum_is_unexplained():
     result = diagnosed(cases.rig(change=lambda r, t: r + 0.01 * np.sin(2 * np.pi * 7.3 * t)[:, None], seed=9))
-    assert result.verdict == "unexplained" and not result.findings
+    assert result.verdict == "unexplained" and not result.findings and result.line is not None
     assert result.structure.strongest == "common mode"
     assert "without touching" in next_experiment(result)
 

@@ -22,26 +22,17 @@ def changing(change):
     return cases.rig(lambda force, time: change(force, next(count)), seed=1, trials=5, seconds=6.0)
 
 
-@pytest.mark.long("whole diagnoses of five recordings")
-@pytest.mark.parametrize("change", [
-    lambda force, i: force * (1.0, 0.7, 1.2, 0.9, 1.1)[i],  # an amplifier's range
-    lambda force, i: force + 0.006 * (0.0, 1.0, -1.0, 2.0, 1.5)[i],  # a sensor that was mounted again
-])  # fmt: skip
-def test_levels_and_gains_of_recordings_are_no_effect_of_the_sensor(change):
-    result = run_job(diagnose(changing(change)))
+@pytest.mark.long("a whole diagnosis of five recordings")
+def test_gains_of_recordings_are_no_effect_of_the_sensor():
+    """As an amplifier's range is changed between recordings; a level is that of test_report.py."""
+    gains = (1.0, 0.7, 1.2, 0.9, 1.1)
+    result = run_job(diagnose(changing(lambda force, i: force * gains[i])))
     assert result.between is not None and result.between.confidence > 0.9
     assert result.verdict == "explained" and not result.findings
-    expected = change(1.0, 1) - change(0.0, 1)
-    assert result.between.factors["t1"] / result.between.factors["t0"] == pytest.approx(expected, rel=0.02)
+    assert result.between.factors["t1"] / result.between.factors["t0"] == pytest.approx(0.7, rel=0.02)
     errors = gap_errors(result)
     assert headline(result, errors).startswith("Recordings differ by a gain and a level of their own")
     assert summary(result, errors)["between_recordings"]["confidence"] == result.between.confidence
-
-
-def test_gains_of_texels_are_no_difference_between_recordings():
-    gains = 1.0 + 0.25 * np.sin(2.3 * np.arange(cases.ROWS * cases.COLUMNS))
-    result = run_job(diagnose(changing(lambda force, i: force * gains)))
-    assert result.between is None and [one.name for one in result.findings] == ["gain-mismatch"]
 
 
 @pytest.mark.long("a whole diagnosis of five recordings")

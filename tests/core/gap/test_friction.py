@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A surface that slides to and fro under a constant load: friction is the base model's own, backlash is in no library."""
+"""Friction of the base model, friction that it lacks, and backlash, which is in no library."""
 
 from dataclasses import replace
 
@@ -17,6 +17,45 @@ from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.rule_numbers import SURE
 from palpate.core.jobs import run_job
 from palpate.core.model.sensor_parameters import SensorParameters
+
+# --- friction that the base model lacks shows in net forces alone
+
+
+STIFF = SensorParameters(k=1e4, cn=0.0, sigma0=5e4, sigma1=1.0, mus=0.6, mud=0.5, x0=0.02, ct=0.0)
+
+
+def sliding(change, sway):
+    """Slides at many constant speeds under a load that changes; `change(force, speed)` is done to the tangential force.
+
+    Readings have noise, and a slow swing of `sway` that is smaller than their noise.
+    """
+    rng, time, trials = np.random.default_rng(0), 0.01 * np.arange(1601), []
+    for i in range(4):
+        speeds = rng.choice([-1.0, 1.0], 16) * 10 ** rng.uniform(-3.3, -1.2, 16)
+        slide = 0.01 * np.cumsum(np.append(np.repeat(speeds, 100), 0.0))
+        level = 1e-3 * (1.0 + 0.3 * np.sin(0.2 * np.pi * (i + 1) * time))
+        nothing, use = np.zeros((len(time), 3)), "check" if i == 3 else "fit"
+        sensed = cases.depth_trial(time, level, slide=slide, force=nothing, reading=nothing[:, :1], name=f"t{i}", use=use)
+        said = Predictor(sensed, cases.grid_rig(1, 1, 0.01, STIFF, [sensed])).predict(Model(STIFF))
+        force = said.force.copy()
+        force[:, 0] = change(force[:, 0], np.gradient(slide, time))
+        reading = said.reading + 0.05 * rng.normal(size=said.reading.shape) + sway * np.sin(3.0 * time)[:, None]
+        trials.append(replace(sensed, force=force + 0.03 * rng.normal(size=force.shape), reading=reading))
+    return cases.grid_rig(1, 1, 0.01, STIFF, trials, given={"k", "mus", "mud", "x0", "ct"})
+
+
+@pytest.mark.slow("a whole diagnosis, the one with friction in this tier")
+def test_friction_is_judged_by_the_forces_where_the_readings_leave_noise():
+    result = run_job(diagnose(sliding(lambda force, speed: force * (1.0 + 10.0 * np.abs(speed)), sway=0.015)))
+    assert [one.name for one in result.findings] == ["viscous-friction"] and result.findings[0].confidence > 0.5
+    errors = gap_errors(result)
+    said, closed = sentences.headline(result, errors), summary.summary(result, errors)["gap"]["closed"]
+    assert "viscous-friction" in said and "The base model has friction" not in said
+    assert closed["fit"] > 0.8 and closed["check"] > 0.8
+
+
+# --- a surface that slides to and fro under a constant load
+
 
 PARAMETERS = SensorParameters(k=1e4, cn=0.0, sigma0=5e3, sigma1=1.0, mus=0.6, mud=0.5, x0=0.02, ct=0.0)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a report says of recordings that differ, of texels that fall silent, and of what its check recordings did."""
+"""Sentences and numbers of a report; its files are tested in test_workflow.py."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -15,9 +15,10 @@ from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.fitting.intervals import ParameterInterval
 from palpate.core.gap.fitting.least_squares import BASE
 from palpate.core.gap.forward.predictor import Model, predictors_of
+from palpate.core.gap.report import summary
 from palpate.core.gap.report.comparison import gap_errors
-from palpate.core.gap.report.sentences import headline
-from palpate.core.gap.report.summary import summary
+from palpate.core.gap.report.html_report import _value_and_ends
+from palpate.core.gap.report.sentences import NOT_IDENTIFIABLE, headline, interval_text, said_confidence
 from palpate.core.gap.selection.base_model import base_fit, prepared
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.recording_differences import RecordingDifferences
@@ -49,7 +50,7 @@ def test_a_shifted_recording_is_named_and_its_gap_is_that_before_it_was_shifted_
     rig = cases.rig(lambda force, time: force + (0.01 if next(count) == 2 else 0.0), seed=1, trials=5, seconds=6.0)
     result = run_job(diagnose(rig))
     errors = gap_errors(result)
-    said, found = headline(result, errors), summary(result, errors)
+    said, found = headline(result, errors), summary.summary(result, errors)
     assert result.between is not None and result.verdict == "explained"
     assert "Only 't2' differs: it reads" in said and "more than the others" in said
     gap = found["gap"]
@@ -102,3 +103,29 @@ def test_numbers_without_an_interval_stand_below_the_others():
         ("misalignment", "y", "0.00255 (0.002 … 0.003)"),
         ("misalignment", "x", "-0.00119 (no interval)"),
     ]
+
+
+@pytest.mark.parametrize(("value", "low", "high", "bounds", "is_told"), [
+    (0.4, 0.3, 0.5, (0.0, 0.95), True),
+    (0.95, 0.8, 0.95, (0.0, 0.95), True),  # at one end of its bounds alone
+    (0.95, 0.0, 0.95, (0.0, 0.95), False),
+    (1.0, 0.01, 30.0, (0.0, 1e6), False),  # the order of magnitude is open
+    (-1.0, -1.5, -0.5, (-10.0, 10.0), True),
+])  # fmt: skip
+def test_an_interval_that_fills_its_bounds_is_not_told(value, low, high, bounds, is_told):
+    text = interval_text(ParameterInterval(0, "amount", value, low, high, bounds))
+    assert text == (
+        f"{value:.4g} ({low:.4g} … {high:.4g})"
+        if is_told
+        else f"not identifiable from these recordings; sensor.toml has {value:.4g}"
+    )
+
+
+@pytest.mark.parametrize(("confidence", "said"), [(0.25, "25%"), (0.985, "98%"), (0.99, "99%"), (0.9996, "over 99%")])
+def test_no_confidence_is_said_as_certain(confidence, said):
+    assert said_confidence(confidence) == said
+
+
+def test_the_report_states_no_value_that_the_recordings_leave_open():
+    assert _value_and_ends(0.95, NOT_IDENTIFIABLE) == ("–", NOT_IDENTIFIABLE)
+    assert _value_and_ends(0.95, "0.9 … 1") == ("0.95", "0.9 … 1")
