@@ -11,6 +11,8 @@ from palpate.core.errors import PalpateError
 from palpate.core.gap.dataset.rig import Indenter, Rig, grid_texels
 from palpate.core.gap.dataset.trial import Trial
 from palpate.core.gap.fitting.noise_floor import coverage
+from palpate.core.gap.forward.closed_form_contact import box_contact, sphere_contact
+from palpate.core.gap.forward.force_model import _equal_columns
 from palpate.core.gap.forward.predictor import Predictor
 from palpate.core.gap.forward.stimulus import stimulus_of
 from palpate.core.geometry.mesh import checked_mesh
@@ -39,15 +41,21 @@ def solid(shape):
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_box_is_its_mesh(turned):
-    """Closed form and the solver's contact search agree to rounding, for boxes smaller and larger than the pad, and askew."""
+    """Closed form and the solver's contact search agree to rounding, for boxes smaller and larger than the pad, and askew.
+
+    The normals of a turned box's texels point in all directions.
+    """
     rng = np.random.default_rng(2)
     for edges in ((0.01, 0.015, 0.008), (0.04, 0.07, 0.02)):
         where = np.column_stack([*rng.uniform(-5e-3, 5e-3, (2, 40)), 0.5 * edges[2] - rng.uniform(-1e-3, 3e-3, 40)])
         turns = np.column_stack([np.ones(40), 0.08 * rng.normal(size=(40, 3))])
         turns /= np.linalg.norm(turns, axis=1)[:, None]
         one = trial(where, turns if turned else None)
-        mesh = solid(trimesh.creation.box(edges))
-        plain, exact = (stimulus_of(one, rig(Indenter(mesh, None, "box", size), one)) for size in (None, edges))
+        own = rig(Indenter(solid(trimesh.creation.box(edges)), None, "box", edges), one)
+        if turned:
+            normal = own.texels.normal + 0.5 * rng.normal(size=own.texels.normal.shape)
+            own = replace(own, texels=replace(own.texels, normal=normal / np.linalg.norm(normal, axis=1)[:, None]))
+        exact, plain = (stimulus_of(one, replace(own, indenter=replace(own.indenter, edges=size))) for size in (edges, None))
         differ = np.abs(plain.depth - exact.depth) > 1e-12  # where a segment just meets an edge, rounding decides
         assert differ.mean() < 1e-3 and exact.depth.max() > 1e-3
         for name in ("rate", "normal", "slide_speed"):
@@ -117,3 +125,77 @@ def test_a_contact_that_is_never_broken_is_one_cycle():
     one = replace(trial(np.zeros((50, 3))), stimulus="depth", position=None, quaternion=None, level=np.full(50, 1e-3))
     found = coverage([Predictor(one, rig(None, one))])
     assert found.cycles == 1 and not found.unloading and found.longest_hold > 0.9
+
+
+# --- closed forms
+
+
+REACH = 2e-3
+
+
+def drawn(seed, samples=40, texels=9):
+    """Texels in all directions, and places of an indenter that touches some of them."""
+    rng = np.random.default_rng(seed)
+    position, outward = rng.normal(size=(texels, 3)) * 3e-3, rng.normal(size=(texels, 3))
+    quaternion = rng.normal(size=(samples, 4))
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
+    return position, outward, rng.normal(size=(samples, 3)) * 4e-3, quaternion
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_sphere_is_met_where_the_segment_enters_it(seed):
+    """At a distance of the radius from its centre: a quadratic equation for the length of the way from behind the texel."""
+    position, outward, center, _ = drawn(seed)
+    radius, base = 4e-3, position - REACH * outward
+    depth, normal, point, most = sphere_contact(center, radius, position, outward, REACH)
+    offset = base - center[:, None]
+    along, square = np.einsum("tnk,nk->tn", offset, outward), (offset**2).sum(axis=2)
+    length = -along - np.sqrt(np.maximum(along**2 - square + radius**2, 0.0))
+    inside = square < radius**2
+    touched = (along**2 > square - radius**2) & (length >= 0.0) & (length <= REACH) & ~inside
+    assert touched.sum() > 10 and most == inside.sum(axis=1).max()
+    expected = (base + length[..., None] * outward)[touched]
+    np.testing.assert_allclose(point[touched], expected, rtol=0, atol=1e-12)
+    out = (expected - np.broadcast_to(center[:, None], point.shape)[touched]) / radius
+    np.testing.assert_allclose(normal[touched], out, rtol=0, atol=1e-9)
+    way = np.broadcast_to(outward, point.shape)[touched]
+    np.testing.assert_allclose(depth[touched], (REACH - length[touched]) * np.abs((out * way).sum(axis=1)), rtol=0, atol=1e-12)
+    assert not depth[~touched & ~inside].any()
+
+
+def test_box_along_its_planes():
+    """A segment along two pairs of planes: between them it meets the third, beside them it meets nothing."""
+    position, outward = np.array([[0.0, 0.0, 0.0], [5e-3, 0.0, 0.0]]), np.array([[0.0, 0.0, 1.0]] * 2)
+    center, straight = np.array([[0.0, 0.0, 2e-3]]), np.array([[1.0, 0.0, 0.0, 0.0]])
+    depth, normal, _, most = box_contact(center, straight, np.array([4e-3, 4e-3, 5e-3]), position, outward, REACH)
+    np.testing.assert_allclose(depth, [[0.5e-3, 0.0]], rtol=0, atol=1e-18)
+    np.testing.assert_array_equal(normal[0], [[0.0, 0.0, -1.0]] * 2)
+    assert most == 0
+
+
+def test_nothing_touched_keeps_texel_and_normal():
+    position, outward, center, quaternion = drawn(7)
+    for contact in (
+        sphere_contact(center + 1.0, 4e-3, position, outward, REACH),
+        box_contact(center + 1.0, quaternion, np.full(3, 4e-3), position, outward, REACH),
+    ):
+        depth, normal, point, most = contact
+        assert not depth.any() and most == 0
+        np.testing.assert_array_equal(normal, np.broadcast_to(-outward, normal.shape))
+        np.testing.assert_array_equal(point, np.broadcast_to(position, point.shape))
+
+
+# --- kernels
+
+
+def test_equal_columns_are_equal_in_all_arrays():
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        # Few different columns in each array, so that some are equal in the first and differ in the last.
+        arrays = [rng.normal(size=(12, 3))[:, rng.integers(0, 3, 15)] for _ in range(3)]
+        columns = rng.permutation(15)[:11]
+        first, group = _equal_columns(arrays, columns)
+        equal = np.array([[all((a[:, i] == a[:, j]).all() for a in arrays) for i in columns] for j in columns])
+        np.testing.assert_array_equal(group[:, None] == group, equal)
+        np.testing.assert_array_equal(first, [np.flatnonzero(group == number)[0] for number in range(group.max() + 1)])
