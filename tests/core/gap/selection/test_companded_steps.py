@@ -11,57 +11,43 @@ from palpate.core.gap.selection.candidates import Candidate
 from palpate.core.gap.selection.companded_steps import companded_steps
 from palpate.core.gap.selection.direct_estimates import power_starts
 
-MIDDLE_DEPTH = 3e-3
+DEPTH = 3e-3
 
 
 def presses(rng):
-    """Return loads (t, n) of a few texels under a ball, the largest about 1: smooth presses and cycles."""
-    texels, number = int(rng.choice([1, 4, 16, 40])), int(rng.integers(3, 8))
-    across = rng.uniform(0.0, 2e-3, texels) ** 2 / 16e-3
-    gains = np.exp(0.1 * rng.standard_normal(texels))
+    """Return loads (t, 16) of texels under a ball, the largest about 1."""
+    across = rng.uniform(0.0, 2e-3, 16) ** 2 / 16e-3
+    gains = np.exp(0.1 * rng.standard_normal(16))
     parts = []
-    for _ in range(number):
-        t = np.linspace(0.0, 1.0, int(rng.integers(120, 500)))
-        depth = rng.uniform(0.4, 1.0) * MIDDLE_DEPTH * np.sin(np.pi * t) ** float(rng.choice([1.0, 2.0]))
-        parts.append(gains * np.maximum(depth[:, None] - across, 0.0) / MIDDLE_DEPTH)
+    for _ in range(5):
+        depth = rng.uniform(0.4, 1.0) * DEPTH * np.sin(np.pi * np.linspace(0.0, 1.0, int(rng.integers(120, 500))))
+        parts.append(gains * np.maximum(depth[:, None] - across, 0.0) / DEPTH)
     return np.concatenate(parts)
 
 
-def converter(rng, kind, full):
-    """Return a converter of loads up to `full`, and the width of its step at a load."""
-    steps = 2.0 ** int(rng.integers(6, 13))
-    if kind in ("square root", "power"):
-        p = 0.5 if kind == "square root" else float(rng.uniform(0.5, 2.0))
-        rounding = float(rng.choice([0.0, 0.5]))
+def power(steps, full, p):
+    """A converter that rounds down the power p of a load, and the width of its step at a load."""
 
-        def convert(load):
-            code = np.floor(steps * (np.abs(load) / full) ** p + rounding)
-            return np.asarray(np.sign(load) * full * (code / steps) ** (1.0 / p))
+    def convert(load):
+        return np.sign(load) * full * (np.floor(steps * (np.abs(load) / full) ** p) / steps) ** (1.0 / p)
 
-        return convert, lambda load: full / steps / p * (load / full) ** (1.0 - p)
-    mu = 255.0 if kind == "mu-law" else float(np.exp(rng.uniform(np.log(5.0), np.log(300.0))))
+    return convert, lambda load: full / steps / p * (load / full) ** (1.0 - p)
 
-    def compand(load):
+
+def logarithm(steps, full, mu):
+    """A converter that rounds down the logarithm of a load (the μ-law), and the width of its step at a load."""
+
+    def convert(load):
         code = np.floor(steps * np.log1p(mu * np.abs(load) / full) / np.log1p(mu))
-        return np.asarray(np.sign(load) * full / mu * np.expm1(code / steps * np.log1p(mu)))
+        return np.sign(load) * full / mu * np.expm1(code / steps * np.log1p(mu))
 
-    return compand, lambda load: np.log1p(mu) / mu * (full + mu * load) / steps
+    return convert, lambda load: np.log1p(mu) / mu * (full + mu * load) / steps
 
 
 def moving(load, reading):
     """Readings at which the load changes, at most 6000, as in the gap analysis."""
     found = reading[np.abs(np.gradient(load, axis=0)) > 1e-5]
     return found[:: max(1, len(found) // 6000)]
-
-
-def with_steps(seed):
-    """Return the kind of a companding converter, readings behind it, and the width of a step at a reading."""
-    rng = np.random.default_rng([7, seed])
-    kind = ("square root", "power", "logarithm", "mu-law")[seed % 4]
-    load = presses(rng)
-    convert, width = converter(rng, kind, float(load.max()) * float(rng.uniform(1.0, 1.6)))
-    spread = rng.uniform(0.05, 0.5) * float(width(np.median(load[load > 0.0])))
-    return kind, moving(load, convert(load + spread * rng.standard_normal(load.shape))), width
 
 
 def has_right_width(steps, values, width):
@@ -72,27 +58,26 @@ def has_right_width(steps, values, width):
     return bool(np.all(np.abs(1.0 / (steps.frequency * slope) / width(at) - 1.0) < 0.1))
 
 
-def without_steps(seed, noisy):
-    """Return readings with noise alone, or with hardly any."""
-    rng = np.random.default_rng([8, seed, noisy])
+@pytest.mark.parametrize("bits", [6, 9, 12])
+@pytest.mark.parametrize(("converter", "bend"), [(power, 0.5), (power, 1.6), (logarithm, 20.0), (logarithm, 255.0)])
+def test_steps_behind_a_power_or_a_logarithm_are_seen(converter, bend, bits):
+    """Noise of a fifth of a middle step is converted with the load."""
+    rng = np.random.default_rng(bits)
     load = presses(rng)
-    spread = 10.0 ** rng.uniform(-3.0, -1.5) if noisy else 10.0 ** rng.uniform(-6.0, -4.0)
-    bent = load ** float(rng.uniform(0.5, 2.0))
-    return moving(load, bent + spread * rng.standard_normal(load.shape))
-
-
-@pytest.mark.parametrize("seed", range(12))
-def test_steps_behind_a_power_or_a_logarithm_are_seen(seed):
-    kind, values, width = with_steps(seed)
+    convert, width = converter(2.0**bits, 1.2 * load.max(), bend)
+    spread = 0.2 * width(np.median(load[load > 0.0]))
+    values = moving(load, convert(load + spread * rng.standard_normal(load.shape)))
     found = companded_steps(values)
-    assert found, f"behind a {kind}"
-    assert has_right_width(found[0], values, width)
+    assert found and has_right_width(found[0], values, width)
 
 
-@pytest.mark.parametrize("noisy", [True, False])
-def test_no_steps_are_seen_where_there_are_none(noisy):
-    for seed in range(10):
-        assert not companded_steps(without_steps(seed, noisy))
+@pytest.mark.parametrize("spread", [1e-5, 1e-2])
+def test_no_steps_are_seen_where_there_are_none(spread):
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        load = presses(rng)
+        bent = load ** float(rng.uniform(0.5, 2.0))
+        assert not companded_steps(moving(load, bent + spread * rng.standard_normal(load.shape)))
 
 
 def test_readings_that_are_written_with_few_decimals_have_even_steps():

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from palpate.benchmarks._recordings import Recording
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.forward.predictor import predictors_of
 from palpate.core.gap.selection.base_model import start_model
@@ -19,19 +20,14 @@ HEIGHTS = (3.0, 4.5, 6.0)
 
 def rig_of(folder, readings):
     """A rig with a known force of up to 20 N; `readings` gives the channels (T, n) from force and time."""
-    time = np.linspace(0.0, 60.0, 301)
-    lines = ['format = "palpate-rig/1"', 'name = "skin"', "[sensor]"]
+    time, trials = np.linspace(0.0, 60.0, 301), []
     for number, use in enumerate(("fit", "check")):
         force = 10.0 * (1.0 - np.cos(2.0 * np.pi * time / 11.0 + 0.3 * number * time / 60.0)) * (0.6 + 0.4 * np.cos(time / 9.0))
-        table = np.column_stack([time, readings(force, time, np.random.default_rng(number))])
-        names = [f"texel_{i}" for i in range(table.shape[1] - 1)]
-        table = np.insert(table, 1, len(names) * force, axis=1)  # shared by all channels
-        if not number:
-            lines += [f"grid = {{ rows = 1, columns = {len(names)}, pitch = 0.01 }}", 'unit = "uT"']
-        lines += ["[[trial]]", f'file = "{use}.csv"', f'use = "{use}"']
-        np.savetxt(folder / f"{use}.csv", table, "%.8g", ",", header=",".join(["time", "force", *names]), comments="")
-    (folder / "rig.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return read_rig(folder / "rig.toml")
+        channels = readings(force, time, np.random.default_rng(number))
+        texels = {f"texel_{i}": one for i, one in enumerate(channels.T)}
+        trials.append((use, use, {"time": time, "force": len(texels) * force, **texels}))  # all channels share the force
+    sensor = f'grid = {{ rows = 1, columns = {len(texels)}, pitch = 0.01 }}\nunit = "uT"'
+    return read_rig(Recording("skin", sensor, trials).write(folder))
 
 
 def field(force, time, random):

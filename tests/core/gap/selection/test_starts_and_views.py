@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where fits of candidates start, and on which views: steps that are seen, friction that is held, and forces."""
+"""Where fits of candidates start, in which ranges, and on which views."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -8,22 +8,25 @@ import gap_cases as cases
 import numpy as np
 import pytest
 import trimesh
+from scipy import stats
 
 from palpate.core.effects.engine.registry import effect, form_of, kind_of
 from palpate.core.gap.data_faults.data_fault import DataFault
 from palpate.core.gap.dataset.rig import Indenter
+from palpate.core.gap.fitting.intervals import student_quantile
 from palpate.core.gap.fitting.least_squares import FRICTION_LEVEL, TrialView, fit, free_base_parameters, with_values
-from palpate.core.gap.forward.predictor import Model, Predictor
-from palpate.core.gap.selection.base_model import friction_parameters_to_search
-from palpate.core.gap.selection.candidates import Candidate, candidates, scales_of
+from palpate.core.gap.forward.predictor import Model, Predictor, predictors_of
+from palpate.core.gap.selection.base_model import friction_parameters_to_search, prepared
+from palpate.core.gap.selection.candidates import Candidate, _halton_points, candidates, scales_of, search_range
 from palpate.core.gap.selection.diagnosis import faults_of
-from palpate.core.gap.selection.direct_estimates import companding_starts, few_levels
+from palpate.core.gap.selection.direct_estimates import companding_starts, few_levels, unresponsive_texels
 from palpate.core.gap.selection.quantities import friction_kinds
 from palpate.core.gap.selection.rao_score import ScoreTest
 from palpate.core.gap.selection.screening import Screening
 from palpate.core.gap.selection.starting_points import starting_points
 from palpate.core.gap.selection.view_set import view_set_of
 from palpate.core.geometry.mesh import checked_mesh
+from palpate.core.model.parameter import Parameter
 from palpate.core.model.sensor_parameters import SensorParameters
 
 
@@ -102,40 +105,29 @@ def test_a_fault_counts_if_displaced_texels_have_it_too(swapped):
 
 def test_a_large_shift_under_a_flat_punch_is_found():
     """A shift changes nothing until an edge passes a texel, so that no derivative points to it."""
-    half, shift = np.array([0.0062, 0.0081, 0.01]), np.array([0.0009, -0.0036])
-    solid = trimesh.creation.box(2.0 * half)
-    punch = checked_mesh(solid.vertices, solid.faces, "punch")[0]
+    edges, shift = (0.0124, 0.0162, 0.02), {"x": 0.0009, "y": -0.0036}
+    solid = trimesh.creation.box(edges)
     plain = cases.rig(trials=4, seconds=1.5)
-    rig = replace(plain, indenter=Indenter(punch, edges=tuple(2.0 * half)))
-    trials = []
-    for trial in rig.trials:
-        level = trial.position[:, 2] - cases.RADIUS  # of the ball's lowest point
-        position = np.column_stack([trial.position[:, :2], level + half[2]])
-        apart = np.abs(rig.texels.position[:, :2] + shift - trial.position[0, :2])
-        reading = 80.0 * np.maximum(-level, 0.0)[:, None] * (apart < half[:2]).all(axis=1)
-        trials.append(replace(trial, position=position, reading=reading))
-    rig = replace(rig, trials=tuple(trials))
-    views = [TrialView(Predictor(trial, rig), noise=(1e-3, 1.0)) for trial in rig.trials]
+    rig = replace(plain, indenter=Indenter(checked_mesh(solid.vertices, solid.faces, "punch")[0], edges=edges))
     base = Model(SensorParameters(k=80.0, cn=0.0))
-    candidate = Candidate(kind_of("misalignment"), form_of("misalignment", "shift"))
-    scales = scales_of([view.predictor for view in views], base)
-    flat = [view.predictor for view in views]
+    trials = [replace(one, position=one.position + [0.0, 0.0, 0.5 * edges[2] - cases.RADIUS]) for one in rig.trials]
+    truth = base.with_effect(effect("misalignment", "shift", **shift))
+    trials = [replace(one, reading=Predictor(one, rig).predict(truth).reading) for one in trials]
+    rig = replace(rig, trials=tuple(trials))
+    flat = [Predictor(trial, rig) for trial in rig.trials]
+    views = [TrialView(one, noise=(1e-3, 1.0)) for one in flat]
+    scales = scales_of(flat, base)
     rigid = next(one for one in candidates(flat, base) if one.label == "misalignment/rigid")
-    assert [one.name for one in rigid.free_parameters(0, scales, 1.0)] == [
-        "z",
-        "about_x",
-        "about_y",
-    ]  # an edge stays where it is
+    free = [one.name for one in rigid.free_parameters(0, scales, 1.0)]
+    assert free == ["z", "about_x", "about_y"]  # an edge stays where it is
     rocked = replace(trials[0], quaternion=np.tile([np.cos(0.01), np.sin(0.01), 0.0, 0.0], (len(trials[0].time), 1)))
     not_all_flat = candidates([*flat, Predictor(rocked, rig)], base)
     assert not any(one.held for one in not_all_flat)  # a face that is not parallel meets texels one after another
     test = ScoreTest(views, fit(views, base, free_base_parameters(base.parameters, ("k",), 1.0)))
+    candidate = Candidate(kind_of("misalignment"), form_of("misalignment", "shift"))
     _, best = starting_points(candidate, test, None, scales)[0]
     left, whole = (
-        sum(
-            float(((view.predictor.predict(model).reading - trial.reading) ** 2).sum())
-            for view, trial in zip(views, trials, strict=True)
-        )
+        sum(float(((one.predict(model).reading - one.trial.reading) ** 2).sum()) for one in flat)
         for model in (base.with_effect(best), base)
     )
     assert left < 0.05 * whole
@@ -150,3 +142,83 @@ def test_a_shift_starts_from_the_displacement_that_was_fitted_alone():
         candidate = Candidate(kind_of(name), form_of(name, form))
         values[form] = [one.values for one in screening._known(candidate, 1.0)]
     assert values == {"shift": [{"x": 1e-3, "y": -2e-3}], "first-order": [{"time": 0.1}], "second-order": []}
+
+
+# --- ranges
+
+
+def test_a_speed_is_that_of_sliding_for_friction_and_that_of_pressing_for_other_effects():
+    rig = cases.rig(lambda force, _time: force, trials=2, seconds=5.0)
+    predictors = predictors_of(rig.trials, rig)
+    scales = scales_of(predictors, Model(rig.parameters))
+    rates = [np.abs(np.diff(p.stimulus.depth, axis=0)).max(axis=1) / np.diff(p.trial.time) for p in predictors]
+    fastest = max(rate.max() for rate in rates)
+    assert scales.rate == pytest.approx(fastest) and 1e-4 < fastest < 1.0
+    parameter = Parameter("rate", "m/s", 0.01, 1e-9, 2.0, "Of something.", log=True)
+    scales = replace(scales, sliding_speed=1e-6)
+    friction, creep = form_of("stribeck", "gaussian"), form_of("creep")
+    assert search_range(parameter, scales, creep) == pytest.approx((0.02 * fastest, 2.0 * fastest))
+    assert search_range(parameter, scales, friction) == pytest.approx((2e-8, 2e-6))
+    work, most = Parameter("life", "J", 0.1, 1e-12, 1e9, "Of something.", log=True), 50.0 * scales.force * scales.seconds
+    assert search_range(work, scales, form_of("wear"))[1] == pytest.approx(most * fastest)
+    assert search_range(work, scales, friction)[1] == pytest.approx(most * 1e-6)
+    drag = Parameter("drag", "N·s/m", 0.1, 1e-12, 1e9, "Of something.", log=True)
+    assert search_range(drag, scales, creep)[1] == pytest.approx(2.0 * scales.force / fastest)
+
+
+# --- points and quantiles without scipy.stats, which takes half a second to load
+
+
+@pytest.mark.parametrize("dimensions", [1, 2, 5, 12])
+def test_halton_points(dimensions):
+    sequence = stats.qmc.Halton(dimensions, scramble=False)
+    sequence.fast_forward(1)
+    assert np.array_equal(_halton_points(dimensions, 300), sequence.random(300))
+
+
+def test_quantiles():
+    for freedom in (1, 2, 7, 40, 1000):
+        assert student_quantile(freedom) == pytest.approx(stats.t.ppf(0.975, freedom), rel=1e-14)
+
+
+# --- texels that do not answer
+
+
+GONE, TOUCH = [5, 9, 14], 0.004
+
+
+def silent(reading, _time):
+    reading[:, GONE] = 0.0
+
+
+def stuck(reading, _time):
+    reading[:, GONE] = 0.3
+
+
+def railed(reading, _time):
+    """To the rail at the first touch, and back when it ends."""
+    reading[:, GONE] = np.where(reading[:, GONE] > TOUCH, 2.0, reading[:, GONE])
+
+
+def clipped(reading, _time):
+    np.minimum(reading, 0.03, out=reading)
+
+
+@pytest.mark.parametrize(("change", "level"), [(silent, 0.0), (stuck, 0.3), (railed, 2.0), (clipped, None)])
+def test_texels_that_do_not_answer(change, level):
+    def changed(reading, time):
+        reading = reading.copy()
+        change(reading, time)
+        return reading
+
+    rig = cases.rig(change=changed, seed=3, stated=80.0, noise=1e-4)
+    predictors = predictors_of(rig.trials, rig)
+    noise, _ = prepared(rig, predictors)
+    view_set = view_set_of(predictors, (noise[0].deviation, 1.0))
+    candidate = Candidate(kind_of("dead-texels"), form_of("dead-texels", "held"))
+    found = unresponsive_texels(view_set.whole, Model(rig.parameters), candidate, len(rig.texels))
+    if level is None:
+        assert found is None
+        return
+    assert np.flatnonzero(found.values["dead"]).tolist() == GONE
+    np.testing.assert_allclose(np.asarray(found.values["level"])[GONE], level + rig.parameters.zero, atol=2e-3)
