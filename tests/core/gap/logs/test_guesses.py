@@ -11,7 +11,6 @@ from palpate.commands import main
 from palpate.core.errors import FileError
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.logs import questions
-from palpate.core.gap.logs.answers import answers_of
 from palpate.core.gap.logs.column_meaning import families
 from palpate.core.gap.logs.log_file import read_log
 from palpate.core.gap.logs.log_table import with_distinct_names
@@ -197,22 +196,12 @@ def test_readings_with_large_noise_that_follow_the_load_are_contact(tmp_path):
     assert new_rig(tmp_path / "rig", [log], template(tmp_path, [log])).path.exists()
 
 
-def test_a_constant_is_typed_at_the_terminal(tmp_path):
-    replies = {"grid": "{ rows = 3, columns = 4, pitch = [0.004, 0.004] }", "shape": "{ sphere = 0.015 }", "x": "0.004"}
-    answers = proposal(write_csv(tmp_path / "run.csv", press(silent=10)))
-    found = questions.asked(answers, lambda question: replies.get(question.split(" ")[0], ""))
-    own = answers_of(found).loggers[0].columns
-    assert (own["x"].constant, own["y"].constant) == (0.004, 0.0)
-
-
-@pytest.mark.parametrize("case", ["press", "skin", "pressure", "unnamed"])
+@pytest.mark.parametrize("case", ["skin", "unnamed"])
 def test_every_guess_is_a_line_with_its_reason_that_is_corrected_there(tmp_path, case):
     """The template and the questions are one list: each line has its value, its reason and a mark where it is to be checked."""
     axes = {f"taxel_{i}_{axis}": 100.0 * LOAD + noise(400) for i in range(3) for axis in "xyz"}
     columns = {
-        "press": press(10),
         "skin": {"time": TIME, "Fz": LOAD, **axes},
-        "pressure": {"time": TIME, "P (kPa)": LOAD, **axes},
         "unnamed": {f"{i}": values for i, values in enumerate([TIME, LOAD, 5.0 * LOAD])},
     }
     found = proposal(write_csv(tmp_path / "a.csv", columns[case]))

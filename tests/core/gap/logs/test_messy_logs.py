@@ -3,7 +3,6 @@
 
 import numpy as np
 import pytest
-from log_rigs import new_rig, template, write_csv
 
 from palpate.commands import main
 from palpate.core.errors import FileError
@@ -81,18 +80,6 @@ def test_of_raw_files_what_drove_is_asked_with_how_far_each_column_reaches(tmp_p
     text = (tmp_path / "rig" / "rig.toml").read_text()
     assert "late = 0.0" in text and 'texel = { name = "column_{}", first = 2, count = 6 }  # CHECK: 6 columns' in text
     assert (tmp_path / "rig" / "recordings.png").stat().st_size > 10_000
-
-
-def test_a_code_for_missing_values_is_a_line_of_the_answers_and_can_be_taken_away(tmp_path):
-    load = np.abs(np.round(100.0 * np.sin(np.arange(2000) * 0.02), 3))
-    coded = np.where(np.arange(2000) % 3 == 0, -1.0, load)
-    log = write_csv(tmp_path / "a.csv", {"time": 0.01 * np.arange(2000), "Fz (N)": coded, "reading": 3.0 * load})
-    guess = propose([read_log(log)]).columns()["force"]
-    assert guess.value["missing"] == -1.0 and "-1 is where a value is missing" in guess.reason and "factor" not in guess.value
-    for word, count in (("missing = -1.0", 0), ("missing = 9999.0", 667)):
-        answers = template(tmp_path, [log], **{"missing = -1.0": word})
-        (trial,) = read_rig(new_rig(tmp_path / "rig", [log], answers).path).trials
-        assert (trial.level == -1.0).sum() == count
 
 
 def test_codes_for_missing_values():
