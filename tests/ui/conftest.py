@@ -17,8 +17,6 @@ import pytest
 SCREEN = (1600, 1000)
 # Folders of the repository and where the Blender inside sees them
 WORK, HERE, RIG = "/palpate-work", "/palpate-ui", "/palpate-rig"
-ALONE = "early_end"
-"""The road that closes Blender by itself, so that another Blender plays the others."""
 PREFERENCES = """
 import bpy
 preferences = bpy.context.preferences
@@ -159,6 +157,4 @@ def played(request, real_blender):
     """Return the results of all roads that the chosen tests ask for, by name."""
     params = [getattr(getattr(item, "callspec", None), "params", {}) for item in request.session.items]
     roads = list(dict.fromkeys(one["road"] for one in params if "road" in one))
-    results = real_blender.play([ALONE]) if ALONE in roads else {}
-    others = [road for road in roads if road != ALONE]
-    return results | (real_blender.play(others, request.config.getoption("--minutes")) if others else {})
+    return real_blender.play(roads, request.config.getoption("--minutes"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Roads through the extension in a real Blender window; each is a file in roads/. All but one are played in one window."""
+"""Roads through the extension in a real Blender window; each is a file in roads/. All are played in one window."""
 
 from __future__ import annotations
 
@@ -8,14 +8,12 @@ import numpy as np
 import pytest
 
 ROADS = [
-    "early_end",
     "first_use",
     "tutorial",
     "bake",
     "paint",
     "authoring",
     "files",
-    "figures",
     "gap",
     "study",
     "sample",

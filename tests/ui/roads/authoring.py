@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ways of making a sensor: the Add menu, the sidebar, a problem and its button, F3, fields, Edit Mode and undo."""
+"""Ways of making a sensor: the Add menu, the sidebar, a problem and its button, F3, fields and undo."""
 
 import bpy
 from steps import add, adjust, empty, obj, over_view, palpate, undo
@@ -31,28 +31,6 @@ def road(ui):
     ui.check(abs(obj("Tactile Pad").palpate.k - 1234.5) > 1.0, "which is as before")
     yield from ui.search("preset weiss")
     ui.check(obj("Tactile Pad").palpate.k == 1000.0, "F3 finds presets")
-
-    # The selection in Edit Mode
-    empty()
-    bpy.ops.mesh.primitive_grid_add(x_subdivisions=20, y_subdivisions=20, size=0.04)
-    with ui.context(ui.area("VIEW_3D")):
-        bpy.ops.view3d.view_axis(type="TOP")
-        bpy.ops.view3d.view_selected()
-    yield 1.5
-    yield from ui.tab("PHYSICS")
-    yield from over_view(ui)
-    yield from ui.key("TAB")
-    yield 0.5
-    yield from ui.key("A", alt=True)
-    yield from ui.key("B")
-    yield from ui.drag(ui.at((-0.0005, -0.0215, 0)), ui.at((0.0215, 0.0215, 0)))
-    yield 0.5
-    yield from ui.press("palpate.sensor_add()")
-    ui.check(
-        (obj("Grid").mode, obj("Grid").palpate.region) == ("OBJECT", "GROUP"), "Make Sensor takes the selection, as a group"
-    )
-    report = palpate("addon.authoring.sensor_report").fresh_report(obj("Grid"), bpy.context.scene)
-    ui.check(len(report.texels) == 21 * 11, "of 21 by 11 vertices")
 
     # Texels on a fingertip, from the sidebar
     empty()

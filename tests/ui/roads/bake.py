@@ -20,6 +20,7 @@ def road(ui):
     yield from render(ui, scene)
     yield from jump(ui, scene)
     yield from bake(ui, scene)
+    yield from figures(ui)
     yield from change(ui)
     yield from open_again(ui)
     yield from copy(ui)
@@ -106,6 +107,23 @@ def bake(ui, scene):
     yield from undo(ui, shift=True)
     yield from ui.becomes(lambda: obj("Pad").palpate.is_baked, "Ctrl Shift Z brings it back")
     yield from ui.becomes(says("of the bake."), "and its numbers at once")
+
+
+def figures(ui):
+    """Make Figures renders beside the window; ESC stops it, and the scene is as it was."""
+    scene = bpy.context.scene  # undo has made a new one
+    place, settings, frame = ui.out / "figures", scene.palpate.figures, scene.frame_current
+    settings.kinds |= {"VIDEO"}
+    settings.engine, settings.size = "WORKBENCH", (480, 360)
+    yield from ui.filter("Make Figures")
+    yield from ui.press("palpate.figures_make()")
+    yield from ui.wait_until(lambda: list(place.glob("**/scene*.png")), "the first figure waits for the others")
+    yield from ui.screenshot("figures")
+    yield from ui.stop("palpate.figures_make")  # many figures and a video are still to come
+    ui.check(scene.camera is None and "Palpate Camera" not in bpy.data.objects, "the scene has no camera, as before")
+    ui.check(scene.frame_current == frame, "and the frame as before")
+    yield from ui.becomes(lambda: not list(place.glob("**/scene*.png")), "and no figure of an unfinished set stays")
+    yield from ui.filter("")
 
 
 def change(ui):

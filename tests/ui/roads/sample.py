@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A sample scene opens to a picture: in its camera's view, its sensor active, and its forces computed without a click."""
+"""The forces of a sample scene are computed without a click when it is opened."""
 
 import shutil
 from pathlib import Path
@@ -14,12 +14,7 @@ def road(ui):
     bpy.ops.wm.open_mainfile(filepath=str(path))
     yield 1.0
     yield from solver(ui)
-    scene, view = bpy.context.scene, ui.area("VIEW_3D").spaces.active
-    seen = view.region_3d.view_perspective, view.shading.type
-    ui.check(seen == ("CAMERA", "MATERIAL"), "in the camera's view, with materials")
-    ui.check(bpy.context.object.name == "Fingertip", "the sensor is active")
-    ui.check(ui.area("PROPERTIES").spaces.active.context == "PHYSICS", "its Physics tab is shown")
-    ui.check(scene.frame_current == 24, "at a frame of contact")
+    ui.check(bpy.context.scene.frame_current == 24, "it opens at a frame of contact")
 
     def force():
         frame = status().frame
