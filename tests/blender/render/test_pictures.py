@@ -4,20 +4,16 @@
 import os
 import subprocess
 import sys
-from dataclasses import replace
 
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import changes, dump, press_and_drop, save
+from blender_scenes import press_and_drop, save
 
 from palpate.addon.bake.bake import bake
 from palpate.addon.render import figure_export, render, render_setup, video
 from palpate.addon.render.figure_request import FigureRequest
 from palpate.commands import main
-from palpate.core.errors import FileError, ParameterError, SceneError
-from palpate.core.figures.figure_style import FigureStyle
-from palpate.core.io.file_writing import atomic_write
 from palpate.core.io.hidden_folder import LIST_NAME
 from palpate.core.jobs import run_job
 
@@ -33,45 +29,22 @@ def baked(tmp_path):
     return scene, path
 
 
-def image(path):
-    from matplotlib.image import imread
-
-    return imread(path)
-
-
-def test_figures_take_the_place_of_earlier_ones(baked, tmp_path, monkeypatch):
+def test_figures_of_another_bake_take_the_place_of_earlier_ones(baked, tmp_path):
     """Those of the same bake with other names stay."""
     scene, _ = baked
-    age = "old"
-
-    def write(path, *_, **__):
-        with atomic_write(path) as temporary:
-            temporary.write_text(age)
-
-    for name in ("tactile_strip", "time_curves", "texel_numbers"):
-        monkeypatch.setattr(figure_export, name, write)
-
-    def draw(folder, frame=3):
-        run_job(
-            figure_export.make_figures(scene, folder, FigureRequest(("curves", "numbers"), frames=(frame,), formats=("png",)))
-        )
-
-    def ages(folder):
-        return {path.name: path.read_text() for path in folder.iterdir() if path.is_file() and path.name[0] != "."}
-
     out = tmp_path / "out"
-    draw(out)
-    (out / "curves mine.png").write_text("mine")
-    age = "new"
-    draw(out)
-    assert len(ages(out)) > 2 and set(ages(out).values()) == {"new", "mine"}
-    draw(out, 4)
-    assert {f"numbers_Pad_000{frame}.png" for frame in (3, 4)} < set(ages(out))
-    made = figure_export.read_scene_bake(scene)
-    another = replace(made, manifests={name: replace(one, bake_id="another") for name, one in made.manifests.items()})
-    monkeypatch.setattr(figure_export, "read_scene_bake", lambda _: another)
-    draw(out, 2)
-    assert {name for name in ages(out) if "Pad" in name} == {"numbers_Pad_0002.png", "numbers_Pad_2_0002.png"}
+
+    def drawn(frame):
+        request = FigureRequest(("numbers",), frames=(frame,), sensors=("Pad",), formats=("svg",))
+        run_job(figure_export.make_figures(scene, out, request))
+        return sorted(path.name for path in out.glob("*.svg"))
+
+    assert drawn(3) == ["numbers_Pad_0003.svg"]
+    (out / "numbers mine.svg").write_text("mine")
+    assert drawn(4) == ["numbers mine.svg", "numbers_Pad_0003.svg", "numbers_Pad_0004.svg"]
+    scene.objects["Pad"].palpate.k *= 2.0
+    run_job(bake(scene))
+    assert drawn(2) == ["numbers mine.svg", "numbers_Pad_0002.svg"]
 
 
 def test_the_video_has_a_picture_per_frame(baked, tmp_path):
@@ -85,41 +58,6 @@ def test_the_video_has_a_picture_per_frame(baked, tmp_path):
     assert [path.name for path in tmp_path.glob("*.mp4")] == ["out.mp4"]
 
 
-def test_all_that_matters_is_in_the_picture_and_lit(baked, tmp_path):
-    scene, _ = baked
-    with render_setup.render_setup(scene, [1, 4], render_setup.RenderOptions(view=(-60.0, 35.0), transparent=True)):
-        points = render.bounding_box_corners(render_setup.subjects(scene))
-        places = np.array([render.image_position(scene, point) for point in points])
-        render.render_frame(scene, tmp_path / "a.png", 4, samples=4, size=(96, 64))
-    assert (places > 0.0).all() and (places < 1.0).all()
-    picture = image(tmp_path / "a.png")
-    assert picture.shape[2] == 4 and (picture[..., 3] == 0.0).any()  # no background
-    covered = picture[..., 3] > 0.9
-    assert covered.any() and picture[covered][:, :3].mean() > 0.1
-
-
-def test_a_scene_that_is_not_baked_and_a_frame_that_is_not_are_one_sentence(baked, tmp_path):
-    scene, _ = baked
-    with pytest.raises(FileError, match="from 1 to 4"):
-        run_job(figure_export.make_figures(scene, tmp_path / "out", FigureRequest(frames=(9,))))
-    bpy.ops.palpate.bake_clear()
-    with pytest.raises(SceneError, match="is not baked"):
-        run_job(figure_export.make_figures(scene, tmp_path / "out", FigureRequest()))
-    with pytest.raises(ParameterError, match="choose from"):
-        FigureRequest(kinds=("hologram",))
-
-
-def test_an_error_in_the_middle_puts_the_scene_back(baked):
-    scene, _ = baked
-    before = dump()
-    with (
-        pytest.raises(RuntimeError),
-        render_setup.render_setup(scene, [1], render_setup.RenderOptions(engine="workbench", transparent=True)),
-    ):
-        raise RuntimeError
-    assert changes(before, dump()) == [] and scene.camera is None and scene.render.engine == "CYCLES"
-
-
 def test_the_command(baked, tmp_path, capsys):
     _, path = baked
     words = ["render", str(path), "--out", str(tmp_path / "out"), "--only", "strip", "--only", "numbers", "--format", "pdf"]
@@ -127,32 +65,6 @@ def test_the_command(baked, tmp_path, capsys):
     assert sorted(item.name for item in (tmp_path / "out").iterdir()) == [LIST_NAME, "numbers_Pad_0004.pdf", "strip.pdf"]
     assert main([*words, "--sensor", "Thumb"]) == 1
     assert "There is no sensor 'Thumb'" in capsys.readouterr().err
-
-
-def test_workbench_shows_the_heat_map_and_leaves_meshes_alone(baked, tmp_path):
-    """Where most force is, the picture has the colour of the map's upper end, seen through the glass ball that presses."""
-    scene, _ = baked
-    pad, ball = scene.objects["Pad"], scene.objects["Ball"]
-    glass = bpy.data.materials.new("Glass")
-    glass.use_nodes = True
-    glass.node_tree.nodes["Principled BSDF"].inputs["Transmission Weight"].default_value = 1.0
-    ball.data.materials.append(glass)
-    before, meshes = dump(), len(bpy.data.meshes)
-    request = FigureRequest(
-        ("scene",),
-        FigureStyle(colour_map="MAGMA"),
-        frames=(4,),
-        sensors=("Pad",),
-        size=(200, 160),
-        engine="workbench",
-        view=(-90, 89),
-    )
-    run_job(figure_export.make_figures(scene, tmp_path / "out", request))
-    picture = image(tmp_path / "out" / "scene_0004.png")[..., :3]
-    assert np.ptp(picture, axis=2).max() > 0.4  # the purples and oranges of magma, on grey
-    assert [line for line in changes(before, dump()) if "Render Result" not in line] == []
-    assert len(bpy.data.meshes) == meshes
-    assert pad.data.color_attributes.find("Palpate Colour") < 0
 
 
 def test_a_transparent_picture_leaves_the_backdrop_out_but_not_what_carries_a_sensor(baked, tmp_path):

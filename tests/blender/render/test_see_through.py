@@ -161,10 +161,3 @@ def test_a_map_has_no_hole_between_two_places_of_contact(tmp_path):
         assert weight_at((0.0, 0.0, 0.0)) == pytest.approx(see_through.CLEARNESS)
         edge = np.abs(np.array(pad.dimensions)[:2]).max() / 2
         assert weight_at((0.0, edge + 0.012, 0.017)) == 0.0  # behind the bar there is no pad
-
-
-@pytest.mark.parametrize("count", [0, 1, 2, 3])
-def test_few_loaded_texels_have_a_patch_of_their_pixels(count):
-    pixels = np.array([[3.5, 4.5], [6.5, 7.5], [9.5, 10.5]])[:count]  # on a line
-    inside = see_through._patch(pixels, 20, 16)
-    assert inside.sum() == count and inside[[4, 7, 10][:count], [3, 6, 9][:count]].all()

@@ -146,15 +146,6 @@ def test_positions_on_the_picture_are_blenders(scene):
         assert render.image_position(scene, point) == pytest.approx((expected.x, expected.y), abs=1e-5)
 
 
-def test_rendering_leaves_the_scene_as_it_was(scene, tmp_path):
-    demo.build(scene)
-    scene.frame_set(7)
-    before = (scene.render.filepath, scene.render.resolution_x, scene.cycles.samples, scene.frame_current)
-    render.render_frame(scene, tmp_path / "a.png", 3, samples=1, size=(32, 18))
-    assert (scene.render.filepath, scene.render.resolution_x, scene.cycles.samples, scene.frame_current) == before
-    assert [path.name for path in tmp_path.iterdir()] == ["a.png"]
-
-
 def test_a_scene_without_camera_says_so(scene, tmp_path):
     with pytest.raises(SceneError, match="no perspective camera"):
         render.render_frame(scene, tmp_path / "a.png", 1)
@@ -197,8 +188,9 @@ def test_samples_are_what_their_scripts_build(name, repository, tmp_path):
     assert described(bpy.context.scene) == committed
 
 
+@pytest.mark.slow("bakes each sample scene")
 @pytest.mark.parametrize("name", build_samples.SAMPLES)
-def test_samples_open_to_a_picture(name, repository):
+def test_samples_open_to_a_picture_and_bake(name, repository, tmp_path):
     """In the camera's view with materials, at a frame past the first, with a sensor active and its tab shown."""
     bpy.ops.wm.open_mainfile(filepath=str(repository / "sample_blends" / f"{name}.blend"), load_ui=True)
     scene, active = bpy.context.scene, bpy.context.view_layer.objects.active
@@ -213,13 +205,6 @@ def test_samples_open_to_a_picture(name, repository):
     assert {space.context for space in spaces if space.type == "PROPERTIES"} == {"PHYSICS"}
     seen = scene.camera.matrix_world.inverted() @ active.matrix_world.translation
     assert seen.z < 0
-
-
-@pytest.mark.slow("bakes each sample scene")
-@pytest.mark.parametrize("name", build_samples.SAMPLES)
-def test_samples_open_and_bake(name, repository, tmp_path):
-    bpy.ops.wm.open_mainfile(filepath=str(repository / "sample_blends" / f"{name}.blend"))
-    scene = bpy.context.scene
     scene.palpate.folder = str(tmp_path / "bake")
     baked = run_job(bake(scene))
     assert baked.recording.warnings == ()
@@ -227,8 +212,3 @@ def test_samples_open_and_bake(name, repository, tmp_path):
     for sensor in baked.recording.sensors.values():
         assert sensor.contact.any()
         assert np.isfinite(sensor.normal_force).all()
-
-
-def test_every_blend_in_the_folder_is_a_sample(repository):
-    found = {path.stem for path in (repository / "sample_blends").glob("*.blend")}
-    assert found == set(build_samples.SAMPLES)
