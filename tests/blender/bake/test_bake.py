@@ -8,8 +8,8 @@ from blender_scenes import changes, contents, cube, dump, grid, press, press_and
 from sample_bake import read_exr
 
 from palpate.addon.bake.bake import bake
-from palpate.addon.display import heat_map, marker_meshes, materials
-from palpate.addon.scene import scene_reader, stored_names
+from palpate.addon.display import heat_map, materials
+from palpate.addon.scene import stored_names
 from palpate.addon.session import fcurves, session_state, transforms
 from palpate.core.errors import FileError
 from palpate.core.io.bake_folder import read_manifest
@@ -25,13 +25,14 @@ def baked(scene):
 
 def test_one_folder_per_sensor(tmp_path):
     scene, *_ = press_and_drop(frames=4)
+    scene.frame_start = 0
     save(tmp_path)
     result = baked(scene)
     assert visible(tmp_path / "palpate-bake") == ["Pad", "Pad 2"]
     for name, folder in result.folders.items():
         files = sorted(path.name for path in folder.iterdir())
         own = ["images.sha256", "manifest.json", "recording.npz", "sensor.npz"]
-        assert files == [*own, *(f"tactile_{frame:04d}.exr" for frame in range(1, 5))]
+        assert files == [*own, *(f"tactile_{frame:04d}.exr" for frame in range(5))]
         manifest = read_manifest(folder)
         assert manifest.complete and manifest.sensor == name and manifest.digest == result.recording.digest
         recording = load_recording(folder / "recording.npz")
@@ -79,8 +80,7 @@ def test_bake_and_compute_to_here_exclude_each_other(monkeypatch):
     assert not bpy.ops.palpate.bake.poll()
 
 
-@pytest.mark.parametrize("mode", ["XYZ", "ZXY", "QUATERNION", "AXIS_ANGLE"])
-@pytest.mark.parametrize("parented", [False, True])
+@pytest.mark.parametrize(("mode", "parented"), [("XYZ", False), ("ZXY", True), ("QUATERNION", True), ("AXIS_ANGLE", True)])
 def test_keyframes_put_free_bodies_where_the_solver_had_them(tmp_path, mode, parented):
     scene, _, _, _, free = press_and_drop(frames=6)
     free.palpate.angular_velocity = (2.0, -3.0, 9.0)
@@ -168,31 +168,6 @@ def test_clearing_brings_everything_back(tmp_path):
     assert fcurves.animated_paths(free) == {"hide_render"}
 
 
-def test_reopened_and_baked_again_it_is_the_same_bit_for_bit(tmp_path):
-    scene, *_ = press_and_drop(frames=6)
-    path = save(tmp_path)
-    names = ("Pad", "Pad 2")
-
-    def recordings():
-        return [(tmp_path / "palpate-bake" / name / "recording.npz").read_bytes() for name in names]
-
-    for frame in range(1, 5):  # played before, as a user would
-        scene.frame_set(frame)
-    baked(scene)
-    first = recordings()
-    save(tmp_path)
-    for _ in range(2):
-        scene = reopen(path)
-        scene.frame_set(5)
-        baked(scene)
-        assert recordings() == first and scene.frame_current == 5
-        save(tmp_path)
-    bpy.ops.palpate.bake_clear()
-    save(tmp_path)
-    baked(reopen(path))
-    assert recordings() == first
-
-
 def test_a_stopped_bake_leaves_the_old_one(tmp_path):
     scene, pad, *_ = press_and_drop(frames=4)
     save(tmp_path)
@@ -211,50 +186,23 @@ def test_a_stopped_bake_leaves_the_old_one(tmp_path):
         assert not session_state.session.suspension_depth
 
 
-@pytest.mark.parametrize("what", ["project", "manifest", ".palpate", "link"])
-def test_a_refused_bake_has_touched_nothing(tmp_path, what):
+@pytest.mark.parametrize("manifest", [None, '{"name": "My web page"}'], ids=["", "that of another program"])
+def test_a_refused_bake_has_touched_nothing(tmp_path, manifest):
     """The bake folder of a .blend from the net leads to a folder of the user's; its sensor has the name of a folder there."""
     scene, pad, _ = press(frames=2)
     pad.name = "project"
     save(tmp_path)
-    folder = tmp_path / "palpate-bake"
-    folder.mkdir()
-    hidden = folder / PRIVATE_FOLDER
-    if what in ("project", "manifest"):
-        (folder / "project").mkdir()
-        (folder / "project" / "main.tex").write_text("years of work")
-        if what == "manifest":  # that of another program
-            (folder / "project" / "manifest.json").write_text('{"name": "My web page"}')
-    elif what == ".palpate":
-        hidden.mkdir()
-        (hidden / "notes.txt").write_text("years of work")
-    else:
-        (tmp_path / "elsewhere").mkdir()
-        hidden.symlink_to(tmp_path / "elsewhere")
+    folder = tmp_path / "palpate-bake" / "project"
+    folder.mkdir(parents=True)
+    (folder / "main.tex").write_text("years of work")
+    if manifest is not None:
+        (folder / "manifest.json").write_text(manifest)
     files = {str(path) for path in tmp_path.rglob("*")}
-    reason = "holds other files than a bake" if what in ("project", "manifest") else "was not made by Palpate"
     stages = []
-    with pytest.raises(FileError, match=reason):
+    with pytest.raises(FileError, match="holds other files than a bake"):
         run_job(bake(scene), lambda progress: stages.append(progress.stage))
     assert "Computing forces" not in stages  # nobody waits for forces that cannot be kept
     assert {str(path) for path in tmp_path.rglob("*")} == files
-
-
-def test_files_put_beside_the_images_outlive_the_next_bake(tmp_path):
-    scene, *_ = press(frames=3)
-    save(tmp_path)
-    folder = baked(scene).folders["Pad"]
-    mine = {"notes.txt": b"years of work", "tactile_mean.exr": b"mine", "plots/a.svg": b"<svg/>"}
-    (folder / "plots").mkdir()
-    for name, content in mine.items():
-        (folder / name).write_bytes(content)
-
-    scene.frame_end = 2
-    baked(scene)
-    assert {name: (folder / name).read_bytes() for name in mine} == mine
-    assert sorted(path.name for path in folder.glob("tactile_0*.exr")) == ["tactile_0001.exr", "tactile_0002.exr"]
-    assert visible(folder.parent) == ["Pad"]
-    assert [path.name for path in (folder.parent / PRIVATE_FOLDER).iterdir()] == [LOCK_NAME]
 
 
 def test_one_bake_at_a_time(tmp_path):
@@ -320,43 +268,6 @@ def test_two_pads_with_one_mesh_have_a_heat_map_each(tmp_path):
     bpy.ops.palpate.bake_clear()
     after = dump(uids=False)
     assert [line for line in changes(before, after) if "settings" not in line and "baked_" not in line] == []
-
-
-def test_a_sensor_all_around_has_a_heat_map_on_its_vertices(tmp_path):
-    """No texture map of shared corners exists for a closed surface; the force arrives as an attribute then."""
-    scene, pad, target = press(frames=6)
-    pad.palpate.role = "NONE"
-    tip = cube("Tip", (0.0, 0.0, -0.01), size=0.02)
-    tip.palpate.role = "SENSOR"
-    save(tmp_path)
-    target.location.z = 0.0
-    readings = baked(scene).recording.sensors["Tip"]
-    for i in (0, 3, 5):
-        scene.frame_set(i + 1)
-        mesh = tip.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-        values = np.zeros(8, dtype=np.float32)
-        mesh.attributes[stored_names.FORCE].data.foreach_get("value", values)
-        assert values == pytest.approx(readings.normal_force[i], abs=1e-7)
-    scenario = run_job(scene_reader.read_scene(scene)).scenario  # its own nodes do not change what is sampled
-    assert scenario.digest() == run_job(bake(scene)).recording.digest
-
-
-def test_an_arrow_without_contact_has_no_size(tmp_path):
-    scene, pad, target = press(frames=3)
-    target.animation_data_clear()
-    target.location.z = 1.0
-    save(tmp_path)
-    baked(scene)
-    assert list(materials.find_block(scene.objects, pad.palpate.uid).scale) == [0.0, 0.0, 0.0]
-    assert marker_meshes.SHAPE_KEY in materials.find_block(scene.objects, pad.palpate.uid).data
-
-
-def test_frame_zero_can_be_baked(tmp_path):
-    scene, *_ = press(frames=3)
-    scene.frame_start = 0
-    save(tmp_path)
-    folder = baked(scene).folders["Pad"]
-    assert (folder / "tactile_0000.exr").exists()
 
 
 def test_materials_given_after_a_bake_outlive_the_next(tmp_path):

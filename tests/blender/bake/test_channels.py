@@ -139,25 +139,6 @@ def test_a_picture_has_red_where_a_channel_has_risen_and_blue_where_it_has_falle
     assert large.any() and (np.sign(tile[..., 0] - tile[..., 2])[large] == np.sign(change)[large]).all()
 
 
-def test_a_load_cell_reads_what_the_texels_bear(tmp_path):
-    scene, pad, *_ = press(frames=4)
-    pad.palpate.readout.kind = "NET_FORCE"
-    save(tmp_path)
-    felt = baked(scene).recording.sensors["Pad"]
-    assert felt.channels.unit == "N" and felt.channels.values[-1, 0, 2] == pytest.approx(-felt.normal_force[-1].sum())
-
-
-def test_without_a_read_out_a_bake_says_nothing_of_channels(tmp_path):
-    scene, *_ = press(frames=3)
-    save(tmp_path)
-    folder = baked(scene).folders["Pad"]
-    assert not any(name.startswith("channels") for name in visible(folder))
-    assert "channels" not in json.loads((folder / "manifest.json").read_text())
-    with np.load(folder / "recording.npz") as members:
-        assert not any("channels" in name for name in members.files)
-        assert "channels" not in json.loads(str(members["header"]))
-
-
 def test_files_reopen_with_their_skin_and_a_moved_magnet_makes_the_bake_stale(tmp_path):
     scene, pad = pressed_skin()
     path = save(tmp_path)
@@ -198,17 +179,6 @@ def test_what_a_user_can_do_wrong_is_one_sentence():
         with pytest.raises(PalpateError, match=rf"(?s)^Channels of sensor 'Pad'.*{sentence}"):
             read(scene)
         bpy.ops.wm.read_homefile(use_empty=True)
-
-
-def test_placing_a_skin_can_be_undone():
-    scene, pad, *_ = press(frames=2)
-    bpy.context.view_layer.objects.active = pad
-    bpy.ops.ed.undo_push(message="before")
-    bpy.ops.palpate.magnetic_skin_place(preset="eflesh")
-    bpy.ops.ed.undo_push(message="after")
-    assert len(bpy.data.objects) == 2 + 10
-    bpy.ops.ed.undo()
-    assert len(bpy.data.objects) == 2 and bpy.data.objects["Pad"].palpate.readout.kind == "NONE"
 
 
 def test_a_pad_that_is_too_small_for_a_preset_is_one_sentence():

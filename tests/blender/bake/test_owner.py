@@ -85,17 +85,6 @@ def test_a_bake_with_the_same_forces_but_other_files_is_another_one(saved, tmp_p
     assert bake_identity.other_bake(scene) == ""
 
 
-def test_a_blend_that_was_renamed_or_moved_owns_its_bake(saved, tmp_path):
-    scene, path = saved
-    scene.palpate.folder = str(tmp_path / "palpate-bake")
-    bpy.ops.wm.save_mainfile()
-    (tmp_path / "far").mkdir()
-    moved = tmp_path / "far" / "renamed.blend"
-    path.rename(moved)
-    baked(reopen(moved))
-    assert read_manifest(tmp_path / "palpate-bake" / "Pad").scene_path == "../far/renamed.blend"
-
-
 def test_a_copy_of_a_blend_does_not_replace_the_bake_of_its_original(saved, tmp_path):
     scene, path = saved
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "copy.blend"))

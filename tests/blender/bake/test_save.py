@@ -106,19 +106,6 @@ def test_stopped_at_every_step_of_the_last_one(saved, tmp_path):
     assert (home / "palpate-bake" / "Pad" / "notes.txt").read_text() == "mine"
 
 
-def test_a_link_to_a_blend_stays_a_link(saved, tmp_path):
-    path, _ = saved
-    home = tmp_path / "elsewhere"
-    home.mkdir()
-    shutil.copytree(path.parent / "palpate-bake", home / "palpate-bake")
-    link = home / "link.blend"
-    link.symlink_to(path)
-    bpy.ops.wm.open_mainfile(filepath=str(link))
-    blender.save_blend(link)
-    assert link.is_symlink() and link.resolve() == path
-    assert found(path)
-
-
 def test_a_blend_that_is_saved_is_there_at_every_moment(saved):
     path, _ = saved
     blender.open_scene(path)
