@@ -9,8 +9,11 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from palpate.addon.bake.bake import bake
 from palpate.addon.display import markers, materials
+from palpate.addon.scene import scene_reader
 from palpate.core.io.hidden_folder import PRIVATE_FOLDER
+from palpate.core.jobs import run_job
 
 
 def grid(name="Pad", location=(0.0, 0.0, 0.0), columns=6, rows=14, size=0.05):
@@ -77,6 +80,16 @@ def scene_with_readings(frames=8):
     target.keyframe_insert("location", frame=frames)
     scene.frame_set(1)
     return scene
+
+
+def baked(scene, **options):
+    """Bake a scene; return what the bake gives."""
+    return run_job(bake(scene, **options))
+
+
+def scenario_of(scene):
+    """Return the scenario that a bake of a scene solves."""
+    return run_job(scene_reader.read_scene(scene)).scenario
 
 
 def find_marker(objects, uid, kind):

@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import changes, contents, cube, dump, grid, press, press_and_drop, reopen, save, visible
+from blender_scenes import baked, changes, contents, cube, dump, grid, press, press_and_drop, reopen, save, visible
 from sample_bake import read_exr
 
 from palpate.addon.bake.bake import bake
@@ -17,10 +17,6 @@ from palpate.core.io.bake_reader import read_bake
 from palpate.core.io.hidden_folder import LOCK_NAME, PRIVATE_FOLDER
 from palpate.core.io.recording_npz import load_recording
 from palpate.core.jobs import SlicedJob, run_job
-
-
-def baked(scene):
-    return run_job(bake(scene))
 
 
 def test_one_folder_per_sensor(tmp_path):
@@ -50,7 +46,7 @@ def test_a_bake_without_images_has_the_same_recordings(tmp_path):
     assert all(read_manifest(folder).has_images for folder in with_images.folders.values())
     expected = {path: content for path, content in contents(tmp_path / "palpate-bake").items() if str(path).endswith(".npz")}
     scene.palpate.folder = str(tmp_path / "plain")
-    found = run_job(bake(scene, into_scene=False, images=False))
+    found = baked(scene, into_scene=False, images=False)
     for folder in found.folders.values():
         assert visible(folder) == ["manifest.json", "recording.npz", "sensor.npz"]
         assert not read_manifest(folder).has_images

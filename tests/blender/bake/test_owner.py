@@ -6,9 +6,8 @@ import shutil
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import contents, press, reopen, save
+from blender_scenes import baked, contents, press, reopen, save
 
-from palpate.addon.bake.bake import bake
 from palpate.addon.display import bake_display, bake_identity, baked_scene
 from palpate.addon.render import figure_export
 from palpate.addon.session import frame_status
@@ -16,11 +15,6 @@ from palpate.commands import blender, export
 from palpate.core.errors import FileError, SceneError
 from palpate.core.io.bake_folder import read_manifest
 from palpate.core.io.bake_reader import read_bake
-from palpate.core.jobs import run_job
-
-
-def baked(scene, **options):
-    return run_job(bake(scene, **options))
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from contextlib import ExitStack
 
 import bpy
 import pytest
-from blender_scenes import press, press_and_drop, save, visible
+from blender_scenes import baked, press, press_and_drop, save, visible
 from kills import stopped_at
 
 from palpate.addon.bake import bake_files, scene_writer
@@ -140,7 +140,7 @@ def test_very_many_keyframes_are_said_before_they_are_made(tmp_path, monkeypatch
     said = scene_writer.keyframe_warning(scene)
     assert said.startswith("The bake puts 40 keyframes into the scene (8 frames, bodies that forces move: 1, markers: 4): ")
     before = {curve for obj in scene.objects for curve in fcurves.of_object(obj) or ()}
-    run_job(bake(scene))
+    baked(scene)
     made = [curve for obj in scene.objects for curve in fcurves.of_object(obj) or () if curve not in before]
     assert sum(len(curve.keyframe_points) for curve in made if (curve.data_path, curve.array_index) == ("location", 0)) == 40
 

@@ -3,7 +3,6 @@
 
 import os
 import shutil
-from dataclasses import replace
 
 import bpy
 import pytest
@@ -16,18 +15,14 @@ from palpate.addon.render.figure_request import FigureRequest
 from palpate.addon.scene import participants
 from palpate.addon.session import frame_status
 from palpate.addon.timeline import baked_frames
-from palpate.core.errors import PalpateError, SceneError
-from palpate.core.io.bake_folder import IMAGE_LIST_NAME, read_manifest, write_manifest
+from palpate.core.errors import PalpateError
 from palpate.core.jobs import run_job
 
 DAMAGES = {
     "half a recording": lambda pad: os.truncate(pad / "recording.npz", 3000),
-    "no sensor": lambda pad: (pad / "sensor.npz").unlink(),
     "no folder": shutil.rmtree,
     "no manifest": lambda pad: (pad / "manifest.json").write_bytes(b"{"),
-    "another manifest": lambda pad: (pad / "manifest.json").write_text('{"format": "palpate-bake/1", "sensor": "pad"}'),
     "half an image": lambda pad: os.truncate(pad / "tactile_0002.exr", 300),
-    "the next image": lambda pad: shutil.copy(pad / "tactile_0003.exr", pad / "tactile_0002.exr"),
 }
 
 
@@ -78,18 +73,3 @@ def test_damage_is_one_sentence_and_changes_nothing(baked, tmp_path):
             assert shown.endswith(".") and shown != "Frame 1 of the bake.", f"{way}: {shown}"
     assert changes(before, dump()) == []
     assert not (tmp_path / "figures").exists()
-
-
-def test_a_bake_without_images_cannot_be_shown(tmp_path):
-    scene, *_ = press(frames=3)
-    save(tmp_path)
-    (folder,) = run_job(bake(scene)).folders.values()
-    manifest = read_manifest(folder)
-    files = {name: sha256 for name, sha256 in manifest.files.items() if name != IMAGE_LIST_NAME}
-    write_manifest(folder, replace(manifest, files=files))
-    for image in (*folder.glob("*.exr"), folder / IMAGE_LIST_NAME):
-        image.unlink()
-    before = dump()
-    with pytest.raises(SceneError, match=r"The bake of sensor 'Pad' in '.*' has no tactile images.*bake again"):
-        bake_display.refresh(scene, baked_scene.bake_folders(scene))
-    assert changes(before, dump()) == []

@@ -4,16 +4,14 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import ball, changes, dump, grid, press, press_and_drop, reopen, save
+from blender_scenes import baked, ball, changes, dump, grid, press, press_and_drop, reopen, save
 
-from palpate.addon.bake.bake import bake
 from palpate.addon.display import indentation, materials, overlays, played_table
-from palpate.addon.scene import mesh_arrays, stored_names
+from palpate.addon.scene import mesh_arrays
 from palpate.addon.scene.stored_names import INDENTATION_MODIFIER
 from palpate.addon.session import frame_status
 from palpate.addon.timeline import live_cache
 from palpate.core.figures.figure_style import FigureStyle
-from palpate.core.jobs import run_job
 
 
 def surface(obj):
@@ -43,7 +41,7 @@ def test_the_surface_lies_where_the_ball_is(tmp_path):
     """Also between the texels: nowhere does the ball cut deeper than a tenth of its penetration into the surface."""
     scene, pad, target = press_wide()
     save(tmp_path)
-    result = run_job(bake(scene))
+    result = baked(scene)
     before = surface(pad)
     assert np.ptp(before[:, 2]) < 1e-9  # at the first frame nothing touches
     scene.frame_set(6)
@@ -67,7 +65,7 @@ def test_the_scene_reads_as_without(tmp_path):
     """A second bake gives the same bits, and no frame of the first is called out of date."""
     scene, pad, *_ = press_and_drop(frames=6)
     save(tmp_path)
-    first = run_job(bake(scene))
+    first = baked(scene)
     for frame in (1, 4, 6):
         scene.frame_set(frame)
         assert frame_status.status_of(scene).text == f"Frame {frame} of the bake."
@@ -76,7 +74,7 @@ def test_the_scene_reads_as_without(tmp_path):
         assert np.array_equal(mesh_arrays.positions(mesh), mesh_arrays.positions(pad.data))
         assert np.array_equal(mesh_arrays.corner_vertices(mesh), mesh_arrays.corner_vertices(pad.data))
         assert len(mesh.polygons) == len(pad.data.polygons)
-    second = run_job(bake(scene))
+    second = baked(scene)
     assert first.recording.digest == second.recording.digest
     for name, sensor in first.recording.sensors.items():
         assert np.array_equal(sensor.normal_force, second.recording.sensors[name].normal_force)
@@ -94,7 +92,7 @@ def test_a_sensor_that_deforms_is_not_stale(tmp_path):
     scene.frame_set(1)
     save(tmp_path)
     plain = mesh_arrays.evaluated_fingerprint(pad, bpy.context.evaluated_depsgraph_get())
-    result = run_job(bake(scene))
+    result = baked(scene)
     assert result.scenario.sensors[0].deformation is not None
     assert mesh_arrays.evaluated_fingerprint(pad, bpy.context.evaluated_depsgraph_get()) == plain
     scene.frame_set(8)
@@ -111,7 +109,7 @@ def test_factor_and_checkbox_are_applied_and_nothing_is_left(tmp_path):
     bpy.ops.palpate.reset()
     save(tmp_path)
     before = dump()
-    run_job(bake(scene))
+    baked(scene)
     scene.frame_set(8)
     once = -surface(pad)[:, 2].min()
     scene.palpate.indentation_factor = 3.0
@@ -142,7 +140,7 @@ def test_two_sensors_share_a_mesh(tmp_path):
     plate = ball("Second", (0.005, 0.3, 0.007))
     plate.palpate.role = "TARGET"
     save(tmp_path)
-    result = run_job(bake(scene))
+    result = baked(scene)
     scene.frame_set(8)
     assert pad.data == other.data
     for obj in (pad, other):
@@ -154,7 +152,7 @@ def test_modifiers_that_add_vertices_leave_the_surface_as_it_is(tmp_path):
     scene, pad, _ = press()
     pad.modifiers.new("Subdivision", "SUBSURF")
     save(tmp_path)
-    run_job(bake(scene))
+    baked(scene)
     assert INDENTATION_MODIFIER not in pad.modifiers
 
 
@@ -162,7 +160,7 @@ def test_long_bakes_keep_every_second_frame(tmp_path, monkeypatch):
     scene, pad, _ = press()
     monkeypatch.setattr(played_table, "MOST_PIXELS", 4)
     save(tmp_path)
-    result = run_job(bake(scene))
+    result = baked(scene)
     image = next(image for image in bpy.data.images if image.name.endswith("depth"))
     width, height = image.size
     assert width * height <= 4 and height == 4
@@ -174,7 +172,7 @@ def test_long_bakes_keep_every_second_frame(tmp_path, monkeypatch):
 def test_the_overlay_of_solid_view_is_indented_as_the_texels_are(tmp_path):
     scene, pad, _ = press_wide()
     save(tmp_path)
-    result = run_job(bake(scene))
+    result = baked(scene)
     scene.frame_set(6)
     made = type("Bake", (), {})()
     made.recording, made.texels = result.recording, {"Pad": result.scenario.sensors[0].texels}
@@ -227,27 +225,6 @@ def flat_colors(scene, run):
     return plain.colors[:, :3].max(axis=1)
 
 
-def test_factor_undo_and_reopening_of_a_played_scene(tmp_path):
-    """What is drawn while playing is in no file and in no step of undo; the factor exaggerates it, zero leaves it out."""
-    scene, pad, _ = press()
-    once, _ = playing(scene, 8)
-    deepest = (once.at_rest[:, 2] - once.corners[:, 2]).max()
-    scene.palpate.indentation_factor = 3.0
-    (thrice,) = overlays.sensor_overlays(scene, live_cache.get(scene), live_cache.get(scene).frames[8])
-    assert (thrice.at_rest[:, 2] - thrice.corners[:, 2]).max() == pytest.approx(3.0 * deepest, rel=1e-4)
-    bpy.ops.ed.undo_push(message="played")
-    pad.location.x += 0.001
-    bpy.ops.ed.undo_push(message="moved")
-    bpy.ops.ed.undo()
-    save(tmp_path)
-    scene = reopen(tmp_path / "scene.blend")
-    pad = scene.objects["Pad"]
-    assert not pad.modifiers and not pad.data.attributes.get(stored_names.FORCE) and len(surface(pad)) == len(pad.data.vertices)
-    assert not [item.name for item in pad.data.attributes if item.name.startswith("palpate")]
-    again, _ = playing(scene, 8)
-    assert (again.at_rest[:, 2] - again.corners[:, 2]).max() == pytest.approx(3.0 * deepest, rel=1e-4)
-
-
 @pytest.mark.parametrize("how", ["modifier", "laid"])
 def test_sensors_whose_surface_stays_stay_while_playing(how):
     scene, pad, _ = press()
@@ -292,7 +269,7 @@ def test_a_sensor_of_any_faces_is_indented(tmp_path):
     scene.collection.objects.link(pad)
     ball(location=(0.0, 0.0, 0.006)).palpate.role, pad.palpate.role = "TARGET", "SENSOR"
     save(tmp_path)
-    result = run_job(bake(scene))
+    result = baked(scene)
     scene.frame_set(2)
     depth = result.recording.at(2).sensors["Fan"].depth
     assert (depth > 1e-3).sum() == 1, "only the vertex in the middle is touched"

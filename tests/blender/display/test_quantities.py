@@ -4,10 +4,9 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import press, reopen, save, scene_with_readings
+from blender_scenes import baked, press, reopen, save, scene_with_readings
 
 from palpate.addon.authoring import texel_overlay
-from palpate.addon.bake.bake import bake
 from palpate.addon.display import bake_display, baked_scene, heat_map, materials, overlays
 from palpate.addon.properties import scene_properties
 from palpate.addon.render import figure_export, workbench_colors
@@ -16,8 +15,7 @@ from palpate.addon.scene.stored_names import GAP_COLORS
 from palpate.addon.timeline import live_cache
 from palpate.core.errors import PalpateError
 from palpate.core.figures import color_maps
-from palpate.core.figures.quantities import QUANTITIES, Scale, between
-from palpate.core.jobs import run_job
+from palpate.core.figures.quantities import QUANTITIES, between
 from palpate.panels import sensor as sensor_panel
 
 EVERY = pytest.mark.parametrize("name", QUANTITIES)
@@ -66,7 +64,7 @@ def test_it_is_seen_on_a_bake(tmp_path, name):
     scene, quantity = scene_with_readings(), QUANTITIES[name]
     pad, scene.palpate.quantity = scene.objects["Pad"], name.upper()
     save(tmp_path)
-    run_job(bake(scene))
+    baked(scene)
     found = figure_export.read_scene_bake(scene)
     scale = bake_display.figure_style(scene).scale(found.recording, found.texels)
     node = next(node for node in pad.material_slots[-1].material.node_tree.nodes if node.bl_idname == "ShaderNodeMapRange")
@@ -140,21 +138,6 @@ def test_its_ends_are_set_in_its_own_unit(name):
     assert bake_display.figure_style(scene).limit in (0.15, 20.0)
 
 
-def test_a_reading_is_seen_where_the_force_is_not_changed():
-    """With load spreading the force of a texel stays, and its reading does not."""
-    scene, pad, _ = press(8)
-    effect = pad.palpate.effects.add()
-    effect.kind = "load-spreading"
-    shown = {}
-    for name in ("FORCE", "READING"):
-        scene.palpate.quantity = name
-        run = play(scene)
-        shown[name] = overlays.sensor_overlays(scene, run, run.frames[8])[0].colors
-    felt = run.frames[8].sensors["Pad"]
-    assert np.abs(felt.reading - felt.normal_force).max() > 0.01 * felt.normal_force.max()
-    assert np.abs(shown["FORCE"] - shown["READING"]).max() > 0.05
-
-
 def test_the_automatic_range_is_that_of_the_present_run():
     """After a harder press the range is wide; softened again, it is narrow again, with Reset and without."""
     scene, pad, _ = press(8)
@@ -174,7 +157,7 @@ def test_a_sensor_without_channels_shows_none(tmp_path):
     assert overlays.sensor_overlays(scene, run, run.frames[4]) == []
     assert overlays.inset_content(scene, run, run.frames[4]).insets == []
     save(tmp_path)
-    run_job(bake(scene))
+    baked(scene)
     assert not any(slot.material and materials.SENSOR_KEY in slot.material for slot in pad.material_slots)
     found = figure_export.read_scene_bake(scene)
     with pytest.raises(PalpateError, match="without channels"):
@@ -213,7 +196,7 @@ def test_files_keep_their_choice_and_its_ends(tmp_path):
 def test_a_heat_map_of_palpate_0_1_is_removed_with_its_areas(tmp_path):
     scene, pad, _ = press(4)
     save(tmp_path)
-    run_job(bake(scene))
+    baked(scene)
     uid = pad.palpate.uid
     pad.data.attributes.new("palpate_area", "FLOAT", "POINT")
     bpy.data.images.new("area", 4, 4)[materials.SENSOR_KEY] = f"{uid}:area"
@@ -233,26 +216,3 @@ def test_a_heat_map_leaves_the_sensor_that_is_painted_alone():
         assert overlay.sensor in overlays.edited_objects(bpy.context)
     bpy.ops.object.mode_set(mode="OBJECT")
     assert not overlays.edited_objects(bpy.context)
-
-
-def test_a_picture_of_another_quantity_has_its_own_range(tmp_path):
-    """The scene's end of 0.15 N is no end of 0.15 kPa."""
-    scene, pad, _ = press(8)
-    scene.palpate.use_auto_range, scene.palpate.range_max = False, 0.15
-    save(tmp_path)
-    run_job(bake(scene))
-    found = figure_export.read_scene_bake(scene)
-    import argparse
-
-    from palpate.commands import figure_options, render
-
-    parser = argparse.ArgumentParser()
-    render.add_arguments(parser)
-    arguments = parser.parse_args(["scene.blend", "--quantity", "pressure"])
-    style = figure_options.figure_style_from(arguments, **vars(bake_display.figure_style(scene)))
-    scale = style.scale(found.recording, found.texels)
-    peak = (found.recording.sensors["Pad"].normal_force / found.texels["Pad"].area).max() / 1e3
-    assert style.limit is None and peak <= scale.high < 2.0 * peak and isinstance(scale, Scale)
-    bake_display.take_style(scene, style)
-    node = next(n for n in pad.material_slots[-1].material.node_tree.nodes if n.bl_idname == "ShaderNodeMapRange")
-    assert node.inputs["From Max"].default_value == pytest.approx(scale.high) and "kPa" in node.label

@@ -9,14 +9,11 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import cube, press_and_drop, save, scene_with_readings
+from blender_scenes import baked, cube, press_and_drop, save, scene_with_readings
 
-from palpate.addon.bake.bake import bake
 from palpate.addon.display import materials
 from palpate.core import response
 from palpate.core.figures import color_maps
-from palpate.core.figures.quantities import QUANTITIES
-from palpate.core.jobs import run_job
 
 FRAMES = (1, 7, 8)
 SCRIPT = Path(__file__).with_name("without_addon.py")
@@ -58,7 +55,7 @@ def scene_file(tmp_path):
     folder = tmp_path / "project"
     folder.mkdir()
     path = save(folder)
-    recording = run_job(bake(scene)).recording
+    recording = baked(scene).recording
     for obj in scene.objects:
         if obj.name.startswith("Net Force"):
             obj.hide_render = True
@@ -88,8 +85,8 @@ def test_it_plays_without_the_addon(scene_file, tmp_path):
     assert recording.sensors["Tip"].normal_force[0].max() > 0.0
 
     depths = [without["frames"][str(frame)]["depth"] for frame in FRAMES]
-    baked = recording.sensors["Pad"].depth.max(axis=1)
-    assert depths == pytest.approx([baked[frame - 1] for frame in FRAMES], rel=0.2, abs=1e-7)  # smooth over 3 by 3 texels
+    deepest = recording.sensors["Pad"].depth.max(axis=1)
+    assert depths == pytest.approx([deepest[frame - 1] for frame in FRAMES], rel=0.2, abs=1e-7)  # smooth over 3 by 3 texels
 
     cube_at = recording.body_names.index("Cube")
     for frame in FRAMES:
@@ -98,23 +95,21 @@ def test_it_plays_without_the_addon(scene_file, tmp_path):
 
 
 @pytest.mark.slow("starts Blender")
-@pytest.mark.parametrize("name", [name for name in QUANTITIES if name != "force"])
-def test_every_quantity_plays_without_the_addon(tmp_path, name):
+def test_another_quantity_plays_without_the_addon(tmp_path):
+    """test_quantities.py compares what a bake stores of every quantity."""
     scene = scene_with_readings()
-    scene.palpate.quantity = name.upper()
+    scene.palpate.quantity = "READING"
     cube("Tip", (0.0, 0.1, 0.0), size=0.02)
     figure_style_from_above(scene)
     path = save(tmp_path)
-    result = run_job(bake(scene))
+    result = baked(scene)
     save(tmp_path)
     (tmp_path / "palpate-bake").rename(tmp_path / "lost")  # the values are in the .blend
     pad = next(sensor for sensor in result.scenario.sensors if sensor.name == "Pad")
-    seen = watch(path, tmp_path, name, False)["frames"]
+    seen = watch(path, tmp_path, "reading", False)["frames"]
     for frame in FRAMES:
-        expected = QUANTITIES[name].values(result.recording.at(frame).sensors["Pad"], pad.texels)
-        shown = np.array(seen[str(frame)]["shown"][f"palpate_{name}"])[pad.texels.vertex]
-        assert shown == pytest.approx(expected, rel=1e-5, abs=1e-5 * max(abs(expected).max(), 1e-9))
-    assert np.abs(expected).max() > 0.0
+        shown = np.array(seen[str(frame)]["shown"]["palpate_reading"])[pad.texels.vertex]
+        assert shown == pytest.approx(result.recording.at(frame).sensors["Pad"].reading, rel=1e-5)
 
 
 @pytest.mark.long("starts Blender three times and renders")

@@ -4,14 +4,12 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import press, reopen, save
+from blender_scenes import press, reopen, save, scenario_of
 
 from palpate.addon.properties.parameter_properties import sensor_parameters
 from palpate.addon.properties.scene_units import ENDING, KINDS, name_in_units
-from palpate.addon.scene import scene_reader
 from palpate.addon.session import transforms
 from palpate.core.io.sensor_toml import SensorModel, read_sensor, write_sensor
-from palpate.core.jobs import run_job
 from palpate.core.model.body import DRIVE_PARAMETERS
 from palpate.core.model.sensor_parameters import SENSOR_PARAMETERS
 
@@ -63,7 +61,7 @@ def test_the_units_of_a_scene_change_no_file(tmp_path, system):
     """A sensor that was described in one system is the same in each: scenario, sensor.toml and saved file."""
     scene, pad, _ = press()
     pad.palpate.max_penetration, pad.palpate.x0 = 0.0123, 0.25
-    before = run_job(scene_reader.read_scene(scene)).scenario.digest()
+    before = scenario_of(scene).digest()
     write_sensor(tmp_path / "before.toml", SensorModel("Pad", sensor_parameters(pad.palpate)))
     set_units(system)
     scene.unit_settings.length_unit = "MILLIMETERS" if system == "METRIC" else "ADAPTIVE"
@@ -77,7 +75,7 @@ def test_the_units_of_a_scene_change_no_file(tmp_path, system):
     write_sensor(tmp_path / "after.toml", SensorModel("Pad", sensor_parameters(own)))
     assert (tmp_path / "after.toml").read_bytes() == (tmp_path / "before.toml").read_bytes()
     assert read_sensor(tmp_path / "after.toml").parameters.max_penetration == 0.0123
-    assert run_job(scene_reader.read_scene(scene)).scenario.digest() == before
+    assert scenario_of(scene).digest() == before
 
 
 def test_every_parameter_with_a_unit_of_blender_is_shown_in_it():

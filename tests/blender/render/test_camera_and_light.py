@@ -4,9 +4,8 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import ball, changes, cube, dump, grid, save
+from blender_scenes import baked, ball, changes, cube, dump, grid, save
 
-from palpate.addon.bake.bake import bake
 from palpate.addon.render import camera_direction, figure_export, loaded_texels, render, render_setup, studio
 from palpate.addon.render.figure_request import FigureRequest
 from palpate.core.figures import color_maps
@@ -32,7 +31,7 @@ def wall(tmp_path):
     scene.camera = bpy.context.object
     scene.render.engine, scene.cycles.samples = "CYCLES", 4
     save(tmp_path)
-    run_job(bake(scene))
+    baked(scene)
     save(tmp_path)
     return scene
 

@@ -7,9 +7,8 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import ball, grid, press, save
+from blender_scenes import baked, ball, grid, press, save
 
-from palpate.addon.bake.bake import bake
 from palpate.addon.render import figure_export
 from palpate.addon.render.figure_request import FigureRequest
 from palpate.addon.scene import mesh_arrays
@@ -55,7 +54,7 @@ def press_gel(scene, folder):
         target.keyframe_insert("location", frame=frame)
     scene.frame_set(1)
     save(folder)
-    run_job(bake(scene))
+    baked(scene)
     return save(folder)
 
 
@@ -108,7 +107,7 @@ def test_a_sensor_without_rows_and_columns_is_refused(tmp_path):
     group.add([vertex for vertex in range(84) if vertex != 40], 1.0, "REPLACE")
     pad.palpate.region, pad.palpate.vertex_group = "GROUP", group.name
     save(tmp_path)
-    run_job(bake(scene))
+    baked(scene)
     for sensors, words in (((), "No sensor of the bake has its texels in rows"), (("Pad",), "'Pad' form no rows and columns")):
         with pytest.raises(SensorError, match=words):
             run_job(figure_export.make_figures(scene, tmp_path / "out", FigureRequest(("gel",), sensors=sensors)))

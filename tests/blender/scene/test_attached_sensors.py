@@ -4,9 +4,8 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import ball, cube, grid
+from blender_scenes import ball, cube, grid, scenario_of
 
-from palpate.addon.bake import bake
 from palpate.addon.scene import participants, scene_reader
 from palpate.core.errors import SceneError
 from palpate.core.jobs import run_job
@@ -70,15 +69,6 @@ def test_texels_of_a_part_are_where_blender_shows_them():
         assert np.abs(there - np.array(shown)).max() < 1e-7
 
 
-def test_a_bake_puts_each_part_its_own_heat_map(tmp_path):
-    scene, box, soles, _ = box_on_soles(4)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "box.blend"))
-    baked = run_job(bake.bake(scene))
-    assert sorted(baked.folders) == ["Sole 0", "Sole 1"]
-    assert all(sole.palpate.is_baked and sole.modifiers or sole.data.uv_layers for sole in soles)
-    assert box.palpate.is_baked  # keyframed
-
-
 def test_a_part_of_something_that_takes_no_part_follows_it():
     pad, stick = grid(), ball("Stick", (0.0, 0.0, -0.02))
     target = ball()
@@ -89,7 +79,7 @@ def test_a_part_of_something_that_takes_no_part_follows_it():
     stick.keyframe_insert("location", frame=10)
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, 10
-    scenario = run_job(scene_reader.read_scene(scene)).scenario
+    scenario = scenario_of(scene)
     assert [body.name for body in scenario.bodies] == ["Pad", "Ball"]
     assert scenario.bodies[0].motion.positions[-1][2] - scenario.bodies[0].motion.positions[0][2] == pytest.approx(0.01)
 
@@ -98,7 +88,7 @@ def test_a_part_never_touches_its_own_body():
     scene, _, soles, table = box_on_soles(2)
     soles[0].location.z += 0.003  # into the box, facing outwards
     table.location.z = -1.0
-    recording = run(run_job(scene_reader.read_scene(scene)).scenario)
+    recording = run(scenario_of(scene))
     assert all(not recording.sensors[sole.name].contact.any() for sole in soles)
 
 

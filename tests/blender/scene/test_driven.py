@@ -4,9 +4,8 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import cube, grid, save
+from blender_scenes import baked, cube, grid, save, scenario_of
 
-from palpate.addon.bake import bake
 from palpate.addon.scene import scene_reader
 from palpate.addon.session import frame_status
 from palpate.core.errors import SceneError
@@ -55,8 +54,7 @@ def gripper(frames=48):
 def test_a_gripper_closes_lifts_and_is_keyframed(tmp_path):
     scene, hand, left, right, box = gripper()
     save(tmp_path)
-    baked = run_job(bake.bake(scene))
-    recording = baked.recording
+    recording = baked(scene).recording
     total = recording.sensors["Left"].normal_force.sum(axis=1)
     assert total[23] == pytest.approx(4.0, rel=1e-3)
     assert total[-1] == pytest.approx(4.0, rel=1e-4)
@@ -84,7 +82,7 @@ def test_playing_gives_the_bake_s_numbers(tmp_path):
         frames[frame] = frame_status.status_of(scene).frame
     at_end = tuple(left.matrix_world.translation), tuple(box.matrix_world.translation)
     assert frames[30].sensors["Left"].normal_force.sum() == pytest.approx(4.0, rel=1e-3)
-    recording = run_job(bake.bake(scene)).recording
+    recording = baked(scene).recording
     for frame, played in frames.items():
         assert np.array_equal(played.sensors["Left"].normal_force, recording.at(frame).sensors["Left"].normal_force)
     scene.frame_set(30)
@@ -98,19 +96,19 @@ def test_targets_are_keyframed_and_axes_belong_to_whom_they_are_said_to():
     left.palpate.keyframe_insert("drive_force", frame=1)
     left.palpate.drive_force = 8.0
     left.palpate.keyframe_insert("drive_force", frame=5)
-    scenario = run_job(scene_reader.read_scene(scene)).scenario
+    scenario = scenario_of(scene)
     body = {b.name: b for b in scenario.bodies}
     values = body["Left"].drive.target.values
     assert values[0] == 4.0 and values[-1] == 8.0 and np.all(np.diff(values) > 0)
     assert body["Left"].drive.axis.tolist() == [0.0, 0.0, 1.0]
     assert body["Right"].drive.leader == [b.name for b in scenario.bodies].index("Left")
     left.palpate.drive_axis, left.palpate.drive_space = "-X", "WORLD"
-    found = run_job(scene_reader.read_scene(scene)).scenario.bodies[0].drive
+    found = scenario_of(scene).bodies[0].drive
     assert found.axis.tolist() == [-1.0, 0.0, 0.0] and found.axis_in_world
     # The hand's +x is the world's +y, in which the left finger's own -y points after the hand's turn by a quarter: its y axis
     # was the hand's y before, and its z the hand's x.
     left.palpate.drive_axis, left.palpate.drive_space = "X", "PARENT"
-    found = run_job(scene_reader.read_scene(scene)).scenario.bodies[0].drive
+    found = scenario_of(scene).bodies[0].drive
     np.testing.assert_allclose(found.axis, [0.0, 0.0, 1.0], atol=1e-6)
     assert not found.axis_in_world
 

@@ -49,17 +49,6 @@ def test_forces_are_the_same_at_every_unit_scale(size):
     assert np.abs(forces(found) / size - usual).max() <= 1e-6 * usual.max()
 
 
-@pytest.mark.parametrize("size", [1e-6, 1e-3, 1e3])
-def test_forces_are_the_same_at_every_size_in_units(size):
-    """Vertices and keyframes are rounded again: some 1e-7 of 0.05, where depths are 0.002."""
-    expected = reading(interpolation="LINEAR")
-    usual = forces(expected)
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    found = reading(size, interpolation="LINEAR")
-    assert expected.warnings == found.warnings == ()
-    assert np.abs(forces(found) / size - usual).max() <= 2e-5 * usual.max()
-
-
 def test_keyframes_that_blender_takes_for_equal_are_named():
     """Of a Bézier curve between keyframes that differ by less than 2⁻²³ units Blender shows the first until the second."""
     found = reading(1e-5)

@@ -155,20 +155,6 @@ def test_how_far_it_is_comes_from_the_process(window):
     assert 0.8 * 7 / 9 <= first_use.progress().share <= 0.99
 
 
-def test_the_progress_goes_on_while_the_last_functions_are_compiled(monkeypatch, tmp_path):
-    """The last six of 185 functions take a fifth of the time: the panel does not say 'one second more' all the while."""
-    log, clock = tmp_path / "log", [0.0]
-    monkeypatch.setattr(first_use.time, "monotonic", lambda: clock[0])
-    monkeypatch.setattr(first_use, "is_ready", lambda: False)
-    monkeypatch.setattr(first_use, "_compilation", first_use._Compilation(None, log, 0.0))
-    said = []
-    for clock[0], done in ((0.5, 0), (10.0, 55), (20.0, 150), (24.0, 179), (26.0, 179), (29.0, 179), (40.0, 179)):
-        log.write_text(json.dumps({"done": done, "total": 185}) + "\n")
-        said.append((round(first_use.progress().share, 2), first_use.progress().text.rpartition(", ")[2]))
-    assert said[0] == (0.01, "about 40 s more")
-    assert said[3:] == [(0.77, "about 7 s more"), (0.83, "about 5 s more"), (0.92, "about 2 s more"), (0.99, "nearly done")]
-
-
 def test_the_bar_never_goes_back_and_the_first_functions_promise_no_minutes(monkeypatch, tmp_path):
     """On a busy machine 28 s were promised, then 144 s, then 40 s."""
     log, clock = tmp_path / "log", [0.0]

@@ -4,17 +4,12 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import press, press_and_drop, save
+from blender_scenes import baked, press, press_and_drop, save
 
 from palpate.addon.authoring import sensor_report
-from palpate.addon.bake.bake import bake
 from palpate.addon.display import overlays
 from palpate.addon.session import frame_status
-from palpate.addon.timeline import baked_frames, live_cache, playback, second_look
-from palpate.core.figures import color_maps
-from palpate.core.figures.figure_style import FigureStyle
-from palpate.core.io.bake_reader import read_sensors
-from palpate.core.jobs import run_job
+from palpate.addon.timeline import live_cache, playback, second_look
 
 
 @pytest.fixture(autouse=True)
@@ -34,7 +29,7 @@ def test_a_bake_is_out_of_date_at_once(tmp_path):
     """After any change of those in test_staleness.py."""
     scene, pad, target = press(frames=4)
     save(tmp_path)
-    run_job(bake(scene))
+    baked(scene)
     scene.frame_set(2)
     second_look.look_again(scene)
     assert frame_status.status_of(scene).text == "Frame 2 of the bake."
@@ -46,7 +41,7 @@ def test_a_bake_is_out_of_date_at_once(tmp_path):
 def test_a_renamed_sensor_takes_numbers_and_arrows_along(tmp_path):
     scene, pad, _ = press(frames=4)
     save(tmp_path)
-    run_job(bake(scene))
+    baked(scene)
     scene.frame_set(4)
     for name in ("Skin", "Palm"):
         pad.name = name
@@ -64,7 +59,7 @@ def test_a_renamed_sensor_takes_numbers_and_arrows_along(tmp_path):
 def test_a_duplicate_of_a_baked_sensor_is_not_baked(tmp_path, linked, is_reported_first):
     scene, pad, _ = press(frames=4)
     save(tmp_path)
-    run_job(bake(scene))
+    baked(scene)
     scene.frame_set(4)
     for obj in scene.objects:
         obj.select_set(obj == pad)
@@ -81,7 +76,7 @@ def test_a_duplicate_of_a_baked_sensor_is_not_baked(tmp_path, linked, is_reporte
     assert copy.palpate.uid != pad.palpate.uid or linked
     assert [slot.material for slot in pad.material_slots] == shown
     assert "Pad" in frame_status.status_of(scene).frame.sensors
-    run_job(bake(scene))
+    baked(scene)
     assert copy.palpate.is_baked and set(frame_status.status_of(scene).frame.sensors) == {"Pad", "Pad.001"}
 
 
@@ -89,7 +84,7 @@ def test_a_baked_file_that_was_opened_shows_its_numbers_and_warnings_at_once(tmp
     scene, pad, _ = press(frames=8)
     pad.palpate.max_penetration = 0.0003
     save(tmp_path)
-    run_job(bake(scene))
+    baked(scene)
     scene.frame_set(2)
     assert "maximum penetration" in frame_status.status_of(scene).warnings
     bpy.ops.wm.save_mainfile()
@@ -202,28 +197,6 @@ def test_nothing_changed_is_left_as_it_is():
     run, status = live_cache.get(scene), frame_status.status_of(scene)
     second_look.look_again(scene)
     assert live_cache.get(scene) is run and frame_status.status_of(scene) is status
-
-
-def test_views_without_materials_show_the_colours_of_a_bake_on_both_sides(tmp_path):
-    scene, pad, _ = press(frames=4)
-    scene.palpate.show_indentation = False  # test_indentation.py tests the indented surface
-    save(tmp_path)
-    run_job(bake(scene))
-    scene.frame_set(4)
-    bake_read = read_sensors(list(baked_frames._folders(scene)), images=False)
-    scale = FigureStyle(limit=0.5).scale(bake_read.recording, bake_read.texels)
-    (overlay,) = overlays.baked_overlays(scene, bake_read, 4, scale)
-    texels, readings = bake_read.texels["Pad"], bake_read.recording.at(4).sensors["Pad"]
-    corner = np.concatenate([texels.layout.triangles[:, ::-1].ravel(), texels.layout.triangles.ravel()])  # below, then above
-    assert overlay.plain_only and overlay.line is None
-    expected = color_maps.colors(scene.palpate.color_map, readings.normal_force / 0.5)[corner]
-    np.testing.assert_allclose(overlay.colors[:, :3], expected, atol=1e-6)
-    below, above = np.split(overlay.corners, 2)
-    below, corner = below.reshape(-1, 3, 3)[:, ::-1].reshape(-1, 3), texels.layout.triangles.ravel()
-    away = np.einsum("ij,ij->i", above - below, texels.normal[corner])
-    assert (away > 0).all()  # the pad stands at the origin, unturned
-    assert readings.depth.max() > 1e-4
-    np.testing.assert_allclose(0.5 * (above + below), texels.position[corner], atol=1e-7)
 
 
 def test_the_first_stroke_puts_what_is_shown_out_of_date():
