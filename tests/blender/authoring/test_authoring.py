@@ -5,9 +5,6 @@ import bpy
 import pytest
 from blender_scenes import ball, changes, dump, grid, select
 
-from palpate.addon.authoring import sensors
-from palpate.addon.session import identity
-
 
 def members(obj, name):
     index = obj.vertex_groups[name].index
@@ -84,19 +81,6 @@ def test_a_role_set_by_a_script_is_enough():
     assert len(pad.palpate.uid) == 32
 
 
-def test_a_copy_gets_a_uid_of_its_own():
-    pad = grid()
-    pad.palpate.role = "SENSOR"
-    copy = pad.copy()
-    bpy.context.scene.collection.objects.link(copy)
-    assert copy.palpate.uid == pad.palpate.uid
-    for obj in (copy, pad, copy):
-        identity.ensure_uid(obj)
-    assert copy.palpate.uid != pad.palpate.uid
-    found = identity.find_objects(bpy.context.scene, [pad.palpate.uid, copy.palpate.uid])
-    assert found == {pad.palpate.uid: pad, copy.palpate.uid: copy}
-
-
 @pytest.mark.parametrize("mode", ["OBJECT", "EDIT", "WEIGHT_PAINT"])
 def test_undo_restores_the_object_exactly(mode):
     pad = grid()
@@ -133,18 +117,6 @@ def test_poll_says_no_without_a_mesh():
     bpy.ops.curve.primitive_bezier_circle_add()
     assert not bpy.ops.palpate.sensor_add.poll()
     assert bpy.ops.palpate.role_set.poll()  # a curve can press, not feel
-
-
-def test_what_automatic_means():
-    pad = grid()
-    select(pad, ())
-    assert sensors.automatic_source(pad, "OBJECT") == "MESH"
-    assert sensors.automatic_source(pad, "WEIGHT_PAINT") == "MESH"
-    pad.vertex_groups.new(name="A")
-    assert sensors.automatic_source(pad, "WEIGHT_PAINT") == "GROUP"
-    assert sensors.automatic_source(pad, "EDIT") == "MESH"
-    select(pad, {0})
-    assert sensors.automatic_source(pad, "EDIT") == "SELECTION"
 
 
 @pytest.mark.parametrize(("size", "expected"), [(2.0, 0.1), (0.2, 0.012), (0.05, 0.012), (0.01, 0.003)])

@@ -4,13 +4,11 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import ball, changes, cube, dump, grid, select
+from blender_scenes import ball, changes, dump, grid, select
 
 from palpate.addon.authoring import laid_sensors
 from palpate.addon.scene import participants, scene_reader
 from palpate.addon.session import transforms
-from palpate.core.jobs import run_job
-from palpate.core.solver.simulation import run
 
 
 def texels_of(obj):
@@ -131,37 +129,6 @@ def test_texels_laid_beside_a_painted_region_leave_it_as_it_is():
     assert obj.palpate.role == "SENSOR"
 
 
-def test_lift_and_turn():
-    obj = finger()
-    bpy.ops.palpate.skin_add(method="NOISE", spacing=0.003, source="MESH", lift=0.001)
-    points = np.array([v.co for v in bpy.context.object.data.vertices])
-    assert np.linalg.norm(points, axis=1) == pytest.approx(0.011, rel=0.01)
-    assert obj.palpate.role == "NONE"
-
-
-def test_one_object_carries_several_sensors_that_feel_on_their_own():
-    obj = finger()
-    names = []
-    for share, sign in ((0.5, 1), (0.5, -1)):
-        size = max(v.co.z for v in obj.data.vertices)
-        select(obj, [v.index for v in obj.data.vertices if sign * v.co.z > share * size])
-        bpy.context.view_layer.objects.active = obj
-        bpy.ops.palpate.skin_add(source="SELECTION", method="NOISE", spacing=0.002)
-        names.append(bpy.context.object.name)
-    assert names == ["Finger Skin", "Finger Skin.001"]
-    assert laid_sensors.laid_on(obj) == [bpy.data.objects[name] for name in names]
-    bpy.data.objects[names[1]].palpate.k = 117.0  # twice as stiff below
-    scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = 1, 2
-    for z in (0.0195, -0.0195):
-        plate = cube("Plate", (0.0, 0.0, z), 0.02)
-        plate.palpate.role = "TARGET"
-    recording = run(run_job(scene_reader.read_scene(scene)).scenario)
-    above, below = (recording.sensors[name].normal_force[-1].sum() for name in names)
-    assert above > 0
-    assert below == pytest.approx(2 * above, rel=0.15)  # other patterns of the same density
-
-
 @pytest.mark.parametrize("scale", [(2.0, 2.0, 2.0), (1.0, 2.0, 1.0), (-1.0, 1.0, 1.0)])
 def test_spacing_is_in_metres_whatever_the_scale_of_the_object(scale):
     obj = grid("Plate", size=0.04)
@@ -207,17 +174,6 @@ def test_what_cannot_be_laid_leaves_no_trace():
         bpy.ops.palpate.skin_add(source="SELECTION", method="ARRAY")
     assert changes(before, dump()) == []
     assert not bpy.ops.palpate.skin_update.poll()
-
-
-def test_undo_takes_a_skin_away():
-    obj = finger()
-    select(obj, upper(obj))
-    bpy.ops.ed.undo_push(message="before")
-    before = dump()
-    bpy.ops.palpate.skin_add("EXEC_DEFAULT", True, source="SELECTION", spacing=0.003)
-    assert changes(before, dump())
-    bpy.ops.ed.undo()
-    assert changes(before, dump()) == []
 
 
 def test_a_skin_that_lost_its_surface_says_so():

@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import ball, grid, press
+from blender_scenes import baked, ball, grid, press
 
 from palpate.addon.authoring import laid_sensors
 from palpate.addon.properties.parameter_properties import sensor_parameters
@@ -40,15 +40,6 @@ def test_a_preset_makes_a_sensor_that_works_and_names_its_source(path):
         assert after == SensorParameters() == before  # the paper's Table 2 is what a new sensor has
     else:
         assert after != before
-
-
-def test_the_stiffness_of_a_silicone_preset_is_the_sum_it_shows():
-    for path in PRESETS:
-        found = re.search(r"k = E · A / h = ([\d.]+) ([kM])Pa · (\d) mm² / (\d) mm = (\d+)", path.read_text(encoding="utf-8"))
-        if found:
-            modulus, prefix, area, thickness, k = found.groups()
-            expected = float(modulus) * {"k": 1e3, "M": 1e6}[prefix] * float(area) * 1e-6 / (float(thickness) * 1e-3)
-            assert float(k) == pytest.approx(expected, rel=0.01)
 
 
 def test_own_presets_are_kept_and_removed():
@@ -137,15 +128,13 @@ def test_a_material_or_face_set_becomes_the_region(source):
 
 
 def test_a_region_by_material_survives_its_own_heat_map(tmp_path):
-    from palpate.addon.bake.bake import bake
-    from palpate.core.jobs import run_job
 
     scene, pad, _ = press(3)
     right = two_halves(pad)
     pad.palpate.region, pad.palpate.material = "MATERIAL", "Rubber"
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "halves.blend"))
     for _ in range(2):
-        run_job(bake(scene))
+        baked(scene)
         assert (sensor_regions.region_vertices(pad, len(right)) == right).all()
 
 

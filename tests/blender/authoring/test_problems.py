@@ -106,121 +106,111 @@ def flip(obj, faces):
     obj.data.update()
 
 
-def test_a_flipped_face_is_turned():
-    obj = sensor(cube(size=0.05))
-    flip(obj, [2])
-    assert kinds(obj) == ["NORMALS"]
-    fix(obj, "NORMALS")
-    assert kinds(obj) == []
-
-
-def test_a_mesh_inside_out_is_flipped():
-    obj = sensor(ball(radius=0.02))
-    flip(obj, range(len(obj.data.polygons)))
-    report = look(obj)
-    assert [problem.kind for problem in report.problems] == ["FLIPPED"]
-    assert len(report.problems[0].texels) == len(report.texels)
-    fix(obj, "FLIPPED")
-    assert kinds(obj) == []
-
-
-def test_a_skin_that_faces_into_its_carrier_is_flipped():
-    ball(radius=0.02)
-    bpy.ops.palpate.skin_add(source="MESH", method="NOISE", spacing=0.008)
-    skin = bpy.context.object
-    skin.palpate.max_penetration = 0.001
-    assert kinds(skin) == []
-    flip(skin, range(len(skin.data.polygons)))
-    assert kinds(skin) == ["FLIPPED"]
-    fix(skin, "FLIPPED")
-    assert kinds(skin) == []
-
-
-def test_texels_inside_the_object_are_left_out():
-    """Two balls that overlap, joined: what is inside the other never touches anything."""
-    one, other = ball("One", (0, 0, 0), 0.02), ball("Other", (0.015, 0, 0), 0.02)
-    one.select_set(True)
-    other.select_set(True)
-    bpy.context.view_layer.objects.active = one
-    bpy.ops.object.join()
-    sensor(one)
-    found = look(one).problems
-    assert [problem.kind for problem in found] == ["INSIDE"]
-    points = np.array([v.co for v in one.data.vertices])
-    centres = np.array([[0, 0, 0], [0.015, 0, 0]]) + np.array(one.location) * 0
-    depth = np.array([0.02 - np.linalg.norm(points - centre, axis=1) for centre in centres])
-    inside = (depth > 4e-4).any(axis=0)  # below the facets
-    assert set(np.flatnonzero(inside)) <= set(found[0].texels)
-    fix(one, "INSIDE")
-    assert one.palpate.region == "GROUP"
-    assert "INSIDE" not in kinds(one)
-
-
-def test_texels_one_upon_another_are_merged():
-    one, other = grid("One"), grid("Other", (0.00005, 0, 0.00001))
+def join(one, other):
     for obj in (one, other):
         obj.select_set(True)
     bpy.context.view_layer.objects.active = one
     bpy.ops.object.join()
-    sensor(one)
-    found = look(one).problems
-    assert "OVERLAP" in [problem.kind for problem in found]
-    assert len(next(p for p in found if p.kind == "OVERLAP").texels) == 84
-    fix(one, "OVERLAP")
-    assert "OVERLAP" not in kinds(one)
-    assert len(one.data.vertices) == 84
 
 
-def test_a_reach_through_a_thin_plate_is_shortened():
+def flipped_face():
+    obj = sensor(cube(size=0.05))
+    flip(obj, [2])
+    return obj
+
+
+def inside_out():
+    obj = sensor(ball(radius=0.02))
+    flip(obj, range(len(obj.data.polygons)))
+    return obj
+
+
+def laid_skin():
+    carrier = ball(radius=0.02)
+    bpy.ops.palpate.skin_add(source="MESH", method="NOISE", spacing=0.008)
+    bpy.context.object.palpate.max_penetration = 0.001
+    assert kinds(bpy.context.object) == []
+    return carrier, bpy.context.object
+
+
+def skin_that_faces_its_carrier():
+    _, skin = laid_skin()
+    flip(skin, range(len(skin.data.polygons)))
+    return skin
+
+
+def thin_plate():
     plate = cube(size=0.05)
     plate.scale = (1, 1, 0.04)  # 2 mm
-    sensor(plate)
-    plate.palpate.max_penetration = 0.012
-    found = look(plate).problems
-    assert [problem.kind for problem in found] == ["THROUGH"]
-    assert "12 mm" in found[0].text
-    fix(plate, "THROUGH")
-    assert kinds(plate) == []
-    assert plate.palpate.max_penetration < 0.012
+    sensor(plate).palpate.max_penetration = 0.012
+    return plate
 
 
-def test_a_subdivided_sensor_s_modifier_is_applied():
+def subdivided():
     obj = sensor(grid(columns=4, rows=4))
     obj.modifiers.new("Subdivision", "SUBSURF").levels = 1
-    assert kinds(obj) == ["MODIFIER"]
-    fix(obj, "MODIFIER")
+    return obj
+
+
+def group_that_is_gone():
+    pad = sensor(grid())
+    pad.palpate.region, pad.palpate.vertex_group = "GROUP", "Gone"
+    return pad
+
+
+PROBLEMS = {
+    flipped_face: "NORMALS",
+    inside_out: "FLIPPED",
+    skin_that_faces_its_carrier: "FLIPPED",
+    thin_plate: "THROUGH",
+    subdivided: "MODIFIER",
+    group_that_is_gone: "REGION",
+}
+"""Problems, by what makes a sensor that has this one alone."""
+
+
+@pytest.mark.parametrize("made", PROBLEMS, ids=lambda made: made.__name__)
+def test_a_problem_is_named_and_its_button_fixes_it(made):
+    obj = made()
+    assert kinds(obj) == [PROBLEMS[made]]
+    fix(obj, PROBLEMS[made])
     assert kinds(obj) == []
-    assert len(obj.data.vertices) == 49
-    assert len(look(obj).texels) == 49
+
+
+def test_texels_inside_the_object_are_left_out():
+    """Two balls that overlap, joined: what is inside the other never touches anything."""
+    one = ball("One", (0, 0, 0), 0.02)
+    join(one, ball("Other", (0.015, 0, 0), 0.02))
+    (problem,) = look(sensor(one)).problems
+    points = np.array([v.co for v in one.data.vertices])
+    depth = np.array([0.02 - np.linalg.norm(points - centre, axis=1) for centre in ((0, 0, 0), (0.015, 0, 0))])
+    inside = (depth > 4e-4).any(axis=0)  # below the facets
+    assert problem.kind == "INSIDE" and set(np.flatnonzero(inside)) <= set(problem.texels)
+    fix(one, "INSIDE")
+    assert one.palpate.region == "GROUP" and "INSIDE" not in kinds(one)
+
+
+def test_texels_one_upon_another_are_merged():
+    one = grid("One")
+    join(one, grid("Other", (0.00005, 0, 0.00001)))
+    found = {problem.kind: problem for problem in look(sensor(one)).problems}
+    assert len(found["OVERLAP"].texels) == 84
+    fix(one, "OVERLAP")
+    assert "OVERLAP" not in kinds(one) and len(one.data.vertices) == 84
 
 
 def test_a_joined_mesh_is_asked_about():
-    pad, other = sensor(grid()), cube()
-    for obj in (pad, other):
-        obj.select_set(True)
-    bpy.context.view_layer.objects.active = pad
-    bpy.ops.object.join()
-    found = look(pad).problems
-    assert "GROWN" in [problem.kind for problem in found]
-    assert "had 84 vertices" in next(p for p in found if p.kind == "GROWN").text
+    pad = sensor(grid())
+    join(pad, cube())
+    found = {problem.kind: problem for problem in look(pad).problems}
+    assert "had 84 vertices" in found["GROWN"].text
     fix(pad, "GROWN")
     assert "GROWN" not in kinds(pad)
-
-
-def test_a_region_that_is_gone_is_replaced():
-    pad = sensor(grid())
-    pad.palpate.region, pad.palpate.vertex_group = "GROUP", "Gone"
-    report = look(pad)
-    assert report.texels is None
-    assert [problem.kind for problem in report.problems] == ["REGION"]
-    fix(pad, "REGION")
-    assert kinds(pad) == []
 
 
 def test_a_renamed_group_offers_the_active_one():
     pad = sensor(grid())
     pad.palpate.region, pad.palpate.vertex_group = "GROUP", "Tip"
-    assert kinds(pad) == ["REGION"]
     group = pad.vertex_groups.new(name="Tip")
     group.add(range(20, 60), 1.0, "REPLACE")
     before = len(look(pad).texels)
@@ -253,10 +243,7 @@ def test_what_is_not_the_regions_fault_leaves_the_region():
 
 
 def test_an_outdated_skin_is_laid_anew_and_an_orphan_stands_alone():
-    carrier = ball(radius=0.02)
-    bpy.ops.palpate.skin_add(source="MESH", method="NOISE", spacing=0.008)
-    skin = bpy.context.object
-    skin.palpate.max_penetration = 0.001
+    carrier, skin = laid_skin()
     for vertex in carrier.data.vertices:
         vertex.co *= 1.2
     assert "OUTDATED" in kinds(skin)

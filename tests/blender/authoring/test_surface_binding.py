@@ -4,11 +4,10 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import ball, grid, reopen, save
+from blender_scenes import ball, grid, reopen, save, scenario_of
 
 from palpate.addon.authoring import laid_sensors, sensor_report, surface_binding
 from palpate.addon.scene import mesh_arrays, participants, scene_reader
-from palpate.core.jobs import run_job
 
 
 def finger():
@@ -32,7 +31,7 @@ def shapes(obj):
     """(frames, n, 9) where the texels of a sensor are, as the solver gets it."""
     target = ball("Target", (0.0, 0.0, 1.0))
     target.palpate.role = "TARGET"
-    scenario = run_job(scene_reader.read_scene(bpy.context.scene)).scenario
+    scenario = scenario_of(bpy.context.scene)
     bpy.data.objects.remove(target)
     return next(s for s in scenario.sensors if s.name == obj.name).deformation.values
 
@@ -79,25 +78,6 @@ def test_texels_between_vertices_keep_their_place_in_the_triangle_under_them(met
         u, v = shares[inside]
         normal = np.cross(b - a, c - a)
         assert end == pytest.approx(a + u * (b - a) + v * (c - a) + lift * normal / np.linalg.norm(normal), abs=2e-6)
-
-
-def test_an_armature_moves_laid_texels():
-    carrier = grid("Sheet", size=0.04)
-    bpy.ops.object.armature_add()
-    armature = bpy.context.object
-    group = carrier.vertex_groups.new(name=armature.data.bones[0].name)
-    group.add([v.index for v in carrier.data.vertices if v.co.x > 0], 1.0, "REPLACE")
-    carrier.modifiers.new("Armature", "ARMATURE").object = armature
-    skin = lay(carrier, method="NOISE", spacing=0.004)
-    armature.pose.bones[0].location = (0.0, 0.0, 0.02)
-    bpy.context.view_layer.update()
-    moved = skin.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.vertices
-    shift = np.array([(b.co - a.co).length for a, b in zip(skin.data.vertices, moved, strict=True)])
-    edge = max(v.co.x for v in carrier.data.vertices if v.co.x < 0.019) - 0.02  # width of a face, negative
-    right = np.array([v.co.x > -edge for v in skin.data.vertices])
-    left = np.array([v.co.x < edge for v in skin.data.vertices])
-    assert shift[right] == pytest.approx(0.02, abs=1e-6)
-    assert shift[left] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_rigid_surface_binds_nothing_and_one_that_bends_later_says_so(tmp_path):
