@@ -134,35 +134,18 @@ def test_a_missing_wheel_is_noticed(missing):
 
 
 @pytest.mark.long("builds the zip and installs it")
-def test_it_is_enabled_and_disabled_as_often_as_one_likes(life):
-    """What it registers and loads is the matter of test_registration.py."""
+def test_the_life_of_an_installed_extension(life):
+    """It is enabled and disabled as often as one likes, runs from its wheels alone, and leaves nothing behind."""
     assert life["enabled"] == life["enabled again"] == [True, True]
     assert life["disabled"] == life["uninstalled"] == [False, False]
-
-
-@pytest.mark.long("builds the zip and installs it")
-def test_the_wheels_are_the_ones_in_use(life):
-    site_packages = str(life["user"] / "extensions" / ".local")
     assert set(life["wheels"]) >= {"numba", "trimesh", "tqdm", "matplotlib", "tomli_w", "jinja2", "markupsafe"}
     for name, origin in life["wheels"].items():
-        assert origin.startswith(site_packages), name
+        assert origin.startswith(str(life["user"] / "extensions" / ".local")), name
     assert life["compiled"] == 45
-
-
-@pytest.mark.long("builds the zip and installs it")
-def test_nothing_is_written_outside_of_the_users_folder_for_the_extension(life):
-    """Blender's own folders in the home of the user are Blender's; it made them before the extension was installed."""
     assert life["written beside the source"] == []
-    assert any(name.startswith("fontlist") for name in life["fonts"])
-    left = [path.relative_to(life["home"]).as_posix() for path in life["home"].rglob("*") if path.is_file()]
-    assert left == []
-    assert life["MPLCONFIGDIR"] is None
-
-
-@pytest.mark.long("builds the zip and installs it")
-def test_uninstalling_removes_the_files(life):
-    left = [path for path in (life["user"] / "extensions").rglob("*") if "palpate" in path.name or path.name == "numba"]
-    assert left == []
+    assert any(name.startswith("fontlist") for name in life["fonts"]) and life["MPLCONFIGDIR"] is None
+    assert [path for path in life["home"].rglob("*") if path.is_file()] == []  # Blender made its folders there before
+    assert [path for path in (life["user"] / "extensions").rglob("*") if "palpate" in path.name or path.name == "numba"] == []
 
 
 @pytest.mark.long("builds the zip and installs it")

@@ -69,16 +69,6 @@ def test_a_rig_is_not_overwritten_by_its_result(tmp_path, repository, capfd):
     assert contents(tmp_path) == before
 
 
-def test_an_export_does_not_go_into_the_bake(tmp_path, repository, capfd):
-    out = tmp_path / "out"
-    assert main(["bake", str(repository / "sample_blends" / "demo.blend"), "--frames", "1", "2", "--out", str(out)]) == 0
-    before = contents(out / "Finger A")
-    for folder in (out, out / "Finger A"):
-        assert main(["export", str(out), "--out", str(folder)]) == 1
-        assert "holds the bake itself" in capfd.readouterr().err
-    assert contents(out / "Finger A") == before
-
-
 def test_a_sensor_definition_is_not_overwritten_by_a_scene(tmp_path, repository, capfd):
     demo, xml = str(repository / "sample_blends" / "demo.blend"), str(tmp_path / "a.xml")
     assert main(["openrave", "export", demo, "--out", xml]) == 0

@@ -47,6 +47,7 @@ def test_wrong_places_are_found_before_the_work(blend, tmp_path, capfd):
         ["openrave", "export", "scene.blend", "--out", "file/deeper.xml"],
         ["bake", "x" * 300],
         ["render", "missing.blend", "--out", "out"],
+        ["demo", "--out", "file/deeper"],
     ):
         assert main(words) == 1, words
         (line,) = capfd.readouterr().err.strip().splitlines()

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Links, commands, paths and code blocks in README.md, docs/ and the other pages are true.
+"""Commands and code blocks in README.md, docs/ and the other pages are true; `make docs` checks their links.
 
 Short code is run. Commands that take long are parsed by the command line's own parser and not run.
 """
 
 from __future__ import annotations
 
-import importlib
 import re
 import shlex
 import shutil
@@ -30,8 +29,7 @@ PAGES = [
     *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "benchmarks/RESULTS.md", "tests/ui/README.md")),
     *sorted((ROOT / "docs").glob("*.md")),
 ]
-FOLDERS = {path.name for path in ROOT.iterdir() if path.is_dir() and not path.name.startswith(".")} - {"build", "dist"}
-on_every_page = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+TEXTS = [page.read_text(encoding="utf-8") for page in PAGES]
 
 
 def blocks(text: str, language: str) -> list[str]:
@@ -42,13 +40,6 @@ def blocks(text: str, language: str) -> list[str]:
 def inline_code(text: str) -> list[str]:
     """Code between single backticks, without the fenced blocks."""
     return re.findall(r"(?<!`)`([^`\n]+)`(?!`)", re.sub(r"^```.*?^```", "", text, flags=re.DOTALL | re.MULTILINE))
-
-
-def anchors(page: Path) -> set[str]:
-    """Anchors of a page's headings as GitHub and MyST make them."""
-    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
-    headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
-    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
 def command_lines(text: str) -> list[str]:
@@ -64,42 +55,8 @@ def command_lines(text: str) -> list[str]:
     return found
 
 
-@on_every_page
-def test_links_lead_somewhere(page):
-    for link in re.findall(r"\]\(([^)\s]+)[^)]*\)", page.read_text(encoding="utf-8")):
-        if re.match(r"[a-z]+:", link):
-            continue
-        name, _, anchor = link.partition("#")
-        target = page.parent / name if name else page
-        assert target.exists(), link
-        assert not anchor or anchor in anchors(target), link
-
-
-@on_every_page
-def test_paths_and_modules_exist(page):
-    """A path in code that begins with a folder of the repository is there, and so is every module of `palpate`."""
-    text = page.read_text(encoding="utf-8")
-    for code in inline_code(text):
-        path = re.fullmatch(r"([\w.-]+/[\w./-]*\w/?)", code)
-        if path and code.split("/")[0] in FOLDERS and "NAME" not in code:
-            assert (ROOT / code).exists(), code
-    for name in set(re.findall(r"\bpalpate\.core(?:\.\w+)+", text)):
-        module, attributes = name, []
-        while True:
-            try:
-                found = importlib.import_module(module)
-                break
-            except ModuleNotFoundError:
-                module, _, attribute = module.rpartition(".")
-                attributes.insert(0, attribute)
-        for attribute in attributes:
-            assert hasattr(found, attribute), name
-            found = getattr(found, attribute)
-
-
-@on_every_page
-def test_commands_are_ones_that_the_command_line_takes(page, capsys):
-    for line in command_lines(page.read_text(encoding="utf-8")):
+def test_commands_are_ones_that_the_command_line_takes(capsys):
+    for line in (line for text in TEXTS for line in command_lines(text)):
         words = shlex.split(line.replace('$(basename "$f" .blend)', "name").replace("[", "").replace("]", ""))
         try:
             _parser(words).parse_args(words)
@@ -107,10 +64,9 @@ def test_commands_are_ones_that_the_command_line_takes(page, capsys):
             pytest.fail(f"palpate {line}: {capsys.readouterr().err}")
 
 
-@on_every_page
-def test_options_that_are_told_of_are_in_the_help(page, capsys):
+def test_options_that_are_told_of_are_in_the_help(capsys):
     """`palpate bake SCENE.blend [--out DIR]` in a sentence or a table names options of that command."""
-    for code in inline_code(page.read_text(encoding="utf-8").replace("\\|", "|")):
+    for code in (code for text in TEXTS for code in inline_code(text.replace("\\|", "|"))):
         words = re.match(r"palpate (\w+)", code)
         if words and words.group(1) in COMMANDS:
             told = re.match(r"palpate (\w+(?: (?:stiffness|friction|show|import|export|new)\b)?)", code).group(1).split()
@@ -118,18 +74,6 @@ def test_options_that_are_told_of_are_in_the_help(page, capsys):
             text = capsys.readouterr().out
             for option in re.findall(r"--[a-z][a-z-]*", code):
                 assert option in text, code
-
-
-@on_every_page
-def test_targets_of_make_and_tools_exist(page):
-    text = page.read_text(encoding="utf-8")
-    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    code = [*inline_code(text), *(line for block in blocks(text, "sh") for line in block.splitlines())]
-    for line in code:
-        for target in re.findall(r"(?:^|&& )make ([a-z][\w-]*)", line):
-            assert re.search(rf"^{target}:", makefile, re.MULTILINE), line
-        for group in re.findall(r"python -m benchmarks (\w+)", line) + re.findall(r"make bench ONLY=(\w+)", line):
-            assert (ROOT / "benchmarks" / f"{group}.py").exists(), line
 
 
 @pytest.fixture(scope="module")

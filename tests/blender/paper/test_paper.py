@@ -4,15 +4,13 @@
 from __future__ import annotations
 
 from functools import partial
-from html.parser import HTMLParser
 
 import bpy
-import numpy as np
 import pytest
 
 from palpate.commands import main
 from palpate.core.solver.simulation import run
-from palpate.paper import experiment_tools, grasping, page, weighing
+from palpate.paper import experiment_tools, grasping, page
 from palpate.paper.chapter import Chapter, Picture, Row, below, compare
 from palpate.sample_blends import grasps, gripper, hand, pick_and_place, tilt
 
@@ -34,20 +32,6 @@ def test_the_page_holds_every_row_and_picture(tmp_path):
     assert 'src="a.png"' in text and 'href="a.pdf"' in text
     assert not chapter.kept
 
-    class Balanced(HTMLParser):
-        open_tags: list[str] = []
-
-        def handle_starttag(self, tag, attrs):
-            if tag not in {"meta", "img"}:
-                self.open_tags.append(tag)
-
-        def handle_endtag(self, tag):
-            assert self.open_tags.pop() == tag
-
-    parser = Balanced()
-    parser.feed(text)
-    assert parser.open_tags == []
-
 
 def test_a_row_outside_its_tolerance_is_not_kept():
     assert compare("x", "—", 1.0, 1.1, 0.05, "N").kept is False
@@ -68,22 +52,12 @@ def test_an_unknown_experiment_is_one_line(tmp_path, capfd):
     assert len(err) == 1 and "no experiment 'weather'" in err[0]
 
 
-def test_the_slope_holds():
-    """Fig. 9 for twenty seconds: the bar of the long run, 1e-10 m from ten seconds on."""
-    scene = experiment_tools.new_scene(tilt.build)
-    scenario = experiment_tools.scenario_of(scene)
-    recording = run(weighing.replace(scenario, fps=10.0, frame_end=scenario.frame_start + 200, dt=1e-3))
-    path = experiment_tools.path_of(recording, "Cube")[recording.times >= 10.0]
-    assert np.abs(path - path[0]).max() < 1e-10
-
-
 @pytest.mark.long("an experiment of the paper")
-@pytest.mark.parametrize("kind", ["sphere", "bottle"])
-def test_each_object_is_held(kind):
+def test_a_bottle_is_held():
     """Controlled sum within 1e-6 N, and not a micrometre in the last ten seconds."""
-    scene = experiment_tools.new_scene(partial(grasps.build, kind=kind))
+    scene = experiment_tools.new_scene(partial(grasps.build, kind="bottle"))
     rows = grasping.held_rows(
-        experiment_tools.scenario_of(scene), grasps.OBJECTS[kind].name, gripper.LEFT, grasps.FORCE, SECONDS
+        experiment_tools.scenario_of(scene), grasps.OBJECTS["bottle"].name, gripper.LEFT, grasps.FORCE, SECONDS
     )
     assert all(row.kept for row in rows), rows
 
