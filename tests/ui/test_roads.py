@@ -77,15 +77,10 @@ def pixel(picture: np.ndarray, x: int, y: int) -> np.ndarray:
     return np.median(picture[-y - 3 : -y + 2, x - 2 : x + 3].reshape(-1, 3), axis=0)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "status", "says"),
-    [(["--help"], 0, "bake"), (["bake", "no-such-scene.blend"], 1, "no-such-scene.blend"), (["bake"], 2, "usage")],
-)
-def test_command(real_blender, tmp_path, arguments, status, says):
-    """`blender --command palpate …`, with nothing but the extension and its wheels."""
+def test_command(real_blender, tmp_path):
+    """`blender --command palpate …`, with nothing but the extension and its wheels, says what is wrong and has its status."""
     log = tmp_path / "command.log"
-    code = real_blender.run(["blender", "--command", "palpate", *arguments], log, timeout=600)
+    code = real_blender.run(["blender", "--command", "palpate", "bake", "no-such-scene.blend"], log, timeout=600)
     text = log.read_text(encoding="utf-8")
-    assert code == status, text
-    assert says in text
+    assert code == 1 and "no-such-scene.blend" in text, text
     assert "Traceback" not in text, text
