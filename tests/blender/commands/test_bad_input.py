@@ -151,20 +151,6 @@ def test_a_baked_body_that_is_no_longer_free(tmp_path):
     assert bpy.ops.palpate.bake() == {"FINISHED"}
 
 
-def test_a_sensor_linked_from_another_file(tmp_path, pressed):
-    scene = bpy.data.scenes.new("Borrower")
-    bpy.context.window.scene = scene
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "empty.blend"))
-    for obj in (pressed.pad, pressed.target):
-        bpy.data.objects.remove(obj)
-    with bpy.data.libraries.load(str(tmp_path / "scene.blend"), link=True) as (_, wanted):
-        wanted.objects = ["Pad", "Ball"]
-    for obj in wanted.objects:
-        scene.collection.objects.link(obj)
-    scene.frame_end = 3
-    assert refusal().startswith("'Pad' is linked from another file")
-
-
 def test_a_sensor_whose_mesh_is_linked(tmp_path, pressed):
     """A library override: the object can be changed, its mesh cannot."""
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "borrower.blend"))

@@ -93,16 +93,6 @@ def test_mistakes_are_one_line(more, reason, demo_blend, capfd):
     assert demo_blend.read_bytes() == before
 
 
-def test_a_scene_without_sensors_says_what_to_do(tmp_path, capfd):
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "bare.blend"))
-    capfd.readouterr()
-    assert main(["bake", str(tmp_path / "bare.blend")]) == 1
-    out, err = lines_of(capfd)
-    assert out == []
-    assert len(err) == 1
-    assert "Make Sensor" in err[0]
-
-
 def test_a_part_cannot_be_saved(tmp_path, demo_blend, capfd):
     words = ["bake", str(demo_blend), "--sensor", "Finger A", "--save-as", str(tmp_path / "a.blend")]
     assert main(words) == 2
@@ -219,15 +209,6 @@ def test_save_as_keeps_the_bake_in_another_file(tmp_path, demo_blend):
         "Finger A",
         "Finger B",
     ]
-
-
-def test_save_keeps_the_bake_in_the_file_itself(tmp_path, demo_blend):
-    mine = tmp_path / "mine.blend"
-    mine.write_bytes(demo_blend.read_bytes())
-    assert main(["bake", str(mine), "--frames", "1", "3", "--save"]) == 0
-    assert (tmp_path / "palpate-bake" / "Finger A" / "recording.npz").is_file()  # the file's own folder, beside it
-    bpy.ops.wm.open_mainfile(filepath=str(mine))
-    assert bpy.context.scene.objects["Finger A"].palpate.is_baked
 
 
 def test_the_bake_that_a_saved_file_plays_is_not_replaced_without_it(tmp_path, demo_blend, capfd):

@@ -3,6 +3,7 @@
 
 import os
 import shutil
+from dataclasses import replace
 
 import bpy
 import pytest
@@ -15,7 +16,8 @@ from palpate.addon.render.figure_request import FigureRequest
 from palpate.addon.scene import participants
 from palpate.addon.session import frame_status
 from palpate.addon.timeline import baked_frames
-from palpate.core.errors import PalpateError
+from palpate.core.errors import PalpateError, SceneError
+from palpate.core.io.bake_folder import IMAGE_LIST_NAME, read_manifest, write_manifest
 from palpate.core.jobs import run_job
 
 DAMAGES = {
@@ -73,3 +75,18 @@ def test_damage_is_one_sentence_and_changes_nothing(baked, tmp_path):
             assert shown.endswith(".") and shown != "Frame 1 of the bake.", f"{way}: {shown}"
     assert changes(before, dump()) == []
     assert not (tmp_path / "figures").exists()
+
+
+def test_a_bake_without_images_cannot_be_shown(tmp_path):
+    scene, *_ = press(frames=3)
+    save(tmp_path)
+    (folder,) = run_job(bake(scene)).folders.values()
+    manifest = read_manifest(folder)
+    files = {name: sha256 for name, sha256 in manifest.files.items() if name != IMAGE_LIST_NAME}
+    write_manifest(folder, replace(manifest, files=files))
+    for image in (*folder.glob("*.exr"), folder / IMAGE_LIST_NAME):
+        image.unlink()
+    before = dump()
+    with pytest.raises(SceneError, match=r"The bake of sensor 'Pad' in '.*' has no tactile images.*bake again"):
+        bake_display.refresh(scene, baked_scene.bake_folders(scene))
+    assert changes(before, dump()) == []

@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import find_marker, press_and_drop, save
+from blender_scenes import find_marker, press_and_drop, reopen, save
 
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import markers, materials, overlays, texel_arrows
@@ -17,16 +17,27 @@ from palpate.sample_blends import grasp
 ALL = {"FORCE", "TORQUE", "CENTRE", "SLIP", "NORMALS", "SHEARS"}
 
 
-@pytest.fixture
-def baked(tmp_path):
+@pytest.fixture(scope="module")
+def baked_file(blender, tmp_path_factory):
+    """Return a saved scene of two sensors with every marker, and its bake."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    folder = tmp_path_factory.mktemp("overlays")
     scene, pad, target, *_ = press_and_drop(frames=8)
     pad.rotation_euler, pad.scale = (0.03, 0.05, 0.3), (1.0, 1.2, 1.0)
     target.location = (0.004, 0.002, 0.0045)
     target.keyframe_insert("location", frame=8)
     scene.frame_set(1)
     scene.palpate.overlays = ALL
-    save(tmp_path)
-    return scene, pad, run_job(bake(scene))
+    save(folder)
+    result = run_job(bake(scene))
+    return save(folder), result
+
+
+@pytest.fixture
+def baked(baked_file):
+    path, result = baked_file
+    scene = reopen(path)
+    return scene, scene.objects["Pad"], result
 
 
 def instances(obj):
@@ -145,11 +156,12 @@ def test_views_that_change_colours_get_the_overlay(baked):
     assert not overlays.shows_colors_as_they_are(scene)
 
 
-def test_arrows_of_a_lost_image_do_not_show(baked, tmp_path):
+def test_arrows_of_a_lost_image_do_not_show(baked):
     scene, pad, _ = baked
     assert texel_arrows.KINDS.keys() <= ALL
-    (tmp_path / "palpate-bake").rename(tmp_path / "lost")
-    materials.find_block(bpy.data.images, pad.palpate.uid).reload()
+    image = materials.find_block(bpy.data.images, pad.palpate.uid)
+    image.filepath = image.filepath.replace("palpate-bake", "lost")
+    image.reload()
     scene.frame_set(7)
     scene.frame_set(8)
     assert instances(find_marker(scene.objects, pad.palpate.uid, "NORMALS")) == []

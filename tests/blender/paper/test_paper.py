@@ -5,14 +5,13 @@ from __future__ import annotations
 
 from functools import partial
 
-import bpy
 import pytest
 
 from palpate.commands import main
 from palpate.core.solver.simulation import run
 from palpate.paper import experiment_tools, grasping, page
 from palpate.paper.chapter import Chapter, Picture, Row, below, compare
-from palpate.sample_blends import grasps, gripper, hand, pick_and_place, tilt
+from palpate.sample_blends import grasps, gripper, hand, pick_and_place
 
 SECONDS = 16.0
 """Of a hold: six to settle and the ten in which nothing may move; palpate paper holds for sixty."""
@@ -84,17 +83,3 @@ def test_finger_and_thumb_hold():
     scene = experiment_tools.new_scene(hand.build)
     rows = grasping.held_rows(experiment_tools.scenario_of(scene), hand.CYLINDER, hand.INDEX, hand.FORCE, SECONDS)
     assert all(row.kept for row in rows), rows
-
-
-@pytest.mark.parametrize(
-    "build",
-    [
-        tilt.build,
-        pick_and_place.build,
-        pytest.param(hand.build, marks=pytest.mark.long("models a hand")),
-        partial(grasps.build, kind="bottle"),
-    ],
-)
-def test_each_scene_explains_itself(build):
-    experiment_tools.new_scene(build)
-    assert "paper, section" in bpy.data.texts["Read me"].as_string()

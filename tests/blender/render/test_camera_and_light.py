@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import baked, ball, changes, cube, dump, grid, save
+from blender_scenes import baked, ball, changes, cube, dump, grid, reopen, save
 
 from palpate.addon.render import camera_direction, figure_export, loaded_texels, render, render_setup, studio
 from palpate.addon.render.figure_request import FigureRequest
@@ -14,8 +14,11 @@ from palpate.core.jobs import run_job
 SIZE = (96, 72)
 
 
-def wall(tmp_path):
-    """A pad whose texels face −x, a ball that presses on it from there, and a camera behind the pad."""
+@pytest.fixture(scope="module")
+def wall_blend(blender, tmp_path_factory):
+    """A pad whose texels face −x, a ball that presses on it from there, and a camera behind the pad, baked and saved."""
+    folder = tmp_path_factory.mktemp("wall")
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, 3
     pad = grid(columns=12, rows=12)
@@ -30,14 +33,17 @@ def wall(tmp_path):
     bpy.ops.object.camera_add(location=(0.5, 0.0, 0.1), rotation=(1.3, 0.0, np.pi / 2))
     scene.camera = bpy.context.object
     scene.render.engine, scene.cycles.samples = "CYCLES", 4
-    save(tmp_path)
+    save(folder)
     baked(scene)
-    save(tmp_path)
-    return scene
+    return save(folder)
 
 
-def test_the_camera_is_turned_to_the_loaded_texels(tmp_path):
-    scene = wall(tmp_path)
+@pytest.fixture
+def scene(scene, wall_blend):
+    return reopen(wall_blend)
+
+
+def test_the_camera_is_turned_to_the_loaded_texels(scene):
     before = dump()
     loaded = loaded_texels.loaded_texels(scene, figure_export.read_scene_bake(scene), 3)
     assert len(loaded) >= 4 and loaded.normals[:, 0] == pytest.approx(np.full(len(loaded), -1.0), abs=1e-5)
@@ -53,8 +59,7 @@ def test_the_camera_is_turned_to_the_loaded_texels(tmp_path):
     assert [line for line in changes(before, dump()) if "Render Result" not in line] == []  # Blender's own
 
 
-def test_a_camera_that_shows_the_texels_keeps_its_direction(tmp_path):
-    scene = wall(tmp_path)
+def test_a_camera_that_shows_the_texels_keeps_its_direction(scene):
     loaded = {3: loaded_texels.loaded_texels(scene, figure_export.read_scene_bake(scene), 3)}
     view = camera_direction.best_view(scene, loaded, (75.0, 20.0), True)
     assert view is not None and np.cos(np.radians(view[0])) < -0.5
@@ -63,9 +68,8 @@ def test_a_camera_that_shows_the_texels_keeps_its_direction(tmp_path):
     assert camera_direction.view_of(camera_direction.direction_of((75.0, 20.0))) == pytest.approx((75.0, 20.0))
 
 
-def test_a_direction_that_shows_things_larger_is_preferred(tmp_path):
+def test_a_direction_that_shows_things_larger_is_preferred(scene):
     """A pad that is seen equally well from two sides is seen from where a long handle is foreshortened."""
-    scene = wall(tmp_path)
     loaded = {3: loaded_texels.loaded_texels(scene, figure_export.read_scene_bake(scene), 3)}
     corners = render.bounding_box_corners([scene.objects["Pad"], scene.objects["Ball"]])
     for side in (-1.0, 1.0):
@@ -75,8 +79,7 @@ def test_a_direction_that_shows_things_larger_is_preferred(tmp_path):
         assert side * np.sin(np.radians(view[0])) > 0.0 > np.cos(np.radians(view[0]))
 
 
-def test_what_stands_before_the_texels_blocks_the_sight_unless_it_is_a_target(tmp_path):
-    scene = wall(tmp_path)
+def test_what_stands_before_the_texels_blocks_the_sight_unless_it_is_a_target(scene):
     loaded = {3: loaded_texels.loaded_texels(scene, figure_export.read_scene_bake(scene), 3)}
     bpy.ops.mesh.primitive_plane_add(size=0.2, location=(-0.03, 0.1, 0.0), rotation=(0.0, np.pi / 2, 0.0))
     screen = bpy.context.object  # from y = 0 to the left
@@ -88,8 +91,7 @@ def test_what_stands_before_the_texels_blocks_the_sight_unless_it_is_a_target(tm
     assert camera_direction.best_view(scene, loaded, (0.0, 30.0), True)[0] > 0.0
 
 
-def test_what_touches_the_subjects_is_in_the_picture_and_a_backdrop_is_not(tmp_path):
-    scene = wall(tmp_path)
+def test_what_touches_the_subjects_is_in_the_picture_and_a_backdrop_is_not(scene):
     housing = cube("Housing", (0.012, 0.0, 0.018), size=0.02)
     knob = cube("Knob", (0.012, 0.0, 0.030), size=0.004)
     knob.parent = housing
@@ -104,8 +106,7 @@ def test_what_touches_the_subjects_is_in_the_picture_and_a_backdrop_is_not(tmp_p
     assert not floor.hide_render
 
 
-def test_a_large_housing_is_cropped_so_that_the_pad_stays_large(tmp_path):
-    scene = wall(tmp_path)
+def test_a_large_housing_is_cropped_so_that_the_pad_stays_large(scene):
     options = render_setup.RenderOptions(size=SIZE, view=(180.0, 20.0))
     central = render.bounding_box_corners([scene.objects["Pad"], scene.objects["Ball"]])
 
@@ -123,8 +124,7 @@ def test_a_large_housing_is_cropped_so_that_the_pad_stays_large(tmp_path):
         assert render.image_position(scene, (0.012, 0.0, tops))[1] > 1.0
 
 
-def test_a_pad_that_nothing_touches_takes_no_room(tmp_path):
-    scene = wall(tmp_path)
+def test_a_pad_that_nothing_touches_takes_no_room(scene):
     options = render_setup.RenderOptions(size=SIZE, view=(180.0, 20.0))
     with render_setup.render_setup(scene, [3], options):
         before = np.array(scene.camera.matrix_world)
@@ -138,12 +138,10 @@ def test_a_pad_that_nothing_touches_takes_no_room(tmp_path):
 
 
 @pytest.mark.slow("two pictures by Cycles, at 4 samples")
-def test_the_subject_stands_out_from_the_background(tmp_path):
+def test_the_subject_stands_out_from_the_background(scene, tmp_path):
     """The scene's own lamp is far too bright and its world green; with own light both count."""
     from matplotlib.image import imread
 
-    bpy.context.scene.palpate.color_map = "VIRIDIS"  # dark without force
-    scene = wall(tmp_path)
     bpy.ops.object.light_add(type="SUN")
     bpy.context.object.data.energy = 1000.0
     scene.world = bpy.data.worlds.new("Green")
@@ -162,8 +160,7 @@ def test_the_subject_stands_out_from_the_background(tmp_path):
     assert counts == [len(blocks) for blocks in (bpy.data.worlds, bpy.data.lights, bpy.data.meshes, bpy.data.materials)]
 
 
-def test_without_denoiser_there_are_more_samples_and_it_is_said(tmp_path, monkeypatch):
-    scene = wall(tmp_path)
+def test_without_denoiser_there_are_more_samples_and_it_is_said(scene, tmp_path, monkeypatch):
     scene.cycles.use_denoising = False
     samples = []
     monkeypatch.setattr(render, "run_render", lambda scene, file, **_: samples.append(_settings(scene)) or file.touch())
@@ -184,13 +181,12 @@ def _settings(scene):
 @pytest.mark.parametrize(  # EEVEE takes Mesa minutes, for its shaders
     "engine", [pytest.param("cycles", marks=pytest.mark.long("a picture by Cycles at 16 samples")), "workbench"]
 )
-def test_colours_are_those_of_the_colour_bar(tmp_path, engine):
+def test_colours_are_those_of_the_colour_bar(scene, tmp_path, engine):
     """Every loaded texel that is seen has the colour of its force, in light that shows its shape, too."""
     from matplotlib.image import imread
 
     if engine != "cycles" and not render.has_opengl():
         pytest.skip("Workbench needs OpenGL, which this machine has not")
-    scene = wall(tmp_path)
     scene.view_settings.view_transform = "AgX"  # as in every new file
     scene.view_settings.exposure = 0.5
     scene.palpate.color_map = "MAGMA"

@@ -28,17 +28,24 @@ def bent(scene, target):
     scene.frame_set(1)
 
 
-@pytest.fixture
-def baked(tmp_path):
-    """A scene with a ball that bends and a pad with a modifier that keeps its vertices, baked, saved and opened again."""
+@pytest.fixture(scope="module")
+def bent_blend(blender, tmp_path_factory):
+    """A scene with a ball that bends and a pad with a modifier that keeps its vertices, baked and saved."""
+    folder = tmp_path_factory.mktemp("bent")
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     scene, pad, target = press(frames=6)
     bent(scene, target)
     pad.modifiers.new("Wave", "CAST").factor = 0.0
     scene.collection.objects.link(bpy.data.objects.new("Arm", None))
     target.parent = bpy.data.objects["Arm"]
-    save(tmp_path)
+    save(folder)
     run_job(bake(scene))
-    return reopen(save(tmp_path))
+    return save(folder)
+
+
+@pytest.fixture
+def baked(bent_blend):
+    return reopen(bent_blend)
 
 
 def texts(scene, frames):
@@ -101,10 +108,10 @@ def test_a_change_is_noticed_at_whatever_frame_is_shown_next(baked, change):
 
 
 @pytest.mark.parametrize("renamed", ["Pad", "Ball"])
-def test_a_new_name_alone_leaves_a_bake_fresh(baked, renamed, tmp_path):
+def test_a_new_name_alone_leaves_a_bake_fresh(baked, renamed, bent_blend):
     bpy.data.objects[renamed].name = "Renamed"
     assert texts(baked, [2, 5]) == [FRESH.format(2), FRESH.format(5)]
-    baked = reopen(save(tmp_path))
+    baked = reopen(save(bent_blend.parent, f"{renamed}.blend"))
     assert texts(baked, [3]) == [FRESH.format(3)]
     bpy.data.objects["Arm"].scale = (1.01, 1.01, 1.01)
     bpy.context.view_layer.update()
@@ -128,9 +135,11 @@ def keyed(owner, path, index=-1):
         owner.keyframe_insert(path, index=index, frame=frame)
 
 
-@pytest.fixture
-def hung(tmp_path):
+@pytest.fixture(scope="module")
+def hung_blend(blender, tmp_path_factory):
     """A baked scene whose ball hangs on others, all of which have keyframes and stay where they are."""
+    folder = tmp_path_factory.mktemp("hung")
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     scene, pad, target, *_ = press_and_drop(frames=8)
     others = {name: bpy.data.objects.new(name, None) for name in ("Leader", "Source", "Far", "Strips", "Nodes")}
     others["Cage"] = bpy.data.objects.new("Cage", bpy.data.lattices.new("Cage"))
@@ -167,9 +176,14 @@ def hung(tmp_path):
     else:
         modifier[socket] = others["Nodes"]
     scene.frame_set(1)
-    save(tmp_path)
+    save(folder)
     run_job(bake(scene))
-    return reopen(save(tmp_path))
+    return save(folder)
+
+
+@pytest.fixture
+def hung(hung_blend):
+    return reopen(hung_blend)
 
 
 def moved_at_4(owner):
