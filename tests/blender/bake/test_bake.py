@@ -31,6 +31,7 @@ def test_one_folder_per_sensor(tmp_path):
         assert files == [*own, *(f"tactile_{frame:04d}.exr" for frame in range(5))]
         manifest = read_manifest(folder)
         assert manifest.complete and manifest.sensor == name and manifest.digest == result.recording.digest
+        assert "channels" not in (folder / "manifest.json").read_text()
         recording = load_recording(folder / "recording.npz")
         assert list(recording.sensors) == [name]
         channels, about = read_exr(folder / "tactile_0004.exr")

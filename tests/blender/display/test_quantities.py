@@ -15,6 +15,7 @@ from palpate.addon.scene.stored_names import GAP_COLORS
 from palpate.addon.timeline import live_cache
 from palpate.core.errors import PalpateError
 from palpate.core.figures import color_maps
+from palpate.core.figures.figure_style import FigureStyle
 from palpate.core.figures.quantities import QUANTITIES, between
 from palpate.panels import sensor as sensor_panel
 
@@ -216,3 +217,16 @@ def test_a_heat_map_leaves_the_sensor_that_is_painted_alone():
         assert overlay.sensor in overlays.edited_objects(bpy.context)
     bpy.ops.object.mode_set(mode="OBJECT")
     assert not overlays.edited_objects(bpy.context)
+
+
+def test_a_picture_may_show_another_quantity_than_the_scene(tmp_path):
+    """tests/core/figures tells the range that it has then."""
+    scene, pad, _ = press(4)
+    scene.palpate.use_auto_range, scene.palpate.range_max = False, 0.15
+    save(tmp_path)
+    baked(scene)
+    found, style = figure_export.read_scene_bake(scene), FigureStyle(quantity="pressure")
+    bake_display.take_style(scene, style)
+    node = next(node for node in pad.material_slots[-1].material.node_tree.nodes if node.bl_idname == "ShaderNodeMapRange")
+    high = style.scale(found.recording, found.texels).high
+    assert node.inputs["From Max"].default_value == pytest.approx(high) and "kPa" in node.label

@@ -74,6 +74,18 @@ def test_files_and_material_show_the_force_on_the_uv_map(tmp_path, pixels):
     assert channels["R"][row, column] == pytest.approx(force[corner], abs=0.2 * readings.normal_force.max())
 
 
+def test_images_do_not_change_forces(tmp_path):
+    recordings = []
+    for layout in ("AUTO", "UV"):
+        bpy.data.batch_remove(list(bpy.data.objects))
+        scene, obj = tip()
+        obj.palpate.image_layout = layout
+        save(tmp_path)
+        recordings.append(baked(scene).recording.sensors["Tip"])
+    np.testing.assert_allclose(recordings[0].normal_force, recordings[1].normal_force, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(recordings[0].shear, recordings[1].shear, rtol=1e-12, atol=1e-15)
+
+
 def test_without_a_map_it_is_one_sentence(tmp_path):
     scene, obj = tip()
     save(tmp_path)

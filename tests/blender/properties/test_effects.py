@@ -74,6 +74,15 @@ def test_a_stack_that_means_nothing_leaves_the_old_one(pad):
     assert len(pad.palpate.effects) == 1
 
 
+def test_the_tooltips_and_bounds_are_those_of_the_library():
+    properties = effect_stack.PALPATE_PG_effect.bl_rna.properties
+    amount = properties["creep_exponential_amount"]
+    assert (amount.soft_min, amount.soft_max) == pytest.approx((0.0, 0.95))
+    form = next(form for form in library()["creep"].forms if form.name == "exponential")
+    assert amount.description.startswith(next(one.text for one in form.parameters if one.name == "amount").rstrip("."))
+    assert "creep" in properties["kind"].enum_items and "logarithmic" in properties["creep_form"].enum_items
+
+
 def test_a_bake_holds_the_readings_and_notices_a_change(tmp_path):
     """A readout effect changes the reading and no force."""
     scene, pad, _ = press(6)
