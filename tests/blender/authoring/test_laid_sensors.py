@@ -94,7 +94,7 @@ def test_texels_laid_on_a_painted_region_take_its_place(role):
     obj.palpate.role, obj.palpate.k = role, 300.0
     obj.vertex_groups.active.add(upper(obj), 1.0, "REPLACE")
     assert obj.mode == "WEIGHT_PAINT"
-    assert bpy.ops.palpate.skin_add(method="NOISE", spacing=0.002) == {"FINISHED"}
+    assert bpy.ops.palpate.skin_add(method="VERTICES") == {"FINISHED"}
     assert bpy.context.object.palpate.role == "SENSOR" and obj.palpate.role == "NONE"
     assert bpy.context.object.palpate.k == 300.0
 
@@ -125,7 +125,7 @@ def test_texels_laid_beside_a_painted_region_leave_it_as_it_is():
     other = obj.vertex_groups.new(name="Other side")
     other.add([v.index for v in obj.data.vertices if v.index not in upper(obj)], 1.0, "REPLACE")
     obj.vertex_groups.active_index = other.index
-    assert bpy.ops.palpate.skin_add(source="GROUP", method="NOISE", spacing=0.003) == {"FINISHED"}
+    assert bpy.ops.palpate.skin_add(source="GROUP", method="VERTICES") == {"FINISHED"}
     assert obj.palpate.role == "SENSOR"
 
 

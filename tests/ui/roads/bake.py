@@ -115,6 +115,7 @@ def figures(ui):
     place, settings, frame = ui.out / "figures", scene.palpate.figures, scene.frame_current
     settings.kinds |= {"VIDEO"}
     settings.engine, settings.size = "WORKBENCH", (480, 360)
+    ui.window.view_layer.objects.active = obj("Pad")
     yield from ui.filter("Make Figures")
     yield from ui.press("palpate.figures_make()")
     yield from ui.wait_until(lambda: list(place.glob("**/scene*.png")), "the first figure waits for the others")
