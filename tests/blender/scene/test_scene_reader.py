@@ -190,14 +190,6 @@ def test_children_of_free_bodies_are_refused():
         sampled(scene)
 
 
-def test_two_scenes_are_sampled_apart():
-    scene, *_ = press()
-    other = bpy.data.scenes.new("Other")
-    with pytest.raises(SceneError, match="'Other' has no sensor"):
-        sampled(other)
-    assert len(sampled(scene).scenario.sensors) == 1
-
-
 def test_a_pad_is_not_read_out():
     scene, *_ = press()
     table = grid("Table", (0.1, 0.0, 0.0))

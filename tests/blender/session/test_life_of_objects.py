@@ -169,18 +169,3 @@ def test_overridden(tmp_path):
     reopen(path)
     local = next(obj for obj in bpy.data.objects if obj.override_library is not None and obj.name == "Pad")
     assert local.palpate.k == 176.0
-
-
-def test_edited_while_it_is_a_sensor():
-    """Subdividing a painted region makes more texels; the count in the panel follows."""
-    pad = grid()
-    select(pad, range(84))
-    bpy.ops.palpate.sensor_add(source="SELECTION")
-    before = len(sensor_report.fresh_report(pad, bpy.context.scene).texels)
-    bpy.ops.object.mode_set(mode="EDIT")
-    bpy.ops.mesh.select_all(action="SELECT")
-    bpy.ops.mesh.subdivide()
-    bpy.ops.object.mode_set(mode="OBJECT")
-    assert before == 84
-    assert len(sensor_report.fresh_report(pad, bpy.context.scene).texels) == 11 * 27
-    assert np.isfinite(sensor_report.fresh_report(pad, bpy.context.scene).density)
