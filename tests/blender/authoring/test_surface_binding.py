@@ -94,7 +94,6 @@ def test_a_rigid_surface_binds_nothing_and_one_that_bends_later_says_so(tmp_path
     assert surface_binding.is_bound(bpy.data.objects["Sheet Skin"])
 
 
-@pytest.mark.slow("lays a skin twice, finely enough for a linear function")
 def test_what_is_painted_on_a_skin_stays_when_it_is_laid_anew():
     """Weights and factors that are linear on a flat sheet are the same linear function of the new texels' places."""
     carrier = grid("Sheet", size=0.04)
