@@ -196,8 +196,8 @@ def test_the_process_loads_the_package_by_its_name_in_blender_and_ends_with_blen
     code = (
         f"import sys; sys.path[:0] = [{str(precompile.PROCESS.parent)!r}]; import precompile_process as c; "
         "c.load('bl_ext.user_default.palpate'); import bl_ext.user_default.palpate.core.solver.precompile as w; "
-        "print(w.__name__, 'numba' in sys.modules, flush=True); import threading; "
-        "threading.Thread(target=w._end_with_parent).start()"
+        "print(w.__name__, 'numba' in sys.modules, flush=True); import threading, time; "
+        "threading.Thread(target=w._end_with_parent, daemon=True).start(); time.sleep(60)"  # as while it compiles
     )
     process = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     assert process.stdout.readline().split() == ["bl_ext.user_default.palpate.core.solver.precompile", "False"]
