@@ -120,28 +120,44 @@ def number_name(word: str, name: str) -> str:
     return f"{word} of {name}"
 
 
-class ResponseModel:
-    """Forces and readings along a stimulus, for any model. Intermediate results are kept, so that a changed parameter costs
-    little.
+class Session:
+    """Recordings of one sensor as one, with an unloaded sensor between them: forces and readings along their stimulus, for any
+    model. Intermediate results are kept, so that a changed parameter costs little.
 
     Parameters
     ----------
+    trials : sequence of Trial
+        In any order; a single one if the sensor was untouched before it.
     rig : Rig
+
+    Attributes
+    ----------
+    trials : list of Trial
+        In order of time.
     stimulus : Stimulus
-        Of the points of the rig's surface.
-    readings_kept : int
-        Number of readings and of total forces that are kept.
+        Of the points of the rig's surface, along all trials.
     """
 
-    def __init__(self, rig: Rig, stimulus: Stimulus, readings_kept: int = CACHE_SIZE):
-        self.rig, self.stimulus = rig, stimulus
+    def __init__(self, trials: Sequence[Trial], rig: Rig):
+        self.rig, self.trials = rig, sorted(trials, key=lambda trial: float(trial.time[0]))
+        stimuli = [surface_stimulus_of(trial, rig) for trial in self.trials]
+        self._of_texels = [of_texels(stimulus, rig) for stimulus in stimuli]
+        self.stimulus, self._starts = joined_stimuli(stimuli, rig.surface)
+        most = CACHE_SIZE
+        if len(trials) > 1:
+            most = int(np.clip(SESSION_CACHE_BYTES / (8.0 * self.stimulus.load.size), CACHE_SIZE, SESSION_CACHE_SIZE))
         self._placed: _Recent[Stimulus] = _Recent(CACHE_SIZE)
         self._histories: _Recent[ContactHistory] = _Recent(2 * CACHE_SIZE)
         self._forces: _Recent[np.ndarray] = _Recent(CACHE_SIZE)
         self._texel_forces: _Recent[np.ndarray] = _Recent(CACHE_SIZE)
-        self._totals: _Recent[np.ndarray] = _Recent(readings_kept)
-        self._readings: _Recent[np.ndarray] = _Recent(readings_kept)
+        self._totals: _Recent[np.ndarray] = _Recent(most)
+        self._readings: _Recent[np.ndarray] = _Recent(most)
         self._sites: dict[bytes | None, TransducerArray] = {}
+
+    def part(self, trial: Trial) -> tuple[Stimulus, slice]:
+        """Return the stimulus of the texels in one of the trials, and its samples among those of all."""
+        number = next(i for i, one in enumerate(self.trials) if one is trial)
+        return self._of_texels[number], slice(self._starts[number], self._starts[number] + len(trial.time))
 
     def reading(self, model: Model, subset: np.ndarray | None = None) -> np.ndarray:
         """Return the readings of each texel, or of some, (T, n) in the sensor's unit."""
@@ -177,7 +193,11 @@ class ResponseModel:
 
     def _temperature(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Times and temperatures that were recorded."""
-        return self.stimulus.trial.temperature
+        recorded = [trial.temperature for trial in self.trials if trial.temperature is not None]
+        if not recorded:
+            return None
+        times, values = zip(*recorded, strict=True)
+        return np.concatenate(times), np.concatenate(values)
 
     def total_force(self, model: Model) -> np.ndarray:
         """Return the sum of normal and friction forces on the sensor, (T, 3) N."""
@@ -212,11 +232,12 @@ class ResponseModel:
 
     def _heights(self, model: Model | None) -> tuple[float, ...]:
         """Contact height of each of its trials; None: where fits start."""
-        return (_height_of(self.stimulus.trial, model),)
+        return tuple(_height_of(trial, model) for trial in self.trials)
 
     def _stimulus_of(self, texels: Texels, heights: tuple[float, ...]) -> Stimulus:
         """The stimulus of texels at other places."""
-        return surface_stimulus_of(self.stimulus.trial, self.rig, texels, heights[0])
+        stimuli = [surface_stimulus_of(trial, self.rig, texels, at) for trial, at in zip(self.trials, heights, strict=True)]
+        return joined_stimuli(stimuli, texels)[0]
 
     def normal_force(self, model: Model, subset: np.ndarray | None = None) -> np.ndarray:
         """Return the normal force of each texel, or of some, (T, n) N."""
@@ -251,48 +272,6 @@ class ResponseModel:
         return self._histories.get_or(key, lambda: ContactHistory.of(self.placed(model), subset, self.rig))
 
 
-class Session(ResponseModel):
-    """The recordings of a session as one, with an unloaded sensor between them.
-
-    Parameters
-    ----------
-    trials : sequence of Trial
-        In any order.
-    rig : Rig
-    """
-
-    def __init__(self, trials: Sequence[Trial], rig: Rig):
-        self.trials = sorted(trials, key=lambda trial: float(trial.time[0]))
-        stimuli = [surface_stimulus_of(trial, rig) for trial in self.trials]
-        self.stimuli = [of_texels(stimulus, rig) for stimulus in stimuli]
-        joined, self._starts = joined_stimuli(stimuli, rig.surface)
-        most = int(SESSION_CACHE_BYTES / (8.0 * joined.load.size))
-        super().__init__(rig, joined, int(np.clip(most, CACHE_SIZE, SESSION_CACHE_SIZE)))
-
-    def samples_of(self, trial: Trial) -> slice:
-        """Return the samples of the session that are those of one of its trials."""
-        number = next(i for i, one in enumerate(self.trials) if one is trial)
-        return slice(self._starts[number], self._starts[number] + len(trial.time))
-
-    def stimulus_in(self, trial: Trial) -> Stimulus:
-        """Return the stimulus of one of its trials."""
-        return next(stimulus for stimulus in self.stimuli if stimulus.trial is trial)
-
-    def _temperature(self) -> tuple[np.ndarray, np.ndarray] | None:
-        recorded = [trial.temperature for trial in self.trials if trial.temperature is not None]
-        if not recorded:
-            return None
-        times, values = zip(*recorded, strict=True)
-        return np.concatenate(times), np.concatenate(values)
-
-    def _heights(self, model: Model | None) -> tuple[float, ...]:
-        return tuple(_height_of(trial, model) for trial in self.trials)
-
-    def _stimulus_of(self, texels: Texels, heights: tuple[float, ...]) -> Stimulus:
-        stimuli = [surface_stimulus_of(trial, self.rig, texels, at) for trial, at in zip(self.trials, heights, strict=True)]
-        return joined_stimuli(stimuli, texels)[0]
-
-
 class Predictor:
     """Predicts a trial for any model.
 
@@ -305,8 +284,8 @@ class Predictor:
 
     Attributes
     ----------
-    responses : ResponseModel
-        Forces and readings along the stimulus of the trial, or of its whole session.
+    responses : Session
+        Forces and readings along the stimulus of the whole session, or of the trial alone.
     stimulus : Stimulus
         Of the texels, during the trial.
     samples : slice
@@ -315,9 +294,8 @@ class Predictor:
 
     def __init__(self, trial: Trial, rig: Rig, session: Session | None = None):
         self.trial, self.rig, self.session = trial, rig, session
-        self.responses = ResponseModel(rig, surface_stimulus_of(trial, rig)) if session is None else session
-        self.stimulus = of_texels(self.responses.stimulus, rig) if session is None else session.stimulus_in(trial)
-        self.samples = slice(None) if session is None else session.samples_of(trial)
+        self.responses = session or Session([trial], rig)
+        self.stimulus, self.samples = self.responses.part(trial)
 
     def predict(self, model: Model, subset: np.ndarray | None = None, with_forces: bool = True) -> Prediction:
         """Return the prediction of a model. Its arrays are kept and must not be written to.
@@ -414,7 +392,7 @@ def predictors_of(trials: Sequence[Trial], rig: Rig) -> list[Predictor]:
 
 def placed_stimulus(trial: Trial, rig: Rig, model: Model) -> Stimulus:
     """Return the stimulus of the texels in a trial at the places where a model's effects move them."""
-    return of_texels(ResponseModel(rig, surface_stimulus_of(trial, rig)).placed(model), rig)
+    return of_texels(Session([trial], rig).placed(model), rig)
 
 
 def _height_of(trial: Trial, model: Model | None) -> float:

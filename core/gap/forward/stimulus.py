@@ -194,6 +194,8 @@ def joined_stimuli(stimuli: Sequence[Stimulus], texels: Texels) -> tuple[Stimulu
         In order of time.
     texels : Texels
     """
+    if len(stimuli) == 1:
+        return stimuli[0], [0]
     parts, starts, count = [stimuli[0]], [0], len(stimuli[0].time)
     for before, after in zip(stimuli[:-1], stimuli[1:], strict=True):
         pause = float(after.time[0] - before.time[-1])
@@ -215,7 +217,7 @@ def joined_stimuli(stimuli: Sequence[Stimulus], texels: Texels) -> tuple[Stimulu
         trial=replace(first.trial, time=np.concatenate([part.time for part in parts])),
         depth=np.concatenate([part.depth for part in parts]),
         rate=np.concatenate([part.rate for part in parts]),
-        force_share=None if first.force_share is None else np.concatenate([_shares(part) for part in parts]),
+        force_share=None if first.force_share is None else np.concatenate([part.load for part in parts]),
         normal=None if no_normal else vectors("normal", -texels.normal),
         slide_speed=np.concatenate([part.slide_speed for part in parts]),
         slip=None if no_slip else vectors("slip", np.zeros((len(texels), 3))),
@@ -229,11 +231,6 @@ def _unloaded(like: Stimulus, time: np.ndarray) -> Stimulus:
     nothing = np.zeros((len(time), like.depth.shape[1]))
     share = None if like.force_share is None else nothing
     return Stimulus(replace(like.trial, time=time), nothing, nothing, share, None, nothing, None)
-
-
-def _shares(stimulus: Stimulus) -> np.ndarray:
-    assert stimulus.force_share is not None
-    return stimulus.force_share
 
 
 def _posed(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) -> Stimulus:
