@@ -5,13 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from ..dataset.rig import Rig, Trial
 from ..forward.response_check import centred
 from ..forward.stimulus import Stimulus
-from .data_fault import Correction, DataFault
+from .data_fault import DataFault
 
 MOST_CHANNELS = 1024
 """Number of texels above which the table of all pairs is not computed."""
@@ -48,7 +49,7 @@ def find_channel_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault
     if what and 1.0 - best > LEAST_ORDER and best < BETTER_ORDER * given:
         order = _orders(rig, n)[what]
         said = f"{what}, the loads explain {1.0 - best:.0%} of the readings, and {1.0 - given:.0%} as they are"
-        return [DataFault("reversed-channels", names, said, dict.fromkeys(names, _reordered(order)))]
+        return [DataFault("reversed-channels", names, said, dict.fromkeys(names, partial(_reordered, order=order)))]
     pairs = _swapped(squared, loaded & (yy > 0))
     if not pairs:
         return []
@@ -63,7 +64,7 @@ def find_channel_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault
         f"{listed} each follow the other's load (texel_{a}: correlation {squared[b, a] ** 0.5:.2f} with the load of texel_{b}, "
         f"{squared[a, a] ** 0.5:.2f} with its own)"
     )
-    return [DataFault("swapped-channels", names, said, dict.fromkeys(names, _reordered(order)))]
+    return [DataFault("swapped-channels", names, said, dict.fromkeys(names, partial(_reordered, order=order)))]
 
 
 def _moments(recorded: Sequence[Stimulus], n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -71,9 +72,7 @@ def _moments(recorded: Sequence[Stimulus], n: int) -> tuple[np.ndarray, np.ndarr
     xx, xy, yy = np.zeros(n), np.zeros((n, n)), np.zeros(n)
     for s in recorded:
         assert s.trial.reading is not None
-        whole = np.isfinite(s.trial.reading)
-        x, y = centred(s.load, np.where(whole, s.trial.reading, np.nan))
-        x = s.load - s.load.mean(axis=0)
+        x, y = s.load - s.load.mean(axis=0), centred(s.load, s.trial.reading)[1]
         xx, xy, yy = xx + (x * x).sum(axis=0), xy + x.T @ y, yy + (y * y).sum(axis=0)
     return xx, xy, yy
 
@@ -104,8 +103,5 @@ def _swapped(squared: np.ndarray, judged: np.ndarray) -> list[tuple[int, int]]:
     return pairs
 
 
-def _reordered(order: np.ndarray) -> Correction:
-    def act(trial: Trial) -> Trial:
-        return trial if trial.reading is None else replace(trial, reading=trial.reading[:, order])
-
-    return act
+def _reordered(trial: Trial, order: np.ndarray) -> Trial:
+    return trial if trial.reading is None else replace(trial, reading=trial.reading[:, order])

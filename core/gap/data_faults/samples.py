@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -55,11 +56,13 @@ def find_sample_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]
         name, frozen = max(stuck.items(), key=lambda item: int(item[1].sum()))
         seconds = float(frozen.sum()) * next(s.trial.step for s in stimuli if s.trial.name == name)
         said = f"in '{name}.csv' no response changes for {seconds:.3g} s, to the last digit"
-        faults.append(DataFault("stuck-logger", tuple(stuck), said, {one: _without(rows) for one, rows in stuck.items()}))
+        faults.append(
+            DataFault("stuck-logger", tuple(stuck), said, {one: partial(_without, rows=rows) for one, rows in stuck.items()})
+        )
     if repeated:
         name, rows = max(repeated.items(), key=lambda item: float(item[1].mean()))
         said = f"in '{name}.csv' {rows.mean():.0%} of the samples repeat the responses of the sample before to the last digit"
-        corrections = {one: _without(rows) for one, rows in repeated.items()}
+        corrections: dict[str, Correction] = {one: partial(_without, rows=rows) for one, rows in repeated.items()}
         faults.append(DataFault("repeated-samples", tuple(repeated), said, corrections))
     return [*faults, *_rails(stimuli)]
 
@@ -140,7 +143,7 @@ def _rails(stimuli: Sequence[Stimulus]) -> list[DataFault]:
     said = (
         f"{count} readings stay at {rail:.6g}, the {'largest' if rail == high else 'smallest'} of all, while the load changes"
     )
-    return [DataFault("saturated-converter", names, said, dict.fromkeys(names, _without_value(rail)))]
+    return [DataFault("saturated-converter", names, said, dict.fromkeys(names, partial(_without_value, rail=rail)))]
 
 
 def _rests_at(stimulus: Stimulus, reading: np.ndarray, value: float) -> bool:
@@ -160,19 +163,16 @@ def _railed_samples(stimulus: Stimulus, rail: float, least: float) -> int:
     return count
 
 
-def _without(rows: np.ndarray) -> Correction:
-    def act(trial: Trial) -> Trial:
-        def without(values: np.ndarray | None) -> np.ndarray | None:
-            return None if values is None else np.where(rows[:, None], np.nan, values)
+def _without(trial: Trial, rows: np.ndarray) -> Trial:
+    """The trial without its responses in some samples."""
 
-        return replace(trial, reading=without(trial.reading), force=without(trial.force))
+    def known(values: np.ndarray | None) -> np.ndarray | None:
+        return None if values is None else np.where(rows[:, None], np.nan, values)
 
-    return act
+    return replace(trial, reading=known(trial.reading), force=known(trial.force))
 
 
-def _without_value(rail: float) -> Correction:
-    def act(trial: Trial) -> Trial:
-        assert trial.reading is not None
-        return replace(trial, reading=np.where(trial.reading == rail, np.nan, trial.reading))
-
-    return act
+def _without_value(trial: Trial, rail: float) -> Trial:
+    """The trial without its readings of one value."""
+    assert trial.reading is not None
+    return replace(trial, reading=np.where(trial.reading == rail, np.nan, trial.reading))

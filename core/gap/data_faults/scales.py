@@ -3,15 +3,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from ..dataset.rig import Rig, Trial
-from ..forward.response_check import OPPOSITE, centred, correlation
+from ..forward.response_check import OPPOSITE, centred, correlation, normal_load, responses_of
 from ..forward.stimulus import Stimulus
-from .data_fault import Correction, DataFault
+from .data_fault import DataFault
 
 FACTORS = (10.0, 9.81, 100.0, 1000.0)
 """Factors by which units are mistaken: prefixes, and kilograms for newtons."""
@@ -19,6 +20,8 @@ NEAR = 0.2
 """Largest distance of a ratio from such a factor, or from its inverse, as a share of it."""
 SAME_SLOPE = 2.0
 """The other recordings must agree on the response per load up to this factor for one of them to be in another unit."""
+Responses = Sequence[tuple[np.ndarray, np.ndarray]]
+"""Loads and responses."""
 LEAST_CORRELATION = 0.5
 """Least correlation of a response with its load for its slope or its sign to count."""
 
@@ -36,7 +39,7 @@ def _signs(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
     faults = []
     gain_is_known = rig.parameters.unit == "N" or "gain" in rig.given
     for part, expected in (("reading", float(np.sign(rig.parameters.gain)) if gain_is_known else 0.0), ("force", 1.0)):
-        found = {s.trial.name: correlation([_pair(s, part)]) for s in stimuli if getattr(s.trial, part) is not None}
+        found = {s.trial.name: correlation(responses_of(rig, [s], part)) for s in stimuli if getattr(s.trial, part) is not None}
         clear = {name: value for name, value in found.items() if abs(value) > LEAST_CORRELATION}
         common = expected or float(np.sign(sum(np.sign(value) for value in clear.values())))
         wrong = tuple(name for name, value in clear.items() if value * common < OPPOSITE)
@@ -46,7 +49,7 @@ def _signs(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
             value = clear[wrong[0]]
             said = f"the {what} of '{wrong[0]}.csv' {'go' if part == 'reading' else 'goes'} the other way"
             said += f" (correlation with the load {value:.2f}), and {against}"
-            faults.append(DataFault("sign", wrong, said, dict.fromkeys(wrong, _scaled(part, -1.0))))
+            faults.append(DataFault("sign", wrong, said, dict.fromkeys(wrong, partial(_scaled, part=part, factor=-1.0))))
     return [*faults, *_friction_signs(stimuli)]
 
 
@@ -60,7 +63,9 @@ def _friction_signs(stimuli: Sequence[Stimulus]) -> list[DataFault]:
         f"the net force along the surface of '{wrong[0]}.csv' drives the slide instead of resisting it (its work is "
         f"{found[wrong[0]]:.2f} of what a force along the travel would do), but forces act on the sensor"
     )
-    return [DataFault("sign", wrong, said, dict.fromkeys(wrong, _scaled("force", np.array([-1.0, -1.0, 1.0]))))]
+    return [
+        DataFault("sign", wrong, said, dict.fromkeys(wrong, partial(_scaled, part="force", factor=np.array([-1.0, -1.0, 1.0]))))
+    ]
 
 
 def _work_share(trial: Trial) -> float:
@@ -73,22 +78,6 @@ def _work_share(trial: Trial) -> float:
     return float((force * step).sum()) / most if most > 0.0 else 0.0
 
 
-def _pair(s: Stimulus, part: str) -> tuple[np.ndarray, np.ndarray]:
-    """Load and response of a recording; of the net force each component with the load that points along it."""
-    if part == "reading":
-        assert s.trial.reading is not None
-        return s.load, s.trial.reading
-    assert s.trial.force is not None
-    return normal_load(s), s.trial.force
-
-
-def normal_load(s: Stimulus) -> np.ndarray:
-    """Return the sum of all loads, each along its normal force on the sensor, (T, 3) float."""
-    normal = np.array([0.0, 0.0, -1.0]) if s.normal is None else s.normal
-    total: np.ndarray = np.sum(s.load[:, :, None] * normal, axis=1)
-    return total
-
-
 # --- unit
 
 
@@ -96,30 +85,28 @@ def _units(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
     """One recording in another unit than the others, or all readings against the net force or the rig's stiffness."""
     faults = []
     for part in ("reading", "force"):
-        recorded = [
-            s for s in stimuli if getattr(s.trial, part) is not None and abs(correlation([_pair(s, part)])) > LEAST_CORRELATION
-        ]
-        faults += _one_of_many(recorded, part)
+        recorded = {s.trial.name: responses_of(rig, [s], part) for s in stimuli}
+        faults += _one_of_many({name: own for name, own in recorded.items() if abs(correlation(own)) > LEAST_CORRELATION}, part)
     if not faults:
         faults += _against_force(rig, stimuli) or _against_stiffness(rig, stimuli)
     return faults
 
 
-def _one_of_many(recorded: Sequence[Stimulus], part: str) -> list[DataFault]:
+def _one_of_many(recorded: Mapping[str, Responses], part: str) -> list[DataFault]:
     """Recordings whose response per load is a factor of units away from that of the others."""
     if len(recorded) < 3:
         return []
-    slope = np.array([abs(_slope([_pair(s, part)])) for s in recorded])
+    slope = np.array([abs(_slope(own)) for own in recorded.values()])
     typical = float(np.median(slope))
     usual = (slope < SAME_SLOPE * typical) & (slope > typical / SAME_SLOPE)
     if usual.sum() < max(2, len(recorded) // 2):
         return []
     level = float(np.exp(np.mean(np.log(slope[usual]))))
     found = {}
-    for s, value in zip(recorded, slope, strict=True):
+    for name, value in zip(recorded, slope, strict=True):
         factor = unit_factor(value / level)
         if factor is not None:
-            found[s.trial.name] = (factor, value / level)
+            found[name] = (factor, value / level)
     if not found:
         return []
     name, (factor, ratio) = next(iter(found.items()))
@@ -128,7 +115,11 @@ def _one_of_many(recorded: Sequence[Stimulus], part: str) -> list[DataFault]:
         f"the {what} of '{name}.csv' for the same load {'are' if part == 'reading' else 'is'} {ratio:.3g} times those of the "
         f"other recordings, as of a unit {_times(factor)}"
     )
-    return [DataFault("unit", tuple(found), said, {one: _scaled(part, 1.0 / f) for one, (f, _) in found.items()})]
+    return [
+        DataFault(
+            "unit", tuple(found), said, {one: partial(_scaled, part=part, factor=1.0 / f) for one, (f, _) in found.items()}
+        )
+    ]
 
 
 def _against_force(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
@@ -139,7 +130,7 @@ def _against_force(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
     pairs = []
     for s in both:
         assert s.trial.reading is not None and s.trial.force is not None
-        along = normal_load(s)
+        along = normal_load(rig, s)
         size = np.linalg.norm(along, axis=1)
         normal = along[int(np.argmax(size))] / max(float(size.max()), 1e-300)
         pairs.append((s.trial.force @ normal, s.trial.reading.sum(axis=1)))
@@ -150,7 +141,7 @@ def _against_force(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
         return []
     names = tuple(s.trial.name for s in both)
     said = f"the readings sum to {ratio:.3g} times the measured net force, as of a unit {_times(factor)}"
-    return [DataFault("unit", names, said, dict.fromkeys(names, _scaled("reading", 1.0 / factor)))]
+    return [DataFault("unit", names, said, dict.fromkeys(names, partial(_scaled, part="reading", factor=1.0 / factor)))]
 
 
 def _against_stiffness(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
@@ -160,7 +151,7 @@ def _against_stiffness(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]
         return []
     if rig.parameters.normal_law != "linear":
         return []
-    pairs = [_pair(s, "reading") for s in recorded]
+    pairs = responses_of(rig, recorded, "reading")
     if correlation(pairs) < LEAST_CORRELATION:
         return []
     found = _slope(pairs)
@@ -172,7 +163,7 @@ def _against_stiffness(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]
         f"the readings rise by {found:.3g} N per metre of depth, {found / rig.parameters.k:.3g} times the k of the rig, "
         f"as of a unit {_times(factor)}"
     )
-    return [DataFault("unit", names, said, dict.fromkeys(names, _scaled("reading", 1.0 / factor)))]
+    return [DataFault("unit", names, said, dict.fromkeys(names, partial(_scaled, part="reading", factor=1.0 / factor)))]
 
 
 def unit_factor(ratio: float) -> float | None:
@@ -188,7 +179,7 @@ def _times(factor: float) -> str:
     return f"{factor:.3g} times too small" if factor > 1.0 else f"{1.0 / factor:.3g} times too large"
 
 
-def _slope(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> float:
+def _slope(pairs: Responses) -> float:
     """Slope of responses over loads of all channels together, each about its mean."""
     xx = xy = 0.0
     for load, response in pairs:
@@ -197,8 +188,5 @@ def _slope(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> float:
     return xy / max(xx, 1e-300)
 
 
-def _scaled(part: str, factor: float | np.ndarray) -> Correction:
-    def act(trial: Trial) -> Trial:
-        return replace(trial, **{part: factor * getattr(trial, part)})
-
-    return act
+def _scaled(trial: Trial, part: str, factor: float | np.ndarray) -> Trial:
+    return replace(trial, **{part: factor * getattr(trial, part)})

@@ -95,18 +95,8 @@ def curvature_ratio(predictors: Sequence[Predictor], model: Model) -> float:
     """
     deepest = max(predictors, key=lambda one: float(one.stimulus.load.max(initial=0.0)))
     texel = int(np.argmax(deepest.stimulus.load.max(axis=0)))
-    return curvature_of(deepest.stimulus.load[:, texel], deepest.predict(model).reading[:, texel])
-
-
-def curvature_of(load: np.ndarray, reading: np.ndarray) -> float:
-    """Return the ratio of the steepest to the flattest eighth of a curve.
-
-    Parameters
-    ----------
-    load, reading : (T,) float
-        In the order of time.
-    """
+    load, reading = deepest.stimulus.load[:, texel], deepest.predict(model).reading[:, texel]
     order = np.argsort(load)
-    slopes = np.diff(np.interp(np.linspace(0.0, load.max(), CURVE_PARTS + 1), load[order], reading[order]))
-    steep = np.abs(slopes)
+    curve = np.interp(np.linspace(0.0, load.max(), CURVE_PARTS + 1), load[order], reading[order])
+    steep = np.abs(np.diff(curve))
     return float(steep.max() / max(float(steep.min()), 1e-9 * float(steep.max()), 1e-300))

@@ -84,18 +84,12 @@ def reading_noise(predictors: Sequence[Predictor], full: float) -> ChannelNoise:
     weights: list[float] = []
     curves: list[np.ndarray] = []
     for predictor in predictors:
-        reading = predictor.trial.reading
-        if reading is None:
-            continue
-        for start, stop in _unloaded_stretches(predictor):
-            for texels in _unloaded_texels(predictor, start, stop):
-                part = reading[start:stop][:, texels]
-                part = part[:, np.isfinite(part).sum(axis=0) >= SHORTEST_STRETCH]
-                if part.shape[1]:
-                    variance, curve, known = _variance_and_autocovariance(part)
-                    variances += list(variance)
-                    weights += list(known)
-                    curves.append(curve * known.sum())
+        for part in _unloaded_parts(predictor):
+            if part.shape[1]:
+                variance, curve, known = _variance_and_autocovariance(part)
+                variances += list(variance)
+                weights += list(known)
+                curves.append(curve * known.sum())
     smallest = SMALLEST_NOISE * full
     alive = np.array(variances) > smallest**2
     if alive.sum() >= 1:
@@ -114,21 +108,14 @@ def force_noise(predictors: Sequence[Predictor], full: float) -> ChannelNoise:
     return ChannelNoise(max(deviation, SMALLEST_NOISE * full), 1.0, "differences between samples")
 
 
-def _unloaded_stretches(predictor: Predictor) -> list[tuple[int, int]]:
-    """Stretches of samples without any contact, and the whole trial for texels that are never touched."""
-    stimulus = predictor.stimulus
-    load = stimulus.load
-    free = ~(load > 0).any(axis=1)
-    found = [(a, b) for a, b in runs(free) if b - a >= SHORTEST_STRETCH]
-    return [*found, (0, len(load))]
-
-
-def _unloaded_texels(predictor: Predictor, start: int, stop: int) -> list[np.ndarray]:
-    """Texels without load in a stretch, as a list of at most one array."""
-    stimulus = predictor.stimulus
-    load = stimulus.load
-    (texels,) = np.nonzero(~(load[start:stop] > 0).any(axis=0))
-    return [texels] if len(texels) else []
+def _unloaded_parts(predictor: Predictor) -> list[np.ndarray]:
+    """Readings of untouched texels, (t, c): in each stretch without any contact, and those never touched in the whole trial."""
+    reading, pressed = predictor.trial.reading, predictor.stimulus.load > 0
+    if reading is None:
+        return []
+    free = [(a, b) for a, b in runs(~pressed.any(axis=1)) if b - a >= SHORTEST_STRETCH]
+    parts = [reading[a:b][:, ~pressed[a:b].any(axis=0)] for a, b in (*free, (0, len(pressed)))]
+    return [part[:, np.isfinite(part).sum(axis=0) >= SHORTEST_STRETCH] for part in parts]
 
 
 def _variance_and_autocovariance(part: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -47,37 +47,35 @@ def check_responses(rig: Rig, stimuli: Sequence[Stimulus]) -> None:
             f"No response in the recordings of '{rig.name}' that are to be fitted ever changes: "
             "check that the sensor was read out while it was pressed."
         )
-    _check_reading_sign(rig, touching)
-    _check_force_sign(rig, touching)
-
-
-def _check_reading_sign(rig: Rig, touching: Sequence[Stimulus]) -> None:
-    """Refuse readings that fall under load although the gain is known to be positive, or rise although it is negative."""
     gain = rig.parameters.gain
-    if rig.parameters.unit != "N" and "gain" not in rig.given:
-        return  # the gain, sign included, is fitted
-    pairs = [(stimulus.load, stimulus.trial.reading) for stimulus in touching if stimulus.trial.reading is not None]
-    if np.sign(gain) * correlation(pairs) < OPPOSITE:
+    gain_is_known = rig.parameters.unit == "N" or "gain" in rig.given  # else the gain, sign included, is fitted
+    if gain_is_known and np.sign(gain) * correlation(responses_of(rig, touching, "reading")) < OPPOSITE:
         how = "fall" if gain > 0 else "rise"
         raise FileError(
             f"The readings of '{rig.name}' {how} where the sensor is pressed: compression counts as positive, "
             'so change the sign of texel_0 and the others, give unit and gain, or write correct = ["sign"] in [data].'
         )
-
-
-def _check_force_sign(rig: Rig, touching: Sequence[Stimulus]) -> None:
-    """Refuse net forces that point away from the indenter."""
-    pairs = []
-    for stimulus in touching:
-        force = stimulus.trial.force
-        if force is not None:
-            normal = -rig.texels.normal if stimulus.normal is None else stimulus.normal
-            pairs.append((np.sum(stimulus.load[:, :, None] * normal, axis=1), force))
-    if correlation(pairs) < OPPOSITE:
+    if correlation(responses_of(rig, touching, "force")) < OPPOSITE:
         raise FileError(
             f"force_x, force_y and force_z of '{rig.name}' point the other way: the force on the sensor is needed, "
             'not that on the indenter, so change their signs, or write correct = ["sign"] in [data].'
         )
+
+
+def responses_of(rig: Rig, stimuli: Sequence[Stimulus], part: str) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return load and response of each recording that has this response, "reading" or "force".
+
+    Readings go with the load of their texel, each component of the net force with the sum of the loads along it.
+    """
+    recorded = [(stimulus, getattr(stimulus.trial, part)) for stimulus in stimuli]
+    return [(s.load if part == "reading" else normal_load(rig, s), values) for s, values in recorded if values is not None]
+
+
+def normal_load(rig: Rig, stimulus: Stimulus) -> np.ndarray:
+    """Return the sum of all loads, each along its normal force on the sensor, (T, 3) float."""
+    normal = -rig.texels.normal if stimulus.normal is None else stimulus.normal
+    total: np.ndarray = np.sum(stimulus.load[:, :, None] * normal, axis=1)
+    return total
 
 
 def centred(load: np.ndarray, response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
