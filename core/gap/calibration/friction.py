@@ -235,63 +235,19 @@ def _with(base: SensorParameters, values: dict[str, float]) -> SensorParameters:
     return replace(base, **changes)
 
 
-@dataclass(frozen=True)
-class _Search:
-    """The variables of the nonlinear fit: the fitted values in units of order one, and `mus` as its excess over `mud`.
-
-    The bounds of the variables then keep `mus` from falling below `mud`.
-
-    Attributes
-    ----------
-    names : tuple of str
-        The fitted parameters; the first two are `mus` and `mud`.
-    units : (p,) float
-        Of the variables.
-    """
-
-    names: tuple[str, ...]
-    units: np.ndarray
-
-    @classmethod
-    def of(cls, data: FrictionData, normal_force: float, base: SensorParameters, names: tuple[str, ...]) -> _Search:
-        """Return the search for some parameters, with units from the measurements."""
-        weight, speed = max(normal_force, 1e-12), max(float(np.abs(data.velocity).max()), 1e-12)
-        units = {"mus": 1.0, "mud": 1.0, "x0": speed, "ct": weight / speed}
-        units |= {"sigma0": base.sigma0, "sigma1": max(base.sigma1, 1e-6)}
-        return cls(names, np.array([units[name] for name in names]))
-
-    @property
-    def low(self) -> np.ndarray:
-        """Lower bounds of the variables."""
-        return np.array([0.0, 0.0, 1e-3, 0.0, 1e-4, 0.0][: len(self.names)])
-
-    @property
-    def transformation(self) -> np.ndarray:
-        """Derivatives of the values with respect to the variables, (p, p) float."""
-        matrix = np.diag(self.units)
-        matrix[0, 1] = self.units[1]
-        return matrix
-
-    def values(self, variables: np.ndarray) -> np.ndarray:
-        """Return the values of the parameters."""
-        values = variables * self.units
-        values[0] += values[1]
-        return values
-
-    def variables(self, values: dict[str, float]) -> np.ndarray:
-        """Return the variables that belong to some values, just inside their bounds."""
-        first = np.array([values[name] for name in self.names])
-        first[0] -= first[1]
-        return np.clip(first / self.units, self.low + 1e-9, None)
-
-
 def _refine(
     data: FrictionData, normal_force: float, base: SensorParameters, names: tuple[str, ...], start: dict[str, float]
 ) -> FrictionFit:
     """Return the fit by nonlinear least squares from start values."""
     from scipy.optimize import least_squares
 
-    search, weight = _Search.of(data, normal_force, base, names), max(normal_force, 1e-12)
+    weight, speed = max(normal_force, 1e-12), max(float(np.abs(data.velocity).max()), 1e-12)
+    units = {"mus": 1.0, "mud": 1.0, "x0": speed, "ct": weight / speed, "sigma0": base.sigma0, "sigma1": max(base.sigma1, 1e-6)}
+    low = np.array([0.0, 0.0, 1e-3, 0.0, 1e-4, 0.0][: len(names)])
+    # The variables are the values in units of order one; in the place of mus its excess over mud, which is not negative.
+    to_values = np.diag([units[name] for name in names])
+    to_values[0, 1] = 1.0
+    first = np.linalg.solve(to_values, [start[name] for name in names])
 
     def residual_of(values: np.ndarray) -> np.ndarray:
         parameters = _with(base, dict(zip(names, map(float, values), strict=True)))
@@ -300,16 +256,16 @@ def _refine(
         return friction_over_time(data.time, data.velocity, normal_force, parameters) - data.force
 
     found = least_squares(
-        lambda variables: residual_of(search.values(variables)) / weight,
-        search.variables(start),
-        bounds=(search.low, np.inf),
+        lambda variables: residual_of(to_values @ variables) / weight,
+        np.maximum(first, low + 1e-9),
+        bounds=(low, np.inf),
         x_scale="jac",
         xtol=1e-14,
         ftol=1e-14,
         gtol=1e-14,
     )
-    values = search.values(found.x)
+    values = to_values @ found.x
     residual = residual_of(values)
-    estimates = dict(zip(names, linearised_estimates(values, found.jac, search.transformation, residual, weight), strict=True))
+    estimates = dict(zip(names, linearised_estimates(values, found.jac, to_values, residual, weight), strict=True))
     fitted = _with(base, {name: estimate.value for name, estimate in estimates.items()})
     return FrictionFit(data, normal_force, fitted, estimates, float(np.sqrt(np.mean(residual**2))))

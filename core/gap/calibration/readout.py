@@ -8,7 +8,7 @@ what was left out is within one standard error of the least (Breiman et al. 1984
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -60,14 +60,45 @@ class ContactEstimate:
 
 
 @dataclass(frozen=True)
+class FittedMethod:
+    """What estimates the stimulus from readings.
+
+    Attributes
+    ----------
+    predictor : callable
+        From readings and memory to values and standard deviations.
+    times : tuple of float, s
+        Of its memory.
+    factor : (q,) float
+        By which standard deviations are multiplied for the interval.
+    floor : (q,) float
+        Values below it are set to it: zero for a force that was never negative, else minus infinity.
+    """
+
+    predictor: Predictor
+    times: tuple[float, ...]
+    factor: np.ndarray
+    floor: np.ndarray
+
+    def estimate(self, time: np.ndarray, readings: np.ndarray) -> ContactEstimate:
+        """Return the stimulus at times (T,), in s, from the readings (T, c) of the channels that are used."""
+        known = np.isfinite(readings).all(axis=1)
+        found = np.full((3, len(time), len(self.floor)), np.nan)
+        if known.any():
+            value, deviation = self.predictor(readings[known], memory_of(time, readings, self.times)[known])
+            reach = self.factor * deviation
+            found[:, known] = np.maximum(np.stack([value, value - reach, value + reach]), self.floor)
+        return ContactEstimate(*found)
+
+
+@dataclass(frozen=True)
 class MethodResult:
     """One method, fitted.
 
     Attributes
     ----------
     method : Ridge, GaussianProcess or ForwardInverse
-    times : tuple of float, s
-        Of its memory.
+    fitted : FittedMethod
     left_out : (q,) float
         Root mean square error on what was left out while numbers were chosen.
     check : (q,) float or None
@@ -76,22 +107,18 @@ class MethodResult:
         Median of the magnitude of these errors.
     coverage : (q,) float or None
         Share of the check samples inside of their interval.
-    factor : (q,) float
-        By which standard deviations are multiplied for the interval.
     score, score_error : float
         Mean of `left_out` in units of how much each target varies, and its standard error by the parts that were left out.
     """
 
     method: Method
-    times: tuple[float, ...]
+    fitted: FittedMethod = field(repr=False)
     left_out: np.ndarray
     check: np.ndarray | None
     check_median: np.ndarray | None
     coverage: np.ndarray | None
-    factor: np.ndarray
     score: float
     score_error: float
-    predictor: Predictor = field(repr=False)
 
 
 @dataclass(frozen=True)
@@ -109,27 +136,22 @@ class ReadoutFit:
         Error of the forward model on the check recordings as a share of the readings' range; None without one.
     reasons : tuple of str
         Where the best read-out fails, and why, a sentence each.
-    floor : (q,) float
-        Values below it are set to it: zero for a force that was never negative, else minus infinity.
     """
 
     data: ReadoutData
     results: tuple[MethodResult, ...]
     forward_check: float | None
     reasons: tuple[str, ...]
-    floor: np.ndarray
     best: MethodResult
 
-    def estimate(self, time: np.ndarray, readings: np.ndarray, result: MethodResult | None = None) -> ContactEstimate:
-        """Return the stimulus of the sensor.
+    def estimate(self, time: np.ndarray, readings: np.ndarray) -> ContactEstimate:
+        """Return the stimulus of the sensor by the method that is proposed.
 
         Parameters
         ----------
         time : (T,) float, s
         readings : (T, n) float
             Of all texels of the rig.
-        result : MethodResult, optional
-            Default: the one that is proposed.
 
         Raises
         ------
@@ -141,13 +163,7 @@ class ReadoutFit:
             raise ParameterError(
                 f"{len(time)} times and readings of the shape {readings.shape} do not fit: give (T, {self.data.texels})."
             )
-        own = result or self.best
-        return _estimate(own.predictor, own.times, own.factor, self.floor, time, readings[:, self.data.channels])
-
-    def estimate_of(self, recording: ReadoutRecording) -> ContactEstimate:
-        """Return the stimulus in one of the recordings of `data`, by the proposed method."""
-        own = self.best
-        return _estimate(own.predictor, own.times, own.factor, self.floor, recording.time, recording.readings)
+        return self.best.fitted.estimate(time, readings[:, self.data.channels])
 
 
 def fit_readout(rig: Rig) -> ReadoutFit:
@@ -171,7 +187,7 @@ def fit_readout(rig: Rig) -> ReadoutFit:
     results = tuple(_result(data, own, floor) for own in methods)
     least = min(results, key=lambda one: one.score)
     best = next(one for one in results if one.score <= least.score + least.score_error)
-    return ReadoutFit(data, results, _forward_check(data), _reasons(data, best, floor), floor, best)
+    return ReadoutFit(data, results, _forward_check(data), _reasons(data, best.fitted), best)
 
 
 def _size(data: ReadoutData, errors: np.ndarray) -> float:
@@ -243,9 +259,8 @@ def _result(data: ReadoutData, candidates: Sequence[Method], floor: np.ndarray) 
     assert best is not None
     score, method, times, errors, factor, spread = best
     whole = _samples(data.fit, times, MOST_SAMPLES)
-    predictor = method.fitted(whole.readings, whole.memory, whole.targets)
-    check = _check(data, lambda one: _estimate(predictor, times, factor, floor, one.time, one.readings))
-    return MethodResult(method, times, errors, *check, factor, score, spread, predictor)
+    fitted = FittedMethod(method.fitted(whole.readings, whole.memory, whole.targets), times, factor, floor)
+    return MethodResult(method, fitted, errors, *_check(data, fitted), score, spread)
 
 
 def _left_out(method: Method, samples: _Samples, floor: np.ndarray) -> Prediction:
@@ -259,30 +274,11 @@ def _left_out(method: Method, samples: _Samples, floor: np.ndarray) -> Predictio
     return error, deviation
 
 
-def _estimate(
-    predictor: Predictor,
-    times: tuple[float, ...],
-    factor: np.ndarray,
-    floor: np.ndarray,
-    time: np.ndarray,
-    readings: np.ndarray,
-) -> ContactEstimate:
-    known = np.isfinite(readings).all(axis=1)
-    found = np.full((3, len(time), len(floor)), np.nan)
-    if known.any():
-        memory = memory_of(time, readings, times)
-        value, deviation = predictor(readings[known], memory[known])
-        found[:, known] = np.maximum(np.stack([value, value - factor * deviation, value + factor * deviation]), floor)
-    return ContactEstimate(*found)
-
-
-def _check(
-    data: ReadoutData, estimate: Callable[[ReadoutRecording], ContactEstimate]
-) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
+def _check(data: ReadoutData, fitted: FittedMethod) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
     """Root mean square and median error on the check recordings, and the share inside of intervals."""
     errors, inside = [], []
     for one in data.check:
-        own = estimate(one)
+        own = fitted.estimate(one.time, one.readings)
         known = np.isfinite(own.value).all(axis=1) & np.isfinite(one.targets).all(axis=1)
         errors.append((own.value - one.targets)[known])
         inside.append(((own.low <= one.targets) & (one.targets <= own.high))[known])
@@ -315,7 +311,7 @@ def _forward_check(data: ReadoutData) -> float | None:
     return float(np.sqrt(error) / np.ptp(check.readings))
 
 
-def _reasons(data: ReadoutData, best: MethodResult, floor: np.ndarray) -> tuple[str, ...]:
+def _reasons(data: ReadoutData, best: FittedMethod) -> tuple[str, ...]:
     """Say where the error of the best read-out is larger than elsewhere on the check recordings."""
     sentences = []
     whole = _samples(data.fit, (), MOST_SAMPLES * 10).targets
@@ -323,7 +319,7 @@ def _reasons(data: ReadoutData, best: MethodResult, floor: np.ndarray) -> tuple[
         low, high = float(whole[:, i].min()), float(whole[:, i].max())
         errors, beyond, rises = [], [], []
         for one in data.check:
-            own = _estimate(best.predictor, best.times, best.factor, floor, one.time, one.readings)
+            own = best.estimate(one.time, one.readings)
             error = own.value[:, i] - one.targets[:, i]
             known = np.isfinite(error)
             errors.append(error[known])
