@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ..core.gap.planning.experiment_plan import ExperimentPlan, Wishes
+from ..core.gap.planning.experiment_plan import ExperimentPlan
 from ..core.gap.planning.experiment_plan import plan_experiment as plan
+from ..core.gap.planning.paths import Wishes
 from ..core.gap.report import plan_files
 from . import arguments
 from .arguments import ArgumentError

@@ -139,7 +139,7 @@ class PALPATE_OT_gap_plan(modal_job.ModalJob, bpy.types.Operator):
     )
 
     def job(self, context):
-        from ..core.gap.planning.experiment_plan import Wishes
+        from ..core.gap.planning.paths import Wishes
 
         support.leave_edit_mode(context)
         self._sensor = context.object.name

@@ -15,8 +15,8 @@ from ..session import fcurves, first_use, identity, transforms
 from . import gap_results
 
 if TYPE_CHECKING:
-    from ...core.gap.planning.experiment_plan import PlannedExperiment, Wishes
-    from ...core.gap.planning.paths import Trajectory
+    from ...core.gap.planning.experiment_plan import PlannedExperiment
+    from ...core.gap.planning.paths import Trajectory, Wishes
 
 MARK = "palpate_planned_probe"
 """Custom property of probes that were made for a plan."""

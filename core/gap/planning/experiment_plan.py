@@ -20,7 +20,7 @@ from ..selection.base_model import base_parameters_to_search, recording_numbers
 from ..selection.candidates import Candidate, candidates, scales_of
 from ..selection.findings import Diagnosis
 from ..selection.unfitted import unfitted
-from .paths import Ground, Limits, Trajectory, limits_of
+from .paths import Ground, Limits, Trajectory, Wishes
 from .separation import Separation, Signals
 
 Pair = tuple[str, str]
@@ -57,7 +57,7 @@ class PlannedExperiment:
 
     @property
     def separation_after(self) -> float:
-        """Table of confusions with the further recording."""
+        """The least separated pair with the further recording, in standard deviations of the noise."""
         return min(one.deviations for one in self.after)
 
 
@@ -89,32 +89,6 @@ class ExperimentPlan:
         return sorted((one for one in self.separations if one.kind == kind and not one.is_separated), key=lambda one: one.share)
 
 
-@dataclass(frozen=True)
-class Wishes:
-    """The user's requirements of an experiment; None and empty are decided from the recordings.
-
-    Attributes
-    ----------
-    between : tuple of str
-        Kinds that it is to separate.
-    depth : float or None
-        See :class:`.paths.Limits`, as for those below.
-    speed : float or None
-    duration : float or None
-    area : (float, float, float, float) or None
-    """
-
-    between: tuple[str, ...] = ()
-    depth: float | None = None
-    speed: float | None = None
-    duration: float | None = None
-    area: tuple[float, float, float, float] | None = None
-
-    def ground(self, predictors: Sequence[Predictor]) -> Ground:
-        """Return where an experiment after some recordings may press."""
-        return Ground(predictors, limits_of(predictors, self.depth, self.speed, self.duration, self.area))
-
-
 def plan_experiment(rig: Rig, wishes: Wishes | None = None) -> Job[ExperimentPlan]:
     """Compute which kinds the fitted recordings of a rig separate, and choose the programme that separates an open pair best.
 
@@ -141,7 +115,7 @@ def plan_experiment(rig: Rig, wishes: Wishes | None = None) -> Job[ExperimentPla
     wishes = wishes or Wishes()
     yield Progress("contacts of every trial", 0, 100)
     known = unfitted(rig)
-    ground = wishes.ground(known.predictors)
+    ground = Ground(known.predictors, wishes.limits(known.predictors))
     full = scales_of(known.fitted, known.start).reading
     names = base_parameters_to_search(rig, known.fitted)
     free = [*free_base_parameters(known.start.parameters, names, full), *recording_numbers(rig, known.fitted, full)]
@@ -172,7 +146,7 @@ def plan_after(result: Diagnosis, wishes: Wishes | None = None) -> Job[PlannedEx
     yield Progress("planning the next experiment", 0, 100)
     wishes, fitted = wishes or Wishes(), result.of("fit")
     try:
-        ground = wishes.ground(result.predictors)
+        ground = Ground(result.predictors, wishes.limits(result.predictors))
     except ParameterError:
         return None  # the sentence says what to record; a limit that nobody gave is no reason to fail
     search = _Search(ground, fitted, result.base.model, result.base.free, result.noise)

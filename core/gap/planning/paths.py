@@ -65,42 +65,47 @@ class Limits:
         return inside
 
 
-def limits_of(
-    predictors: Sequence[Predictor],
-    depth: float | None = None,
-    speed: float | None = None,
-    duration: float | None = None,
-    area: tuple[float, float, float, float] | None = None,
-) -> Limits:
-    """Return the limits that some recordings kept, or those that are given.
+@dataclass(frozen=True)
+class Wishes:
+    """The user's requirements of an experiment; None and empty are decided from the recordings.
 
-    Parameters
+    Attributes
     ----------
-    predictors : sequence of Predictor
-    depth, speed, duration : float, optional
-    area : (float, float, float, float), optional
-
-    Raises
-    ------
-    ParameterError
-        A given limit is not positive, or the recordings never touched the sensor and no depth is given.
+    between : tuple of str
+        Kinds that it is to separate.
+    depth, speed, duration : float or None
+        See :class:`Limits`, as for the area.
+    area : (float, float, float, float) or None
     """
-    if depth is None:
-        depth = max(float(p.stimulus.load.max(initial=0.0)) for p in predictors if _is_like(p, predictors[0]))
-        if depth <= 0.0:
-            raise ParameterError("The recordings never touched the sensor: give the limit of the depth.")
-        if predictors[0].trial.stimulus == "force":
-            depth = max(float(np.max(p.trial.level)) for p in predictors if p.trial.level is not None)
-    if speed is None:
-        recorded = max(_speed(p) for p in predictors if _is_like(p, predictors[0]))
-        speed = max(recorded, depth / LONGEST_PRESS, _extent(predictors[0]) / LONGEST_TRAVEL)
-    if duration is None:
-        duration = max(float(np.ptp(p.trial.time)) for p in predictors)
-    return Limits(depth, speed, duration, area)
 
+    between: tuple[str, ...] = ()
+    depth: float | None = None
+    speed: float | None = None
+    duration: float | None = None
+    area: tuple[float, float, float, float] | None = None
 
-def _is_like(one: Predictor, other: Predictor) -> bool:
-    return one.trial.stimulus == other.trial.stimulus
+    def limits(self, predictors: Sequence[Predictor]) -> Limits:
+        """Return the limits that some recordings kept, or those that are given.
+
+        Raises
+        ------
+        ParameterError
+            A given limit is not positive, or the recordings never touched the sensor and no depth is given.
+        """
+        depth, speed, duration = self.depth, self.speed, self.duration
+        first = predictors[0]
+        alike = [p for p in predictors if p.trial.stimulus == first.trial.stimulus]
+        if depth is None:
+            depth = max(float(p.stimulus.load.max(initial=0.0)) for p in alike)
+            if depth <= 0.0:
+                raise ParameterError("The recordings never touched the sensor: give the limit of the depth.")
+            if first.trial.stimulus == "force":
+                depth = max(float(np.max(p.trial.level)) for p in predictors if p.trial.level is not None)
+        if speed is None:
+            speed = max(*map(_speed, alike), depth / LONGEST_PRESS, _extent(first) / LONGEST_TRAVEL)
+        if duration is None:
+            duration = max(float(np.ptp(p.trial.time)) for p in predictors)
+        return Limits(depth, speed, duration, self.area)
 
 
 def _extent(predictor: Predictor) -> float:

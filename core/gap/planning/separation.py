@@ -138,11 +138,6 @@ class Signals:
             p, q = p + own, q + len(texel)
         self._width = p, q
 
-    @property
-    def pairs(self) -> list[tuple[str, str]]:
-        """Each kind with each other one."""
-        return [(kind, other) for kind in self._forms for other in self._forms if kind != other]
-
     def products(self, predictors: Sequence[Predictor]) -> Products:
         """Return the sums of products over recordings. What is not recorded yet counts where it is not None."""
         first, *others = [self._of_recording(predictor) for predictor in predictors]

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from dataclasses import replace
 
@@ -16,7 +17,8 @@ from palpate.core.errors import ParameterError
 from palpate.core.gap.fitting.least_squares import free_base_parameters
 from palpate.core.gap.fitting.noise_floor import ChannelNoise
 from palpate.core.gap.forward.predictor import Model, predictors_of
-from palpate.core.gap.planning.experiment_plan import Wishes, plan_experiment
+from palpate.core.gap.planning.experiment_plan import plan_experiment
+from palpate.core.gap.planning.paths import Wishes
 from palpate.core.gap.planning.separation import STARTS, Signals
 from palpate.core.gap.report.plan_files import planned_sentence, table_rows, write_plan
 from palpate.core.gap.selection.candidates import candidates, scales_of
@@ -43,7 +45,8 @@ def test_what_a_rival_leaves_is_that_of_least_squares_over_all_samples(rig):
     labels = ("gain-mismatch/listed", "saturation/tanh", "creep/power")
     forms = [one for one in candidates(fitted, model) if one.label in labels]
     signals = Signals(model, free_base_parameters(model.parameters, ["k"], 1.0), forms, fitted, NOISES)
-    found = {(one.kind, one.other): one for one in signals.separations(signals.products(fitted), signals.pairs)}
+    pairs = list(itertools.permutations([label.partition("/")[0] for label in labels], 2))
+    found = {(one.kind, one.other): one for one in signals.separations(signals.products(fitted), pairs)}
     scales = scales_of(fitted, model)
 
     def changes(form):

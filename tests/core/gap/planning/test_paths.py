@@ -14,7 +14,7 @@ from palpate.core.errors import ParameterError
 from palpate.core.gap.dataset.rig import Indenter
 from palpate.core.gap.forward.predictor import predictors_of
 from palpate.core.gap.forward.stimulus import stimulus_of
-from palpate.core.gap.planning.paths import Ground, Limits, limits_of
+from palpate.core.gap.planning.paths import Ground, Limits, Wishes
 from palpate.core.geometry.mesh import checked_mesh
 from palpate.core.model.sensor_parameters import SensorParameters
 
@@ -72,12 +72,12 @@ def test_every_trajectory_keeps_its_limits(name):
 def test_limits_come_from_the_recordings_unless_they_are_given():
     rig = cases.rig(trials=3, seconds=6.0)
     predictors = predictors_of(rig.trials, rig)
-    own = limits_of(predictors)
+    own = Wishes().limits(predictors)
     assert own.depth == max(p.stimulus.load.max() for p in predictors)
     assert own.duration == pytest.approx(6.0, abs=0.05) and own.area is None
     down = max(np.abs(np.diff(t.position[:, 2])).max() * cases.RATE for t in rig.trials)
     assert 0.5 * down < own.speed <= down * (1.0 + ROUNDING)
-    given = limits_of(predictors, depth=1e-4, speed=0.5, duration=3.0, area=(0, 1, 0, 1))
+    given = Wishes(depth=1e-4, speed=0.5, duration=3.0, area=(0, 1, 0, 1)).limits(predictors)
     assert given == Limits(1e-4, 0.5, 3.0, (0, 1, 0, 1))
 
 
@@ -96,7 +96,7 @@ def test_limits_without_meaning_are_refused():
         Ground(predictors, replace(LIMITS, duration=0.5))
     clear = [replace(t, position=t.position + [0.0, 0.0, 1.0]) for t in rig.trials]
     with pytest.raises(ParameterError, match="never touched"):
-        limits_of(predictors_of(clear, rig))
+        Wishes().limits(predictors_of(clear, rig))
 
 
 def test_where_depths_are_known_depths_are_planned():
@@ -106,7 +106,7 @@ def test_where_depths_are_known_depths_are_planned():
     trial = cases.depth_trial(time, level, reading=reading)
     rig = cases.grid_rig(3, 2, 0.003, SensorParameters(k=50.0), [trial])
     predictors = predictors_of(rig.trials, rig)
-    limits = limits_of(predictors, duration=8.0)
+    limits = Wishes(duration=8.0).limits(predictors)
     ground = Ground(predictors, limits)
     assert limits.depth == pytest.approx(0.001) and limits.speed == pytest.approx(0.001, rel=0.05)
     assert not any("slide" in called or "place" in called for called in ground.programmes())
