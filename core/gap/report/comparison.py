@@ -184,10 +184,10 @@ def squared_errors(predictor: Predictor, model: Model, result: Diagnosis) -> np.
     return np.tile(error.sum(axis=1, keepdims=True) / n, (1, n))
 
 
-def rms_by_texel(result: Diagnosis, model: Model, use: str = "fit") -> np.ndarray:
-    """Return the root mean square error of each texel over the trials of one use, (n,) float, as a share of the range."""
+def rms_by_texel(result: Diagnosis, model: Model) -> np.ndarray:
+    """Return the root mean square error of each texel over the fitted trials, (n,) float, as a share of the range."""
     total, count = np.zeros(len(result.rig.texels)), 0
-    for predictor in result.of(use):
+    for predictor in result.of("fit"):
         square = squared_errors(predictor, model, result)
         total, count = total + square.sum(axis=0), count + len(square)
     return np.sqrt(total / max(count, 1))
@@ -201,6 +201,13 @@ OUTSIDE = 1.25
 """Depth, speed, length and number of loads are mentioned from this many times the largest of the fitted recordings on."""
 LEAST_NEW_LOAD = 0.05
 """Share of the load on texels that no fitted recording touches, from which on it is mentioned."""
+LOADINGS = {
+    "depth": "is loaded {:.3g} times as much",
+    "speed": "is loaded {:.3g} times as fast",
+    "seconds": "lasts {:.3g} times as long",
+    "loads": "is loaded {:.3g} times as often",
+}
+"""Words for a quantity of :class:`RecordingSummary` that is so many times the largest of the fitted recordings."""
 FAST = 0.95
 """Quantile of the rates of loading that counts as a recording's speed."""
 
@@ -278,47 +285,29 @@ def recording_differences(result: Diagnosis, name: str) -> list[str]:
     model = result.best.model
     fitted = [recording_summary(p, model, result.full) for p in result.of("fit")]
     other = next(recording_summary(p, model, result.full) for p in result.of("check") if p.trial.name == name)
-    said = [*_response_differences(fitted, other), *_loading_differences(fitted, other)]
-    return said or ["it does not differ from the fitted ones in level, gain, depth, speed, length or place"]
-
-
-def _response_differences(fitted: list[RecordingSummary], other: RecordingSummary) -> list[str]:
-    """Differences of the level without load and of the gain."""
     said = []
-    levels, gains = np.array([one.level for one in fitted]), np.array([one.gain for one in fitted])
-    away = _outside(levels, other.level)
-    if abs(away) > LEAST_LEVEL:
-        said.append(f"without load it reads {abs(away):.1%} of the range {'more' if away > 0 else 'less'} than any fitted one")
-    away = _outside(gains, other.gain)
-    if abs(away) > LEAST_GAIN:
-        said.append(f"under the same load it reads {abs(away):.0%} {'more' if away > 0 else 'less'} than any fitted one")
-    return said
-
-
-def _loading_differences(fitted: list[RecordingSummary], other: RecordingSummary) -> list[str]:
-    """Differences of what was done to the sensor."""
-    said = []
-    for attribute, words in (
-        ("depth", "it is loaded {:.3g} times as much as any fitted one"),
-        ("speed", "it is loaded {:.3g} times as fast as any fitted one"),
-        ("seconds", "it lasts {:.3g} times as long as any fitted one"),
-        ("loads", "it is loaded {:.3g} times as often as any fitted one"),
-    ):
+    level = _outside([one.level for one in fitted], other.level)
+    if abs(level) > LEAST_LEVEL:
+        said.append(
+            f"without load it reads {abs(level):.1%} of the range {'more' if level > 0 else 'less'} than any fitted one"
+        )
+    gain = _outside([one.gain for one in fitted], other.gain)
+    if abs(gain) > LEAST_GAIN:
+        said.append(f"under the same load it reads {abs(gain):.0%} {'more' if gain > 0 else 'less'} than any fitted one")
+    for attribute, words in LOADINGS.items():
         most, own = max(float(getattr(one, attribute)) for one in fitted), float(getattr(other, attribute))
         if own > OUTSIDE * most > 0.0:
-            said.append(words.format(own / most))
+            said.append(f"it {words.format(own / most)} as any fitted one")
     known = np.sum([one.load for one in fitted], axis=0) > 0
     share = float(other.load[~known].sum()) / max(float(other.load.sum()), 1e-300)
     if share > LEAST_NEW_LOAD:
         said.append(f"{share:.0%} of its load is on texels that no fitted one touches")
     if other.slides and not any(one.slides for one in fitted):
         said.append("a surface slides in it, and in no fitted one")
-    return said
+    return said or ["it does not differ from the fitted ones in level, gain, depth, speed, length or place"]
 
 
-def _outside(values: np.ndarray, value: float) -> float:
+def _outside(values: Sequence[float], value: float) -> float:
     """How far a value lies outside the range of some others; 0 inside or if unknown."""
-    values = values[np.isfinite(values)]
-    if not len(values) or not np.isfinite(value):
-        return 0.0
-    return float(max(value - values.max(), 0.0) + min(value - values.min(), 0.0))
+    known = [one for one in values if np.isfinite(one)]
+    return max(value - max(known), 0.0) + min(value - min(known), 0.0) if known and np.isfinite(value) else 0.0

@@ -30,6 +30,8 @@ BEFORE, AFTER = SHEAR_COLOUR, NORMAL_COLOUR
 MEASURED = INK
 LONG = 12
 """How many times as long as wide a grid is no picture any more."""
+Pick = Callable[[Model], np.ndarray]
+"""What a model predicts of one channel."""
 HEADING: dict[str, Any] = {"fontsize": 8.5, "color": INK, "weight": "bold"}
 
 
@@ -75,15 +77,7 @@ def curves(result: Diagnosis) -> Figure:
         name, measured, pick = _worst_channel(result, predictor)
         time = predictor.trial.time
         axes.plot(time, measured, color=MEASURED, lw=width_below(1), label="measured")
-        for label, model, colour in _models(result):
-            axes.plot(
-                time,
-                np.where(np.isfinite(measured), pick(model), np.nan),
-                color=colour,
-                lw=1.0,
-                ls="--" if label == "base model" else "-",
-                label=label,
-            )
+        _draw_models(axes, result, time, measured, pick, lw=1.0)
         axes.set_title(f"{predictor.trial.name} ({predictor.trial.use}): {name}", loc="left", fontsize=8.5, color=INK)
         axes.set_ylabel(_quantity(result, name))
         axes.margins(x=0)
@@ -95,6 +89,13 @@ def curves(result: Diagnosis) -> Figure:
     return figure
 
 
+def _draw_models(axes: Axes, result: Diagnosis, x: np.ndarray, measured: np.ndarray, pick: Pick, **style: Any) -> None:
+    """Draw what each model predicts over x, where something was measured."""
+    for label, model, colour in _models(result):
+        shown = np.where(np.isfinite(measured), pick(model), np.nan)
+        axes.plot(x, shown, color=colour, ls="--" if label == "base model" else "-", label=label, **style)
+
+
 def _quantity(result: Diagnosis, channel: str) -> str:
     """Quantity of a channel, with its unit."""
     if not channel.startswith("texel"):
@@ -103,30 +104,19 @@ def _quantity(result: Diagnosis, channel: str) -> str:
     return "normal force (N)" if unit == "N" else f"reading ({unit})"
 
 
-def _worst_channel(
-    result: Diagnosis, predictor: Predictor, stimulus: np.ndarray | None = None
-) -> tuple[str, np.ndarray, Callable[[Model], np.ndarray]]:
+def _worst_channel(result: Diagnosis, predictor: Predictor, stimulus: np.ndarray | None = None) -> tuple[str, np.ndarray, Pick]:
     """The channel with the largest error: its name, what was measured, and what a model predicts.
 
     With the `stimulus` of each texel (samples, n), those whose stimulus changes come first.
     """
-    trial, base = predictor.trial, predictor.predict(result.base.model)
-    if trial.reading is not None:
-        miss = np.nansum((trial.reading - base.reading) ** 2, axis=0)
-        changes = np.ptp(stimulus, axis=0) > 0.0 if stimulus is not None else np.ones(len(miss), bool)
-        if changes.any():
-            miss[~changes] = 0.0
-        texel = int(np.argmax(miss))
-        return f"texel {texel}", trial.reading[:, texel], lambda model: predictor.predict(model).reading[:, texel]
-    assert trial.force is not None and base.force is not None
-    axis = int(np.argmax(np.nansum((trial.force - base.force) ** 2, axis=0)))
-
-    def force_along(model: Model) -> np.ndarray:
-        force = predictor.predict(model).force
-        assert force is not None
-        return force[:, axis]
-
-    return f"force {'xyz'[axis]}", trial.force[:, axis], force_along
+    part = "force" if predictor.trial.reading is None else "reading"
+    measured = getattr(predictor.trial, part)
+    miss = np.nansum((measured - getattr(predictor.predict(result.base.model), part)) ** 2, axis=0)
+    if part == "reading" and stimulus is not None and (changes := np.ptp(stimulus, axis=0) > 0.0).any():
+        miss[~changes] = 0.0
+    channel = int(np.argmax(miss))
+    name = f"texel {channel}" if part == "reading" else f"force {'xyz'[channel]}"
+    return name, measured[:, channel], lambda model: getattr(predictor.predict(model), part)[:, channel]
 
 
 def error_map(result: Diagnosis) -> Figure:
@@ -190,17 +180,10 @@ def _draw_error_line(axes: Axes, result: Diagnosis) -> None:
     axes.legend(frameon=False, fontsize=8, loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2)
 
 
-def overview(result: Diagnosis, errors: GapErrors, width: float = WIDTHS["double"]) -> Figure:
-    """Where the error is on the sensor, which effects were found, and the error without and with each of them.
-
-    Parameters
-    ----------
-    result : Diagnosis
-    errors : GapErrors
-    width : float, inches
-    """
+def overview(result: Diagnosis, errors: GapErrors) -> Figure:
+    """Where the error is on the sensor, which effects were found, and the error without and with each of them."""
     bars = len(errors.stages) + 2 * bool(result.of("check"))
-    figure = new_figure(width, max(2.7, 0.9 + 0.36 * bars))
+    figure = new_figure(WIDTHS["double"], max(2.7, 0.9 + 0.36 * bars))
     height = figure.get_figheight()
     bottom, top = 0.5 / height, 1.0 - 0.55 / height
     if len(result.rig.texels) > 1:
@@ -286,16 +269,7 @@ def loops(result: Diagnosis) -> Figure:
     figure = new_figure(WIDTHS["single"], 2.5)
     axes = figure.add_axes((0.21, 0.18, 0.76, 0.62))
     axes.plot(x, measured, ".", ms=4.0, mew=0, color=MEASURED, alpha=0.55, zorder=3, label="measured")
-    for text, model, colour in _models(result):
-        axes.plot(
-            x,
-            np.where(np.isfinite(measured), pick(model), np.nan),
-            lw=0.8,
-            color=colour,
-            ls="--" if text == "base model" else "-",
-            label=text,
-            zorder=4,  # above the samples, which hide a line that describes them well
-        )
+    _draw_models(axes, result, x, measured, pick, lw=0.8, zorder=4)  # above the samples, which hide a line that fits them
     axes.set_xlabel(label)
     axes.set_ylabel(_quantity(result, name))
     axes.set_title(f"{trial.name}: {name}", loc="left", fontsize=8.5, color=INK, pad=18)
