@@ -584,9 +584,8 @@ def _readings(columns: Mapping[str, np.ndarray], texels: int, file: Path) -> np.
         )
     if len(names) != texels:
         raise FileError(f"'{file.name}' has {len(names)} texel columns and the sensor has {texels} texels: make them agree.")
-    for name in wanted:
-        if name not in columns:
-            raise FileError(f"'{file.name}' has no column {name}: texels are numbered texel_0 to texel_{texels - 1}.")
+    if lost:
+        raise FileError(f"'{file.name}' has no column {lost[0]}: texels are numbered texel_0 to texel_{texels - 1}.")
     return np.stack([columns[name] for name in wanted], axis=1)
 
 

@@ -134,11 +134,9 @@ def _changes(values: np.ndarray, width: int) -> np.ndarray:
 
 def _correlation(cause: np.ndarray, answer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return all shifts in samples at which both overlap enough, and the correlation at each."""
-    count = len(cause) + len(answer) - 1
-    length = 1 << (count - 1).bit_length()
-    product = np.fft.irfft(np.conj(np.fft.rfft(cause, length)) * np.fft.rfft(answer, length), length)
-    lags = np.arange(-(len(cause) - 1), len(answer))
-    product = product[lags % length]
+    from scipy.signal import correlate, correlation_lags
+
+    product, lags = correlate(answer, cause, method="fft"), correlation_lags(len(answer), len(cause))
     causes, answers = np.concatenate([[0.0], np.cumsum(cause**2)]), np.concatenate([[0.0], np.cumsum(answer**2)])
     begin, end = np.maximum(0, -lags), np.minimum(len(cause), len(answer) - lags)
     shared_cause = causes[end] - causes[begin]

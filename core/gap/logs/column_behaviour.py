@@ -31,6 +31,12 @@ def is_unnamed(names: Sequence[str]) -> bool:
     return all(re.fullmatch(r"column_\d+", name) for name in names)
 
 
+def is_clock(values: np.ndarray, strictly: bool = False) -> bool:
+    """Return True if values rise like a clock; strictly: with few that repeat."""
+    steps = np.diff(values[np.isfinite(values)])
+    return len(steps) >= 7 and not (steps < 0).any() and bool(steps.any()) and not (strictly and (steps == 0).mean() > 0.3)
+
+
 def is_force(values: np.ndarray) -> bool:
     """Return True if values behave as a force of contact."""
     known = values[np.isfinite(values)]

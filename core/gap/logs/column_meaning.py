@@ -21,53 +21,16 @@ KNOWN_UNITS = {unit for units in LOG_UNITS.values() for unit in units} | set(PRE
 KNOWN_UNITS |= set(
     ["counts", "count", "V", "mV", "ohm", "kohm", "Ohm", "kOhm", "Ω", "kΩ", "F", "pF", "raw", "LSB", "ADC", "deg", "rad", "%"]
 )
-TEXEL_WORDS = set(
-    [
-        "texel",
-        "taxel",
-        "tactel",
-        "cell",
-        "sensor",
-        "tactile",
-        "tac",
-        "tactip",
-        "pressure",
-        "adc",
-        "reading",
-        "readings",
-        "raw",
-        "resistance",
-        "capacitance",
-        "voltage",
-        "ch",
-        "channel",
-        "r",
-        "c",
-        "s",
-        "p",
-        "v",
-        "value",
-        "values",
-        "signal",
-        "hall",
-    ]
-)
+TEXEL_WORDS = {
+    *("texel", "taxel", "tactel", "cell", "sensor", "tactile", "tac", "tactip", "ch", "channel", "hall"),
+    *("pressure", "resistance", "capacitance", "voltage", "adc", "raw", "signal", "reading", "readings", "value", "values"),
+    *("r", "c", "s", "p", "v"),
+}
 """Words in the names of columns that hold the sensor's response."""
 _AXIS_WORDS = {
     "position": [
-        "position",
-        "pos",
-        "pose",
-        "translation",
-        "tcp",
-        "tip",
-        "probe",
-        "indenter",
-        "tool",
-        "ee",
-        "motion",
-        "p",
-        "robot",
+        *("position", "pos", "pose", "translation", "motion", "p"),
+        *("tcp", "tip", "probe", "indenter", "tool", "ee", "robot"),
     ],
     "force": ["force", "f", "wrench", "load", "ft"],
     "torque": ["torque", "moment", "t", "m", "tau"],

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...errors import FileError
 from ...io.csv_table import LARGEST_NUMBER
+from .column_behaviour import is_clock
 
 LARGEST_FILE = 2 * 2**30
 """Bytes of a log."""
@@ -127,7 +128,7 @@ def joined_frames(logs: Sequence[LogFile]) -> list[LogFile]:
         return list(logs)
     frames = [np.stack(list(log.tables[0].columns.values()), axis=1) for log in logs]
     rows, columns = frames[0].shape
-    if rows > MOST_FRAME_ROWS or columns < 2 or any(_rises(column) for frame in frames for column in frame.T):
+    if rows > MOST_FRAME_ROWS or columns < 2 or any(is_clock(column) for frame in frames for column in frame.T):
         return list(logs)
     loads = np.array([float(one[1]) for one in found if one])
     order = np.argsort(loads, kind="stable")
@@ -142,12 +143,6 @@ def joined_frames(logs: Sequence[LogFile]) -> list[LogFile]:
     )
     note = f"{len(logs)} files are taken for frames of {rows} × {columns} texels, in the order of the {name} in their names."
     return [replace(logs[0], kind=FRAMES, tables=(table,), notes=(note, *logs[0].notes), label=f"{len(logs)} frames")]
-
-
-def _rises(values: np.ndarray) -> bool:
-    """Return True if values never fall and change, as those of a clock."""
-    steps = np.diff(values)
-    return len(steps) > 6 and bool((steps >= 0.0).all() and steps.any())
 
 
 def require_size(values: int, columns: int, path: Path) -> None:

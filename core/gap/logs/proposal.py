@@ -13,7 +13,7 @@ import numpy as np
 from ...errors import FileError
 from ..dataset.column_names import FORCE, POSE, PRESSURES, READING_UNITS, TURN
 from .answers import Use
-from .column_behaviour import LEAST_CONTACT, contact_of, correlation, is_force, is_unnamed, is_unordered, missing_code
+from .column_behaviour import LEAST_CONTACT, contact_of, correlation, is_clock, is_force, is_unnamed, is_unordered, missing_code
 from .column_meaning import (
     Family,
     Meaning,
@@ -288,7 +288,7 @@ class _Logger:
         return all(is_unordered(self.values(name, log)) for log in self.logs)
 
     def _rises(self, name: str, strictly: bool = False) -> bool:
-        return all(_is_clock(self.values(name, log), strictly) for log in self.logs if len(self.values(name, log)))
+        return all(is_clock(self.values(name, log), strictly) for log in self.logs if len(self.values(name, log)))
 
     def _counts_rows(self, name: str) -> bool:
         """Return whether a column only counts the rows."""
@@ -393,17 +393,11 @@ def _with_clocks(logs: Sequence[LogFile]) -> tuple[LogTable, ...]:
         table.sample_count
         for table in tables
         for name in table.columns
-        if all(_is_clock(values) for log in logs if len(values := _values(log.tables, table.full_name(name))))
+        if all(is_clock(values) for log in logs if len(values := _values(log.tables, table.full_name(name))))
         and (table.sample_count == longest or meaning_of(name).quantity == "time")
     }
     kept = tuple(table for table in tables if table.sample_count in lengths)
     return kept if kept and len(tables) > 1 else tables
-
-
-def _is_clock(values: np.ndarray, strictly: bool = False) -> bool:
-    """Return whether values rise like a clock; strictly: with few that repeat."""
-    steps = np.diff(values[np.isfinite(values)])
-    return len(steps) >= 7 and not (steps < 0).any() and bool(steps.any()) and not (strictly and (steps == 0).mean() > 0.3)
 
 
 def _texel_words(names: tuple[str, ...]) -> dict[str, Any]:
