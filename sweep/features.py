@@ -67,23 +67,6 @@ TIMESTAMP = Feature("timestamp", "float32", (1,), (), "s", "Time since the first
 """A column that LeRobot expects in every dataset."""
 
 
-@dataclass(frozen=True)
-class FrameStyle:
-    """How texels stand in a dataset.
-
-    Attributes
-    ----------
-    points : bool
-        As a list in any case, and not as a picture where they form a grid.
-    dtype : str
-        Of forces and readings: "float32" or "float16".
-    """
-
-    points: bool = False
-    dtype: str = "float32"
-
-
-PLAIN_STYLE = FrameStyle()
 HALF_ERROR = "Rounded to 16 bits: a relative error of 2^-11 at most, and 3e-8 absolute below 6.1e-5."
 """Of IEEE 754's binary16: 11 digits of the mantissa, and steps of 2^-24 below 2^-14."""
 
@@ -155,7 +138,11 @@ class RunFrames:
 
 
 def frames_of(
-    recording: Recording, sensors: Sensors, shared: SharedResults | None = None, style: FrameStyle = PLAIN_STYLE
+    recording: Recording,
+    sensors: Sensors,
+    shared: SharedResults | None = None,
+    points: bool = False,
+    half_precision: bool = False,
 ) -> RunFrames:
     """Return the frames of a run; raise :class:`PalpateError` for a number that its bits cannot hold.
 
@@ -166,12 +153,15 @@ def frames_of(
         Of the recording.
     shared : SharedResults, optional
         Of the runs of this process.
-    style : FrameStyle
+    points : bool
+        True for texels as a list in any case, and not as a picture where they form a grid.
+    half_precision : bool
+        True for forces and readings of texels in 16 bits.
     """
     names = folder_names(sensors)  # unique and without a slash, which LeRobot does not allow in names
     features, columns = [TIMESTAMP], {TIMESTAMP.name: (recording.times - recording.times[0]).astype(TIMESTAMP.dtype)}
     with np.errstate(over="ignore"):  # what is too large is looked for where all is narrow
-        for feature, values in _all_features(recording, sensors, names, style):
+        for feature, values in _all_features(recording, sensors, names, points, half_precision):
             features.append(feature)
             columns[feature.name] = _narrowed(feature, values)
     fps, texels = _frame_rate(recording.times), {names[name]: own for name, (own, _, _) in sensors.items()}
@@ -203,10 +193,12 @@ def _narrowed(feature: Feature, values: np.ndarray) -> np.ndarray:
 
 
 def _all_features(
-    recording: Recording, sensors: Sensors, names: Mapping[str, str], style: FrameStyle
+    recording: Recording, sensors: Sensors, names: Mapping[str, str], points: bool, half_precision: bool
 ) -> Iterator[tuple[Feature, np.ndarray]]:
+    dtype = "float16" if half_precision else "float32"
     for sensor, (texels, painted, parameters) in sensors.items():
-        yield from _texel_features(names[sensor], recording.sensors[sensor], texels, painted, parameters, style)
+        layout = None if points or not isinstance(texels.layout, GridLayout) else texels.layout
+        yield from _texel_features(names[sensor], recording.sensors[sensor], texels, painted, parameters, layout, dtype)
         yield from _net_features(names[sensor], recording.sensors[sensor])
     count = len(recording.body_names)  # poses of all bodies as one list, which is how LeRobot keeps the state of a robot
     axes = tuple(f"{body}.{axis}" for body in recording.body_names for axis in POSE_AXES)
@@ -244,28 +236,28 @@ def _texel_features(
     texels: Texels,
     painted: Painted,
     parameters: SensorParameters,
-    style: FrameStyle,
+    layout: GridLayout | None,
+    dtype: str,
 ) -> Iterator[tuple[Feature, np.ndarray]]:
-    """Yield what is recorded of each texel: forces, readings, and the truth about contact."""
-    layout = None if style.points or not isinstance(texels.layout, GridLayout) else texels.layout
+    """Yield what is recorded of each texel: forces and readings of a type, and the truth about contact."""
     shape: tuple[int, ...] = (len(texels),) if layout is None else layout.shape
     names = ("row", "column") if len(shape) == 2 else ("texel",)
 
-    def placed(dtype: str, *channels: np.ndarray) -> np.ndarray:
+    def placed(kind: str, *channels: np.ndarray) -> np.ndarray:
         """Return numbers of the texels, (F, n) each, where the dataset has them: one number, or a list of them, per place."""
-        picture = np.zeros((len(channels[0]), math.prod(shape), len(channels)), dtype)
+        picture = np.zeros((len(channels[0]), math.prod(shape), len(channels)), kind)
         places = slice(None) if layout is None else _places(layout)
         for number, values in enumerate(channels):
             picture[:, places, number] = values
         return picture.reshape(-1, *shape, *(len(channels),) * (len(channels) > 1))
 
-    error = f" {HALF_ERROR}" if style.dtype == "float16" else ""
+    error = f" {HALF_ERROR}" if dtype == "float16" else ""
     about = f"Forces on the texels: along the normal, and shear along the texel's x and y axes.{error}"
-    image = Feature(tactile_name(name), style.dtype, (*shape, 3), (*names, "channel"), "N", about, CHANNELS)
-    yield image, placed(style.dtype, arrays.normal_force, arrays.shear[:, :, 0], arrays.shear[:, :, 1])
+    image = Feature(tactile_name(name), dtype, (*shape, 3), (*names, "channel"), "N", about, CHANNELS)
+    yield image, placed(dtype, arrays.normal_force, arrays.shear[:, :, 0], arrays.shear[:, :, 1])
     about = f"Readings of the texels, in the sensor's unit.{error}"
-    readings = placed(style.dtype, arrays.reading)
-    yield Feature(f"observation.reading.{name}", style.dtype, shape, names, parameters.unit, about), readings
+    readings = placed(dtype, arrays.reading)
+    yield Feature(f"observation.reading.{name}", dtype, shape, names, parameters.unit, about), readings
     touch = placed("bool", arrays.contact)
     yield Feature(f"contact.touch.{name}", "bool", shape, names, "1", "Which texels touch something."), touch
     slips = placed("bool", response.slipping(arrays, parameters, painted))

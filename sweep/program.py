@@ -12,7 +12,6 @@ import hashlib
 import importlib.util
 import shutil
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,20 +23,8 @@ from .scene_evaluation import ALLOW
 SUFFIX = ".py"
 
 
-@dataclass(frozen=True)
-class Program:
-    """A loaded program.
-
-    Attributes
-    ----------
-    run : callable
-        Takes the values of a run by name, and a folder; returns metrics by name.
-    digest : str
-        Of the file and of what else its results depend on.
-    """
-
-    run: Callable[[dict[str, Any], Path], Mapping[str, Any]]
-    digest: str
+RunFunction = Callable[[dict[str, Any], Path], Mapping[str, Any]]
+"""Takes the values of a run by name, and a folder; returns metrics by name."""
 
 
 def require_allowed(study: Study, scripts: str) -> None:
@@ -46,8 +33,8 @@ def require_allowed(study: Study, scripts: str) -> None:
         raise SceneError(f"The study runs the Python of '{study.scenes[0]}': add --allow-scripts if you trust the file.")
 
 
-def load_program(file: Path) -> Program:
-    """Run the Python of a file and return its program.
+def load_program(file: Path) -> tuple[RunFunction, str]:
+    """Run the Python of a file, and return its ``run`` and a digest of the file and of what else its results depend on.
 
     Raises
     ------
@@ -65,7 +52,7 @@ def load_program(file: Path) -> Program:
         raise PalpateError(f"The job '{file.name}' cannot be run ({type(error).__name__}: {error}): mend it.") from error
     if not callable(found):
         raise PalpateError(f"The job '{file.name}' has no function run(values, folder): write one.")
-    return Program(found, hashlib.sha256(f"{sha256} {more}".encode()).hexdigest())
+    return found, hashlib.sha256(f"{sha256} {more}".encode()).hexdigest()
 
 
 def freeze_program(source: Path, target: Path) -> str:
@@ -74,21 +61,21 @@ def freeze_program(source: Path, target: Path) -> str:
         shutil.copyfile(source, target)
     except OSError as error:
         raise FileError(f"The job '{source}' could not be copied ({os_error_reason(error)}): check it.") from error
-    return load_program(target).digest
+    return load_program(target)[1]
 
 
-def frozen_program(study: Study, folder: Path, name: str) -> Program:
-    """Return the program of a study's folder.
+def frozen_program(study: Study, folder: Path, name: str) -> RunFunction:
+    """Return the ``run`` of the program in a study's folder.
 
     Raises
     ------
     PalpateError
         It is no longer the one that the study began with, or cannot be run.
     """
-    program = load_program(folder / SCENES / f"{name}{SUFFIX}")
-    if program.digest not in [one.digest for one in (study.frozen.scenes if study.frozen else ()) if one.name == name]:
+    run, digest = load_program(folder / SCENES / f"{name}{SUFFIX}")
+    if digest not in [one.digest for one in (study.frozen.scenes if study.frozen else ()) if one.name == name]:
         raise FileError(
             f"What the job '{study.scenes[0]}' computes with is not what the study in '{folder}' began with: go on with that, "
             "or give another folder with --out."
         )
-    return program
+    return run

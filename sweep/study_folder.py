@@ -21,7 +21,7 @@ from ..core.io.bake_folder import folder_names
 from ..core.io.file_writing import atomic_write, file_sha256, writable_folder
 from ..core.io.scenario_npz import load_scenario, save_scenario
 from ..core.model.scenario import Scenario
-from ..core.study.design import MESHES, StudyMeshes, find_meshes, freeze_meshes
+from ..core.study.design import MESHES, find_meshes, freeze_meshes, mesh_copy
 from ..core.study.scene_property import read_properties
 from ..core.study.study_file import (
     LAYOUTS,
@@ -127,7 +127,7 @@ def _frozen(study: Study, file: Path, folder: Path, sources: Mapping[str, Path],
         plans[name] = plan_of(study, folder, name, meshes)
         entries.append(FrozenFile(source.name, file_sha256(source), name, digest))
     runs = Runs(study, plans, _digests(plans, entries))
-    mesh_entries = tuple(FrozenFile(name, sha256) for name, sha256 in meshes.digests.items())
+    mesh_entries = tuple(FrozenFile(name, copy.stem) for name, copy in meshes.items())
     frozen = Frozen(VERSION, len(runs), tuple(entries), mesh_entries, PARTS_FORMAT)
     text = frozen_text(file.read_text(encoding="utf-8"), frozen)
     with atomic_write(folder / STUDY_NAME) as fresh:
@@ -210,7 +210,7 @@ def resume_study(folder: Path) -> OpenStudy:
             f"The study in '{folder}' was begun with Palpate {frozen.version}, and this is {VERSION}, which may compute other "
             "numbers: go on with that version, or give another folder with --out."
         )
-    plans, meshes = {}, frozen_meshes(study, folder)
+    plans, meshes = {}, {one.file: mesh_copy(folder / SCENES / MESHES, one.file, one.sha256) for one in frozen.meshes}
     for scene in frozen.scenes:
         if not _is_as_frozen(study, folder, scene):
             raise FileError(f"The scene '{scene.name}' in '{folder}' is not the one that the study began with: start again.")
@@ -218,18 +218,13 @@ def resume_study(folder: Path) -> OpenStudy:
     return OpenStudy(folder, study, plans, Runs(study, plans, _digests(plans, frozen.scenes)))
 
 
-def plan_of(study: Study, folder: Path, scene: str, meshes: StudyMeshes) -> Plan:
+def plan_of(study: Study, folder: Path, scene: str, meshes: Mapping[str, Path]) -> Plan:
     """Return the distributions of a study on one of its scenes; raise PalpateError where a file is damaged or does not fit."""
     if study.is_job:
         return plan_for_job(study)
     start = folder / SCENES / scene
     properties = read_properties(_with(start, ".json"))
     return plan_for(study, load_scenario(_with(start, SCENARIO)), properties, meshes)
-
-
-def frozen_meshes(study: Study, folder: Path) -> StudyMeshes:
-    """Return the meshes of a frozen study."""
-    return StudyMeshes(folder / SCENES / MESHES, {one.file: one.sha256 for one in frozen_of(study, folder).meshes})
 
 
 def _is_as_frozen(study: Study, folder: Path, scene: FrozenFile) -> bool:
@@ -295,7 +290,8 @@ def _freeze_scene(source: Path, start: Path, read: ReadBlend) -> str:
 
 def _check_sources(opened: OpenStudy, sources: Mapping[str, Path], base: Path, read: ReadBlend) -> None:
     """Raise FileError if the scenes are no longer those that the study began with; a .blend is read only if it has changed."""
-    before, now = {one.name: one for one in frozen_of(opened.study, opened.folder).scenes}, set(sources)
+    frozen = frozen_of(opened.study, opened.folder)
+    before, now = {one.name: one for one in frozen.scenes}, set(sources)
     if set(before) != now:
         odd = sorted(set(before) ^ now)[0]
         what = "is new" if odd in now else "is missing"
@@ -312,8 +308,9 @@ def _check_sources(opened: OpenStudy, sources: Mapping[str, Path], base: Path, r
             _with(start, SCENARIO).unlink(missing_ok=True)
         if digest != before[name].digest:
             raise _changed(source, opened)
+    meshes = {one.file: one.sha256 for one in frozen.meshes}
     for name, file in find_meshes(opened.study.vary, base).items():
-        if file_sha256(file) != frozen_meshes(opened.study, opened.folder).digests.get(name):
+        if file_sha256(file) != meshes.get(name):
             raise _changed(file, opened)
 
 

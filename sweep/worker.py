@@ -34,7 +34,7 @@ from ..core.study.presses import Press, place_of
 from ..core.study.scene_property import is_scene_property, write_overrides
 from ..core.study.study_file import RUNS, SCENE, SCENES, STUDY_NAME, Run, at_rate
 from ..core.study.variation import PRESS, varied_scenario
-from .features import FrameStyle, frames_of
+from .features import frames_of
 from .parts import RunResult, write_part
 from .program import frozen_program, require_allowed
 from .scene_evaluation import REFUSE, read_blend
@@ -216,7 +216,6 @@ class RunComputer:
         self.opened, self._scripts, self._limit = opened, scripts, limit
         self._read = lru_cache(maxsize=MOST_SCENES_KEPT)(self._read_scene)
         self._program = lru_cache(lambda name: frozen_program(opened.study, opened.folder, name))
-        self._style = FrameStyle(opened.study.points, "float16" if opened.study.half_precision else "float32")
         self._shared = SharedResults()
         if not opened.study.is_job:
             precompile.compile_solver()  # loads what was compiled, so that the first run is as fast as the others
@@ -249,7 +248,7 @@ class RunComputer:
             press = replace(press, **own)
         metrics = metrics_of(scenario, recording, press)
         sensors = {own.name: (own.texels, own.painted, own.parameters) for own in scenario.sensors if own.readout}
-        frames = frames_of(recording, sensors, self._shared, self._style)
+        frames = frames_of(recording, sensors, self._shared, study.points, study.half_precision)
         if study.has_folders:
             with _run_folder(self.opened.folder, run) as folder:
                 write_run_folder(folder, scenario, recording, study.images)
@@ -291,10 +290,10 @@ class RunComputer:
 
     def _by_program(self, run: Run) -> RunResult:
         """Compute a run by the program of a study that has no scene; nothing can end it before it returns."""
-        program, began = self._program(run.scene), time.monotonic()
+        function, began = self._program(run.scene), time.monotonic()
         values = {**self.opened.plans[run.scene].fixed, **run.values}
         with _run_folder(self.opened.folder, run) as folder:
-            metrics = _checked_metrics(_called(program.run, values, folder), run)
+            metrics = _checked_metrics(_called(function, values, folder), run)
             if self._limit is not None and time.monotonic() - began > self._limit:
                 raise PalpateError(f"Run {run.index} took longer than its limit of {self._limit:g} s: raise run_limit.")
         return RunResult(run, metrics=metrics)

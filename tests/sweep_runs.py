@@ -21,7 +21,7 @@ from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.solver.simulation import run
 from palpate.core.study.study_file import Run, read_study
 from palpate.sweep.dataset import publish
-from palpate.sweep.features import FrameStyle, RunFrames, frames_of
+from palpate.sweep.features import RunFrames, frames_of
 from palpate.sweep.parts import RunResult, write_part
 
 FPS, SECONDS = 50.0, 0.3
@@ -72,14 +72,14 @@ def solved_press(index: int) -> tuple[RunResult, Recording]:
     return done, recording
 
 
-def frames_by(scenario: Scenario, recording: Recording, style: FrameStyle | None = None) -> RunFrames:
+def frames_by(scenario: Scenario, recording: Recording, **style: bool) -> RunFrames:
     """The frames of a recording of a scenario."""
     sensors = {own.name: (own.texels, own.painted, own.parameters) for own in scenario.sensors}
-    return frames_of(recording, sensors, style=style or FrameStyle())
+    return frames_of(recording, sensors, **style)
 
 
 def made_up(index: int, values: dict[str, Any], texels: dict[str, Texels] | None = None, load: float = 1.0,
-            style: FrameStyle | None = None) -> RunResult:  # fmt: skip
+            **style: bool) -> RunResult:  # fmt: skip
     """A run whose recording nobody has solved; its metric follows the load."""
     texels = texels or {"pad": grid_texels()}
     arrays = {}
@@ -91,7 +91,7 @@ def made_up(index: int, values: dict[str, Any], texels: dict[str, Texels] | None
     recording = replace(recording_of(first, 5 + index % 10), sensors=arrays)
     sensors = tuple(Sensor(name, 0, own, SensorParameters()) for name, own in texels.items())
     scenario = replace(press(0)[0], sensors=sensors)
-    frames = frames_by(scenario, recording, style)
+    frames = frames_by(scenario, recording, **style)
     return RunResult(run_of(index, values), metrics={"load": load}, seconds=0.01, frames=frames)
 
 

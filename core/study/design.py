@@ -11,16 +11,15 @@ import glob
 import math
 import os
 import shutil
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
 from pathlib import Path, PurePath
 from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 
 from ..errors import FileError, ParameterError, os_error_reason
-from ..geometry.mesh import TriangleMesh, outward_faces, turned_outwards
+from ..geometry.mesh import turned_outwards
 from ..io.file_writing import file_sha256
 from ..io.input_files import load_mesh
 from ..io.schema import WORD, wanted
@@ -34,36 +33,6 @@ MESH = "mesh"
 """Last word of the name of a target's shape."""
 MESHES = "meshes"
 """Folder of the copies, in that of the scenes."""
-MOST_MESHES_KEPT = 64
-"""Meshes that a process keeps in memory."""
-
-
-class StudyMeshes(Mapping[str, TriangleMesh]):
-    """The meshes of a study by the names that its file gives; each is read when it is needed.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the copies.
-    digests : mapping of str to str
-        SHA-256 of the files by name.
-    """
-
-    def __init__(self, folder: Path, digests: Mapping[str, str]):
-        self._folder, self.digests = folder, dict(digests)
-        self._load = lru_cache(maxsize=MOST_MESHES_KEPT)(_target_of)
-
-    def __getitem__(self, name: str) -> TriangleMesh:
-        return self._load(_copy_of(self._folder, name, self.digests[name]))
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.digests)
-
-    def __len__(self) -> int:
-        return len(self.digests)
-
-    def __contains__(self, name: object) -> bool:
-        return name in self.digests
 
 
 def expanded(words: Iterable[str], known: Iterable[str]) -> list[str]:
@@ -116,27 +85,24 @@ def find_meshes(vary: Mapping[str, Any], base: Path) -> dict[str, Path]:
     return files
 
 
-def _target_of(kept: Path) -> TriangleMesh:
-    """Return the mesh in a copy, of whose faces was warned by its own name."""
-    return outward_faces(load_mesh(kept), kept.name)[0]
-
-
-def freeze_meshes(files: Mapping[str, Path], folder: Path) -> StudyMeshes:
-    """Copy mesh files into a folder, which is made, and return them; raises FileError."""
-    digests = {name: file_sha256(file) for name, file in files.items()}
+def freeze_meshes(files: Mapping[str, Path], folder: Path) -> dict[str, Path]:
+    """Copy mesh files into a folder, which is made, and return the copies by the names of the files; raises FileError."""
+    copies = {}
     for name, file in files.items():
+        copies[name] = copy = mesh_copy(folder, name, file_sha256(file))
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(file, _copy_of(folder, name, digests[name]))
+            shutil.copyfile(file, copy)
         except OSError as error:
             raise FileError(
                 f"The mesh '{file}' could not be copied ({os_error_reason(error)}): check it and '{folder}'."
             ) from error
-    return StudyMeshes(folder, digests)
+    return copies
 
 
-def _copy_of(folder: Path, name: str, sha256: str) -> Path:
-    return folder / f"{sha256[:24]}{os.path.splitext(name)[1].lower()}"
+def mesh_copy(folder: Path, name: str, sha256: str) -> Path:
+    """Return the copy of a mesh file in a folder; its name without the ending is the SHA-256."""
+    return folder / f"{sha256}{os.path.splitext(name)[1].lower()}"
 
 
 DesignKind = Literal["grid", "random", "latin-hypercube", "sobol"]
@@ -236,44 +202,11 @@ def check_count(count: int) -> None:
         )
 
 
-class Points(Sequence[dict[str, Value]]):
-    """The values of every point of a design by the names of the varied numbers, as a column for each number.
-
-    Parameters
-    ----------
-    columns : mapping of str to (count,) ndarray
-    count : int
-    """
-
-    def __init__(self, columns: Mapping[str, np.ndarray], count: int):
-        self._columns, self._count = columns, count
-
-    def __len__(self) -> int:
-        return self._count
-
-    def __getitem__(self, at: Any) -> Any:
-        found = {name: column[at] for name, column in self._columns.items()}
-        return {name: float(value) if isinstance(value, np.floating) else value for name, value in found.items()}
-
-
-def points_of(design: Design, varied: Mapping[str, Distribution]) -> Points:
-    """Return the values of every point, in order.
-
-    Parameters
-    ----------
-    design : Design
-    varied : mapping of str to Distribution
-
-    Raises
-    ------
-    ParameterError
-        There are too many points.
-    """
-    count = design.count(varied)
-    check_count(count)
+def columns_of(design: Design, varied: Mapping[str, Distribution]) -> dict[str, np.ndarray]:
+    """Return the values of the varied numbers in the order of the runs, (count,) each, by name."""
     columns: dict[str, np.ndarray] = {}
     if varied and design.kind == GRID:
-        repeat = count
+        count = repeat = design.count(varied)
         for name, distribution in varied.items():  # the last one changes fastest
             own = distribution.grid_values()
             repeat //= len(own)
@@ -281,7 +214,7 @@ def points_of(design: Design, varied: Mapping[str, Distribution]) -> Points:
     elif varied:
         cube = _unit_points(design, len(varied))
         columns = {name: one.values(cube[:, axis]) for axis, (name, one) in enumerate(varied.items())}
-    return Points(columns, count)
+    return columns
 
 
 def _unit_points(design: Design, axes: int) -> np.ndarray:

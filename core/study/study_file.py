@@ -40,7 +40,6 @@ import msgspec
 import numpy as np
 
 from ..errors import FileError, ParameterError, did_you_mean
-from ..geometry.mesh import TriangleMesh
 from ..io.input_files import checked_name, is_number, read_toml
 from ..io.schema import LARGEST, WORD, Name, Number, Positive, Switch, known_words, read_words, wanted
 from ..model.parameter import Parameter, Specification, TextParameter
@@ -56,11 +55,10 @@ from .design import (
     UNIFORM,
     Design,
     Distribution,
-    StudyMeshes,
     Value,
     check_count,
+    columns_of,
     expanded,
-    points_of,
 )
 from .presses import PLACE_PARAMETERS, PRESS_PARAMETERS, Press, with_press
 from .scene_property import SceneProperty, WholeNumber, is_scene_property
@@ -209,8 +207,8 @@ class Plan:
     fixed : dict of str to value
     press : Press or None
         With the numbers that do not vary.
-    meshes : mapping of str to TriangleMesh
-        Shapes that targets may have, by the names of their files.
+    meshes : mapping of str to Path
+        Copies of the files with the shapes that targets may have, by the names that the study gives.
     tied : mapping of str to (str, float or None)
         Names whose value follows that of another name, and the factor of numbers.
     """
@@ -219,7 +217,7 @@ class Plan:
     varied: Mapping[str, Distribution]
     fixed: Mapping[str, Value]
     press: Press | None
-    meshes: Mapping[str, TriangleMesh] = field(default_factory=dict)
+    meshes: Mapping[str, Path] = field(default_factory=dict)
     tied: Mapping[str, tuple[str, float | None]] = field(default_factory=dict)
 
     def with_tied(self, values: Mapping[str, Value]) -> dict[str, Value]:
@@ -303,7 +301,7 @@ def plan_for(
     study: Study,
     scenario: Scenario,
     properties: Mapping[str, SceneProperty] | None = None,
-    meshes: Mapping[str, TriangleMesh] | None = None,
+    meshes: Mapping[str, Path] | None = None,
 ) -> Plan:
     """Return the plan of a study on a scene.
 
@@ -313,8 +311,8 @@ def plan_for(
     scenario : Scenario
     properties : mapping of str to SceneProperty, optional
         What the properties of the scene are that the study names.
-    meshes : mapping of str to TriangleMesh, optional
-        The shapes of targets that the study names.
+    meshes : mapping of str to Path, optional
+        Copies of the files with the shapes of targets that the study names.
 
     Raises
     ------
@@ -420,7 +418,7 @@ def _times(value: Any, factor: float | None) -> Any:
     return value if factor is None or not is_number(value) else value * factor
 
 
-def _with_files(found: Variable, entry: Mapping[str, Any], meshes: Mapping[str, TriangleMesh]) -> Mapping[str, Any]:
+def _with_files(found: Variable, entry: Mapping[str, Any], meshes: Iterable[str]) -> Mapping[str, Any]:
     """Return the table of a target's shape with the names of files in the place of patterns; other tables as they are."""
     words = entry.get(CHOICE)
     if found.words != (MESH,) or not isinstance(words, list) or not all(isinstance(word, str) for word in words):
@@ -525,25 +523,28 @@ class Runs(Sequence[Run]):
     """
 
     def __init__(self, study: Study, plans: Mapping[str, Plan], digests: Mapping[str, str]):
-        check_count(sum(study.design.count(plan.varied) for plan in plans.values()))
-        self._plans = plans
-        self._points = {scene: points_of(study.design, plan.varied) for scene, plan in plans.items()}
+        counts = {scene: study.design.count(plan.varied) for scene, plan in plans.items()}
+        check_count(sum(counts.values()))
+        self._plans, self._counts = plans, counts
+        self._columns = {scene: columns_of(study.design, plan.varied) for scene, plan in plans.items()}
         self._hashes = {scene: _hash_of(plan, digests[scene]) for scene, plan in plans.items()}
 
     def __len__(self) -> int:
-        return sum(map(len, self._points.values()))
+        return sum(self._counts.values())
 
     def __getitem__(self, at: Any) -> Any:
         if isinstance(at, slice):
             return [self[i] for i in range(*at.indices(len(self)))]
-        index = at = range(len(self))[at]
-        for scene, points in self._points.items():
-            if index < len(points):
-                return self._run(at, scene, points[index])
-            index -= len(points)
+        row = index = range(len(self))[at]
+        for scene, count in self._counts.items():
+            if row < count:
+                return self._run(index, scene, row)
+            row -= count
         raise IndexError(at)
 
-    def _run(self, index: int, scene: str, values: dict[str, Value]) -> Run:
+    def _run(self, index: int, scene: str, row: int) -> Run:
+        found = {name: column[row] for name, column in self._columns[scene].items()}
+        values = {name: float(value) if isinstance(value, np.floating) else value for name, value in found.items()}
         own = self._hashes[scene].copy()
         own.update(json.dumps([index, values]).encode())
         values = self._plans[scene].with_tied(values)
@@ -556,8 +557,8 @@ def _hash_of(plan: Plan, digest: str) -> hashlib._Hash:
     fps = None if plan.scenario is None else plan.scenario.fps
     press = [] if plan.press is None else [plan.press.sensor, plan.press.target]
     same: dict[str, Any] = {"scene": digest, "fixed": dict(plan.fixed), "fps": fps, "press": press, "tied": dict(plan.tied)}
-    if isinstance(plan.meshes, StudyMeshes):
-        same["meshes"] = plan.meshes.digests
+    if plan.meshes:
+        same["meshes"] = {name: copy.stem for name, copy in plan.meshes.items()}
     return hashlib.sha256(json.dumps(same, sort_keys=True).encode())
 
 

@@ -23,15 +23,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import inf
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..effects.engine.registry import check_scenario, effect, form_of, kind_of, library
 from ..errors import PalpateError, ParameterError, did_you_mean
-from ..geometry.mesh import TriangleMesh, mass_properties
+from ..geometry.mesh import TriangleMesh, mass_properties, outward_faces
 from ..geometry.rotations import quaternion_product, quaternions_from_vectors, rotation_matrices
+from ..io.input_files import load_mesh
 from ..model.body import DRIVE_PARAMETERS, Body, Motion, Signal
 from ..model.parameter import ChoiceParameter, Parameter, Specification, TextParameter
 from ..model.scenario import Scenario
@@ -41,6 +44,8 @@ from ..model.shared_results import SharedResults
 from .presses import PRESS_PARAMETERS, Press, with_press
 
 AXES = ("x", "y", "z")
+MOST_MESHES_KEPT = 64
+"""Meshes that a process keeps in memory."""
 PRESS = "press"
 """First word of the numbers of a press."""
 
@@ -196,7 +201,7 @@ def varied_scenario(
     scenario: Scenario,
     values: Mapping[str, Any],
     press: Press | None = None,
-    meshes: Mapping[str, TriangleMesh] | None = None,
+    meshes: Mapping[str, Path] | None = None,
     shared: SharedResults | None = None,
 ) -> Scenario:
     """Return a scenario with the values of one run.
@@ -209,8 +214,8 @@ def varied_scenario(
         By names that :func:`variable` knows.
     press : Press, optional
         The numbers of the study's press that do not vary.
-    meshes : mapping of str to TriangleMesh, optional
-        The shapes of targets by the names of their files.
+    meshes : mapping of str to Path, optional
+        The study's copies of the files with the shapes of targets, by the names that the study gives.
     shared : SharedResults, optional
         Of the runs of this process.
 
@@ -272,7 +277,7 @@ def _varied_effects(effects: tuple[Effect, ...], kind: str, wanted: dict[str, An
     return tuple(fresh if item is old else item for item in effects)
 
 
-def _with_shapes(scenario: Scenario, grouped: Mapping[str, list], meshes: Mapping[str, TriangleMesh]) -> Scenario:
+def _with_shapes(scenario: Scenario, grouped: Mapping[str, list], meshes: Mapping[str, Path]) -> Scenario:
     """Return the scenario with the targets in their shapes and sizes, and the mass properties of the bodies that these are."""
     targets, bodies = list(scenario.targets), list(scenario.bodies)
     for index, target in enumerate(targets):
@@ -292,10 +297,16 @@ def _with_shapes(scenario: Scenario, grouped: Mapping[str, list], meshes: Mappin
     return replace(scenario, targets=tuple(targets), bodies=tuple(bodies))
 
 
-def _mesh_called(name: str, target: str, meshes: Mapping[str, TriangleMesh]) -> TriangleMesh:
+def _mesh_called(name: str, target: str, meshes: Mapping[str, Path]) -> TriangleMesh:
     if name not in meshes:
         raise ParameterError(f"The mesh of '{target}' is '{name:.80}', and the study has no such file: check its name.")
-    return meshes[name]
+    return _shape_in(meshes[name])
+
+
+@lru_cache(maxsize=MOST_MESHES_KEPT)
+def _shape_in(copy: Path) -> TriangleMesh:
+    """Return the mesh in a copy; if its faces pointed inwards, the beginning of the study has warned of it."""
+    return outward_faces(load_mesh(copy), copy.name)[0]
 
 
 def _varied_body(body: Body, changes: Iterable[tuple[tuple[str, ...], Any]], scenario: Scenario) -> Body:

@@ -9,7 +9,7 @@ from study_scenes import BALL_RADIUS, HEAD, tiny_scene
 from palpate.core.errors import PalpateError
 from palpate.core.geometry.mesh import mass_properties
 from palpate.core.io.input_files import load_mesh
-from palpate.core.study.design import find_meshes, freeze_meshes, points_of
+from palpate.core.study.design import columns_of, find_meshes, freeze_meshes
 from palpate.core.study.study_file import Runs, plan_for, read_study
 from palpate.core.study.variation import varied_scenario
 
@@ -33,7 +33,7 @@ def plan_in(folder):
 
 def test_a_pattern_stands_for_its_files_and_runs_do_not_need_them(folder):
     study, plan = plan_in(folder)
-    names = [point["Ball.mesh"] for point in points_of(study.design, plan.varied)]
+    names = columns_of(study.design, plan.varied)["Ball.mesh"].tolist()
     assert names == ["shapes/ball.stl", "shapes/box.stl", "cone.ply"]
     for file in ("shapes/ball.stl", "shapes/box.stl", "cone.ply"):
         (folder / file).unlink()
@@ -58,7 +58,7 @@ def test_a_shape_whose_faces_point_inwards_is_turned(folder):
     inverted.export(folder / "cone.ply")
     with pytest.warns(UserWarning, match="faces of 'cone.ply' point inwards"):
         _, plan = plan_in(folder)
-    mesh = plan.meshes["cone.ply"]
+    mesh = varied_scenario(plan.scenario, {"Ball.mesh": "cone.ply"}, None, plan.meshes).targets[0].mesh
     assert trimesh.Trimesh(mesh.vertices, mesh.triangles).volume == pytest.approx(-inverted.volume, rel=1e-6)
 
 

@@ -88,6 +88,16 @@ def test_runs_have_different_digests_and_the_same_every_time():
     )
 
 
+def test_too_many_runs_of_a_grid_are_refused_before_they_are_made():
+    text = (
+        HEAD
+        + "design = 'grid'\n[vary]\n"
+        + "".join(f"'Pad.{name}' = {{ uniform = [1, 2], levels = 2000 }}\n" for name in ("k", "gain"))
+    )
+    with pytest.raises(PalpateError, match=r"asks for 4e\+06 runs"):
+        Runs(study(text), {"tiny": plan(text)}, {"tiny": "abc"})
+
+
 def test_several_scenes_have_a_column():
     text = RANDOM + "[vary]\n'Pad.k' = { uniform = [1, 2] }"
     plans = {"one": plan(text), "two": plan(text)}

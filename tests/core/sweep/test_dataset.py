@@ -20,7 +20,6 @@ from palpate.core.response import slipping
 from palpate.core.study.study_file import read_study
 from palpate.sweep import dataset, lerobot
 from palpate.sweep.dataset import publish
-from palpate.sweep.features import FrameStyle
 
 pyarrow = pytest.importorskip("pyarrow")
 parquet = pytest.importorskip("pyarrow.parquet")
@@ -210,7 +209,7 @@ def test_a_dataset_that_cannot_take_its_place_leaves_the_earlier_one(tmp_path, m
 def test_a_study_may_ask_for_points_and_half_precision(tmp_path):
     """Lists in the order of meta/texels.parquet hold what pictures hold, and 16 bits hold it with the error that is stated."""
     plain = published(new_study(tmp_path / "plain"), loads(3))
-    points = published(new_study(tmp_path / "points"), loads(3, style=FrameStyle(points=True, dtype="float16")))
+    points = published(new_study(tmp_path / "points"), loads(3, points=True, half_precision=True))
     info = json.loads((points / "dataset" / "meta" / "info.json").read_text(encoding="utf-8"))["features"]
     for name, shape in (("observation.tactile.pad", [15, 3]), ("observation.reading.pad", [15]), ("contact.touch.pad", [15])):
         assert info[name]["shape"] == shape
@@ -223,7 +222,7 @@ def test_a_study_may_ask_for_points_and_half_precision(tmp_path):
     assert (error <= np.maximum(2.0**-11 * np.abs(pictures), 3e-8)).all() and error.max() > 0.0
 
 
-@pytest.mark.parametrize(("style", "load", "bits"), [(FrameStyle(), 1e40, 32), (FrameStyle(dtype="float16"), 1e6, 16)])
-def test_a_number_that_its_bits_cannot_hold_is_refused(style, load, bits):
+@pytest.mark.parametrize(("is_half", "load", "bits"), [(False, 1e40, 32), (True, 1e6, 16)])
+def test_a_number_that_its_bits_cannot_hold_is_refused(is_half, load, bits):
     with pytest.raises(PalpateError, match=f"A number of 'observation.tactile.pad' is too large for {bits} bits"):
-        made_up(5, {}, load=load, style=style)
+        made_up(5, {}, load=load, half_precision=is_half)
