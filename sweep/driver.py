@@ -27,8 +27,6 @@ BATCHES_EACH = 4
 """Batches of a short study for each worker, so that all end at about the same time."""
 RETRIES = 2
 """How often Dask repeats a batch whose files could not be written."""
-MOST_FAILURES = 100
-"""Failed runs whose sentences the driver keeps."""
 LOOK = 0.1
 """Seconds between two looks at the keyboard."""
 
@@ -239,7 +237,7 @@ class Dispatch:
         found = future.result()  # waits where a result is lost with its worker, as Dask computes it again
         self.over.done += found.done
         self.over.seconds += found.seconds
-        self._note_failed(found.failures, found.failed)
+        self.over.failures += found.failures
         return []
 
     def _note_fatal(self, index: int) -> None:
@@ -247,11 +245,7 @@ class Dispatch:
         advice = f"raise run_memory, {memory:g} MB" if memory else "it may need more memory"
         sentence = f"Run {index} ended its worker each time that it was computed: {advice}, or vary less widely."
         write_part(self.opened.folder, [RunResult(self.opened.runs[index], sentence)])
-        self._note_failed([(index, sentence)], 1)
-
-    def _note_failed(self, failures: list[tuple[int, str]], count: int) -> None:
-        self.over.failed += count
-        self.over.failures += failures[: MOST_FAILURES - len(self.over.failures)]
+        self.over.failures.append((index, sentence))
 
 
 def _scheduler_gone() -> PalpateError:

@@ -178,8 +178,8 @@ class BatchResult:
 
     Attributes
     ----------
-    done, failed : int
-        Runs.
+    done : int
+        Number of runs.
     seconds : float
         That all of them took.
     failures : list of (int, str)
@@ -187,9 +187,13 @@ class BatchResult:
     """
 
     done: int = 0
-    failed: int = 0
     seconds: float = 0.0
     failures: list[tuple[int, str]] = field(default_factory=list)
+
+    @property
+    def failed(self) -> int:
+        """Number of runs that failed."""
+        return len(self.failures)
 
     @property
     def finished(self) -> int:
@@ -388,7 +392,6 @@ def compute_batch(
         batch.seconds += result.seconds
         batch.done += not result.message
         if result.message:
-            batch.failed += 1
             batch.failures.append((index, result.message))
         if sum(one.size for one in waiting) > PART_BYTES or not _same_layout(waiting, result):
             write_part(place, waiting)

@@ -11,7 +11,6 @@ from sample_bake import grid_texels, recording_of, round_texels, write_sensor
 
 from palpate.commands import export as export_command
 from palpate.commands import main
-from palpate.core.export.format_table import FORMATS
 from palpate.core.io.bake_reader import read_bake
 from palpate.core.model.sensor_parameters import SensorParameters
 
@@ -38,12 +37,6 @@ def test_one_bake_is_one_episode(tmp_path):
     assert info["features"]["observation.reading.pad"]["palpate"]["unit"] == "V"
     assert parquet.read_table(found / "meta" / "texels.parquet").num_rows == sum(map(len, bake.texels.values()))
     assert not [name for name in info["features"] if name.startswith("varied.")]
-
-
-def test_the_name_of_the_format_is_no_other_ones():
-    from palpate.sweep.bake_dataset import EXPORTER
-
-    assert EXPORTER.name == export_command.LEROBOT and EXPORTER.name not in FORMATS
 
 
 def test_the_extension_without_studies_says_so(tmp_path, capsys, monkeypatch):

@@ -75,18 +75,6 @@ def test_pandas_opens_the_dataset(study):
     assert pandas.read_parquet(study / "dataset" / "meta" / "tasks.parquet").index[0] == "presses"
 
 
-def test_a_dataset_in_a_bucket_is_read_as_one_on_the_disk(study):
-    """By fsspec's file system in memory, which pandas opens as it opens S3."""
-    pandas, fsspec = (pytest.importorskip(name, exc_type=ImportError) for name in ("pandas", "fsspec"))
-    bucket = fsspec.filesystem("memory")
-    bucket.put(str(study / "dataset"), "/bucket/dataset", recursive=True)
-    try:
-        found = pandas.read_parquet("memory://bucket/dataset/data")
-    finally:
-        bucket.rm("/bucket", recursive=True)
-    pandas.testing.assert_frame_equal(found, pandas.read_parquet(study / "dataset" / "data"))
-
-
 def test_duckdb_opens_the_dataset(study):
     duckdb = pytest.importorskip("duckdb", exc_type=ImportError)
     path = study / "dataset" / "data" / "*" / "*.parquet"

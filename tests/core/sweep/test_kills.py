@@ -175,18 +175,6 @@ def test_a_stopped_study_goes_on_where_it_was(tmp_path):
     assert rows_of(out) == undisturbed(tmp_path / "expected", RUNS)[0]
 
 
-@pytest.mark.long("starts the command twice, each with workers")
-def test_two_commands_at_once(tmp_path):
-    study, out = write_study(tmp_path, 300), tmp_path / "out"
-    command = ("palpate.commands", "sweep", str(study), "--out", str(out), "--workers", "1")
-    with started(*command) as first:
-        until(lambda: sum(counted_runs(out)) > 0 or first.poll() is not None, "the first part")
-        with started(*command) as second:
-            said = second.communicate(timeout=LONGEST)[0]
-        assert second.returncode == 1 and "Another sweep is writing to" in said
-        assert "300 runs: 300 done, 0 failed, 0 left" in first.communicate(timeout=LONGEST)[0]
-
-
 @pytest.mark.long("a run that ends its worker three times")
 @pytest.mark.parametrize(("job", "more"), [(FATAL, ""), (HUNGRY, "run_memory = 600\n")])
 def test_a_run_that_ends_its_worker_fails_alone(tmp_path, job, more):

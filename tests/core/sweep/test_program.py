@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from small_study import begun
 
+from palpate.commands import main
 from palpate.core.errors import PalpateError
 from palpate.core.study.study_file import study_of
 from palpate.sweep.parts import Parts
@@ -31,6 +32,7 @@ loud = true
 """
 JOB = """
 import json
+from palpate.commands import main
 from palpate.core.errors import PalpateError
 
 def fingerprint():
@@ -51,18 +53,15 @@ def write(folder: Path, text: str = STUDY, job: str = JOB) -> Path:
     return folder / "study.toml"
 
 
-def sweep(*words) -> subprocess.CompletedProcess:
-    command = [sys.executable, "-m", "palpate.commands", "sweep", *map(str, words)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
-
-
 def computed(opened: OpenStudy) -> BatchResult:
     return compute_batch(range(len(opened.runs)), str(opened.folder), ALLOW)
 
 
 @pytest.mark.slow("the one study of a job from the command line in this tier")
-def test_a_job_computes_its_runs(tmp_path):
-    finished = sweep(write(tmp_path), "--out", tmp_path / "out", "--allow-scripts", "--workers", 1)
+def test_a_job_computes_its_runs(tmp_path, capsys):
+    words = ["sweep", str(write(tmp_path)), "--out", str(tmp_path / "out"), "--allow-scripts", "--workers", "1"]
+    command = [sys.executable, "-m", "palpate.commands", *words]
+    finished = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert (finished.returncode, finished.stderr) == (0, "")
     assert "6 runs: 5 done, 1 failed, 0 left" in finished.stdout
     assert "Three is too many." in finished.stdout
@@ -81,21 +80,20 @@ def test_a_job_computes_its_runs(tmp_path):
     assert "metric.nothing" not in table[0]
     assert not (tmp_path / "out" / "dataset").exists()
     assert (tmp_path / "out" / "report.html").is_file()
-    again = sweep(tmp_path / "out")  # nothing is left to run, so no Python is
-    assert (again.returncode, again.stderr) == (0, "")
-    refused = sweep(tmp_path / "out", "--retry-failed")
-    assert (refused.returncode, refused.stderr.count("\n")) == (1, 1)
-    assert "--allow-scripts" in refused.stderr
+    assert main(["sweep", str(tmp_path / "out")]) == 0  # nothing is left to run, so no Python is
+    assert main(["sweep", str(tmp_path / "out"), "--retry-failed"]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "--allow-scripts" in line
 
 
-def test_a_job_needs_permission_and_nothing_of_it_is_run_before(tmp_path):
-    refused = sweep(write(tmp_path, job="open('mine', 'w')\n" + JOB), "--out", tmp_path / "out")
-    assert refused.returncode == 1
-    assert refused.stderr == (
+def test_a_job_needs_permission_and_nothing_of_it_is_run_before(tmp_path, capsys):
+    file = write(tmp_path, job=f"open({str(tmp_path / 'mine')!r}, 'w')\n" + JOB)
+    assert main(["sweep", str(file), "--out", str(tmp_path / "out")]) == 1
+    assert capsys.readouterr().err == (
         "palpate sweep: The study runs the Python of 'count.py': add --allow-scripts if you trust the file.\n"
     )
     assert not (tmp_path / "out").exists()
-    assert not Path("mine").exists()
+    assert not (tmp_path / "mine").exists()
     folder = begun(write(tmp_path)).folder
     with pytest.raises(PalpateError, match="--allow-scripts"):
         RunComputer(resume_study(folder), REFUSE)

@@ -12,6 +12,7 @@ from sample_bake import read_exr
 from small_study import begun, rows_of, write_study
 from study_scenes import HEAD, tiny_scene
 
+from palpate.commands import main
 from palpate.core.errors import PalpateError
 from palpate.core.io.bake_folder import IMAGE_LIST_NAME, check_sha256, frame_file, read_checksums, read_manifest
 from palpate.core.io.bake_reader import read_bake
@@ -21,6 +22,7 @@ from palpate.core.study.study_file import part_files
 from palpate.sweep import driver
 from palpate.sweep.driver import dask_client
 from palpate.sweep.parts import Parts, RunResult, write_part
+from palpate.sweep.studies import locked_folder
 from palpate.sweep.study_folder import begin_study, resume_study
 from palpate.sweep.trial import FIXED_SECONDS, Estimate, try_study
 from palpate.sweep.worker import compute_batch
@@ -87,16 +89,6 @@ def test_a_run_holds_what_it_promises(undisturbed, tmp_path):
     }
 
 
-@pytest.mark.long("exports a study from the command line")
-def test_a_finished_study_is_exported(undisturbed):
-    h5py = pytest.importorskip("h5py")
-    finished = sweep(undisturbed, "--format", "hdf5")
-    assert (finished.returncode, finished.stderr) == (0, "")
-    assert f"export: {undisturbed / 'dataset.h5'}" in finished.stdout.splitlines()
-    with h5py.File(undisturbed / "dataset.h5") as file:
-        assert len(file["episodes/run"]) == 24
-
-
 @pytest.mark.long("computes a study twice")
 def test_failed_runs_are_left_alone_until_they_are_asked_for(undisturbed, tmp_path):
     folder = tmp_path / "study"
@@ -116,14 +108,21 @@ def test_failed_runs_are_left_alone_until_they_are_asked_for(undisturbed, tmp_pa
     assert (folder / "runs.parquet").read_bytes() == (undisturbed / "runs.parquet").read_bytes()
 
 
-@pytest.mark.slow("starts the command twice")
-def test_another_study_in_the_same_folder_is_refused(undisturbed, tmp_path):
-    refused = sweep(write(tmp_path, STUDY.replace("24", "25").replace("2e-3", "3e-3")), "--out", undisturbed)
-    assert refused.returncode == 1
-    (line,) = refused.stderr.splitlines()
+def test_another_study_in_the_same_folder_is_refused(undisturbed, tmp_path, capsys):
+    study = write(tmp_path, STUDY.replace("24", "25").replace("2e-3", "3e-3"))
+    assert main(["sweep", str(study), "--out", str(undisturbed)]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
     assert "samples was 24 and is 25" in line
     assert "press.depth was" in line
-    assert sweep(undisturbed, "--status").stdout == "24 runs: 24 done, 0 failed, 0 left\n"
+    assert main(["sweep", str(undisturbed), "--status"]) == 0
+    assert capsys.readouterr().out == "24 runs: 24 done, 0 failed, 0 left\n"
+
+
+def test_a_folder_that_another_command_writes_to_is_refused(tmp_path, capsys):
+    study, out = write(tmp_path), tmp_path / "out"
+    with locked_folder(study, out):
+        assert main(["sweep", str(study), "--out", str(out)]) == 1
+    assert "Another sweep is writing to" in capsys.readouterr().err
 
 
 def test_a_folder_of_an_earlier_version_is_one_sentence(undisturbed, tmp_path):
@@ -134,19 +133,17 @@ def test_a_folder_of_an_earlier_version_is_one_sentence(undisturbed, tmp_path):
         resume_study(tmp_path / "out")
 
 
-def test_mistakes_are_one_line_and_begin_nothing(tmp_path):
-    refused = sweep(write(tmp_path, STUDY.replace("Pad.k", "Pad.kk")))
-    assert refused.returncode == 1
-    assert refused.stderr == "palpate sweep: There is no 'Pad.kk' to vary in 'tiny': did you mean 'Pad.k'?\n"
+def test_mistakes_are_one_line_and_begin_nothing(tmp_path, capsys):
+    assert main(["sweep", str(write(tmp_path, STUDY.replace("Pad.k", "Pad.kk")))]) == 1
+    assert capsys.readouterr().err == "palpate sweep: There is no 'Pad.kk' to vary in 'tiny': did you mean 'Pad.k'?\n"
     assert not (tmp_path / "study").exists()
 
 
-def test_names_are_listed_for_a_study_with_a_wrong_one_and_for_a_scene(tmp_path):
+def test_names_are_listed_for_a_study_with_a_wrong_one_and_for_a_scene(tmp_path, capsys):
     study = write(tmp_path, STUDY.replace("Pad.k", "Pad.kk"))
     for place in (study, tmp_path / "tiny.npz"):
-        listed = sweep(place, "--list")
-        assert (listed.returncode, listed.stderr) == (0, "")
-        assert listed.stdout.startswith("tiny:\n  Pad.k N/m: a value above zero\n")
+        assert main(["sweep", str(place), "--list"]) == 0
+        assert capsys.readouterr().out.startswith("tiny:\n  Pad.k N/m: a value above zero\n")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["study.toml", "tiny.npz"]
 
 
@@ -209,7 +206,8 @@ def test_other_limits_hold_for_the_same_study(undisturbed, tmp_path):
 
 @pytest.mark.long("computes a study in five commands")
 def test_parts_make_the_whole(undisturbed, tmp_path):
-    """As on a farm: the study is begun, its parts are computed by themselves, and a last command makes the dataset."""
+    """As on a farm: the study is begun, its parts are computed by themselves, and a last command exports the dataset."""
+    h5py = pytest.importorskip("h5py")
     study, out = write(tmp_path), tmp_path / "out"
     refused = sweep(study, "--out", out, "--part", "1/2")
     assert (refused.returncode, refused.stderr.count("\n")) == (1, 1)
@@ -221,10 +219,12 @@ def test_parts_make_the_whole(undisturbed, tmp_path):
         assert (finished.returncode, finished.stderr) == (0, "")
         assert len(Parts(out).done) == count
     assert not (out / "dataset").exists()
-    finished = sweep(out)
+    finished = sweep(out, "--format", "hdf5")
     assert (finished.returncode, finished.stderr) == (0, "")
     assert rows_of(out) == rows_of(undisturbed)
-    assert (out / "dataset").is_dir()
+    assert f"export: {out / 'dataset.h5'}" in finished.stdout.splitlines()
+    with h5py.File(out / "dataset.h5") as file:
+        assert len(file["episodes/run"]) == 24
 
 
 @pytest.mark.slow("bakes the images of a run")
