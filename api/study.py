@@ -83,7 +83,7 @@ def run_study(
         The study or a scene cannot be used, or a package is missing.
     """
     require_studies()
-    from ..sweep import driver, exports, studies
+    from ..sweep import driver, exports, studies, study_folder
     from .running import shown
 
     arguments.known([scripts], SCRIPTS, "value of scripts")
@@ -94,7 +94,7 @@ def run_study(
     target = studies.output_folder(place, None if folder is None else Path(folder))
     number = None if workers is None else arguments.count(workers, "workers")
     with studies.locked_folder(place, target):
-        opened = studies.open_study(place, target, scripts)
+        opened = study_folder.open_study(place, target, scripts)
         with shown(progress, "sweep", "run") as show:
             failures = studies.compute_runs(opened, show, number, scripts, retry_failed)
         found, written = studies.write_results(opened, formats)

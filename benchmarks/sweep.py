@@ -40,7 +40,7 @@ from palpate.core.solver.simulation import Simulation
 from palpate.core.study.variation import varied_scenario
 from palpate.sweep.dataset import publish
 from palpate.sweep.report import write_report
-from palpate.sweep.study_folder import OpenStudy, begin_study
+from palpate.sweep.study_folder import OpenStudy, open_study
 from palpate.sweep.worker import compute_batch
 
 from .solver import GRIDS, mujoco_pad, pad
@@ -84,7 +84,7 @@ def begun(folder: Path, hold: float, texels: int, count: int) -> OpenStudy:
         f"[press]\ndepth = {{ uniform = [{DEPTH / 2}, {DEPTH}] }}\nspeed = {SPEED}\nhold = {hold}\n",
         encoding="utf-8",
     )
-    return begin_study(folder / "study.toml", folder / "out")
+    return open_study(folder / "study.toml", folder / "out")
 
 
 def in_turn(*works: Callable[[range], object], count: int) -> list[float]:

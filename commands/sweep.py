@@ -126,9 +126,9 @@ def _part(text: str) -> tuple[int, int]:
 
 
 def _opened(place: Path, folder: Path, arguments: argparse.Namespace) -> OpenStudy:
-    from ..sweep import studies
+    from ..sweep import study_folder
 
-    return studies.open_study(place, folder, arguments.scripts, console.Interrupt.check)
+    return study_folder.open_study(place, folder, arguments.scripts, console.Interrupt.check)
 
 
 def _print_names(place: Path, arguments: argparse.Namespace) -> None:

@@ -18,11 +18,11 @@ from ..core.io.file_writing import writable_folder
 from ..core.io.hidden_folder import PRIVATE_FOLDER, FolderLock
 from ..core.jobs import Progress
 from ..core.study.study_file import STUDY_NAME, read_study
-from . import driver, study_folder
+from . import driver
 from .parts import Parts, remove_unfinished_parts
 from .program import require_allowed
 from .scene_evaluation import REFUSE
-from .study_folder import OpenStudy
+from .study_folder import OpenStudy, frozen_of
 from .worker import BatchResult
 
 
@@ -54,7 +54,7 @@ def status_of(folder: Path) -> Status:
     if not (folder / STUDY_NAME).is_file():
         raise FileError(f"There is no study in '{folder}': give the folder that a study was run in.")
     parts = Parts(folder)
-    return Status(study_folder.frozen_of(read_study(folder / STUDY_NAME), folder).runs, len(parts.done), len(parts.failed))
+    return Status(frozen_of(read_study(folder / STUDY_NAME), folder).runs, len(parts.done), len(parts.failed))
 
 
 def output_folder(place: Path, out: Path | str | None) -> Path:
@@ -77,15 +77,6 @@ def locked_folder(place: Path, folder: Path) -> Iterator[None]:
         lock.release()
         if is_new and [path.name for path in folder.iterdir()] == [PRIVATE_FOLDER]:
             shutil.rmtree(folder, ignore_errors=True)
-
-
-def open_study(place: Path, folder: Path, scripts: str, check: Callable[[], object] = lambda: None) -> OpenStudy:
-    """Open a study by its file or folder; a .blend is read in a Blender of its own, which is gone before the runs begin.
-
-    `check` is called after each scene, and may raise to stop.
-    """
-
-    return study_folder.resume_study(folder) if place.is_dir() else study_folder.begin_study(place, folder, scripts, check)
 
 
 def compute_runs(

@@ -71,14 +71,15 @@ class OpenStudy:
     runs: Runs
 
 
-def begin_study(file: Path, folder: Path, scripts: str = REFUSE, check: Callable[[], object] = lambda: None) -> OpenStudy:
-    """Open a study by its file: freeze it in an empty folder, or go on in the folder of the same study.
+def open_study(place: Path, folder: Path, scripts: str = REFUSE, check: Callable[[], object] = lambda: None) -> OpenStudy:
+    """Open a study by its folder, or by its file: freeze it in an empty folder, or go on in the folder of the same study.
 
     Parameters
     ----------
-    file : Path
+    place : Path
+        File, or output folder.
     folder : Path
-        Made if it is missing.
+        Output folder, which is made if it is missing.
     scripts : str
         What is done about the Python of a .blend or a program, one of :data:`.scene_evaluation.SCRIPTS`.
     check : callable
@@ -90,21 +91,23 @@ def begin_study(file: Path, folder: Path, scripts: str = REFUSE, check: Callable
         The file or a scene cannot be read, a program is not allowed, the folder holds something else, or another study, or this
         one with another scene.
     """
-    study, read = read_study(file), _blend_reader(scripts, check, "--study", str(file))
-    sources = _sources(study, file.parent)
+    if place.is_dir():
+        return resume_study(folder)
+    study, read = read_study(place), _blend_reader(scripts, check, "--study", str(place))
+    sources = _sources(study, place.parent)
     if (folder / STUDY_NAME).exists():
         opened = resume_study(folder)
         changed = differences(opened.study, study)
         if changed:
             raise FileError(f"'{folder}' belongs to another study ({'; '.join(changed)}): give another folder with --out.")
-        _check_sources(opened, sources, file.parent, read)
+        _check_sources(opened, sources, place.parent, read)
         # No result depends on the limits.
         return replace(opened, study=replace(opened.study, run_limit=study.run_limit, run_memory=study.run_memory))
     if folder.exists() and (not folder.is_dir() or {path.name for path in folder.iterdir()} - {*MADE, STUDY_NAME, ".palpate"}):
         raise FileError(f"'{folder}' holds other files and no study: give a new or empty folder with --out.")
     program.require_allowed(study, scripts)
     with _whole_or_nothing(folder):
-        return _frozen(study, file, folder, sources, read)
+        return _frozen(study, place, folder, sources, read)
 
 
 def _blend_reader(scripts: str, check: Callable[[], object], *words: str) -> ReadBlend:
@@ -155,7 +158,7 @@ def scenarios_of(place: Path, scripts: str, check: Callable[[], object]) -> dict
     place : Path
         The file of a study, the folder of one, or a scene.
     scripts, check
-        As of :func:`begin_study`.
+        As of :func:`open_study`.
 
     Returns
     -------

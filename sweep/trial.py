@@ -13,8 +13,7 @@ from pathlib import Path
 from ..core.study.study_file import PARTS, RUNS, SCENES, STUDY_NAME
 from .dataset import DATASET_FOLDER, publish
 from .scene_evaluation import REFUSE
-from .studies import open_study
-from .study_folder import OpenStudy
+from .study_folder import OpenStudy, open_study
 from .worker import compute_batch
 
 RUNS_TRIED, QUICK_RUNS, QUICK_SECONDS = 5, 50, 0.5
@@ -51,7 +50,7 @@ class Estimate:
 
 
 def try_study(place: Path, scripts: str = REFUSE, check: Callable[[], object] = lambda: None) -> tuple[OpenStudy, Estimate]:
-    """Compute some runs, spread over a study, in a folder that is removed; parameters as of :func:`.studies.open_study`."""
+    """Compute some runs, spread over a study, in a folder that is removed; parameters as of :func:`.open_study`."""
     with tempfile.TemporaryDirectory(prefix="palpate-sweep-") as name:
         trial = Path(name)
         if place.is_dir():

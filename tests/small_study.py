@@ -14,7 +14,7 @@ from palpate.core.io.scenario_npz import save_scenario
 from palpate.core.model.scenario import Scenario
 from palpate.sweep.parts import Parts
 from palpate.sweep.scene_evaluation import ALLOW
-from palpate.sweep.study_folder import OpenStudy, begin_study
+from palpate.sweep.study_folder import OpenStudy, open_study
 
 STUDY = """format = "palpate-sweep/1"
 name = "small presses"
@@ -51,7 +51,7 @@ def write_study(folder: Path, runs: int, seed: int = 1, fails: bool = False, mor
 
 def begun(file: Path) -> OpenStudy:
     """Open a study in the folder ``out`` beside its file."""
-    return begin_study(file, file.parent / "out", ALLOW)
+    return open_study(file, file.parent / "out", ALLOW)
 
 
 def rows_of(folder: Path) -> list[dict[str, Any]]:

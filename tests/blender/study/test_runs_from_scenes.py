@@ -16,7 +16,7 @@ from palpate.core.io.recording_npz import load_recording
 from palpate.core.jobs import run_job
 from palpate.core.solver.simulation import run
 from palpate.core.study.variation import varied_scenario
-from palpate.sweep.study_folder import begin_study, resume_study
+from palpate.sweep.study_folder import open_study, resume_study
 from palpate.sweep.worker import compute_batch
 
 SCALE = 'bpy.data.objects["Ball"].scale[2]'
@@ -35,7 +35,7 @@ def begun(folder, text=STUDY):
     save(folder)
     study = folder / "study.toml"
     study.write_text(text, encoding="utf-8")
-    return begin_study(study, folder / "out")
+    return open_study(study, folder / "out")
 
 
 def computed(opened):

@@ -5,14 +5,14 @@ import pytest
 from small_study import rows_of
 from solver_scenes import GRAVITY
 
-from palpate.sweep.study_folder import begin_study
+from palpate.sweep.study_folder import open_study
 from palpate.sweep.worker import compute_batch
 
 
 def finished(folder, tmp_path, name: str, order, count: int) -> list[dict]:
     """Compute the first and the last runs of a sample study by an order of their values, and return what they say."""
     file = folder / f"{name}.toml"
-    opened = begin_study(file, tmp_path / name)
+    opened = open_study(file, tmp_path / name)
     ordered = sorted(opened.runs, key=lambda run: order(run.values))
     chosen = [run.index for run in (*ordered[:count], *ordered[-count:])]
     assert compute_batch(chosen, str(opened.folder)).done == 2 * count

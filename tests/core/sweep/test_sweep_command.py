@@ -23,7 +23,7 @@ from palpate.sweep import driver
 from palpate.sweep.driver import dask_client
 from palpate.sweep.parts import Parts, RunResult, write_part
 from palpate.sweep.studies import locked_folder
-from palpate.sweep.study_folder import begin_study, resume_study
+from palpate.sweep.study_folder import open_study, resume_study
 from palpate.sweep.trial import FIXED_SECONDS, Estimate, try_study
 from palpate.sweep.worker import compute_batch
 
@@ -92,7 +92,7 @@ def test_a_run_holds_what_it_promises(undisturbed, tmp_path):
 @pytest.mark.long("computes a study twice")
 def test_failed_runs_are_left_alone_until_they_are_asked_for(undisturbed, tmp_path):
     folder = tmp_path / "study"
-    opened = begin_study(write(tmp_path), folder)
+    opened = open_study(write(tmp_path), folder)
     write_part(folder, [RunResult(run, "The lamp went out.") for run in opened.runs[::20]])
     finished = sweep(folder, "--workers", 1)
     assert (finished.returncode, finished.stderr) == (0, "")
@@ -200,7 +200,7 @@ def test_other_limits_hold_for_the_same_study(undisturbed, tmp_path):
     folder = tmp_path / "out"
     shutil.copytree(undisturbed, folder)
     file = write(tmp_path, STUDY.replace("fps = 200", "fps = 200\nrun_limit = 77\nrun_memory = 999"))
-    study = begin_study(file, folder).study
+    study = open_study(file, folder).study
     assert (study.run_limit, study.run_memory) == (77.0, 999.0)
 
 
