@@ -42,7 +42,6 @@ from ..core.study.study_file import (
 )
 from ..core.version import VERSION
 from . import program
-from .parts import FORMAT as PARTS_FORMAT
 from .scene_evaluation import REFUSE, read_blend
 
 BLEND, SCENARIO = ".blend", ".npz"
@@ -131,7 +130,7 @@ def _frozen(study: Study, file: Path, folder: Path, sources: Mapping[str, Path],
         entries.append(FrozenFile(source.name, file_sha256(source), name, digest))
     runs = Runs(study, plans, _digests(plans, entries))
     mesh_entries = tuple(FrozenFile(name, copy.stem) for name, copy in meshes.items())
-    frozen = Frozen(VERSION, len(runs), tuple(entries), mesh_entries, PARTS_FORMAT)
+    frozen = Frozen(VERSION, len(runs), tuple(entries), mesh_entries)
     text = frozen_text(file.read_text(encoding="utf-8"), frozen)
     with atomic_write(folder / STUDY_NAME) as fresh:
         fresh.write_text(text, encoding="utf-8", newline="\n")
@@ -203,11 +202,6 @@ def resume_study(folder: Path) -> OpenStudy:
         raise FileError(f"There is no study in '{folder}': give the file of a study, or the folder that it was run in.")
     study = read_study(folder / STUDY_NAME)
     frozen = frozen_of(study, folder)
-    if frozen.parts != PARTS_FORMAT:
-        raise FileError(
-            f"The runs in '{folder}' are in files of an earlier version, Palpate {frozen.version}, which this one does not "
-            "read: go on with that one, or give another folder with --out."
-        )
     if frozen.version != VERSION:
         raise FileError(
             f"The study in '{folder}' was begun with Palpate {frozen.version}, and this is {VERSION}, which may compute other "

@@ -130,13 +130,12 @@ class FrozenFile:
 
 @dataclass(frozen=True)
 class Frozen:
-    """Table ``[frozen]`` of the study in an output folder: versions of Palpate and of the parts, number of runs, and files."""
+    """Table ``[frozen]`` of the study in an output folder: version of Palpate, number of runs, and files."""
 
     version: str
     runs: int
     scenes: Annotated[tuple[FrozenFile, ...], msgspec.Meta(min_length=1)]
     meshes: tuple[FrozenFile, ...] = ()
-    parts: str = ""
 
 
 @dataclass(frozen=True)

@@ -72,7 +72,7 @@ def test_differences_are_named():
 
 def test_the_frozen_text_is_the_study_again():
     text = RANDOM + "[vary]\n'Pad.k' = { uniform = [1, 2] }\n"
-    own = Frozen("1", 4, (FrozenFile("tiny.npz", "ab", "tiny", "cd"),), (FrozenFile("ball.stl", "ef"),), "parts/1")
+    own = Frozen("1", 4, (FrozenFile("tiny.npz", "ab", "tiny", "cd"),), (FrozenFile("ball.stl", "ef"),))
     frozen = study(frozen_text(text, own))
     assert differences(frozen, study(text)) == []
     assert frozen.frozen == own
