@@ -38,7 +38,7 @@ class CouplingMatrix:
     def apply(self, signal: np.ndarray) -> np.ndarray:
         """Return the coupled signal, (t, n) float."""
         if self.matrix is not None:
-            return signal @ self.matrix.T
+            return coupled(signal, self.matrix)
         result = np.zeros_like(signal)
         starts = np.flatnonzero(np.diff(self.target, prepend=-1))
         for i in range(len(signal)):
@@ -54,6 +54,13 @@ class CouplingMatrix:
         if self.matrix is None:
             return replace(self, weight=self.weight / by[self.source])
         return replace(self, matrix=self.matrix / by)
+
+
+def coupled(signal: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    """Return ``signal @ matrix.T``, (t, n) float, of the texels that have a signal: a small indenter touches few of them."""
+    (source,) = np.nonzero((signal != 0.0).any(axis=0))
+    result: np.ndarray = signal[:, source] @ matrix[:, source].T
+    return result
 
 
 def coupling_matrix(

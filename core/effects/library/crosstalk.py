@@ -8,7 +8,7 @@ import numpy as np
 from ...errors import EffectError
 from ...model.parameter import Parameter
 from ...model.sensor import Values
-from ..engine.coupling_matrix import CouplingMatrix, coupling_matrix, nearest_distance
+from ..engine.coupling_matrix import LARGEST_DENSE, CouplingMatrix, coupled, coupling_matrix, nearest_distance
 from ..engine.specification import Drawing, Form, Kind, TransducerArray, scalar
 
 
@@ -48,9 +48,11 @@ def wires(signal: np.ndarray, time: np.ndarray, values: Values, transducers: Tra
     """Couple the wires of the rows with each other, and those of the columns, the less the farther apart they are."""
     share, fall = scalar(values, "share"), scalar(values, "fall")
     row, column = (np.unique(line, return_inverse=True)[1] for line in _rows_and_columns(transducers, "wires"))
-    table = np.zeros((len(signal), int(row.max()) + 1, int(column.max()) + 1))
+    across, along = (_coupled_wires(int(line.max()) + 1, share, fall) for line in (row, column))
+    if len(transducers) <= LARGEST_DENSE:  # one product is faster than many of small tables
+        return coupled(signal, across[row[:, None], row] * along[column[:, None], column])
+    table = np.zeros((len(signal), len(across), len(along)))
     table[:, row, column] = signal
-    across, along = (_coupled_wires(count, share, fall) for count in table.shape[1:])
     return np.asarray((across @ table @ along)[:, row, column])
 
 
