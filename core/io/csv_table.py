@@ -154,17 +154,18 @@ def _complain(path: Path, line: int, names: Sequence[str], cells: Sequence[str])
 def _values(lines: Any, names: list[str], path: Path) -> np.ndarray:
     """(rows, columns) float: the cells of the lines that a reader of :mod:`csv` has left."""
     values, width = array("d"), len(names)
-    for cells in filter(_is_filled, lines):
+    for count, cells in enumerate(filter(_is_filled, lines)):
         if len(cells) != width:
             raise FileError(
                 f"Line {lines.line_num} of '{path.name}' has {len(cells)} cells and the header has {width}: "
                 "leave a missing value's cell empty, but keep its comma."
             )
         try:
-            row = [float(cell) if cell and not cell.isspace() else math.nan for cell in cells]
-        except ValueError:
+            values.extend(map(float, cells))
+        except ValueError:  # a missing value, or none at all
             _complain(path, lines.line_num, names, cells)
-        if not all(-LARGEST_NUMBER <= value <= LARGEST_NUMBER for value in row):  # false for NaN, too
+            del values[count * width :]
+            values.extend(float(cell.strip() or "nan") for cell in cells)
+        if not sum(map(abs, values[count * width :])) <= LARGEST_NUMBER:  # false for NaN, too
             _complain(path, lines.line_num, names, cells)
-        values.extend(row)
     return np.frombuffer(values, float).reshape(-1, width) if values else np.zeros((0, width))
