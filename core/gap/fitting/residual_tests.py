@@ -65,7 +65,7 @@ def residual_structure(predictors: Sequence[Predictor], residuals: Sequence[np.n
         halves = False
     found = [features(predictor, residual) for predictor, residual in zip(predictors, residuals, strict=True)]
     sizes = {name: len(columns) for groups in found for name, columns in groups.items()}
-    folds = []
+    parts, sums = [], []
     for number, (predictor, groups, residual) in enumerate(zip(predictors, found, residuals, strict=True)):
         table = _table(groups, sizes, residual.shape)
         missing = missing_readings(predictor)
@@ -75,18 +75,19 @@ def residual_structure(predictors: Sequence[Predictor], residuals: Sequence[np.n
         if halves:
             middle = len(residual) // 2
             part = slice(None, middle) if number == 0 else slice(middle, None)
-        folds.append((table[:, part].reshape(len(table), -1), residual[part]))
-    total = sum(float(np.vdot(r, r)) for _, r in folds)
+        x, r = table[:, part].reshape(len(table), -1), residual[part].ravel()
+        parts.append(residual[part])
+        sums.append((x @ x.T, x @ r, float(r @ r)))
+    total = sum(square for _, _, square in sums)
     if total <= 0:
         return ResidualStructure(0.0, dict.fromkeys(sizes, 0.0))
-    sums = [(x @ x.T, x @ r.ravel()) for x, r in folds]
     shares, start = {}, 0
     for name, size in sizes.items():
-        shares[name] = _share_predicted(folds, sums, np.arange(start, start + size), total)
+        shares[name] = _share_predicted(sums, np.arange(start, start + size))
         start += size
-    everything = _share_predicted(folds, sums, np.arange(start), total)
+    everything = _share_predicted(sums, np.arange(start))
     if residuals[0].shape[1] > 1 and not halves:
-        shares["texel"] = _share_predicted_by_texel(predictors, [r for _, r in folds], total)
+        shares["texel"] = _share_predicted_by_texel(predictors, parts, total)
         everything = 1.0 - (1.0 - max(everything, 0.0)) * (1.0 - max(shares["texel"], 0.0))
     return ResidualStructure(max(everything, *shares.values(), 0.0), {name: max(share, 0.0) for name, share in shares.items()})
 
@@ -96,18 +97,23 @@ def _table(groups: dict[str, np.ndarray], sizes: dict[str, int], shape: tuple[in
     return np.concatenate([groups.get(name, np.zeros((size, *shape))) for name, size in sizes.items()])
 
 
-def _share_predicted(
-    folds: list[tuple[np.ndarray, np.ndarray]], sums: list[tuple[np.ndarray, np.ndarray]], use: np.ndarray, total: float
-) -> float:
-    """Share of the squares that a ridge regression on some features predicts in folds that it has not seen."""
-    left = 0.0
-    for i, (x, r) in enumerate(folds):
-        a = sum((s[0] for j, s in enumerate(sums) if j != i), np.zeros(sums[0][0].shape))[np.ix_(use, use)]
-        b = sum((s[1] for j, s in enumerate(sums) if j != i), np.zeros(len(sums[0][1])))[use]
-        weights = np.linalg.solve(a + np.diag(1e-3 * np.diag(a) + 1e-9 * (1.0 + np.trace(a))), b)
-        miss = r.ravel() - weights @ x[use]
-        left += float(np.vdot(miss, miss))
-    return 1.0 - left / total
+def _share_predicted(sums: list[tuple[np.ndarray, np.ndarray, float]], use: np.ndarray) -> float:
+    """Share of the squares that a ridge regression on some features predicts in folds that it has not seen.
+
+    Parameters
+    ----------
+    sums : list of ((p, p) float, (p,) float, float)
+        Of each fold: products of the features with each other and with the residual, and the squares of the residual.
+    use : (f,) int
+        Features.
+    """
+    grams, products, squares = zip(*((a[np.ix_(use, use)], b[use], square) for a, b, square in sums), strict=True)
+    whole, along, left = sum(grams), sum(products), sum(squares)
+    for a, b in zip(grams, products, strict=True):
+        seen = whole - a
+        weights = np.linalg.solve(seen + np.diag(1e-3 * np.diag(seen) + 1e-9 * (1.0 + np.trace(seen))), along - b)
+        left += float(weights @ a @ weights - 2.0 * weights @ b)
+    return 1.0 - left / sum(squares)
 
 
 def _share_predicted_by_texel(predictors: Sequence[Predictor], residuals: Sequence[np.ndarray], total: float) -> float:
