@@ -297,8 +297,13 @@ def test_adhesion_ends_with_the_contact():
 def test_friction_laws():
     speed, load = np.array([0.0, 0.005, 0.01, 0.1]), np.array([0.5, 1.0, 2.0, 3.0])
     x = speed / 0.01
-    for form, shape in (("gaussian", np.exp(-(x**2))), ("exponential", np.exp(-x)), ("rational", 1 / (1 + x**2))):
-        factor, viscous = friction_factors((effect("stribeck", form, rise=0.7, speed=0.01),), speed, load)
+    for form, more, shape in (
+        ("gaussian", {}, np.exp(-(x**2))),
+        ("exponential", {}, np.exp(-x)),
+        ("rational", {}, 1 / (1 + x**2)),
+        ("stretched", {"exponent": 0.7}, np.exp(-(x**0.7))),
+    ):
+        factor, viscous = friction_factors((effect("stribeck", form, rise=0.7, speed=0.01, **more),), speed, load)
         np.testing.assert_allclose(factor, 1 + 0.7 * shape, rtol=1e-12)
         assert not viscous.any()
     for form, values, expected in (
