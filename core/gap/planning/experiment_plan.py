@@ -12,16 +12,16 @@ from ...effects.engine.registry import library
 from ...effects.engine.specification import FIT
 from ...errors import ParameterError
 from ...jobs import Job, Progress
+from ..base.base_model import base_parameters_to_search, recording_numbers
+from ..candidates.candidates import Candidate, candidates, scales_of
 from ..dataset.rig import Rig
 from ..fitting.least_squares import FreeParameter, free_base_parameters
 from ..fitting.noise_floor import ChannelNoise
 from ..forward.predictor import Model, Predictor
-from ..selection.base_model import base_parameters_to_search, recording_numbers
-from ..selection.candidates import Candidate, candidates, scales_of
 from ..selection.findings import Diagnosis
-from ..selection.unfitted import unfitted
 from .paths import Ground, Limits, Trajectory, Wishes
 from .separation import Separation, Signals
+from .unfitted import unfitted
 
 Pair = tuple[str, str]
 """A kind that acts, and a rival."""

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model.sensor import Effect
+from ..candidates.candidates import Candidate, scales_of
 from ..fitting.least_squares import FreeParameter, TrialView, derivatives, value_of
 from ..fitting.noise_floor import ChannelNoise
 from ..forward.predictor import Model, Predictor
-from ..selection.candidates import Candidate, scales_of
 
 STARTS = 4
 """Values of each form whose signals are compared, spread over the ranges in which a form would show."""

@@ -5,15 +5,15 @@ from __future__ import annotations
 
 from ...effects.engine.registry import kind_of
 from ...effects.engine.specification import SCATTER
+from ..base.quantities import FORCES, READINGS, friction_kinds
+from ..candidates.silenced_texels import silenced_texels
 from ..dataset.trial import FAULT_KINDS
 from ..fitting.identifiability import LEAST_CYCLES
 from ..fitting.intervals import ParameterInterval
 from ..fitting.residual_tests import LEAST_STRUCTURE
 from ..forward.contact_phases import FEATURES
 from ..selection.findings import Diagnosis, Finding
-from ..selection.quantities import FORCES, READINGS, friction_kinds
 from ..selection.rule_numbers import SURE
-from ..selection.silenced_texels import silenced_texels
 from .comparison import LEAST_GAIN, LEAST_LEVEL, GapErrors, nrmse, recording_differences
 
 LOUD_NOISE = 0.05

@@ -13,12 +13,12 @@ from ...io.file_writing import atomic_write
 from ...io.hidden_folder import FileList
 from ...io.sensor_toml import write_sensor
 from ...jobs import Job, Progress, part_of_job
+from ..base.quantities import FORCES, READINGS, friction_kinds
 from ..fitting.least_squares import BASE, RECORDING
 from ..forward.predictor import Model
 from ..planning.experiment_plan import PlannedExperiment, plan_after
 from ..selection.check_recordings import CheckedRecording
 from ..selection.findings import Diagnosis, Finding
-from ..selection.quantities import FORCES, READINGS, friction_kinds
 from .amended_sensor import amended_sensor, with_mean_gain_moved
 from .comparison import USES, GapErrors, closed_share, error_location, gap_errors, recording_differences, recording_errors
 from .html_report import html_report

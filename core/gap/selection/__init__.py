@@ -6,14 +6,4 @@ the recordings that no fit has seen, ``verdict`` names them; the rule's numbers 
 the result.
 """
 
-__all__ = [
-    "base_model",
-    "candidates",
-    "check_recordings",
-    "diagnosis",
-    "findings",
-    "quantities",
-    "rule_numbers",
-    "silenced_texels",
-    "unfitted",
-]
+__all__ = ["check_recordings", "diagnosis", "findings", "rule_numbers"]

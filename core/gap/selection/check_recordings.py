@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.quantities import FORCES, READINGS
 from .blocks import Blocks
-from .quantities import FORCES, READINGS
 from .rule_numbers import SIGNIFICANT_ERRORS
 from .score import Hypothesis, Score
 

@@ -15,6 +15,12 @@ import numpy as np
 
 from ...jobs import Job, Progress
 from ...model.sensor import Effect
+from ..base.base_model import base_fit, identified_base_parameters, prepared
+from ..base.contact_heights import with_starting_heights
+from ..base.quantities import FORCES, READINGS, friction_kinds
+from ..base.recording_differences import RecordingDifferences, as_one_session, may_differ, own_numbers, with_own_numbers
+from ..candidates.candidates import scales_of
+from ..candidates.view_set import ViewSet, view_set_of
 from ..data_faults.data_fault import DataFault
 from ..data_faults.search import find_faults, put_right
 from ..dataset.rig import Rig
@@ -23,20 +29,14 @@ from ..fitting.least_squares import BASE, Fit, fit, free_base_parameters
 from ..fitting.noise_floor import MEASURED_REPEATS, MOST_SQUARE, ChannelNoise, coverage
 from ..fitting.residual_tests import LEAST_STRUCTURE, ResidualStructure, proportional_noise, residual_structure, strongest_line
 from ..forward.predictor import Model, Predictor, placed_stimulus, predictors_of
-from .base_model import base_fit, identified_base_parameters, prepared
 from .blocks import Blocks, views_of
-from .candidates import scales_of
 from .check_recordings import checked
-from .contact_heights import with_starting_heights
 from .findings import Diagnosis, Finding
-from .quantities import FORCES, READINGS, friction_kinds
-from .recording_differences import RecordingDifferences, as_one_session, may_differ, own_numbers, with_own_numbers
 from .rule_numbers import SURE
 from .score import ONE_SESSION, OWN_NUMBERS, Hypothesis
 from .screening import Screening
 from .search import Search, Start
 from .verdict import closed_shares, judge, with_best_forms, with_best_kinds
-from .view_set import ViewSet, view_set_of
 
 TOTAL_WORK = 1000
 BASE_MODEL_BEGINS, SELECTION_BEGINS, VERDICT_BEGINS = 40, 60, 950

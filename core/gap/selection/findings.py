@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..base.recording_differences import RecordingDifferences
+from ..candidates.candidates import Scales
 from ..data_faults.data_fault import DataFault
 from ..dataset.rig import Rig
 from ..fitting.intervals import ParameterInterval
@@ -14,9 +16,7 @@ from ..fitting.least_squares import Fit
 from ..fitting.noise_floor import ChannelNoise, Coverage
 from ..fitting.residual_tests import NO_STRUCTURE, ResidualStructure, SpectralLine
 from ..forward.predictor import Model, Predictor
-from .candidates import Scales
 from .check_recordings import CheckOutcome
-from .recording_differences import RecordingDifferences
 
 
 @dataclass(frozen=True)

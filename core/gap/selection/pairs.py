@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...model.sensor import Effect
+from ..candidates.candidates import DIRECTLY_ESTIMATED, Candidate, is_free_already
+from ..candidates.rao_score import ScoreTest
 from ..fitting.least_squares import Fit, fit
-from .candidates import DIRECTLY_ESTIMATED, Candidate, is_free_already
-from .rao_score import ScoreTest
 from .score import Hypothesis
 from .screening import Making, Screening, free_with
 

@@ -24,9 +24,9 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ...effects.engine.registry import form_of, kind_of
+from ..candidates.candidates import IN_PLANE, parameters_at_bounds
 from ..fitting.least_squares import BASE, Fit
 from .block_sums import Sums
-from .candidates import IN_PLANE, parameters_at_bounds
 from .noise_level import NoiseLevel
 from .rule_numbers import (
     DRAWS,

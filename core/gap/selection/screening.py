@@ -14,16 +14,24 @@ from dataclasses import dataclass, replace
 from ...effects.engine.specification import scalar
 from ...model.sensor import Effect
 from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
+from ..candidates.candidates import (
+    DIRECTLY_ESTIMATED,
+    START_COUNT,
+    Candidate,
+    FittedCandidate,
+    Scales,
+    candidates,
+    is_free_already,
+)
+from ..candidates.plausibility import is_plausible
+from ..candidates.rao_score import ScoreTest
+from ..candidates.starting_points import is_large_shift, starting_points
+from ..candidates.view_set import ViewSet
 from ..fitting.least_squares import BASE, Fit, FreeParameter, TrialView, fit
 from ..forward.predictor import Model
 from .blocks import Blocks, Views
-from .candidates import DIRECTLY_ESTIMATED, START_COUNT, Candidate, FittedCandidate, Scales, candidates, is_free_already
-from .plausibility import is_plausible
-from .rao_score import ScoreTest
 from .rule_numbers import FIT_TOLERANCE
 from .score import OWN_NUMBERS, Hypothesis
-from .starting_points import is_large_shift, starting_points
-from .view_set import ViewSet
 
 LATER_STARTS = 1
 """Points of the search ranges that are tried on top of an effect, or in addition to the form's values alone: for speed."""

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from ...effects.engine.registry import form_of, library
+from ..candidates.candidates import NOT_FITTED, parameters_at_bounds
 from ..fitting.identifiability import curvature_ratio, indistinguishable, unidentifiable
-from .candidates import NOT_FITTED, parameters_at_bounds
 from .findings import ClosedShares, Diagnosis, Finding
 from .rule_numbers import LEAST_WEIGHT, SIGNIFICANT_ERRORS, SURE
 from .score import Hypothesis, Score

@@ -20,8 +20,8 @@ ALLOWED = {
     "core/gap/dataset/rig.py": ({"temperature"}, COLUMN),
     "core/gap/logs/column_meaning.py": ({"temperature"}, COLUMN),
     "core/gap/logs/proposal.py": ({"temperature"}, COLUMN),
-    "core/gap/selection/candidates.py": ({"temperature"}, "what recordings must hold"),
-    "core/gap/selection/plausibility.py": ({"offset"}, "the parameter that the signature of an offset is about"),
+    "core/gap/candidates/candidates.py": ({"temperature"}, "what recordings must hold"),
+    "core/gap/candidates/plausibility.py": ({"offset"}, "the parameter that the signature of an offset is about"),
     "core/simulators/formats/urdf.py": ({"offset"}, "an attribute of arrays in a URDF"),
 }
 """Files outside the library that may name effects, which, and why. Tests may: they are examples."""

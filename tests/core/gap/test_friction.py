@@ -7,12 +7,12 @@ import gap_cases as cases
 import numpy as np
 import pytest
 
+from palpate.core.gap.base.base_model import base_fit
 from palpate.core.gap.fitting.least_squares import TrialView
 from palpate.core.gap.forward.contact_phases import TRAVEL_BANDS, features
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.report import sentences, summary
 from palpate.core.gap.report.comparison import gap_errors
-from palpate.core.gap.selection.base_model import base_fit
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.rule_numbers import SURE
 from palpate.core.jobs import run_job

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from rig_files import RIG, write
 
-from palpate.core.gap.dataset.rig import read_rig
-from palpate.core.gap.fitting.least_squares import TrialView, cross_fitted, fit, free_base_parameters
-from palpate.core.gap.forward.predictor import Model, predictors_of
-from palpate.core.gap.forward.stimulus import stimulus_of
-from palpate.core.gap.selection.base_model import (
+from palpate.core.gap.base.base_model import (
     base_parameters_to_search,
     recording_numbers,
     start_model,
     with_recording_numbers,
 )
-from palpate.core.gap.selection.candidates import candidates
+from palpate.core.gap.candidates.candidates import candidates
+from palpate.core.gap.dataset.rig import read_rig
+from palpate.core.gap.fitting.least_squares import TrialView, cross_fitted, fit, free_base_parameters
+from palpate.core.gap.forward.predictor import Model, predictors_of
+from palpate.core.gap.forward.stimulus import stimulus_of
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.jobs import run_job
 from palpate.core.model.sensor_parameters import SensorParameters

@@ -11,6 +11,10 @@ import pytest
 
 from palpate.commands.gap import _parameter_rows
 from palpate.core.effects.engine.registry import effect
+from palpate.core.gap.base.base_model import base_fit, prepared
+from palpate.core.gap.base.recording_differences import RecordingDifferences
+from palpate.core.gap.candidates.silenced_texels import silenced_texels
+from palpate.core.gap.candidates.view_set import view_set_of
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.fitting.intervals import ParameterInterval
 from palpate.core.gap.fitting.least_squares import BASE
@@ -19,11 +23,7 @@ from palpate.core.gap.report import summary
 from palpate.core.gap.report.comparison import gap_errors
 from palpate.core.gap.report.html_report import _value_and_ends
 from palpate.core.gap.report.sentences import NOT_IDENTIFIABLE, headline, interval_text, said_confidence
-from palpate.core.gap.selection.base_model import base_fit, prepared
 from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.gap.selection.recording_differences import RecordingDifferences
-from palpate.core.gap.selection.silenced_texels import silenced_texels
-from palpate.core.gap.selection.view_set import view_set_of
 from palpate.core.jobs import run_job
 
 

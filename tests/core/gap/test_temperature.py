@@ -9,10 +9,10 @@ import pytest
 from rig_files import RIG, refusal, table, write
 
 from palpate.core.effects.library.temperature import REFERENCE
+from palpate.core.gap.candidates.candidates import candidates, scales_of
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.logs.column_meaning import meaning_of, unit_of
-from palpate.core.gap.selection.candidates import candidates, scales_of
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.jobs import run_job
 

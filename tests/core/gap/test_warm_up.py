@@ -7,10 +7,10 @@ import gap_cases as cases
 import numpy as np
 import pytest
 
+from palpate.core.gap.base.recording_differences import as_one_session
+from palpate.core.gap.candidates.candidates import candidates
 from palpate.core.gap.forward.predictor import Model, predictors_of
-from palpate.core.gap.selection.candidates import candidates
 from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.gap.selection.recording_differences import as_one_session
 from palpate.core.gap.selection.rule_numbers import SURE
 from palpate.core.jobs import run_job
 

@@ -14,17 +14,17 @@ from scipy.signal import lfilter
 
 from palpate.core.effects.engine.registry import effect, kind_of
 from palpate.core.errors import FileError
+from palpate.core.gap.candidates.candidates import Candidate, scales_of
+from palpate.core.gap.candidates.rao_score import ScoreTest
+from palpate.core.gap.candidates.starting_points import starting_points
 from palpate.core.gap.fitting.least_squares import FreeParameter, TrialView, cross_fitted, fit, free_base_parameters
 from palpate.core.gap.fitting.residual_tests import residual_structure
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.report import summary
 from palpate.core.gap.report.comparison import nrmse
 from palpate.core.gap.report.sentences import next_experiment, noise_sentence
-from palpate.core.gap.selection.candidates import Candidate, scales_of
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.findings import Diagnosis
-from palpate.core.gap.selection.rao_score import ScoreTest
-from palpate.core.gap.selection.starting_points import starting_points
 from palpate.core.io.hidden_folder import FileList
 from palpate.core.io.sensor_toml import read_sensor
 from palpate.core.jobs import run_job

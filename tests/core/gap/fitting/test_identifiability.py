@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from palpate.core.effects.engine.registry import effect
+from palpate.core.gap.candidates.candidates import candidates
 from palpate.core.gap.fitting.identifiability import (
     KNOWN_FROM_CYCLES,
     KNOWN_FROM_PLACES,
@@ -21,7 +22,6 @@ from palpate.core.gap.fitting.identifiability import (
 from palpate.core.gap.fitting.noise_floor import coverage
 from palpate.core.gap.forward.contact_phases import PHASES, phase_indices
 from palpate.core.gap.forward.predictor import Model, Predictor
-from palpate.core.gap.selection.candidates import candidates
 from palpate.core.model.sensor_parameters import SensorParameters
 
 PROGRAMMES = {

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from palpate.core.effects.engine.registry import effect
+from palpate.core.gap.candidates.view_set import view_set_of
 from palpate.core.gap.fitting.noise_floor import coverage
 from palpate.core.gap.forward.predictor import Model, Predictor, predictors_of
-from palpate.core.gap.selection.view_set import view_set_of
 from palpate.core.model.sensor_parameters import SensorParameters
 
 PARAMETERS = SensorParameters(k=80.0, cn=0.8)

@@ -14,6 +14,7 @@ import pytest
 from palpate.benchmarks._recordings import Recording
 from palpate.commands import main
 from palpate.core.errors import ParameterError
+from palpate.core.gap.candidates.candidates import candidates, scales_of
 from palpate.core.gap.fitting.least_squares import free_base_parameters
 from palpate.core.gap.fitting.noise_floor import ChannelNoise
 from palpate.core.gap.forward.predictor import Model, predictors_of
@@ -21,7 +22,6 @@ from palpate.core.gap.planning.experiment_plan import plan_experiment
 from palpate.core.gap.planning.paths import Wishes
 from palpate.core.gap.planning.separation import STARTS, Signals
 from palpate.core.gap.report.plan_files import planned_sentence, table_rows, write_plan
-from palpate.core.gap.selection.candidates import candidates, scales_of
 from palpate.core.jobs import run_job
 
 NOISES = ChannelNoise(0.005, 1.0, "given"), ChannelNoise(0.05, 1.0, "given")

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from palpate.core.effects.engine.registry import effect
+from palpate.core.gap.candidates.candidates import parameters_at_bounds
 from palpate.core.gap.fitting.least_squares import FreeParameter
 from palpate.core.gap.forward.predictor import Model
 from palpate.core.gap.report import sentences, summary
 from palpate.core.gap.report.comparison import gap_errors
-from palpate.core.gap.selection.candidates import parameters_at_bounds
 from palpate.core.gap.selection.check_recordings import CheckedRecording, CheckOutcome
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.jobs import run_job

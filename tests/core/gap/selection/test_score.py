@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from palpate.core.effects.engine.registry import effect, library
+from palpate.core.gap.base.base_model import with_recording_numbers
+from palpate.core.gap.base.recording_differences import with_own_numbers
 from palpate.core.gap.fitting.least_squares import Fit, fit
 from palpate.core.gap.forward.predictor import Model, number_name, predictors_of
 from palpate.core.gap.selection import blocks, diagnosis, noise_level, rule_numbers, score, search, verdict
-from palpate.core.gap.selection.base_model import with_recording_numbers
 from palpate.core.gap.selection.block_sums import Sums
 from palpate.core.gap.selection.noise_level import NoiseLevel
-from palpate.core.gap.selection.recording_differences import with_own_numbers
 from palpate.core.gap.selection.score import OWN_NUMBERS, Hypothesis, Score, drawn_weights
 from palpate.core.jobs import run_job
 from palpate.core.model.sensor import Effect

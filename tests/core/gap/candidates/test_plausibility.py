@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from palpate.core.effects.engine.registry import effect, form_of, kind_of
+from palpate.core.gap.base.base_model import prepared
+from palpate.core.gap.candidates.candidates import Candidate, FittedCandidate, scales_of
+from palpate.core.gap.candidates.plausibility import is_plausible
+from palpate.core.gap.candidates.view_set import view_set_of
 from palpate.core.gap.fitting.least_squares import fit, free_base_parameters
 from palpate.core.gap.forward.predictor import Model, predictors_of
-from palpate.core.gap.selection.base_model import prepared
-from palpate.core.gap.selection.candidates import Candidate, FittedCandidate, scales_of
-from palpate.core.gap.selection.plausibility import is_plausible
-from palpate.core.gap.selection.view_set import view_set_of
 
 SPREAD = 0.02 * np.random.default_rng(1).normal(size=cases.ROWS * cases.COLUMNS)
 """N, of each texel."""

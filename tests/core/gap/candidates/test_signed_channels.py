@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from palpate.benchmarks._recordings import Recording
+from palpate.core.gap.base.base_model import start_model
+from palpate.core.gap.candidates.candidates import candidates
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.forward.predictor import predictors_of
-from palpate.core.gap.selection.base_model import start_model
-from palpate.core.gap.selection.candidates import candidates
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.jobs import run_job
 

@@ -7,11 +7,11 @@ import gap_cases as cases
 import numpy as np
 import pytest
 
+from palpate.core.gap.base.recording_differences import as_one_session, may_differ, with_own_numbers
 from palpate.core.gap.report.comparison import gap_errors
 from palpate.core.gap.report.sentences import headline
 from palpate.core.gap.report.summary import summary
 from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.gap.selection.recording_differences import as_one_session, may_differ, with_own_numbers
 from palpate.core.gap.selection.rule_numbers import SURE
 from palpate.core.jobs import run_job
 

@@ -11,20 +11,20 @@ import trimesh
 from scipy import stats
 
 from palpate.core.effects.engine.registry import effect, form_of, kind_of
+from palpate.core.gap.base.base_model import friction_parameters_to_search, prepared
+from palpate.core.gap.base.quantities import friction_kinds
+from palpate.core.gap.candidates.candidates import Candidate, _halton_points, candidates, scales_of, search_range
+from palpate.core.gap.candidates.direct_estimates import companding_starts, few_levels, unresponsive_texels
+from palpate.core.gap.candidates.rao_score import ScoreTest
+from palpate.core.gap.candidates.starting_points import starting_points
+from palpate.core.gap.candidates.view_set import view_set_of
 from palpate.core.gap.data_faults.data_fault import DataFault
 from palpate.core.gap.dataset.rig import Indenter
 from palpate.core.gap.fitting.intervals import student_quantile
 from palpate.core.gap.fitting.least_squares import FRICTION_LEVEL, TrialView, fit, free_base_parameters, with_values
 from palpate.core.gap.forward.predictor import Model, Predictor, predictors_of
-from palpate.core.gap.selection.base_model import friction_parameters_to_search, prepared
-from palpate.core.gap.selection.candidates import Candidate, _halton_points, candidates, scales_of, search_range
 from palpate.core.gap.selection.diagnosis import faults_of
-from palpate.core.gap.selection.direct_estimates import companding_starts, few_levels, unresponsive_texels
-from palpate.core.gap.selection.quantities import friction_kinds
-from palpate.core.gap.selection.rao_score import ScoreTest
 from palpate.core.gap.selection.screening import Screening
-from palpate.core.gap.selection.starting_points import starting_points
-from palpate.core.gap.selection.view_set import view_set_of
 from palpate.core.geometry.mesh import checked_mesh
 from palpate.core.model.parameter import Parameter
 from palpate.core.model.sensor_parameters import SensorParameters

@@ -7,9 +7,9 @@ import pytest
 from palpate.core.effects.engine.readout_chain import readings
 from palpate.core.effects.engine.registry import effect, form_of, kind_of
 from palpate.core.effects.engine.specification import TransducerArray
-from palpate.core.gap.selection.candidates import Candidate
-from palpate.core.gap.selection.companded_steps import companded_steps
-from palpate.core.gap.selection.direct_estimates import power_starts
+from palpate.core.gap.candidates.candidates import Candidate
+from palpate.core.gap.candidates.companded_steps import companded_steps
+from palpate.core.gap.candidates.direct_estimates import power_starts
 
 DEPTH = 3e-3
 

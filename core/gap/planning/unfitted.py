@@ -6,14 +6,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ...effects.engine.registry import library
+from ..base.base_model import identified_base_parameters, prepared, start_model, with_recording_numbers
+from ..base.contact_heights import with_starting_heights
+from ..base.quantities import friction_kinds
+from ..candidates.candidates import DIRECTLY_ESTIMATED, NOT_FITTED, candidates
 from ..dataset.rig import Rig
 from ..fitting.identifiability import unidentifiable
 from ..fitting.noise_floor import ChannelNoise, coverage
 from ..forward.predictor import Model, Predictor, predictors_of
-from .base_model import identified_base_parameters, prepared, start_model, with_recording_numbers
-from .candidates import DIRECTLY_ESTIMATED, NOT_FITTED, candidates
-from .contact_heights import with_starting_heights
-from .quantities import friction_kinds
 
 
 @dataclass(frozen=True)
