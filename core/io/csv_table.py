@@ -162,10 +162,11 @@ def _values(lines: Any, names: list[str], path: Path) -> np.ndarray:
             )
         try:
             values.extend(map(float, cells))
-        except ValueError:  # a missing value, or none at all
+        except ValueError:  # an empty cell, or a text that is not a number
             _complain(path, lines.line_num, names, cells)
             del values[count * width :]
             values.extend(float(cell.strip() or "nan") for cell in cells)
+            continue
         if not sum(map(abs, values[count * width :])) <= LARGEST_NUMBER:  # false for NaN, too
             _complain(path, lines.line_num, names, cells)
     return np.frombuffer(values, float).reshape(-1, width) if values else np.zeros((0, width))

@@ -13,6 +13,10 @@ LARGEST_DENSE = 1500
 """Up to this number of texels every pair counts. Of more texels only pairs within reach count, since the matrix would not fit
 into memory."""
 
+MANY_SAMPLES = 100
+"""From this number of samples on, a product of the texels with a signal pays for their selection. For 900 samples of 84 texels
+of which nine are loaded it takes 0.4 times as long; for one sample of 1,024 loaded texels it would take sixty times as long."""
+
 LARGEST_KEPT = 256
 """Up to this number of texels all distances are kept: a fit asks thousands of times for those of the same texels."""
 
@@ -57,7 +61,9 @@ class CouplingMatrix:
 
 
 def coupled(signal: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """Return ``signal @ matrix.T``, (t, n) float, of the texels that have a signal: a small indenter touches few of them."""
+    """Return ``signal @ matrix.T``, (t, n) float; of many samples only texels with a signal, as a small indenter loads few."""
+    if len(signal) < MANY_SAMPLES:
+        return np.asarray(signal @ matrix.T)
     (source,) = np.nonzero((signal != 0.0).any(axis=0))
     result: np.ndarray = signal[:, source] @ matrix[:, source].T
     return result

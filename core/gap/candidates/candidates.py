@@ -38,8 +38,9 @@ LEAST_WIDTH = 0.25
 AT_BOUND = 0.01
 """A parameter is at a bound if it differs from it by less than this share of the bound."""
 NEARLY_ALL = 0.9
-"""Shares with this bound or a larger one may be all there is; some end below one, where a formula would divide by zero. With a
-bound of 0.5 (what a wire adds to the next) 0.5 was called natural: crosstalk stood beside load spreading in two of 133 rigs."""
+"""Least upper bound of a share that means the whole. Bounds of 0.9 and 0.95 avoid a division by zero at 1. The next smaller
+bound is the 0.5 of crosstalk between wires. While it meant the whole, wires rivalled load spreading in two of the 133 rigs of
+base 126900."""
 LEAST_WARMTH = 1.0
 """Range of temperatures (K) from which on what follows them can be told from what does not. Chosen by eye."""
 INVERSE_FORCES = {1: "1/N", 2: "1/N²", 3: "1/N³", 4: "1/N⁴"}
@@ -297,9 +298,9 @@ class FittedCandidate:
 def parameters_at_bounds(model: Model, free: Sequence[FreeParameter], index: int) -> dict[str, float]:
     """Return the fitted parameters of an effect that are at a bound, with the bound.
 
-    The bound at which a part of the formula does nothing does not count: a simpler formula does as well. Nor does the natural
-    bound of a share, which is all: then the effect takes all that it can, or its shape is the limit that elements which stick
-    and slip have (the β of Bouc and Wen is 1 where unloading yields as loading does, as in every Masing loop).
+    The bound at which a part of the formula does nothing does not count: a simpler formula does as well. Nor does the upper
+    bound of a share that means the whole: then the effect takes all that it can, or its shape is the limit that elements which
+    stick and slip have (the β of Bouc and Wen is 1 where unloading yields as loading does, as in every Masing loop).
 
     Parameters
     ----------
@@ -311,11 +312,9 @@ def parameters_at_bounds(model: Model, free: Sequence[FreeParameter], index: int
     effect = model.effects[index]
     form = form_of(effect.name, effect.form)
     neutral = form.neutral
-    whole = {
-        p.name: p.high
-        for p in form.parameters
-        if p.name == SHARPNESS or p.unit == "1" and p.low >= 0.0 and NEARLY_ALL <= p.high <= 1.0
-    }
+    shares = [p for p in form.parameters if p.unit == "1" and p.low >= 0.0 and NEARLY_ALL <= p.high <= 1.0]
+    whole = {p.name: p.high for p in shares if p.low == neutral.get(p.name) == 0.0 or p.low > 0.0 and p.high == 1.0}
+    whole |= {p.name: p.high for p in form.parameters if p.name == SHARPNESS}
     found = {}
     for item in free:
         if item.effect == index and not item.per_texel:

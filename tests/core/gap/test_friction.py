@@ -44,13 +44,27 @@ def sliding(change, sway):
     return cases.grid_rig(1, 1, 0.01, STIFF, trials, given={"k", "mus", "mud", "x0", "ct"})
 
 
-@pytest.mark.slow("a whole diagnosis, the one with friction in this tier")
-def test_friction_is_judged_by_the_forces_where_the_readings_leave_noise():
-    result = run_job(diagnose(sliding(lambda force, speed: force * (1.0 + 10.0 * np.abs(speed)), sway=0.015)))
-    assert [one.name for one in result.findings] == ["viscous-friction"] and result.findings[0].confidence > 0.5
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        pytest.param(
+            "viscous-friction",
+            lambda force, speed: force * (1.0 + 10.0 * np.abs(speed)),
+            marks=pytest.mark.slow("a whole diagnosis, the one with friction in this tier"),
+        ),
+        pytest.param(
+            "stribeck",
+            lambda force, speed: force * (1.0 + 0.8 / (1.0 + np.sqrt(np.abs(speed) / 0.004))),
+            marks=pytest.mark.long("a whole diagnosis with friction"),
+        ),
+    ],
+)
+def test_friction_is_judged_by_the_forces_where_the_readings_leave_noise(name, change):
+    result = run_job(diagnose(sliding(change, sway=0.015)))
+    assert [one.name for one in result.findings] == [name] and result.findings[0].confidence > 0.5
     errors = gap_errors(result)
     said, closed = sentences.headline(result, errors), summary.summary(result, errors)["gap"]["closed"]
-    assert "viscous-friction" in said and "The base model has friction" not in said
+    assert name in said and "The base model has friction" not in said
     assert closed["fit"] > 0.8 and closed["check"] > 0.8
 
 

@@ -18,9 +18,9 @@ def write(folder, text):
 
 
 def test_recordings_keep_empty_cells_as_nan(tmp_path):
-    table = read_table(write(tmp_path, '\ufefftime,"texel, left"\r\n0,1.5\r\n\r\n1, \r\n"2",-3e-2\r\n'))
+    table = read_table(write(tmp_path, '\ufefftime,"texel, left"\r\n0,1.5\r\n\r\n1, \r\n"2",-3e-2\r\n,4\r\n'))
     assert table.names == ["time", "texel, left"]
-    np.testing.assert_array_equal(table.values, [[0, 1.5], [1, np.nan], [2, -0.03]])
+    np.testing.assert_array_equal(table.values, [[0, 1.5], [1, np.nan], [2, -0.03], [np.nan, 4]])
 
 
 @pytest.mark.parametrize("cell, words", [("soft", "'soft' for depth"), ("inf", "inf for depth"), ("nan", "nan for depth")])

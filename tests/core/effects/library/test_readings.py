@@ -302,7 +302,7 @@ def test_crosstalk(monkeypatch):
     along, across = (0.2 * 0.5 ** (np.abs(np.arange(n) - at) - 1.0) for n, at in ((COLUMNS, column), (ROWS, row)))
     along[column] = across[row] = 1.0
     np.testing.assert_allclose(found, np.outer(across, along), atol=1e-15)  # a column's wire carries what a row's has leaked
-    monkeypatch.setattr(crosstalk, "LARGEST_DENSE", 0)  # as for many texels: wires of rows first, then those of columns
+    monkeypatch.setattr(crosstalk, "MANY_SAMPLES", 1)  # one product of all pairs
     again = read(effect("crosstalk", "wires", share=0.2, fall=0.5), image(texel))[0].reshape(ROWS, COLUMNS)
     np.testing.assert_allclose(again, found, atol=1e-15)
 

@@ -190,7 +190,7 @@ def test_where_it_fails_is_said(fitted):
 
     def reasons(targets):
         changed = replace(fitted.data, check=(replace(check, targets=targets),))
-        return " ".join(_reasons(changed, fitted.best, fitted.floor))
+        return " ".join(_reasons(changed, fitted.best.fitted))
 
     assert "beyond what was fitted (" in reasons(1.4 * check.targets)
     assert "off on average, more than half of its error" in reasons(check.targets + 1.0)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from palpate.core.errors import FileError
+from palpate.core.gap.base import base_model
 from palpate.core.gap.forward.predictor import predictors_of
-from palpate.core.gap.selection import base_model
 
 RIG = gap_cases.rig(trials=2, seconds=3.0)
 
