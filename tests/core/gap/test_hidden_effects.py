@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import gap_cases as cases
 import numpy as np
 import pytest
@@ -24,8 +26,8 @@ def test_two_effects_are_named_of_which_none_joins_alone(tmp_path):
     assert sure == {"load-spreading", "gain-mismatch"} == set(hidden.answer_of("two", 47001))
 
 
-def beneath_a_cover(force, _time, width=3e-3):
-    """The loads under a cover, kernels of 3 mm, of which the texels see their part: texels outside are there and not read."""
+def beneath_a_cover(force, _time, width):
+    """The loads under a cover that spreads them by `width`, of which the texels see their part: those outside are not read."""
     margin, y, x = 6, *np.mgrid[0 : cases.ROWS, 0 : cases.COLUMNS]
     rows, columns = cases.ROWS + 2 * margin, cases.COLUMNS + 2 * margin
     wide_y, wide_x = np.mgrid[0:rows, 0:columns] - margin
@@ -38,9 +40,16 @@ def beneath_a_cover(force, _time, width=3e-3):
 @pytest.mark.long("a whole diagnosis of five recordings")
 def test_a_narrow_cover_and_wires_side_by_side_are_not_told_apart():
     """Where the kernel hardly reaches beyond the next texels, leaking wires and another gain give the same readings."""
-    result = run_job(diagnose(cases.rig(beneath_a_cover, seed=4)))
+    result = run_job(diagnose(cases.rig(partial(beneath_a_cover, width=2e-3), seed=4)))
     assert result.verdict == "unexplained" and set(result.ambiguous[0]) == {"load-spreading", "crosstalk"}
     assert sentences.headline(result, gap_errors(result)).startswith(
         "Indistinguishable in these recordings: load-spreading or crosstalk"
     )
     assert not any(one.confidence >= SURE for one in result.findings)
+
+
+@pytest.mark.long("a whole diagnosis of five recordings")
+def test_a_cover_is_named_where_wires_would_have_to_leak_half_of_each_signal():
+    result = run_job(diagnose(cases.rig(partial(beneath_a_cover, width=3e-3), seed=4)))
+    assert result.verdict == "explained" and [one.name for one in result.findings] == ["load-spreading"]
+    assert result.findings[0].confidence >= SURE
