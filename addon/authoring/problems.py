@@ -97,7 +97,8 @@ def object_problems(obj, notes: list[str]) -> list[Problem]:
     found = [Problem("MODIFIER", note) for note in notes]
     if laid_sensors.is_laid(obj):
         if obj.parent is None:
-            found.append(Problem("ORPHAN", f"'{obj.name}' has lost its parent: it no longer moves with an object."))
+            if obj.palpate.body == "PARENT":
+                found.append(Problem("ORPHAN", f"'{obj.name}' has lost its parent: it no longer moves with an object."))
         elif laid_sensors.is_outdated(obj):
             found.append(
                 Problem("OUTDATED", f"The surface of '{obj.parent.name}' has changed since '{obj.name}' was laid on it.")

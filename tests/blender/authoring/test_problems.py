@@ -252,7 +252,7 @@ def test_an_outdated_skin_is_laid_anew_and_an_orphan_stands_alone():
     skin.parent = None
     assert kinds(skin) == ["ORPHAN"]
     fix(skin, "ORPHAN")
-    assert skin.palpate.body == "KEYFRAMED"
+    assert skin.palpate.body == "KEYFRAMED" and kinds(skin) == []
 
 
 def test_every_problem_has_a_button_with_a_name():
