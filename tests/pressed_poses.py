@@ -30,21 +30,17 @@ def random_poses(seed, steps, environments, targets=1, height=SIZE / 2):
     return poses * np.array([1.0] * 3 + [1.5] * 4)  # quaternions of any length are taken
 
 
-def assert_environments_are_singles(many, singles, poses, loads=None):
-    """Take the same steps with both, under loads (steps, E, n) or not; one of them is reset on the way.
-
-    Return how many texels touch, over all steps.
-    """
+def assert_environments_are_singles(many, singles, poses):
+    """Take the same steps with both; one of them is reset on the way. Return how many texels touch, over all steps."""
     touched, mask = 0, np.arange(len(singles)) == 1
     for step, now in enumerate(poses):
         if step == len(poses) - 2:
             many.reset(mask)
             singles[1].reset(*map(pose, now[1]))
-        found = many.step(now[:, 0], now[:, 1], wrench=None if loads is None else loads[step])
+        found = many.step(now[:, 0], now[:, 1])
         touched += found.contact.sum()
         for number, single in enumerate(singles):
-            load = None if loads is None else loads[step, number]
-            assert_equal_bits(found, number, single.step(*map(pose, now[number]), wrench=load))
+            assert_equal_bits(found, number, single.step(*map(pose, now[number])))
     return touched
 
 

@@ -24,13 +24,17 @@ def test_an_engine_that_is_missing_or_old_is_one_sentence(monkeypatch):
     monkeypatch.delitem(sys.modules, "palpate.plugins.mjlab", raising=False)
     with pytest.raises(PalpateError, match="needs mjlab, which is not installed: run 'pip install mjlab'"):
         importlib.import_module("palpate.plugins.mjlab")
+
+
+def test_newton_that_is_missing_is_one_sentence(monkeypatch):
     monkeypatch.setitem(sys.modules, "newton", None)
-    newton = importlib.import_module("palpate.plugins.newton")
+    from palpate.plugins.newton import SensorTouch
+
     with pytest.raises(PalpateError, match="needs newton, which is not installed: run 'pip install newton'"):
-        newton.SensorTouch(None, pad(4, 4), 1e-3, sensing_shapes="a", counterpart_shapes="b")
+        SensorTouch(None, pad(4, 4), 1e-3, sensing_shapes="a", counterpart_shapes="b")
 
 
-def plates_on_pads(newton, warp, tilt):
+def plates_on_pads(newton, warp, tilt, **other):
     """Return a model of two worlds, each with a plate of 1 kg that touches a pad."""
     cfg = newton.ModelBuilder.ShapeConfig(density=0.0, has_shape_collision=False)
     world, moment = newton.ModelBuilder(), 1e-3

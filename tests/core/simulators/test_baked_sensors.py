@@ -47,6 +47,15 @@ def test_texels_paint_parameters_and_effects_are_those_of_the_bake(blend):
     assert len(found["cap"].faces) == 12 and list(pp.sensors_from_blend(str(blend), "pad")) == ["pad"]
 
 
+def test_the_sensor_of_a_blend_is_pressed_in_a_loop(blend):
+    """A plate 1 mm deep in every texel: k times what is painted, times the depth; the creep has not begun."""
+    pad = pp.sensors_from_blend(blend, "pad")["pad"].with_effects()
+    plate = pp.Body.box((0.1, 0.1, 0.02), position=(0.0, 0.0, 0.009))
+    pressed = pp.PressedSensor(pad, plate, 1e-3)
+    contact = pressed.step((pad.position, pad.quaternion), (plate.position, plate.quaternion))
+    assert contact.texels.normal_force == pytest.approx(123.0 * PAINT * 1e-3, rel=1e-9)
+
+
 @pytest.mark.parametrize(
     "names, message",
     [(("pat",), "sensor 'pat' .did you mean 'pad'..: choose from cap, pad."), (("wrist",), "sensor 'wrist': choose from cap")],

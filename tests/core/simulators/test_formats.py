@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -14,10 +15,15 @@ from palpate.core.errors import FileError, PalpateError
 from palpate.core.geometry.mesh import is_closed, mass_properties
 from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.simulators.formats.urdf import roll_pitch_yaw
-from palpate.core.simulators.sensor_format import export_sensors, written_formats
+from palpate.core.simulators.sensor_format import export_sensors, formats, written_formats
 from palpate.core.simulators.sensor_on_mesh import identifiers, thickened
 
 SENSORS = (pad(), pad(radius=0.02, name="Bent"), ball())
+
+
+def test_every_format_is_registered_once():
+    assert list(formats()) == ["contact", "mjcf", "openrave", "probes", "urdf", "usd"]
+    assert all(item.title and item.description and (item.write or item.read) for item in formats().values())
 
 
 def test_an_unknown_format_is_refused(tmp_path):
@@ -80,6 +86,26 @@ def test_probe_lists_hold_every_number(item, tmp_path):
         assert ("factor_k" in listed) == (item.sensor.painted.k is not None)
 
 
+def origins(robot):
+    """Return positions and rotations of a URDF's fixed joints, as its specification defines them."""
+    found = [joint.find("origin").attrib for joint in robot.iter("joint")]
+    turns = Rotation.from_euler("xyz", [[float(value) for value in one["rpy"].split()] for one in found])
+    return np.array([[float(value) for value in one["xyz"].split()] for one in found]), turns.as_matrix()
+
+
+@pytest.mark.parametrize("item", SENSORS, ids=lambda item: item.name)
+def test_urdf_has_a_frame_at_every_texel(item, tmp_path):
+    mesh, robot, macro, probes = export_sensors([item], "urdf", tmp_path).files
+    position, turn = origins(ElementTree.parse(robot))
+    assert np.abs(position - item.sensor.texels.position).max() < 1e-12
+    assert np.abs(turn - item.frames).max() < 1e-10  # twelve digits of angles
+    import trimesh
+
+    assert len(trimesh.load_mesh(mesh).faces) == len(item.mesh.triangles)
+    assert json.loads(probes.read_text())["sensor"] == item.name
+    assert probes.name in macro.read_text() and mesh.name in macro.read_text()
+
+
 def test_roll_pitch_yaw_hold_at_gimbal_lock():
     rng = np.random.default_rng(3)
     turns = Rotation.from_euler(
@@ -108,10 +134,7 @@ def test_identifiers_are_unique():
 @pytest.mark.parametrize("item", SENSORS, ids=lambda item: item.name)
 def test_urdf_is_read_by_a_urdf_library(item, tmp_path):
     yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy reads the URDF: pip install yourdfpy")
-    mesh, path, macro, probes = export_sensors([item], "urdf", tmp_path).files
-    assert json.loads(probes.read_text())["sensor"] == item.name
-    assert probes.name in macro.read_text() and mesh.name in macro.read_text()
-    robot = yourdfpy.URDF.load(str(path))
+    robot = yourdfpy.URDF.load(str(export_sensors([item], "urdf", tmp_path).files[1]))
     link = robot.base_link
     poses = np.array([robot.get_transform(joint.child, link) for joint in robot.robot.joints])
     assert len(poses) == len(item.sensor.texels)

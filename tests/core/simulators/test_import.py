@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from bad_files import TOUCH_GRID
 from exported_sensors import FLOAT32, ball, pad
 from scipy.spatial.transform import Rotation
 
@@ -107,13 +108,26 @@ BROKEN = {
     "nothing": ("<mujoco/>", "has no <tactile>"),
     "another root": ("<sdf/>", "holds no sensor that can be read"),
     "no mesh": (TACTILE.format(mesh=""), "MuJoCo cannot compile .*mesh 'm' not found"),
+    "no geom": (TACTILE.format(mesh=MESH).replace('geom="g"', 'geom="h"'), "unrecognized name 'h'"),
+    "words": (TACTILE.format(mesh=MESH.replace("1 1 0", "1 one 0")), "bad format in attribute 'vertex'"),
+    "NaN": (TACTILE.format(mesh=MESH.replace("1 1 0", "1 nan 0")), "is not finite"),
+    "odd": (TACTILE.format(mesh=MESH.replace(" 1 1 0", " 1 1")), "must be a multiple of 3"),
+    "a wrong face": (TACTILE.format(mesh=MESH.replace("0 3 2", "0 3 9")), "does not exist"),
+    "half a face": (TACTILE.format(mesh=MESH.replace("0 3 2", "0 3")), "must be a multiple of 3"),
     "included": ("<mujocoinclude/>", "give the file that includes it"),
     "no file": (
         TACTILE.format(mesh='<mesh name="m" file="gone.stl"/>'),
         "Error opening file 'gone.stl'.*give the file that includes it, with its meshes",
     ),
+    "no quaternion": (TACTILE.format(mesh=MESH).replace("1 0 0 0", "0 0 0 0"), "zero quaternion"),
     "deep": ("<mujoco><worldbody>" + "<body>" * 300 + "</body>" * 300 + "</worldbody></mujoco>", "nests more than"),
+    "no site": (
+        GRID.format(config=CONFIG).replace('objname="s"', 'objname="t"'),
+        "unrecognized name 't'.*give the file that includes it",
+    ),
+    "no size": (GRID.format(config=""), "resolutions must be specified"),
     "one bin": (GRID.format(config=CONFIG.replace("7 5", "1 5")), "two each way"),
+    "huge": (GRID.format(config=CONFIG.replace("7 5", "1e9 5")), "resolutions are too large"),
     "two texels": (ROBOT.format(joints=JOINTS[: JOINTS.index('<link name="skin_sensor_2"')]), "three or more texels"),
     "one place": (ROBOT.format(joints=JOINTS.replace("3 9 0", "2 4 0")), "at the same place"),
     "zero axis": (ROBOT.format(joints=JOINTS.replace("<parent", '<axis xyz="0 0 0"/><parent')), "is zero"),
@@ -146,10 +160,50 @@ def test_a_mesh_beside_the_file_is_read(tmp_path):
     assert np.linalg.norm(found.position, axis=1) == pytest.approx(np.full(42, 0.05), abs=FLOAT32)
 
 
+@pytest.mark.parametrize("size", ["0", "-1 0.1"])
+def test_a_touch_grid_without_a_size_is_one_sentence(tmp_path, size):
+    path = tmp_path / "grid.xml"
+    path.write_text(TOUCH_GRID.replace('size="0.01"', f'size="{size}"'))
+    with pytest.raises(FileError, match="size 0 must be positive in"):
+        import_sensors(path)
+
+
 def test_a_texel_that_is_immeasurably_far_is_one_sentence():
     points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1e308, 1.0, 0.0]])
     with pytest.raises(SensorError, match="Texel 3 is immeasurably far"):
         triangles_between(points, np.tile([0.0, 0.0, 1.0], (4, 1)))
+
+
+DEFAULTS = """<mujoco><compiler eulerseq="ZYX"/><default><site size="0.03"/><mesh scale="0.001 0.001 0.001"/>
+<default class="fine"><site size="0.02" zaxis="0 1 0"/></default></default>
+<extension><plugin plugin="mujoco.sensor.touch_grid"/></extension>
+<asset><mesh name="m" inertia="shell" vertex="0 0 0 10 0 0 0 10 0 10 10 3" face="0 1 3 0 3 2"/></asset>
+<worldbody><body name="finger" pos="0 0 0.1" euler="20 30 40" childclass="fine"><geom name="tip" type="capsule" size="0.01"
+fromto="0 0 0 0.02 0.01 0"/><site name="fine"/><site name="coarse" class="main" euler="30 40 25"/></body></worldbody>
+<sensor><tactile name="skin" geom="tip" mesh="m"/>{grids}</sensor></mujoco>"""
+
+
+def test_defaults_classes_and_rotations_are_those_of_mujoco(tmp_path):
+    mujoco = pytest.importorskip("mujoco", reason="MuJoCo compiles the model: pip install mujoco")
+    grids = "".join(
+        GRID[GRID.index("<plugin name") : GRID.index("</sensor>")].replace('"touch"', f'"{name}"').replace('"s"', f'"{name}"')
+        for name in ("fine", "coarse")
+    ).format(config=CONFIG)
+    text = DEFAULTS.format(grids=grids)
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    found = {one.name: one for one in read(tmp_path, text)}
+    for name in ("fine", "coarse"):
+        site, turn = model.site(name), Rotation.from_quat(np.roll(found[name].frame_quaternion, -1)).as_matrix()
+        assert np.linalg.norm(found[name].position, axis=1) == pytest.approx(np.full(35, site.size[0]))
+        assert turn == pytest.approx(data.site(name).xmat.reshape(3, 3), abs=1e-12)
+        assert found[name].frame_position == pytest.approx(data.site(name).xpos, abs=1e-15)
+    skin, geom = found["skin"], data.geom("tip")
+    turn = Rotation.from_quat(np.roll(skin.frame_quaternion, -1)).as_matrix()
+    places = model.mesh_vert @ geom.xmat.reshape(3, 3).T + geom.xpos  # where MuJoCo's tactile sensor has its vertices
+    assert skin.position @ turn.T + skin.frame_position == pytest.approx(places, abs=1e-8)
+    assert np.ptp(skin.position, axis=0) == pytest.approx([0.01, 0.01, 0.003], abs=1e-12)
 
 
 def test_included_files_are_read_and_a_part_alone_says_so(tmp_path):
@@ -195,6 +249,35 @@ def test_touch_sites_become_texels_out_of_the_surface_of_their_body(tmp_path):
     assert np.einsum("ij,ij->i", radial, found.normal) == pytest.approx(np.ones(3), abs=1e-6)
     with pytest.raises(FileError, match="no <tactile>, <touch> on 2 sites and never on three of one body"):
         read(tmp_path, text.replace('<touch site="0"/>', ""))
+
+
+def cap_of_urdf(count=10, radius=0.02, opening=0.4):
+    """A patch of a sphere as links, whose frames say the normals; and its places."""
+    angles = np.linspace(-opening, opening, count)
+    a, b = (grid.ravel() for grid in np.meshgrid(angles, angles))
+    out = np.stack([np.sin(a), np.sin(b) * np.cos(a), np.cos(a) * np.cos(b)], axis=1)
+    joints = ""
+    for number, (place, normal) in enumerate(zip(radius * out, out, strict=True)):
+        turn = f"{np.arcsin(-normal[1])} {np.arctan2(normal[0], normal[2])} 0"
+        xyz = " ".join(map(repr, place.tolist()))
+        joints += JOINT.format(n=f"{number}_link", xyz=xyz, axis="").replace('rpy="0 0 0"', f'rpy="{turn}"')
+    return ROBOT.format(joints=joints), out, radius * out
+
+
+@pytest.mark.parametrize("count, depth", [(3, 0.004), (10, 0.001)])
+def test_the_normals_of_a_file_are_kept_on_a_doubly_curved_patch(count, depth, tmp_path):
+    import palpate as pp
+
+    text, out, place = cap_of_urdf(count)
+    path = tmp_path / "cap.urdf"
+    path.write_text(text)
+    sensor = pp.read_sensor(path)
+    assert sensor.texels.normal == pytest.approx(out, abs=1e-12) and sensor.texels.position == pytest.approx(place, abs=1e-15)
+    box, level = pp.Body.box((0.06, 0.06, 0.02)), [1.0, 0.0, 0.0, 0.0]
+    pose = ([0.0, 0.0, 0.02 - depth + 0.01], level)
+    read_out = pp.PressedSensor(sensor, box, 1e-3, ([0, 0, 0], level), pose).step(([0, 0, 0], level), pose)
+    within = np.clip(place[:, 2] - (0.02 - depth), 0.0, None).sum()
+    assert read_out.texels.normal_force.sum() == pytest.approx(sensor.parameters.k * within, rel=1e-9)
 
 
 TACTILE_TAGS = """<robot name="glove" xmlns="http://www.ros.org"><link name="palm"/>

@@ -77,11 +77,13 @@ def test_a_single_sensor_says_it_and_goes_on(path):
 def test_the_sensor_may_be_what_moves():
     """It turns about a far point, and its ball of texels passes the target."""
     item, target = ball(), shapes.sphere(0.01)
+    radius = np.linalg.norm(item.sensor.texels.position, axis=1).max()
     sensor = [np.array([x, 0.0, 0.0, np.cos(a / 2), 0.0, 0.0, np.sin(a / 2)]) for x, a in ((-0.2, 0.3), (0.2, 0.3))]
     many = PressedSensors(item, target, DT, 1)
     for number, jumps in ((0, False), (1, True)):
-        found = many.step(sensor[number][None], LEVEL[None])
+        found = many.step(sensor[number][None], LEVEL[None] * [1, 1, 1, 1, 1, 1, 1])
         assert found.jumped.tolist() == [jumps]
+    assert radius < 0.1
 
 
 def test_environments_that_begin_or_have_no_pose_do_not_jump():

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from exported_sensors import FLOAT32, ball, pad
 
+from palpate.core.simulators.contact_translation import mujoco_contact
 from palpate.core.simulators.formats import mjcf
 from palpate.core.simulators.sensor_format import export_sensors
 
@@ -43,6 +44,40 @@ def test_mujoco_has_our_texels(item, tmp_path):
     assert np.abs(axes[:, 2] - item.sensor.texels.bitangent).max() < FLOAT32
     body = model.body(item.name)
     assert np.allclose(body.pos, item.position) and np.allclose(body.quat, item.quaternion)
+
+
+def weighed(mass, folder, **parameters):
+    """Let a box come to rest on a flat pad in MuJoCo; return its depth, the sensor's depths and the force that carries it."""
+    item = pad(**parameters)
+    item = type(item)(item.sensor, item.mesh)  # level, in the origin
+    box = f'<body pos="0 0 0.0251"><freejoint/><geom name="box" type="box" size="0.03 0.03 0.025" mass="{mass}"/></body>'
+    model, _ = loaded(item, folder, box)
+    data = mujoco.MjData(model)
+    for _ in range(3000):
+        mujoco.mj_step(model, data)
+    total = np.zeros(3)
+    for number in range(data.ncon):
+        wrench = np.zeros(6)
+        mujoco.mj_contactForce(model, data, number, wrench)
+        total += wrench[:3] @ data.contact[number].frame.reshape(3, 3)
+    depths = data.sensordata[: len(item.sensor.texels)]
+    return 0.025 - data.qpos[2], depths, abs(total[2]), item
+
+
+def test_a_kilogram_sinks_in_as_far_as_on_ours(tmp_path):
+    """The rule behind `solref`: (1 - d) g / (4 stiffness) is m g / (N k), which Palpate's texels give."""
+    depth, depths, force, item = weighed(1.0, tmp_path)
+    ours = 9.81 / (len(item.sensor.texels) * item.sensor.parameters.k)
+    assert depth == pytest.approx(ours, rel=1e-4)  # it still settles by 1e-5 of the depth
+    assert depths == pytest.approx(np.full(len(depths), ours), abs=FLOAT32)
+    assert force == pytest.approx(9.81, rel=1e-4)
+    assert item.sensor.parameters.k * depths.sum() == pytest.approx(9.81, rel=0.01)
+
+
+def test_the_depth_of_another_mass_is_the_same_as_the_note_says(tmp_path):
+    (light, *_, item), (heavy, *_) = weighed(0.5, tmp_path / "light"), weighed(2.0, tmp_path / "heavy")
+    assert light == pytest.approx(heavy, rel=1e-3)
+    assert "per mass" in " ".join(mjcf._notes(item, mujoco_contact(item)))
 
 
 def test_a_body_that_is_not_convex_is_touched_where_it_is(tmp_path):

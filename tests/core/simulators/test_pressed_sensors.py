@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from exported_sensors import ball, pad
-from pressed_poses import DT, LEVEL, SIZE, assert_equal_bits, pose, random_poses
+from pressed_poses import DT, LEVEL, SIZE, assert_environments_are_singles, assert_equal_bits, pose, random_poses
 from solver_scenes import box
 
+from palpate.core.compiled.kernels import COMPILED
 from palpate.core.effects.engine.registry import effect
 from palpate.core.errors import ParameterError
 from palpate.core.model.body import Body, Motion
@@ -26,6 +27,23 @@ KINDS = {
     "forces": (effect("creep", amount=0.2, time=0.02), effect("hysteresis")),
     "readings": (effect("noise", seed=3), effect("lag")),
 }
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3])
+@pytest.mark.parametrize("kind", KINDS)
+def test_environments_have_the_bits_of_single_sensors(kind, threads):
+    """Also after one of them was reset on the way."""
+    item = pad(5, 4)
+    item = replace(item, sensor=replace(item.sensor, effects=KINDS[kind]))
+    seeds = range(30 if COMPILED and kind == "plain" else 1)
+    touched = 0
+    many = PressedSensors(item, box(SIZE, SIZE, SIZE), DT, 7, threads)
+    for seed in seeds:
+        poses = random_poses(seed, 5, 7)
+        many.reset()
+        singles = [PressedSensor(item, box(SIZE, SIZE, SIZE), DT, *map(pose, one)) for one in poses[0]]
+        touched += assert_environments_are_singles(many, singles, poses)
+    assert touched > 50 * len(seeds)
 
 
 @pytest.mark.parametrize("kind", KINDS)

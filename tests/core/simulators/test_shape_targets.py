@@ -6,12 +6,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from exported_sensors import pad
-from pressed_poses import DT, LEVEL, SIZE, pose, random_poses
+from pressed_poses import DT, LEVEL, SIZE, assert_environments_are_singles, pose, random_poses
 from scipy.spatial.transform import Rotation
 from solver_scenes import box
 
 from palpate.core.geometry import shapes
 from palpate.core.simulators.pressed_sensor import PressedSensor
+from palpate.core.simulators.pressed_sensors import PressedSensors
 
 SHAPES = {
     "sphere": (shapes.sphere(SIZE / 2), SIZE / 2),
@@ -49,6 +50,26 @@ def test_a_sphere_presses_by_its_depth_along_its_normals():
     assert contact.force_on_target[2] == pytest.approx(slopes[height > 0.0].sum(), abs=1e-11)
 
 
+def test_a_capsule_that_lies_presses_as_a_cylinder():
+    """Along the whole pad, which is shorter than the capsule's axis."""
+    radius = 0.01
+    contact, texels, _ = at_rest(shapes.capsule(radius, 0.2), [0.0, 0.0, radius - DEPTH], [np.pi / 2, 0.0, 0.0])
+    square = radius**2 - texels[:, 0] ** 2
+    height = np.sqrt(np.maximum(square, 0.0)) - (radius - DEPTH)
+    expected = np.where(height > 0.0, K * height * np.sqrt(np.maximum(square, 0.0)) / radius, 0.0)
+    assert contact.texels.normal_force == pytest.approx(expected, abs=1e-11)
+    assert (expected > 0.0).sum() == 9
+
+
+def test_a_leaning_plane_presses_by_its_depth():
+    """The plane's normal leads down to the pad and leans by 1°, so that one end of the pad is not pressed."""
+    lean = np.radians(1.0)
+    contact, texels, _ = at_rest(shapes.plane(), [0.0, 0.0, -5e-5], [np.pi + lean, 0.0, 0.0])
+    depth = 5e-5 - np.tan(lean) * texels[:, 1]
+    assert contact.texels.normal_force == pytest.approx(np.where(depth > 0.0, K * depth * np.cos(lean), 0.0), abs=1e-11)
+    assert 0 < (depth > 0.0).sum() < len(depth)
+
+
 def test_a_box_gives_the_numbers_of_its_mesh():
     """Also where it slides and leans; within 1e-9 of the largest force, for another order of the arithmetic."""
     item, lit = pad(9, 7), 0
@@ -79,6 +100,16 @@ def test_a_pad_in_parts_has_the_same_bits_with_two_threads(shape):
         assert np.array_equal(first.force_on_target, second.force_on_target)
     assert first.texels.normal_force.sum() == pytest.approx(first.force_on_target[2], rel=0.05)
     assert 10 < first.texels.contact.sum() < len(first.texels.contact)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_environments_have_the_bits_of_single_sensors(name):
+    shape, height = SHAPES[name]
+    item, poses = pad(5, 4), random_poses(7, 5, 6, height=height - DEPTH)
+    poses[:, :, 1, 0] *= 0.3
+    poses[:, :, 1, 3:] = turned(name, poses[:, :, 1, 3:])
+    singles = [PressedSensor(item, shape, DT, *map(pose, one)) for one in poses[0]]
+    assert assert_environments_are_singles(PressedSensors(item, shape, DT, 6, 2), singles, poses) > 20
 
 
 @pytest.mark.parametrize("name", [*SHAPES, "mesh"])

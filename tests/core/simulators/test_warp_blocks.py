@@ -16,7 +16,7 @@ from palpate.core.geometry import shapes
 from palpate.core.geometry.bvh import Segment, build_tree, segment_entry
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.simulators.load_search import LoadSearch
-from palpate.core.simulators.warp import balance_kernels, engine, press_kernels, warp_sensors
+from palpate.core.simulators.warp import balance_kernels, block, engine, press_kernels, warp_sensors
 from palpate.core.simulators.warp.balance_kernels import Beginning
 from palpate.core.simulators.warp.press_arrays import Jumps, Results, Slots, Worlds, split_leaves
 from palpate.core.simulators.warp.warp_sensors import WarpSensors
@@ -28,11 +28,11 @@ SHAPE = shapes.box((SIZE, SIZE, SIZE))
 
 
 class Block:
-    """Run a function by so many threads."""
+    """Run a function by so many threads, and count the passes of the longest loop that one of them takes."""
 
     def __init__(self, lanes, monkeypatch):
         self._lanes, self._barrier, self._values, self._own = lanes, threading.Barrier(lanes), [0.0] * lanes, threading.local()
-        self._monkeypatch = monkeypatch
+        self._monkeypatch, self.longest = monkeypatch, 0
 
     def run(self, function, world, *arguments):
         """Run it for an environment; whatever a thread raises is raised here."""
@@ -51,6 +51,7 @@ class Block:
             for module in (press_kernels, balance_kernels):
                 patch.setattr(module, "block_sum", self._sum)
                 patch.setattr(module, "wait_for_block", self._barrier.wait)
+                patch.setattr(module, "range", self._counted, raising=False)
             for one in threads:
                 one.start()
             for one in threads:
@@ -65,11 +66,49 @@ class Block:
         self._barrier.wait()
         return total
 
+    def _counted(self, *limits):
+        self.longest = max(self.longest, len(range(*limits)))
+        return range(*limits)
 
-def host(arrays, kind):
-    """The arrays of Warp as those of numpy, by name."""
-    parts = {name: getattr(arrays, name) for name in kind._fields}
-    return SimpleNamespace(**{name: part.numpy() if hasattr(part, "numpy") else part for name, part in parts.items()})
+
+class Run:
+    """Steps of plain Python with arrays as :class:`.WarpSensors` makes them."""
+
+    def __init__(self, block):
+        item, ours = pad(5, 4), WarpSensors(pad(5, 4), SHAPE, DT, E)
+        sensor, self._block = item.sensor, block
+        self.sensor, self.targets = (
+            SimpleNamespace(**{name: _host(getattr(part, name)) for name in kind._fields})
+            for part, kind in ((ours._sensor, warp_sensors.SensorArrays), (ours._targets, warp_sensors.TargetArrays))
+        )
+        self.n, self.tree = len(sensor.texels), build_tree([warp_sensors._NO_MESH])
+        slots, room = Slots.zero(E, *ours._of_slots), Worlds.zero(E, 1)
+        self.worlds, self.slots, self.out = room, slots, Results.zero(E, self.n, 1)
+        self.jumps, self.start = Jumps.of(sensor.texels, [SHAPE], E), Slots.zero(E, *ours._of_slots)
+        self.beginning = Beginning.zero(E)
+        self.search = LoadSearch.of(sensor.texels, sensor.parameters.max_penetration, E)
+
+    def step(self, poses, loads=None):
+        """Go on by one step, under loads or not, and return the results."""
+        self.worlds.poses[:] = poses
+        touching = self.sensor, self.targets, self.tree, self.worlds, self.slots
+        for world in range(E):
+            if loads is not None:
+                self.search.given[:] = loads
+                rest = self.jumps, self.out, self.start, self.beginning, self.search
+                self._block.run(balance_kernels.balance_world, world, loads.shape[1], *touching, *rest)
+                continue
+            self._block.run(press_kernels.move_world, world, self.sensor, self.worlds)
+            for texel in range(self.n):
+                press_kernels.press_texel(world, texel, *touching, self.out)
+            self._block.run(
+                press_kernels.finish_world, world, self.sensor, self.worlds, self.slots, self.jumps, self.out
+            )  # fmt: skip
+        return self.out
+
+
+def _host(value):
+    return value.numpy() if hasattr(value, "numpy") else value
 
 
 def poses_of(step):
@@ -81,30 +120,46 @@ def poses_of(step):
     return poses
 
 
+@pytest.mark.parametrize("lanes", [1, 3, 8])
+def test_the_threads_of_a_block_share_contact_points(lanes, monkeypatch):
+    """The numbers are Warp's; no thread takes more passes than its share, apart from loops over the numbers of a row."""
+    shared, ours = Block(lanes, monkeypatch), WarpSensors(pad(5, 4), SHAPE, DT, E)
+    run = Run(shared)
+    for step in range(4):
+        poses = poses_of(step)
+        found, expected = run.step(poses), ours.step(poses[:, 0], poses[:, 1])
+        for name in ("texels", "readings", "wrench", "too_deep", "contact"):
+            assert np.abs(getattr(found, name) - getattr(expected, name).numpy().astype(float)).max() < 1e-12, (step, name)
+        assert np.array_equal(run.jumps.jumped, ours.jumped.numpy())
+    assert found.wrench[:, 0, 2].min() > 0.1
+    assert shared.longest == max(12, -(-run.n // lanes))
+
+
 @pytest.mark.slow("Warp compiles the kernels of steps under loads")
-@pytest.mark.parametrize("lanes", [1, 3])
-def test_the_threads_of_a_block_share_contact_points_and_search_together(lanes, monkeypatch):
-    """Steps of plain Python have Warp's numbers; a step under a load passes through all that a step does."""
-    item, ours, block = pad(5, 4), WarpSensors(pad(5, 4), SHAPE, DT, E), Block(lanes, monkeypatch)
-    texels, reach = item.sensor.texels, item.sensor.parameters.max_penetration
-    sensor, targets = host(ours._sensor, warp_sensors.SensorArrays), host(ours._targets, warp_sensors.TargetArrays)
-    tree, worlds = build_tree([warp_sensors._NO_MESH]), Worlds.zero(E, 1)
-    slots, start = (Slots.zero(E, *ours._of_slots) for _ in range(2))
-    jumps, found, search = Jumps.of(texels, [SHAPE], E), Results.zero(E, len(texels), 1), LoadSearch.of(texels, reach, E)
-    touching, rest = (sensor, targets, tree, worlds, slots), (jumps, found, start, Beginning.zero(E), search)
-    loads = np.zeros((E, 6))
+@pytest.mark.parametrize("lanes", [1, 4])
+def test_the_threads_of_a_block_search_together(lanes, monkeypatch):
+    shared, ours = Block(lanes, monkeypatch), WarpSensors(pad(5, 4), SHAPE, DT, E)
+    run = Run(shared)
     for step in range(3):
+        poses, loads = poses_of(1), np.zeros((E, 6))
         loads[:, 2] = WEIGHT * (1.0 + 0.1 * step)
-        worlds.poses[:], search.given[:] = poses_of(step), loads
-        for world in range(E):
-            block.run(balance_kernels.balance_world, world, loads.shape[1], *touching, *rest)
-        expected = ours.step(poses_of(step)[:, 0], poses_of(step)[:, 1], wrench=loads)
-        for name in ("texels", "readings", "too_deep", "contact"):
-            assert np.abs(getattr(found, name) - getattr(expected, name).numpy().astype(float)).max() < 1e-9, (step, name)
-        assert np.abs(found.wrench - expected.wrench.numpy()).max() < 1e-6
-        assert np.array_equal(worlds.poses[:, 1], poses_of(step)[:, 1])
-        assert np.array_equal(jumps.jumped, ours.jumped.numpy())
-    assert found.wrench[:, 0, 2] == pytest.approx(loads[:, 2], abs=1e-6)
+        found, expected = run.step(poses, loads), ours.step(poses[:, 0], poses[:, 1], wrench=loads)
+        assert np.abs(found.texels - expected.texels.numpy()).max() < 1e-9
+        assert np.abs(found.wrench[:, 0] - loads).max() < 1e-6
+        assert np.array_equal(run.worlds.poses[:, 1], poses[:, 1])
+    assert shared.longest == max(12, -(-run.n // lanes))
+
+
+def test_a_gpu_gets_a_thread_for_each_texel(monkeypatch):
+    """Threads of each kernel of a step, and of their blocks: a few move an environment, and a warp adds its texels up."""
+    launched, ours = [], WarpSensors(pad(5, 4), SHAPE, DT, E)
+    monkeypatch.setattr(warp, "launch", lambda kernel, dim, block_dim, **_: launched.append((dim, block_dim)))
+    ours._on_gpu = True
+    ours.step(poses_of(0)[:, 0], poses_of(0)[:, 1])
+    assert launched == [((E, warp_sensors.MOVERS), block.THREADS), ((E, 20), block.THREADS), ((E, block.WARP), block.WARP)]
+    launched.clear()
+    ours.step(wrench=np.zeros((E, 6)))
+    assert launched == [((E, block.WARP), block.WARP)]
 
 
 def test_a_gpu_meets_fewer_triangles_and_finds_the_same():

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from exported_sensors import ball, pad
-from pressed_poses import DT, SIZE, random_poses
+from pressed_poses import DT, LEVEL, SIZE, random_poses
 from solver_scenes import box
 
 from palpate.core.effects.engine.registry import effect
@@ -29,11 +29,10 @@ AGREE = 1e-9
 """Newtons (and units of a reading, N·m) to which Warp in float64 and the solver agree: forces here are up to some newtons."""
 
 
-def assert_agree(item, meshes, targets, poses, device="cpu", parameters=None):
-    """Take the same steps with both; an environment is reset on the way, and others have no pose. Return the largest shear."""
+def assert_agree(item, meshes, targets, poses, device="cpu"):
+    """Take the same steps with both; an environment is reset on the way, and others have no pose. Return the largest force."""
     e, largest = poses.shape[1], 0.0
-    core = PressedSensors(item, meshes, DT, e, parameters=parameters)
-    ours = WarpSensors(item, targets, DT, e, device, parameters=parameters)
+    core, ours = PressedSensors(item, meshes, DT, e), WarpSensors(item, targets, DT, e, device)
     poses[1, 0, 1, 4], poses[2, 2, 0, 3:] = np.nan, 0.0
     for step, now in enumerate(poses):
         if step == 3:
@@ -82,33 +81,20 @@ def test_several_targets_share_a_sensor():
     assert assert_agree(pad(5, 8), [CUBE, CUBE], [CUBE, SHAPE], random_poses(6, 5, 3, 2)) > 1e-3
 
 
-@pytest.mark.slow("Warp compiles the kernels")
-@pytest.mark.parametrize("normal_law", ["linear", "hunt-crossley"])
-def test_environments_have_parameters_of_their_own(normal_law):
-    draw = np.random.default_rng(3)
-    columns = {name: draw.uniform(low, high, 4) for name, low, high in (
-        ("k", 500.0, 2000.0), ("cn", 0.0, 5.0), ("mus", 0.3, 1.2), ("mud", 0.1, 0.3), ("gain", 0.5, 2.0), ("zero", -1.0, 1.0),
-        ("exponent", 1.2, 2.0),
-    )}  # fmt: skip
-    item, poses = pad(5, 4, normal_law=normal_law), random_poses(8, 5, 4)
-    assert assert_agree(item, [SHAPE], [SHAPE], poses, parameters=columns) > 1e-3
+EFFECTS = {
+    "forces": ("creep", "hysteresis", "stribeck", "viscous-friction"),
+    "memory and pull": ("softening", "wear", "stiffening", "adhesion"),
+    "readings": ("lag",),
+}
 
 
-@pytest.mark.long("Warp compiles kernels for these effects")
-def test_environments_have_effects_of_their_own():
-    """On forces, on friction and on readings, beside stiffness and gain."""
+@pytest.mark.long("Warp compiles kernels for each set of effects")
+@pytest.mark.parametrize("names", EFFECTS.values(), ids=EFFECTS)
+def test_effects_are_those_of_pressed_sensors(names):
+    """With two targets on four points, the deepest of which is remembered."""
     item = pad(4, 3, points_per_texel=4)
-    names = ("creep", "viscous-friction", "lag")
     item = replace(item, sensor=replace(item.sensor, effects=tuple(effect(name) for name in names)))
-    columns = {
-        "k": np.linspace(500.0, 2000.0, 4),
-        "gain": np.linspace(0.5, 2.0, 4),
-        "effect.creep.amount": np.linspace(0.0, 0.5, 4),
-        "effect.creep.time": np.linspace(0.02, 0.1, 4),
-        "effect.viscous-friction.viscosity": np.linspace(0.0, 5.0, 4),
-        "effect.lag.time": np.linspace(0.01, 0.1, 4),
-    }
-    assert assert_agree(item, [SHAPE], [SHAPE], random_poses(8, 6, 4), parameters=columns) > 1e-3
+    assert assert_agree(item, [CUBE, CUBE], [SHAPE, CUBE], random_poses(7, 6, 3, 2)) > 1e-3
 
 
 @needs_gpu
@@ -129,6 +115,49 @@ def test_a_step_is_captured_as_a_graph():
         warp.copy(graph.poses, warp.array(now, dtype=warp.float64, device=CUDA))
         warp.capture_launch(capture.graph)
         assert np.array_equal(graph.texels.numpy(), plain.texels.numpy())
+
+
+# --- physics
+
+
+def slide(pressed, tilt, steps, dt, mass=1.0, start=0.05):
+    """Let a cube go on a pad that is tilted about x, coupled explicitly; return where it was, by steps."""
+    pull = mass * 9.81 * np.array([0.0, -np.sin(tilt), -np.cos(tilt)])
+    where, speed, path = np.array([0.0, 0.0, start]), np.zeros(3), []
+    sensor, target = LEVEL[None], LEVEL[None].copy()
+    target[0, :3] = where
+    pressed.step(sensor, target)
+    for _ in range(steps):
+        speed += dt * (pressed.wrench.numpy()[0, 0, :3] + pull) / mass
+        where += dt * speed
+        target[0, :3] = where
+        pressed.step(sensor, target)
+        path.append(where.copy())
+    return np.array(path)
+
+
+def slope_sensor(dt):
+    return WarpSensors(pad(8, 8, k=1000.0, cn=10.0, sigma0=1000.0, sigma1=10.0), shapes.box((0.1, 0.1, 0.1)), dt, 1)
+
+
+@pytest.mark.slow("Warp compiles the kernels, and 2,000 steps")
+@pytest.mark.parametrize(("degrees", "weight", "shear"), [(0.0, 9.81, 0.0), (10.0, 9.6610, 1.7035)])
+def test_a_cube_at_rest_weighs_and_holds_what_it_should(degrees, weight, shear):
+    pressed = slope_sensor(5e-4)
+    slide(pressed, np.radians(degrees), 2000, 5e-4)
+    texels, wrench = pressed.texels.numpy()[0], pressed.wrench.numpy()[0, 0]
+    assert pressed.contact.numpy().all()
+    assert texels[:, 0].sum() == pytest.approx(weight, abs=1e-4)
+    assert wrench[:3] == pytest.approx([0.0, shear, weight], abs=1e-4)
+    along = np.abs(texels[:, 1:].sum(axis=0))
+    assert along.max() == pytest.approx(shear, abs=1e-3)
+    assert along.min() == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.long("120,000 steps of a minute on a slope")
+def test_friction_holds_for_a_minute():
+    path = slide(slope_sensor(5e-4), np.radians(10.0), 122_000, 5e-4)
+    assert np.abs(path[-1] - path[2000]).max() < 1e-6
 
 
 # --- use
@@ -178,6 +207,52 @@ def test_poses_and_masks_of_another_shape_are_one_sentence():
 def test_warp_is_imported_only_on_demand():
     code = "import sys, palpate; from palpate.core.simulators.warp import warp_sensors; print('warp' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "False"
+
+
+@pytest.mark.slow("Warp compiles the kernels")
+@pytest.mark.parametrize("normal_law", ["linear", "hunt-crossley"])
+def test_environments_have_parameters_of_their_own(normal_law):
+    """As in PressedSensors; those of which there is no column stay the sensor's."""
+    draw = np.random.default_rng(3)
+    columns = {name: draw.uniform(low, high, 4) for name, low, high in (
+        ("k", 500.0, 2000.0), ("cn", 0.0, 5.0), ("mus", 0.3, 1.2), ("mud", 0.1, 0.3), ("gain", 0.5, 2.0), ("zero", -1.0, 1.0),
+        ("exponent", 1.2, 2.0),
+    )}  # fmt: skip
+    item, poses = pad(5, 4, normal_law=normal_law), random_poses(8, 5, 4)
+    core = PressedSensors(item, SHAPE, DT, 4, parameters=columns)
+    ours, same = WarpSensors(item, SHAPE, DT, 4, parameters=columns), WarpSensors(item, SHAPE, DT, 4)
+    for now in poses:
+        expected = core.step(now[:, 0], now[:, 1])
+        found = ours.step(now[:, 0], now[:, 1])
+        same.step(now[:, 0], now[:, 1])
+        for name in ("texels", "readings", "wrench"):
+            assert np.abs(getattr(found, name).numpy().reshape(-1) - getattr(expected, name).reshape(-1)).max() < AGREE
+    assert np.abs(ours.texels.numpy() - same.texels.numpy()).max() > 1e-3
+
+
+@pytest.mark.long("Warp compiles kernels for these effects")
+def test_environments_have_effects_of_their_own():
+    """On forces, on friction and on readings, beside stiffness and gain."""
+    item = pad(4, 3, points_per_texel=4)
+    names = ("creep", "viscous-friction", "lag")
+    item = replace(item, sensor=replace(item.sensor, effects=tuple(effect(name) for name in names)))
+    columns = {
+        "k": np.linspace(500.0, 2000.0, 4),
+        "gain": np.linspace(0.5, 2.0, 4),
+        "effect.creep.amount": np.linspace(0.0, 0.5, 4),
+        "effect.creep.time": np.linspace(0.02, 0.1, 4),
+        "effect.viscous-friction.viscosity": np.linspace(0.0, 5.0, 4),
+        "effect.lag.time": np.linspace(0.01, 0.1, 4),
+    }
+    core = PressedSensors(item, SHAPE, DT, 4, parameters=columns)
+    ours, same = WarpSensors(item, SHAPE, DT, 4, parameters=columns), WarpSensors(item, SHAPE, DT, 4)
+    for now in random_poses(8, 6, 4):
+        expected, found = core.step(now[:, 0], now[:, 1]), ours.step(now[:, 0], now[:, 1])
+        same.step(now[:, 0], now[:, 1])
+        for name in ("texels", "readings", "wrench"):
+            assert np.abs(getattr(found, name).numpy().reshape(-1) - getattr(expected, name).reshape(-1)).max() < AGREE
+    for one in (0, 3):
+        assert np.abs(ours.readings.numpy()[one] - same.readings.numpy()[one]).max() > 1e-3
 
 
 def test_more_environments_than_memory_are_one_sentence(monkeypatch):
