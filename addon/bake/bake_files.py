@@ -17,8 +17,9 @@ import bpy
 
 from ...core.errors import FileError, os_error_reason
 from ...core.io.bake_folder import (
+    BAKE_FILE_NAMES,
+    MANIFEST_FORMAT,
     MANIFEST_NAME,
-    RECORDING_NAME,
     BakeOwner,
     begin_bake,
     discard_bake,
@@ -32,8 +33,8 @@ from ...core.io.bake_folder import (
     write_manifest,
 )
 from ...core.io.file_writing import require_space, writable_folder
-from ...core.io.hidden_folder import FolderLock
-from ...core.io.recording_npz import SENSOR_NAME
+from ...core.io.hidden_folder import PRIVATE_FOLDER, FolderLock, is_private_folder
+from ...core.io.input_files import read_bytes
 from ...core.io.row_tables import FrameTable
 from ...core.io.tactile_exr import CHANNELS
 from ...core.model.recording import Frame, Recording
@@ -170,11 +171,13 @@ class BakeFiles:
         self._sensors = {sensor.name: sensor for sensor in scenario.sensors if sensor.readout}
         self._names = folder_names(self._sensors)
         self.folders = {name: self.folder / self._names[name] for name in self._sensors}
-        self._check_replaceable()  # before anything is made
+        if not is_private_folder(self.folder / PRIVATE_FOLDER):
+            self._check_replaceable()  # before anything is made
         self._lock = FolderLock(writable_folder(self.folder, create=True))
         try:
             with _refusals_named(self.folder):
                 new = begin_bake(self.folder)
+                self._check_replaceable()
                 self._new = {name: new / self._names[name] for name in self._sensors}
                 for own in self._new.values():
                     own.mkdir()
@@ -254,16 +257,29 @@ def _check_replaceable(folder: Path, owner: BakeOwner) -> None:
     """Raise FileError if a sensor's folder holds other files than a bake, or the bake of another scene."""
     if not folder.exists():
         return
+    if not _is_bake(folder):
+        if not folder.is_dir() or any(folder.iterdir()):
+            raise FileError(f"'{folder}' holds other files than a bake: rename it, or choose another bake folder.")
+        return
     try:
         manifest = read_manifest(folder)
     except FileError:
-        found = {path.name for path in folder.iterdir()} if folder.is_dir() else {folder.name}
-        if found and not found >= {MANIFEST_NAME, RECORDING_NAME, SENSOR_NAME}:
-            raise FileError(f"'{folder}' holds other files than a bake: rename it, or choose another bake folder.") from None
         return  # a bake that cannot be read may be replaced
     other = other_owner(manifest, folder.parent, owner)
     if other:
         raise FileError(f"'{folder}' holds the bake of {other}: choose another bake folder, or rename this one.")
+
+
+def _is_bake(folder: Path) -> bool:
+    """Return True if a folder holds a manifest of Palpate, or a damaged manifest beside other files of a bake."""
+    try:
+        content = json.loads(read_bytes(folder / MANIFEST_NAME).decode("utf-8", "surrogatepass"))
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except (OSError, ValueError, RecursionError):
+        others = {path.name for path in folder.iterdir()} - {MANIFEST_NAME}
+        return any(BAKE_FILE_NAMES.fullmatch(name) for name in others)
+    return isinstance(content, dict) and str(content.get("format")).partition("/")[0] == MANIFEST_FORMAT.partition("/")[0]
 
 
 @contextmanager

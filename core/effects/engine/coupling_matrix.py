@@ -13,10 +13,6 @@ LARGEST_DENSE = 1500
 """Up to this number of texels every pair counts. Of more texels only pairs within reach count, since the matrix would not fit
 into memory."""
 
-MANY_SAMPLES = 100
-"""From this number of samples on, a product of the texels with a signal pays for their selection. For 900 samples of 84 texels
-of which nine are loaded it takes 0.4 times as long; for one sample of 1,024 loaded texels it would take sixty times as long."""
-
 LARGEST_KEPT = 256
 """Up to this number of texels all distances are kept: a fit asks thousands of times for those of the same texels."""
 
@@ -61,12 +57,15 @@ class CouplingMatrix:
 
 
 def coupled(signal: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """Return ``signal @ matrix.T``, (t, n) float; of many samples only texels with a signal, as a small indenter loads few."""
-    if len(signal) < MANY_SAMPLES:
+    """Return ``signal @ matrix.T``, (t, n) float.
+
+    A signal that is no smaller than the matrix goes without the texels that are never loaded: an indenter touches few, and
+    selecting the others costs less than their products. One sample is multiplied as it is.
+    """
+    if len(signal) < len(matrix):
         return np.asarray(signal @ matrix.T)
     (source,) = np.nonzero((signal != 0.0).any(axis=0))
-    result: np.ndarray = signal[:, source] @ matrix[:, source].T
-    return result
+    return np.asarray(signal[:, source] @ matrix[:, source].T)
 
 
 def coupling_matrix(

@@ -39,8 +39,8 @@ AT_BOUND = 0.01
 """A parameter is at a bound if it differs from it by less than this share of the bound."""
 NEARLY_ALL = 0.9
 """Least upper bound of a share that means the whole. Bounds of 0.9 and 0.95 avoid a division by zero at 1. The next smaller
-bound is the 0.5 of crosstalk between wires. While it meant the whole, wires rivalled load spreading in two of the 133 rigs of
-base 126900."""
+bound is the 0.5 of crosstalk between wires, so any number between does the same. While 0.5 meant the whole, wires rivalled load
+spreading in two of the 133 rigs of base 126900."""
 LEAST_WARMTH = 1.0
 """Range of temperatures (K) from which on what follows them can be told from what does not. Chosen by eye."""
 INVERSE_FORCES = {1: "1/N", 2: "1/N²", 3: "1/N³", 4: "1/N⁴"}
