@@ -12,6 +12,7 @@ import bpy
 import pytest
 
 import palpate
+from palpate.addon.properties import registration
 
 pytestmark = pytest.mark.enabling
 
@@ -213,3 +214,17 @@ def test_every_icon_exists(repository):
     for file in (repository / "panels").glob("*.py"):
         for name in re.findall(r'icon="(\w+)"', file.read_text(encoding="utf-8")):
             assert name in known, f"{file.name}: {name}"
+
+
+def test_every_number_with_a_unit_says_it_in_its_tooltip():
+    """A name as in "Stiffness k (N/m)" may be cut off where it is drawn; what it says when the mouse rests on it is not."""
+    owners = [cls.bl_rna for cls in registration.CLASSES]
+    owners += [getattr(bpy.ops.palpate, name).get_rna_type() for name in dir(bpy.ops.palpate)]
+    counted = 0
+    for rna in owners:
+        for item in rna.properties:
+            unit = re.search(r"\(([^)×]+)\)$", item.name)
+            if unit and item.type in {"FLOAT", "INT"}:
+                counted += 1
+                assert unit.group(1) in item.description, f"{rna.identifier}.{item.identifier}: {item.description}"
+    assert counted > 60

@@ -383,3 +383,20 @@ def test_nothing_is_left_of_a_deleted_sensor(tmp_path, around):
     left, blocks = ours()
     assert left == [] and blocks["materials"] == ["Mine"] and blocks["images"] == []
     assert not [action for action in blocks["actions"] if action.startswith("Net Force")]
+
+
+def test_files_put_beside_the_images_outlive_the_next_bake(tmp_path):
+    scene, *_ = press(frames=3)
+    save(tmp_path)
+    folder = baked(scene).folders["Pad"]
+    mine = {"notes.txt": b"years of work", "tactile_mean.exr": b"mine", "plots/a.svg": b"<svg/>"}
+    (folder / "plots").mkdir()
+    for name, content in mine.items():
+        (folder / name).write_bytes(content)
+
+    scene.frame_end = 2
+    baked(scene)
+    assert {name: (folder / name).read_bytes() for name in mine} == mine
+    assert sorted(path.name for path in folder.glob("tactile_0*.exr")) == ["tactile_0001.exr", "tactile_0002.exr"]
+    assert visible(folder.parent) == ["Pad"]
+    assert [path.name for path in (folder.parent / PRIVATE_FOLDER).iterdir()] == [LOCK_NAME]

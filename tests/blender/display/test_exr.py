@@ -9,7 +9,7 @@ import sys
 import bpy
 import numpy as np
 import pytest
-from sample_bake import pictures_of, tactile_frame
+from sample_bake import pictures_of, read_exr, tactile_frame
 
 from palpate.core.geometry.grid_layout import GridLayout
 from palpate.core.geometry.texture_maps import uv_layout
@@ -70,3 +70,19 @@ def test_either_library_may_come_first(tmp_path, first):
         "assert image.pixels[0] == file.channels()['R'].pixels[-1, 0] != 0\n"
     )
     assert subprocess.run([sys.executable, "-c", program, str(tmp_path / "a.exr")]).returncode == 0
+
+
+def test_both_libraries_work_after_a_render(tmp_path, scene):
+    camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    scene.render.engine = "CYCLES"
+    scene.cycles.samples = 1
+    scene.render.resolution_x, scene.render.resolution_y = 32, 24
+    scene.render.image_settings.file_format = "OPEN_EXR"
+    for turn in range(2):
+        assert_blender_reads_it(tmp_path / f"{turn}.exr", grid(), tactile_frame(ROWS * COLUMNS, turn))
+        scene.render.filepath = str(tmp_path / f"render_{turn}.exr")
+        bpy.ops.render.render(write_still=True)
+        channels, _ = read_exr(tmp_path / f"render_{turn}.exr")
+        assert channels["R"].shape == (24, 32)

@@ -249,3 +249,11 @@ def test_a_folder_without_a_bag_and_a_missing_file_are_named(tmp_path):
         read_log(tmp_path)
     with pytest.raises(FileError, match="There is no file"):
         read_log(tmp_path / "gone.csv")
+
+
+def test_a_fifo_in_the_folder_of_a_bag_is_not_waited_for(tmp_path):
+    write_bag(folder := tmp_path / "bag")
+    (folder / "metadata.yaml").unlink()
+    os.mkfifo(folder / "metadata.yaml")
+    with pytest.raises(FileError, match="is a FIFO"):
+        read_log(folder)

@@ -90,3 +90,13 @@ def test_a_value_with_a_meaning_of_its_own_is_no_bound(kind, form, values, low, 
     model = Model(SensorParameters(), (effect(kind, form, **values),))
     (name,) = values
     assert parameters_at_bounds(model, (FreeParameter(0, name, low, high),), 0) == (values if at_bound else {})
+
+
+@pytest.mark.long("two whole diagnoses")
+def test_check_recordings_choose_no_effect():
+    """The amended model has the same effects, whatever the check recording holds; only what is said of it changes."""
+    rig = cases.rig(contact=lambda f, t: f / (1.0 + 4.0 * f), seed=5, trials=4, seconds=6.0)
+    plain, other = diagnosed(rig), diagnosed(with_check(rig, 0.6))
+    chosen = [[(one.name, one.form) for one in result.best.model.effects] for result in (plain, other)]
+    assert chosen[0] and chosen[0] == chosen[1]
+    assert not plain.check.is_refuted and other.check.is_refuted
