@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A contract of ``lint-imports`` that import-linter itself does not have; pyproject.toml lists it with the others."""
+"""Contracts of ``lint-imports`` that import-linter itself does not have; pyproject.toml lists them with the others."""
 
 from __future__ import annotations
 
@@ -11,9 +11,33 @@ from grimp import ImportGraph
 from importlinter import Contract, ContractCheck, fields, output
 
 ROOT = Path(__file__).resolve().parents[1]
+DEEPEST = 8  # layers of imports among the direct children of one package
 
 
-class OfferedModules(Contract):
+class _SentencesContract(Contract):
+    """A contract whose breaches are sentences."""
+
+    packages = fields.ListField(subfield=fields.StringField())
+    """Top packages of the extension, without the name of the root."""
+
+    def breaches(self, graph: ImportGraph) -> Iterator[str]:
+        """Yield each breach as one sentence."""
+        raise NotImplementedError
+
+    def check(self, graph: ImportGraph, verbose: bool) -> ContractCheck:
+        found = sorted(self.breaches(graph))
+        return ContractCheck(kept=not found, metadata={"found": found})
+
+    def render_broken_contract(self, check: ContractCheck) -> None:
+        for sentence in check.metadata["found"]:
+            output.print_error(sentence)
+
+    def modules(self, graph: ImportGraph) -> list[str]:
+        """Return the modules of the packages."""
+        return sorted(m for m in graph.modules if m.count(".") and m.split(".")[1] in self.packages)
+
+
+class OfferedModules(_SentencesContract):
     """``__all__`` of a package names the modules that others may import, and no module imports a private name.
 
     Packages of core and addon also say what they are for, and import nothing when they are entered. Imports inside the
@@ -22,20 +46,8 @@ class OfferedModules(Contract):
 
     type_name = "offered_modules"
 
-    packages = fields.ListField(subfield=fields.StringField())
-    """Top packages of the extension, without the name of the root."""
-
-    def check(self, graph: ImportGraph, verbose: bool) -> ContractCheck:
-        found = sorted(self._breaches(graph))
-        return ContractCheck(kept=not found, metadata={"found": found})
-
-    def render_broken_contract(self, check: ContractCheck) -> None:
-        for sentence in check.metadata["found"]:
-            output.print_error(sentence)
-
-    def _breaches(self, graph: ImportGraph) -> Iterator[str]:
-        """Yield each breach as one sentence."""
-        modules = sorted(m for m in graph.modules if m.count(".") and m.split(".")[1] in self.packages)
+    def breaches(self, graph: ImportGraph) -> Iterator[str]:
+        modules = self.modules(graph)
         sources = {module: ast.parse(_file(module).read_text(encoding="utf-8")) for module in modules}
         offered = {module: _offered(sources[module]) for module in modules if graph.find_children(module)}
         for module, names in offered.items():
@@ -92,3 +104,29 @@ def _statement_breaches(module: str, source: ast.Module, packages: list[str]) ->
             continue
         if any(name.split(".")[0] in ("palpate", *packages) for name in absolute):
             yield f"{module}, line {node.lineno}: inside the extension imports are relative"
+
+
+class Depth(_SentencesContract):
+    """The direct children of a package import each other in a few layers at most."""
+
+    type_name = "depth"
+
+    def breaches(self, graph: ImportGraph) -> Iterator[str]:
+        for package in self.modules(graph):
+            children = graph.find_children(package)
+            if (layers := _layers(graph, children)) > DEEPEST:
+                yield f"{package} has {layers} layers of imports among its children; {DEEPEST} are allowed"
+
+
+def _layers(graph: ImportGraph, children: set[str]) -> int:
+    """Return the number of children on the longest path of imports; circles are another contract's."""
+    below: dict[str, int] = {}
+
+    def depth(child: str) -> int:
+        if child not in below:
+            below[child] = 1
+            others = (o for o in children - {child} if graph.direct_import_exists(importer=child, imported=o, as_packages=True))
+            below[child] += max(map(depth, others), default=0)
+        return below[child]
+
+    return max(map(depth, children), default=0)
