@@ -165,6 +165,16 @@ PARTS = (
 )
 
 
+def _number(name: str, text: str, **more):
+    """Return a number that is constant during a run."""
+    return FloatProperty(name=name, description=text, **more, **FIXED)
+
+
+def _vector(name: str, text: str, precision: int = 4):
+    """Return a vector that is constant during a run."""
+    return FloatVectorProperty(name=name, description=text, size=3, subtype="XYZ", precision=precision, **FIXED)
+
+
 class PALPATE_PG_readout(bpy.types.PropertyGroup):
     """Channels of a sensor besides its texels' readings: `Object.palpate.readout`"""
 
@@ -175,24 +185,22 @@ class PALPATE_PG_readout(bpy.types.PropertyGroup):
         type=bpy.types.Collection,
         **FIXED,
     )
-    thickness: FloatProperty(
-        name="Layer (m)",
-        description="Thickness of the compliant layer, whose base is rigid, m",
+    thickness: _number(
+        "Layer (m)",
+        "Thickness of the compliant layer, whose base is rigid, m",
         default=6e-3,
         min=1e-6,
         max=0.999,
         precision=5,
         step=0.01,
-        **FIXED,
     )
     thickness_in_units: in_units("thickness", "m", "Layer", "Thickness of the compliant layer, whose base is rigid", step=0.1)
-    shear_stiffness: FloatProperty(
-        name="Shear Stiffness (N/m)",
-        description="Stiffness of a texel against shear, N/m: its surface moves sideways by its shear divided by it; "
+    shear_stiffness: _number(
+        "Shear Stiffness (N/m)",
+        "Stiffness of a texel against shear, N/m: its surface moves sideways by its shear divided by it; "
         "0 is its normal stiffness",
         min=0.0,
         precision=3,
-        **FIXED,
     )
 
 
@@ -200,31 +208,25 @@ class PALPATE_PG_magnetic(bpy.types.PropertyGroup):
     """The part that an empty has in magnetic skins: `Object.palpate.magnetic`"""
 
     part: EnumProperty(name="Part", description="What the empty is in a magnetic skin", items=PARTS, **FIXED)
-    moment: FloatProperty(
-        name="Moment (A·m²)",
-        description="Dipole moment of a magnet along its Z axis, A·m²; "
-        "a cylinder of N52, 1.6 mm wide and 1.7 mm high, has 0.004",
+    moment: _number(
+        "Moment (A·m²)",
+        "Dipole moment of a magnet along its Z axis, A·m²; a cylinder of N52, 1.6 mm wide and 1.7 mm high, has 0.004",
         default=4e-3,
         precision=5,
         step=0.01,
-        **FIXED,
     )
-    full_scale: FloatProperty(
-        name="Range (T)",
-        description="Largest field that an axis of a magnetometer shows, T; what is larger is clipped",
+    full_scale: _number(
+        "Range (T)",
+        "Largest field that an axis of a magnetometer shows, T; what is larger is clipped",
         default=50e-3,
         min=1e-9,
         precision=4,
         step=0.1,
-        **FIXED,
     )
-    zero_field: FloatVectorProperty(
-        name="Offset (T)",
-        description="What the axes of a magnetometer show more, T: its own zero and the field of the surroundings",
-        size=3,
-        subtype="XYZ",
+    zero_field: _vector(
+        "Offset (T)",
+        "What the axes of a magnetometer show more, T: its own zero and the field of the surroundings",
         precision=6,
-        **FIXED,
     )
 
 
@@ -298,14 +300,8 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
     material: StringProperty(name="Material", description="Material of the faces that belong to the sensor", **FIXED)
     face_set: IntProperty(name="Face Set", description="Number of the face set that is the sensor", default=1, **FIXED)
     vertex_group: StringProperty(name="Vertex Group", description="Painted or assigned region of the sensor", **FIXED)
-    threshold: FloatProperty(
-        name="Threshold",
-        description="Least weight at which a vertex belongs to the sensor",
-        default=0.5,
-        min=0.0,
-        max=1.0,
-        subtype="FACTOR",
-        **FIXED,
+    threshold: _number(
+        "Threshold", "Least weight at which a vertex belongs to the sensor", default=0.5, min=0.0, max=1.0, subtype="FACTOR"
     )
 
     image_layout: EnumProperty(
@@ -363,36 +359,21 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
         ),
         **(FIXED | {"update": _body_changed}),
     )
-    mass: FloatProperty(
-        name="Mass (kg)",
-        description="Mass of a free or driven body, kg; the inertia is that of a solid of uniform density",
+    mass: _number(
+        "Mass (kg)",
+        "Mass of a free or driven body, kg; the inertia is that of a solid of uniform density",
         default=1.0,
         min=0.0,
         precision=4,
-        **FIXED,
     )
-    velocity: FloatVectorProperty(
-        name="Velocity (m/s)",
-        description="Velocity of a free body at the first frame, m/s, world axes",
-        size=3,
-        subtype="XYZ",
-        precision=4,
-        **FIXED,
-    )
+    velocity: _vector("Velocity (m/s)", "Velocity of a free body at the first frame, m/s, world axes")
     mass_in_units: in_units(
         "mass", "kg", "Mass", "Mass of a free or driven body; its inertia is that of a solid of uniform density", min=0.0
     )
     velocity_in_units: in_units(
         "velocity", "m/s", "Velocity", "Velocity of a free body at the first frame, world axes", is_vector=True
     )
-    angular_velocity: FloatVectorProperty(
-        name="Spin (rad/s)",
-        description="Angular velocity of a free body at the first frame, rad/s, world axes",
-        size=3,
-        subtype="XYZ",
-        precision=4,
-        **FIXED,
-    )
+    angular_velocity: _vector("Spin (rad/s)", "Angular velocity of a free body at the first frame, rad/s, world axes")
 
     effects: CollectionProperty(
         type=effect_stack.PALPATE_PG_effect,

@@ -198,6 +198,16 @@ def set_color_range(settings, lowest: float | None, limit: float) -> None:
         setattr(settings, name, lowest or 0.0)
 
 
+def _switch(name: str, text: str, default: bool = True):
+    """Return a setting that is on or off."""
+    return BoolProperty(name=name, description=text, default=default, **SETTING)
+
+
+def _number(name: str, text: str, **more):
+    """Return a setting that is a number."""
+    return FloatProperty(name=name, description=text, **more, **SETTING)
+
+
 def _ranges() -> dict:
     """Return the properties of the ends of all quantities' colours."""
     found = {}
@@ -205,15 +215,11 @@ def _ranges() -> dict:
         unit = f" ({quantity.unit})" if isinstance(quantity.unit, str) else ""
         is_between = quantity.span is between
         text = f"{quantity.title} at the %s of the heat map{unit or ', in the unit of the sensor'}"
-        found[RANGE_NAMES.get(name, f"range_max_{name}")] = FloatProperty(
-            name=f"Maximum{unit}",
-            description=text % "end",
-            default=quantity.limit,
-            **({} if is_between else {"min": 1e-9}),
-            **SETTING,
-        )
+        least = {} if is_between else {"min": 1e-9}
+        upper = RANGE_NAMES.get(name, f"range_max_{name}")
+        found[upper] = _number(f"Maximum{unit}", text % "end", default=quantity.limit, **least)
         if is_between:
-            found[f"range_min_{name}"] = FloatProperty(name=f"Minimum{unit}", description=text % "beginning", **SETTING)
+            found[f"range_min_{name}"] = _number(f"Minimum{unit}", text % "beginning")
     return found
 
 
@@ -234,20 +240,16 @@ class PALPATE_PG_scene(ColorRanges, bpy.types.PropertyGroup):
         subtype="DIR_PATH",
         **{**SETTING, "options": scene_units.OUTPUT},
     )
-    use_auto_dt: BoolProperty(
-        name="Auto Time Step",
-        description="Choose the substep from the stability limit of each free body against all texels that can touch it",
-        default=True,
-        **SETTING,
+    use_auto_dt: _switch(
+        "Auto Time Step", "Choose the substep from the stability limit of each free body against all texels that can touch it"
     )
-    dt: FloatProperty(
-        name="Time Step (s)",
-        description="Longest step of the solver, s; a whole number of steps makes a frame",
+    dt: _number(
+        "Time Step (s)",
+        "Longest step of the solver, s; a whole number of steps makes a frame",
         default=1e-4,
         min=0.0,
         precision=6,
         step=0.001,
-        **SETTING,
     )
     interpolation: EnumProperty(
         name="Between Frames",
@@ -267,79 +269,42 @@ class PALPATE_PG_scene(ColorRanges, bpy.types.PropertyGroup):
         max=1000,
         **SETTING,
     )
-    use_live: BoolProperty(
-        name="Live Playback",
-        description="Playing forward from the first frame computes frame by frame; scrubbing shows what was computed",
-        default=True,
-        **SETTING,
+    use_live: _switch(
+        "Live Playback", "Playing forward from the first frame computes frame by frame; scrubbing shows what was computed"
     )
-    show_texels: BoolProperty(
-        name="Texels",
-        description="Mark the texels of the active sensor in the 3D view; red ones have a problem",
-        default=True,
-        **SETTING,
+    show_texels: _switch("Texels", "Mark the texels of the active sensor in the 3D view; red ones have a problem")
+    show_normals: _switch("Normals", "Show the normals of the texels of the active sensor")
+    show_numbers: _switch(
+        "Numbers", "Show row and column of the texels where they form a grid, and their number where not", default=False
     )
-    show_normals: BoolProperty(
-        name="Normals", description="Show the normals of the texels of the active sensor", default=True, **SETTING
+    show_reach: _switch("Reach", "Show the maximum penetration: how deep the texels of the active sensor reach", default=False)
+    show_overlay: _switch("Live Heat Map", "Colour the texels in the 3D view while playing; nothing of it is saved")
+    show_through: _switch(
+        "Through Objects", "Draw the heat map over what covers it in the 3D view, as X-ray does (Alt Z)", default=False
     )
-    show_numbers: BoolProperty(
-        name="Numbers",
-        description="Show row and column of the texels where they form a grid, and their number where not",
-        default=False,
-        **SETTING,
-    )
-    show_reach: BoolProperty(
-        name="Reach",
-        description="Show the maximum penetration: how deep the texels of the active sensor reach",
-        default=False,
-        **SETTING,
-    )
-    show_overlay: BoolProperty(
-        name="Live Heat Map",
-        description="Colour the texels in the 3D view while playing; nothing of it is saved",
-        default=True,
-        **SETTING,
-    )
-    show_through: BoolProperty(
-        name="Through Objects",
-        description="Draw the heat map over what covers it in the 3D view, as X-ray does (Alt Z)",
-        default=False,
-        **SETTING,
-    )
-    show_inset: BoolProperty(
-        name="Live Images and Curves",
-        description="Tactile images, their scale and the force over time in a corner of the 3D view",
-        default=True,
-        **SETTING,
+    show_inset: _switch(
+        "Live Images and Curves", "Tactile images, their scale and the force over time in a corner of the 3D view"
     )
     color_map: EnumProperty(name="Colour Map", description="Colours of the heat map", items=COLOR_MAPS, **SETTING)
-    use_auto_range: BoolProperty(
-        name="Auto Range",
-        description="The heat maps of all sensors end at the largest value of any of them",
-        default=True,
-        **SETTING,
-    )
+    use_auto_range: _switch("Auto Range", "The heat maps of all sensors end at the largest value of any of them")
     quantity: EnumProperty(
         name="Shows",
         description="What the colours of heat maps and tactile images mean",
         items=[(name.upper(), quantity.title, quantity.text) for name, quantity in QUANTITIES.items()],
         **SETTING,
     )
-    show_indentation: BoolProperty(
-        name="Indentation",
-        description="The surface of a sensor is displaced by its penetration, while playing and after a bake, "
+    show_indentation: _switch(
+        "Indentation",
+        "The surface of a sensor is displaced by its penetration, while playing and after a bake, "
         "so that objects hardly intersect it",
-        default=True,
-        **SETTING,
     )
-    indentation_factor: FloatProperty(
-        name="Factor",
-        description="Displacement of the surface over its penetration: 1 is true to scale, more exaggerates",
+    indentation_factor: _number(
+        "Factor",
+        "Displacement of the surface over its penetration: 1 is true to scale, more exaggerates",
         default=1.0,
         min=0.0,
         soft_max=10.0,
         max=1000.0,
-        **SETTING,
     )
     overlays: EnumProperty(
         name="On Baked Sensors",
@@ -349,27 +314,12 @@ class PALPATE_PG_scene(ColorRanges, bpy.types.PropertyGroup):
         options={"ENUM_FLAG"},
         update=session_state.settings_changed,
     )
-    texel_arrow_scale: FloatProperty(
-        name="Texel Arrow Scale (m/N)",
-        description="Length of the arrow at a texel for each newton, m/N",
-        default=0.1,
-        min=0.0,
-        precision=5,
-        **SETTING,
+    texel_arrow_scale: _number(
+        "Texel Arrow Scale (m/N)", "Length of the arrow at a texel for each newton, m/N", default=0.1, min=0.0, precision=5
     )
-    use_auto_arrow: BoolProperty(
-        name="Auto Length",
-        description="The longest arrow of a bake is as long as the largest side of any sensor",
-        default=True,
-        **SETTING,
-    )
-    arrow_scale: FloatProperty(
-        name="Arrow Scale (m/N)",
-        description="Length of the net-force arrow for each newton, m/N",
-        default=0.05,
-        min=0.0,
-        precision=5,
-        **SETTING,
+    use_auto_arrow: _switch("Auto Length", "The longest arrow of a bake is as long as the largest side of any sensor")
+    arrow_scale: _number(
+        "Arrow Scale (m/N)", "Length of the net-force arrow for each newton, m/N", default=0.05, min=0.0, precision=5
     )
     figures: PointerProperty(type=figure_properties.PALPATE_PG_figures, description="Figures of the bake and their settings")
     study: PointerProperty(type=PALPATE_PG_study, description="Varied parameters of the study and their distributions")
