@@ -1,44 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Operators. Each checks the context, calls one function and reports."""
 
+import importlib
+import pkgutil
 
-def _classes():
-    from . import (
-        bake,
-        debug,
-        effects,
-        exchange,
-        figures,
-        fits,
-        fix,
-        gap,
-        laid_sensor,
-        magnetic,
-        presets,
-        probe,
-        sensor,
-        simulators,
-        study,
-    )
 
-    modules = (
-        sensor,
-        laid_sensor,
-        magnetic,
-        presets,
-        effects,
-        fix,
-        probe,
-        fits,
-        gap,
-        exchange,
-        simulators,
-        bake,
-        figures,
-        study,
-        debug,
-    )
-    return tuple(cls for module in modules for cls in module.CLASSES)
+def _classes() -> list[type]:
+    """Return the classes for Blender of all modules here: those whose names begin with PALPATE_."""
+    modules = [importlib.import_module(f".{item.name}", __package__) for item in pkgutil.iter_modules(__path__)]
+    return [found for module in modules for name, found in vars(module).items() if name.startswith("PALPATE_")]
 
 
 def register():

@@ -132,6 +132,3 @@ class PALPATE_OT_display_refresh(support.PalpateOperator, bpy.types.Operator):
     def run(self, context):
         support.leave_edit_mode(context)
         bake_display.refresh(context.scene, baked_scene.bake_folders(context.scene))
-
-
-CLASSES = (PALPATE_OT_bake, PALPATE_OT_catch_up, PALPATE_OT_bake_clear, PALPATE_OT_reset, PALPATE_OT_display_refresh)

@@ -16,6 +16,3 @@ class PALPATE_OT_debug_info_copy(bpy.types.Operator):
         context.window_manager.clipboard = dependencies.debug_info()
         self.report({"INFO"}, "Debug info is on the clipboard")
         return {"FINISHED"}
-
-
-CLASSES = (PALPATE_OT_debug_info_copy,)

@@ -67,6 +67,3 @@ class PALPATE_OT_effect_move(support.PalpateOperator, bpy.types.Operator):
         stack = context.object.palpate.effects
         to = self.index + (-1 if self.way == "UP" else 1)
         stack.move(self.index, min(max(to, 0), len(stack) - 1))
-
-
-CLASSES = (PALPATE_OT_effect_add, PALPATE_OT_effect_remove, PALPATE_OT_effect_move)

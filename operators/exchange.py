@@ -93,11 +93,3 @@ class PALPATE_OT_sensor_toml_export(support.PalpateOperator, ExportHelper, bpy.t
     def run(self, context):
         exchange.save_toml(context, context.object, self.filepath)
         self.report({"INFO"}, f"Wrote '{context.object.name}' to '{self.filepath}'")
-
-
-CLASSES = (
-    PALPATE_OT_openrave_import,
-    PALPATE_OT_openrave_export,
-    PALPATE_OT_sensor_toml_import,
-    PALPATE_OT_sensor_toml_export,
-)

@@ -35,6 +35,3 @@ class PALPATE_OT_figures_make(modal_job.ModalJob, bpy.types.Operator):
         self.report({"INFO"}, f"Made {names}{more} in '{result[0].parent}'" if result else "There is no figure to make")
         for reason in self._left_out:  # the status bar shows the last
             self.report({"WARNING"}, reason)
-
-
-CLASSES = (PALPATE_OT_figures_make,)

@@ -152,6 +152,3 @@ class PALPATE_OT_friction_fit(MeasurementFit, bpy.types.Operator):
         if fit.unidentifiable:
             names = ", ".join(fit.unidentifiable)
             self.report({"WARNING"}, f"These measurements do not identify {names}: add some at other velocities")
-
-
-CLASSES = (PALPATE_OT_stiffness_fit, PALPATE_OT_friction_fit)

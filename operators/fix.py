@@ -31,6 +31,3 @@ class PALPATE_OT_fix(support.PalpateOperator, bpy.types.Operator):
             self.report({"WARNING"}, left[0].text)
         else:
             self.report({"INFO"}, f"'{obj.name}' is fixed")
-
-
-CLASSES = (PALPATE_OT_fix,)

@@ -224,16 +224,3 @@ class PALPATE_OT_gap_report(modal_job.ModalJob, bpy.types.Operator):
 
     def done(self, result):
         self.report({"INFO"}, f"Wrote {result}")
-
-
-CLASSES = (
-    PALPATE_OT_measured_open,
-    PALPATE_OT_measured_logs,
-    PALPATE_OT_log_question,
-    PALPATE_OT_gap_find,
-    PALPATE_OT_gap_plan,
-    PALPATE_OT_gap_add,
-    PALPATE_OT_gap_curves,
-    PALPATE_OT_gap_show,
-    PALPATE_OT_gap_report,
-)

@@ -150,6 +150,3 @@ class PALPATE_OT_object_activate(support.PalpateOperator, bpy.types.Operator):
                 other.select_set(False)
             obj.select_set(True)
             context.view_layer.objects.active = obj
-
-
-CLASSES = (PALPATE_OT_pad_mesh_add, PALPATE_OT_skin_add, PALPATE_OT_skin_update, PALPATE_OT_object_activate)

@@ -36,6 +36,3 @@ class PALPATE_OT_magnetic_skin_place(support.PalpateOperator, bpy.types.Operator
         magnets = len(collection.objects) - count
         text = f"'{collection.name}' has {magnets} magnets over {count} magnetometers: '{obj.name}' has {3 * count} channels"
         self.report({"INFO"}, text)
-
-
-CLASSES = (PALPATE_OT_magnetic_skin_place,)

@@ -117,15 +117,6 @@ class PALPATE_OT_parameters_copy(support.PalpateOperator, bpy.types.Operator):
         self.report({"INFO"}, f"Copied the parameters of '{context.object.name}' to {counted(len(others), 'other')}")
 
 
-CLASSES = (
-    PALPATE_PT_presets,
-    PALPATE_MT_presets,
-    PALPATE_OT_preset_load,
-    PALPATE_OT_preset_add,
-    PALPATE_OT_parameters_copy,
-)
-
-
 def register():
     bpy.utils.register_preset_path(str(laid_sensors.FOLDER.parent))
 

@@ -47,6 +47,3 @@ class PALPATE_OT_probe_add(support.PalpateOperator, bpy.types.Operator):
         self.report(
             {"INFO"}, f"'{probe.name}' presses on '{context.object.name}': press Space to play. {note}".removesuffix(". ")
         )
-
-
-CLASSES = (PALPATE_OT_probe_add,)

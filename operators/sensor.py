@@ -138,12 +138,3 @@ class PALPATE_OT_face_set_choose(support.PalpateOperator, bpy.types.Operator):
     def run(self, context):
         settings = context.object.palpate
         settings.region, settings.face_set = "FACE_SET", int(self.face_set)
-
-
-CLASSES = (
-    PALPATE_OT_face_set_choose,
-    PALPATE_OT_sensor_add,
-    PALPATE_OT_role_set,
-    PALPATE_OT_sensor_remove,
-    PALPATE_OT_weight_paint,
-)

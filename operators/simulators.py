@@ -60,6 +60,3 @@ class PALPATE_OT_sensor_import(support.PalpateOperator, support.FileChooser, bpy
         for note in notes:
             self.report({"WARNING"}, note)
         self.report({"INFO"}, f"Read {', '.join(obj.name for obj in objects)}")
-
-
-CLASSES = (PALPATE_OT_sensor_export, PALPATE_OT_sensor_import)

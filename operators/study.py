@@ -106,12 +106,3 @@ class PALPATE_OT_study_report(support.PalpateOperator, bpy.types.Operator):
 
         report = study_process.report_of(study_settings.study_path(context.scene))
         bpy.ops.wm.url_open(url=report.absolute().as_uri())
-
-
-CLASSES = (
-    PALPATE_OT_study_vary,
-    PALPATE_OT_study_remove,
-    PALPATE_OT_study_write,
-    PALPATE_OT_study_run,
-    PALPATE_OT_study_report,
-)

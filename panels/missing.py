@@ -4,7 +4,7 @@
 import bpy
 
 from ..addon.session import dependencies
-from ..operators import debug
+from ..operators.debug import PALPATE_OT_debug_info_copy
 
 
 class PALPATE_PT_missing(bpy.types.Panel):
@@ -24,10 +24,10 @@ class PALPATE_PT_missing(bpy.types.Panel):
 
 def register():
     PALPATE_PT_missing.lost = tuple(dependencies.missing_modules())
-    for cls in (*debug.CLASSES, PALPATE_PT_missing):
-        bpy.utils.register_class(cls)
+    bpy.utils.register_class(PALPATE_OT_debug_info_copy)
+    bpy.utils.register_class(PALPATE_PT_missing)
 
 
 def unregister():
-    for cls in (PALPATE_PT_missing, *reversed(debug.CLASSES)):
-        bpy.utils.unregister_class(cls)
+    bpy.utils.unregister_class(PALPATE_PT_missing)
+    bpy.utils.unregister_class(PALPATE_OT_debug_info_copy)
