@@ -5,7 +5,7 @@ from ..addon.display import baked_scene
 from ..addon.properties import scene_properties
 from ..addon.properties.scene_units import name_in_units
 from ..addon.session import frame_status
-from .subpanels import Subpanel, draw_choices, draw_job, draw_named, draw_progress, draw_sentences, job_progress
+from .subpanels import Subpanel, draw_choices, draw_job, draw_named, draw_progress, draw_sentences, draw_settings, job_progress
 
 
 class Bake(Subpanel):
@@ -20,8 +20,7 @@ class Bake(Subpanel):
         layout.prop(own, "folder", text="")
         column = layout.column(align=True)
         draw_named(column, own, "interpolation", "Motion")
-        column.prop(own, "subframes")
-        column.prop(own, "use_auto_dt")
+        draw_settings(column, own, "subframes", "use_auto_dt")
         if not own.use_auto_dt:
             column.prop(own, "dt")
         layout.prop(own, "use_live")
@@ -64,8 +63,7 @@ class Display(Subpanel):
         column = layout.column(align=True)
         column.prop(own, "use_auto_range")
         if not own.use_auto_range:
-            for name in scene_properties.range_names(own):
-                column.prop(own, name)
+            draw_settings(column, own, *scene_properties.range_names(own))
         row = layout.row(align=True)
         row.prop(own, "show_indentation")
         if own.show_indentation:
@@ -75,8 +73,7 @@ class Display(Subpanel):
         column = layout.column(align=True)
         column.prop(own, "use_auto_arrow")
         if not own.use_auto_arrow:
-            column.prop(own, "arrow_scale")
-            column.prop(own, "texel_arrow_scale")
+            draw_settings(column, own, "arrow_scale", "texel_arrow_scale")
         if baked_scene.baked_objects(context.scene):
             layout.operator("palpate.display_refresh")
 
@@ -91,27 +88,19 @@ class Figures(Subpanel):
         draw_choices(layout, own, "kinds")
         if own.kinds & {"STRIP", "CURVES", "NUMBERS"}:
             draw_choices(layout, own, "formats")
-            layout.prop(own, "width")
-            layout.prop(own, "dpi")
-        layout.prop(own, "sensors")
-        layout.prop(own, "frames")
+            draw_settings(layout, own, "width", "dpi")
+        draw_settings(layout, own, "sensors", "frames")
         if own.kinds & {"SCENE", "VIDEO"}:
             column = layout.column()
-            column.prop(own, "engine")
-            column.prop(own, "camera")
+            draw_settings(column, own, "engine", "camera")
             if own.camera == "VIEW":
                 column.prop(own, "view", text="")
-            column.prop(own, "size")
-            column.prop(own, "samples")
-            column.prop(own, "own_light")
-            column.prop(own, "see_through")
-            column.prop(own, "transparent")
+            draw_settings(column, own, "size", "samples", "own_light", "see_through", "transparent")
         if "GEL" in own.kinds:
             column = layout.column()
             if not own.kinds & {"SCENE", "VIDEO"}:
                 column.prop(own, "size")
-            column.prop(own, "light_angle")
-            column.prop(own, "markers")
+            draw_settings(column, own, "light_angle", "markers")
             if own.markers:
                 column.prop(own, name_in_units(own, "marker_pitch", context.scene))
         draw_choices(layout, own, "exports")

@@ -20,9 +20,7 @@ class PALPATE_MT_object(bpy.types.Menu):
         layout.operator("palpate.sensor_add", text="Make Pad").role = "PAD"
         layout.operator("palpate.weight_paint", icon="WPAINT_HLT")
         layout.operator("palpate.skin_add", icon="MOD_SHRINKWRAP")
-        layout.operator("palpate.skin_update")
-        layout.operator("palpate.probe_add")
-        layout.operator("palpate.parameters_copy")
+        _draw_operators(layout, "palpate.skin_update", "palpate.probe_add", "palpate.parameters_copy")
         presets = layout.column()
         presets.enabled = context.object is not None and context.object.palpate.role in {"SENSOR", "PAD"}
         presets.menu("PALPATE_MT_presets")
@@ -31,32 +29,25 @@ class PALPATE_MT_object(bpy.types.Menu):
         layout.operator_menu_enum("palpate.magnetic_skin_place", "preset")
         layout.operator("palpate.sensor_remove", icon="X")
         layout.separator()
-        layout.operator("palpate.stiffness_fit")
-        layout.operator("palpate.friction_fit")
+        _draw_operators(layout, "palpate.stiffness_fit", "palpate.friction_fit")
         layout.separator()
         layout.operator("palpate.bake", icon="RENDER_ANIMATION")
-        layout.operator("palpate.bake_clear")
-        layout.operator("palpate.display_refresh")
-        layout.operator("palpate.figures_make")
-        layout.operator("palpate.catch_up")
-        layout.operator("palpate.reset")
+        _draw_operators(layout, "palpate.bake_clear", "palpate.display_refresh", "palpate.figures_make")
+        _draw_operators(layout, "palpate.catch_up", "palpate.reset")
         layout.separator()
         layout.operator("palpate.study_vary", text="Vary in Study…")
-        layout.operator("palpate.study_remove")
-        layout.operator("palpate.study_run")
-        layout.operator("palpate.study_write")
-        layout.operator("palpate.study_report")
+        _draw_operators(layout, "palpate.study_remove", "palpate.study_run", "palpate.study_write", "palpate.study_report")
         layout.separator()
-        layout.operator("palpate.measured_open")
-        layout.operator("palpate.measured_logs")
-        layout.operator("palpate.gap_find")
-        layout.operator("palpate.gap_plan")
-        layout.operator("palpate.gap_add")
-        layout.operator("palpate.gap_curves")
-        layout.operator("palpate.gap_show")
-        layout.operator("palpate.gap_report")
+        _draw_operators(layout, "palpate.measured_open", "palpate.measured_logs", "palpate.gap_find", "palpate.gap_plan")
+        _draw_operators(layout, "palpate.gap_add", "palpate.gap_curves", "palpate.gap_show", "palpate.gap_report")
         layout.separator()
         layout.operator("palpate.debug_info_copy")
+
+
+def _draw_operators(layout, *names: str) -> None:
+    """Draw operators by their own names, one below the other."""
+    for name in names:
+        layout.operator(name)
 
 
 def _draw(self, _context):

@@ -2,7 +2,7 @@
 """Panel of a scene's study: what varies, over what, and the button that computes it."""
 
 from ..addon.properties.scene_properties import WORDS
-from .subpanels import Subpanel, draw_named, draw_progress, draw_sentences, job_progress
+from .subpanels import Subpanel, draw_named, draw_progress, draw_sentences, draw_settings, job_progress
 
 HINT = "Right-click on a number and choose Vary in Study."
 
@@ -19,15 +19,13 @@ class Study(Subpanel):
         draw_named(layout, own, "design")
         column = layout.column(align=True)
         if own.design != "GRID":
-            column.prop(own, "samples")
-            column.prop(own, "seed")
+            draw_settings(column, own, "samples", "seed")
         for index, item in enumerate(own.variables):
             _draw_variable(layout.box(), item, index, own.design)
         if not own.variables:
             draw_sentences(layout, HINT, "INFO", context)
         self._draw_press(layout, own)
-        layout.prop(own, "images")
-        layout.prop(own, "use_limit")
+        draw_settings(layout, own, "images", "use_limit")
         if own.use_limit:
             layout.prop(own, "run_limit")
         layout.prop(own, "use_memory_limit")
@@ -52,8 +50,7 @@ class Study(Subpanel):
         draw_named(layout, own, "press_by")
         column = layout.column(align=True)
         kind = own.press_by.lower()
-        for name in (f"{kind}_low", f"{kind}_high", "slide", "tilt", "twist"):
-            column.prop(own, name)
+        draw_settings(column, own, f"{kind}_low", f"{kind}_high", "slide", "tilt", "twist")
 
 
 def _draw_variable(box, item, index: int, design: str) -> None:
@@ -69,8 +66,7 @@ def _draw_variable(box, item, index: int, design: str) -> None:
     if item.distribution == "CHOICE":
         column.prop(item, "choices", text="")
         return
-    for name in ("mean", "deviation") if item.distribution == "NORMAL" else ("low", "high"):
-        column.prop(item, name)
+    draw_settings(column, item, *(("mean", "deviation") if item.distribution == "NORMAL" else ("low", "high")))
     if design == "GRID":
         column.prop(item, "levels")
 

@@ -97,7 +97,11 @@ def draw_choices(layout, settings, key: str) -> None:
 
 def draw_operator_fields(layout, context, operator: str, *names: str) -> None:
     """Draw settings of an operator, which its button uses: those of its last run, as Blender keeps them for the session."""
-    settings = context.window_manager.operator_properties_last(operator)
+    draw_settings(layout, context.window_manager.operator_properties_last(operator), *names)
+
+
+def draw_settings(layout, settings, *names: str) -> None:
+    """Draw settings one below the other."""
     for name in names:
         layout.prop(settings, name)
 

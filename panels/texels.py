@@ -4,7 +4,7 @@
 from ..addon.authoring import problems, sensor_report
 from ..core.geometry.grid_layout import GridLayout
 from ..core.solver.time_step_adviser import benefit
-from .subpanels import Subpanel, draw_sentences
+from .subpanels import Subpanel, draw_sentences, draw_settings
 
 
 class Texels(Subpanel):
@@ -17,8 +17,7 @@ class Texels(Subpanel):
     def draw_part(self, layout, _settings, context):
         own = context.scene.palpate
         grid = layout.grid_flow(columns=2, even_columns=True, align=True)
-        for name in ("show_texels", "show_normals", "show_numbers", "show_reach"):
-            grid.prop(own, name)
+        draw_settings(grid, own, "show_texels", "show_normals", "show_numbers", "show_reach")
         report = sensor_report.known_report(context.object, context.scene)
         if report is None:
             layout.label(text="Looking at it…", icon="SORTTIME")
