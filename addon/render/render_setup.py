@@ -14,6 +14,7 @@ from mathutils import Euler, Vector
 
 from ...core.errors import ParameterError
 from ..display import materials
+from ..session import fcurves
 from . import camera_direction, render, studio
 from .loaded_texels import LoadedTexels
 
@@ -118,18 +119,14 @@ def render_setup(
     loaded : mapping of int to LoadedTexels, optional
         Loaded texels at some of the frames, which the camera is turned to.
     """
-    now = scene.frame_current, scene.frame_subframe
-    try:
-        with render.TemporaryChanges() as changes:
-            _set_output(scene, options, changes)
-            _set_colors(scene, changes)
-            _set_camera(scene, frames, options, loaded or {}, changes)
-            _set_lights(scene, frames, options, changes)
-            if scene.render.engine == "BLENDER_WORKBENCH":
-                _set_workbench(scene, changes)
-            yield
-    finally:
-        scene.frame_set(now[0], subframe=now[1])
+    with fcurves.frame_kept(scene), render.TemporaryChanges() as changes:
+        _set_output(scene, options, changes)
+        _set_colors(scene, changes)
+        _set_camera(scene, frames, options, loaded or {}, changes)
+        _set_lights(scene, frames, options, changes)
+        if scene.render.engine == "BLENDER_WORKBENCH":
+            _set_workbench(scene, changes)
+        yield
 
 
 def _set_colors(scene, changes: render.TemporaryChanges) -> None:

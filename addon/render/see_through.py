@@ -19,6 +19,7 @@ from mathutils import Vector
 from ...core.io.file_writing import atomic_write
 from ...core.io.hidden_folder import temporary_folder
 from ..display import materials
+from ..session import fcurves
 from . import camera_direction, render
 from .loaded_texels import LoadedTexels
 
@@ -54,15 +55,12 @@ def render_picture(
         As :func:`.render.render_frame`.
     """
     path = render.render_frame(scene, path, frame, samples=samples, size=size)
-    now = scene.frame_current, scene.frame_subframe
-    scene.frame_set(frame)
-    try:
+    with fcurves.frame_kept(scene):
+        scene.frame_set(frame)
         hidden = _target_parts(scene)
         if not len(loaded) or not hidden or not _cover(scene, hidden, loaded):
             return path
         weights = clear_weights(scene, loaded, size)
-    finally:
-        scene.frame_set(now[0], subframe=now[1])
     rows, columns = np.nonzero(weights > 0.0)
     if not len(rows):
         return path

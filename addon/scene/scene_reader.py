@@ -9,7 +9,6 @@ are sampled at every frame.
 from __future__ import annotations
 
 from collections.abc import Generator
-from contextlib import suppress
 from dataclasses import replace
 
 import bpy
@@ -118,14 +117,13 @@ def read_scene(scene) -> Generator[Progress, None, SceneReading]:
     PalpateError
         Something in the scene makes no run; the message names it.
     """
-    before = scene.frame_current, scene.frame_subframe
-    with session_state.suspended(), stored_names.hidden_display(scene):
-        try:
-            with fcurves.without_time_stretching(scene):
-                return (yield from _read_frames(scene))
-        finally:
-            with suppress(ReferenceError):  # the scene was deleted while its frames were read
-                scene.frame_set(before[0], subframe=before[1])
+    with (
+        session_state.suspended(),
+        stored_names.hidden_display(scene),
+        fcurves.frame_kept(scene),
+        fcurves.without_time_stretching(scene),
+    ):
+        return (yield from _read_frames(scene))
 
 
 def read_start(scene, depsgraph) -> SceneReading:

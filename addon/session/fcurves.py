@@ -130,6 +130,17 @@ def current_frame(scene) -> tuple[int, float]:
 
 
 @contextmanager
+def frame_kept(scene) -> Iterator[None]:
+    """Let the scene stand at other frames inside the ``with`` block, and return to the present one."""
+    before = scene.frame_current, scene.frame_subframe
+    try:
+        yield
+    finally:
+        with suppress(ReferenceError):  # the scene was deleted meanwhile
+            scene.frame_set(before[0], subframe=before[1])
+
+
+@contextmanager
 def without_time_stretching(scene) -> Iterator[None]:
     """Make frames of the timeline equal to frames of the animation while the context is open."""
     render = scene.render

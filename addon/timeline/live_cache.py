@@ -170,13 +170,8 @@ def _sample_between_frames(scene, run: LiveRun, frame: int) -> None:
 @contextmanager
 def at_other_frames(scene) -> Iterator[None]:
     """Let the scene stand at other frames without showing them, and return to the present one."""
-    before = scene.frame_current, scene.frame_subframe
-    with session_state.suspended():
-        try:
-            with fcurves.without_time_stretching(scene):
-                yield
-        finally:
-            scene.frame_set(before[0], subframe=before[1])
+    with session_state.suspended(), fcurves.frame_kept(scene), fcurves.without_time_stretching(scene):
+        yield
 
 
 def is_stale(scene, depsgraph, run: LiveRun) -> bool:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Generator
-from contextlib import suppress
 
 import bpy
 import numpy as np
@@ -155,10 +154,11 @@ def compute_to_present_frame(scene) -> Generator[Progress, None, None]:
     """Compute the missing frames up to the present one, and return to it. Closing the generator keeps what was computed."""
     if scene.session_uid in _waiting:
         yield from first_use.wait()
-    wanted, frames = (scene.frame_current, scene.frame_subframe), missing_frames(scene)
+    frames = missing_frames(scene)
     session_state.session.catching_up = True
     try:
-        with fcurves.without_time_stretching(scene):
+        # At the return to the present frame still catching up, so that what was stopped does not start again.
+        with fcurves.frame_kept(scene), fcurves.without_time_stretching(scene):
             for done, number in enumerate(frames, 1):
                 scene.frame_set(number)
                 if scene.session_uid in _waiting:
@@ -169,11 +169,7 @@ def compute_to_present_frame(scene) -> Generator[Progress, None, None]:
                     break  # the panel says why
                 yield Progress("Computing forces", done, len(frames), number)
     finally:
-        try:  # still catching up, so that what was stopped does not start again
-            with suppress(ReferenceError):  # the scene was deleted meanwhile
-                scene.frame_set(wanted[0], subframe=wanted[1])
-        finally:
-            session_state.session.catching_up = False
+        session_state.session.catching_up = False
 
 
 def file_is_open() -> None:
