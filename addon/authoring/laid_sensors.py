@@ -21,6 +21,7 @@ from ...core.geometry.scattered_points import scatter
 from ...core.geometry.texel_arrays import TexelMesh, filled_region, pad_array, region_middle, shifted_pose, wrapped_array
 from ...core.model.sensor_parameters import SENSOR_PARAMETERS
 from ..properties import effect_stack
+from ..properties.object_properties import PatternProperties
 from ..scene import mesh_arrays, participants, sensor_regions
 from ..session import identity, transforms
 from . import sensors, surface_binding
@@ -41,19 +42,7 @@ def copy_parameters(source, target) -> None:
     effect_stack.put_stack(target, effect_stack.stack(source))
 
 
-PATTERN_PROPERTIES = (
-    "method",
-    "rows",
-    "columns",
-    "pitch_x",
-    "pitch_y",
-    "shift_x",
-    "shift_y",
-    "angle",
-    "spacing",
-    "seed",
-    "lift",
-)
+PATTERN_PROPERTIES = ("method", "spacing", *PatternProperties.__annotations__)
 """Properties of :class:`.properties.PALPATE_PG_skin` that make up the pattern of the texels."""
 
 
@@ -301,8 +290,7 @@ def usual_spacing(obj, scene) -> float:
     if obj is None or obj.type != "MESH" or not obj.data.edges:
         return 0.002
     points = mesh_arrays.vertices(obj.data) @ np.diag(np.abs(obj.matrix_world.to_scale()))
-    ends = np.empty(2 * len(obj.data.edges), dtype=np.int32)
-    obj.data.edges.foreach_get("vertices", ends)
+    ends = transforms.values_of(obj.data.edges, "vertices", np.int32, 2)
     lengths = np.linalg.norm(np.diff(points[ends.reshape(-1, 2)], axis=1)[:, 0], axis=1)
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     usual = min(float(np.median(lengths)), size / 20) * transforms.metres_per_unit(scene)

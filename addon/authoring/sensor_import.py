@@ -166,8 +166,8 @@ def _flagged_points(mesh, name: str):
     flag = mesh.attributes.get(FLAG)
     if flag is None or flag.domain != "POINT" or flag.data_type not in ("BOOLEAN", "INT", "FLOAT"):
         return None
-    values = np.empty(len(mesh.vertices), {"BOOLEAN": bool, "INT": np.int32, "FLOAT": np.float32}[flag.data_type])
-    flag.data.foreach_get("value", values)
+    kind = {"BOOLEAN": bool, "INT": np.int32, "FLOAT": np.float32}[flag.data_type]
+    values = transforms.values_of(flag.data, "value", kind)
     position, normal = (mesh_arrays.point_vectors(mesh, name) for name in (POSITION, NORMAL))
     notes = [f"'{name}': the kind and the radius of GenTact's sensors were not imported; parameters have their defaults."]
     if position is None:

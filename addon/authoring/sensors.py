@@ -29,9 +29,7 @@ def automatic_source(obj, mode: str) -> str:
 
 def selected_vertices(obj) -> np.ndarray:
     """Return which vertices were selected when the object was last updated from Edit Mode, (nv,) bool."""
-    chosen = np.zeros(len(obj.data.vertices), dtype=bool)
-    obj.data.vertices.foreach_get("select", chosen)
-    return chosen
+    return transforms.values_of(obj.data.vertices, "select", bool)
 
 
 def make_sensor(obj, source: str, role: str = "SENSOR") -> int:

@@ -172,7 +172,7 @@ def painted_values(sensor) -> PaintedMesh:
         mesh_arrays.vertices(mesh),
         [list(face.vertices) for face in mesh.polygons],
         {group.name: sensor_regions.vertex_weights(mesh, group.index) for group in sensor.vertex_groups},
-        {item.name: _attribute_values(item) for item in mesh.attributes if parameter_properties.is_map(item)},
+        {item.name: transforms.values_of(item.data, "value") for item in mesh.attributes if parameter_properties.is_map(item)},
     )
 
 
@@ -191,13 +191,6 @@ def transfer_painted_values(sensor, before: PaintedMesh) -> None:
                 group.add([vertex], weight, "REPLACE")
     for name, values in before.attributes.items():
         mesh_arrays.store(sensor.data, name, interpolated(values), kind="FLOAT")
-
-
-def _attribute_values(attribute) -> np.ndarray:
-    """Return the values of a float attribute, (n,) float32."""
-    values = np.empty(len(attribute.data), dtype=np.float32)
-    attribute.data.foreach_get("value", values)
-    return values
 
 
 def _nearest_points(mesh: PaintedMesh, points: np.ndarray) -> list[tuple[list[int], np.ndarray]]:

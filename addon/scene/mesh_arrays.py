@@ -12,6 +12,7 @@ import numpy as np
 
 from ...core.errors import MeshError, SensorError
 from ..properties import parameter_properties
+from ..session import transforms
 from . import sensor_regions
 from .stored_names import MODIFIERS, REST_POSITION
 
@@ -52,8 +53,7 @@ def evaluated_mesh(obj, depsgraph):
 
 def _undo_indentation(mesh, base) -> None:
     """Give an indented mesh the vertices and faces of the object's own mesh, and the places that these had before."""
-    rest = np.empty(3 * len(mesh.vertices), dtype=np.float32)
-    mesh.attributes[REST_POSITION].data.foreach_get("vector", rest)
+    rest = transforms.values_of(mesh.attributes[REST_POSITION].data, "vector", width=3)
     mesh.clear_geometry()
     mesh.vertices.add(len(base.vertices))
     mesh.vertices.foreach_set("co", rest[: 3 * len(base.vertices)])
@@ -67,8 +67,7 @@ def _undo_indentation(mesh, base) -> None:
 def read_arrays(mesh) -> MeshArrays:
     """Copy the arrays of a mesh."""
     mesh.calc_loop_triangles()
-    triangles = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
-    mesh.loop_triangles.foreach_get("vertices", triangles)
+    triangles = transforms.values_of(mesh.loop_triangles, "vertices", np.int32, 3)
     first_corners = face_numbers(mesh, "loop_start")[face_numbers(mesh, "loop_total") == 4]
     quads = corner_vertices(mesh)[first_corners[:, None] + np.arange(4)]
     return MeshArrays(vertices(mesh), triangles.reshape(-1, 3).astype(np.int64), quads.astype(np.int64))
@@ -84,31 +83,23 @@ def positions(mesh) -> np.ndarray:
 
     Blender copies an attribute at once, but properties one by one, which takes at least ten times as long.
     """
-    found = np.empty(3 * len(mesh.vertices), dtype=np.float32)
     attribute = mesh.attributes.get("position")
-    if attribute is None or 3 * len(attribute.data) != len(found):  # the attribute is empty in Edit Mode
-        mesh.vertices.foreach_get("co", found)
-    else:
-        attribute.data.foreach_get("vector", found)
-    return found
+    if attribute is None or len(attribute.data) != len(mesh.vertices):  # the attribute is empty in Edit Mode
+        return transforms.values_of(mesh.vertices, "co", width=3)
+    return transforms.values_of(attribute.data, "vector", width=3)
 
 
 def corner_vertices(mesh) -> np.ndarray:
     """Return the vertex of each corner of the faces, (nc,) int32."""
-    found = np.empty(len(mesh.loops), dtype=np.int32)
     attribute = mesh.attributes.get(".corner_vert")
-    if attribute is None or len(attribute.data) != len(found):
-        mesh.loops.foreach_get("vertex_index", found)
-    else:
-        attribute.data.foreach_get("value", found)
-    return found
+    if attribute is None or len(attribute.data) != len(mesh.loops):
+        return transforms.values_of(mesh.loops, "vertex_index", np.int32)
+    return transforms.values_of(attribute.data, "value", np.int32)
 
 
 def face_numbers(mesh, name: str) -> np.ndarray:
     """Return a property of the faces, as ``material_index``, (nf,) int32."""
-    found = np.empty(len(mesh.polygons), dtype=np.int32)
-    mesh.polygons.foreach_get(name, found)
-    return found
+    return transforms.values_of(mesh.polygons, name, np.int32)
 
 
 def store(mesh, name: str, values: np.ndarray, vertices: np.ndarray | None = None, kind: str = "FLOAT_VECTOR") -> None:
@@ -127,9 +118,7 @@ def point_vectors(mesh, name: str) -> np.ndarray | None:
     attribute = mesh.attributes.get(name)
     if attribute is None or attribute.domain != "POINT" or attribute.data_type != "FLOAT_VECTOR":
         return None
-    values = np.empty(3 * len(attribute.data), np.float32)
-    attribute.data.foreach_get("vector", values)
-    return values.astype(float).reshape(-1, 3)
+    return transforms.values_of(attribute.data, "vector", width=3).astype(float).reshape(-1, 3)
 
 
 def remove_attributes(mesh, names) -> None:
@@ -205,8 +194,7 @@ def region_bytes(obj) -> bytes:
             parts.append(b"" if values is None else values.tobytes())
     if obj.palpate.image_layout == "UV":
         for layer in obj.data.uv_layers:
-            uv = np.empty(2 * len(layer.uv), dtype=np.float32)
-            layer.uv.foreach_get("vector", uv)
+            uv = transforms.values_of(layer.uv, "vector", width=2)
             parts.append(layer.name.encode("utf-8", "surrogatepass") + uv.tobytes())
     return b"".join(parts)
 

@@ -61,12 +61,10 @@ def _faces_of_material(obj, name: str) -> np.ndarray:
     slots = [index for index, slot in enumerate(obj.material_slots) if slot.material is not None and slot.material.name == name]
     if not slots:
         raise RegionError(f"Sensor '{obj.name}' has no material '{name}': choose one in its Region panel (was it renamed?).")
-    index = np.empty(len(obj.data.polygons), dtype=np.int32)
-    obj.data.polygons.foreach_get("material_index", index)
+    index = transforms.values_of(obj.data.polygons, "material_index", np.int32)
     covered = obj.data.attributes.get(stored_names.OLD_MATERIAL)
     if covered is not None and len(covered.data) == len(index):
-        before = np.empty(len(index), dtype=np.int32)
-        covered.data.foreach_get("value", before)
+        before = transforms.values_of(covered.data, "value", np.int32)
         index = np.where(before >= 0, before, index)
     return np.isin(index, slots)
 
@@ -91,10 +89,8 @@ def _faces_of_set(obj, number: int) -> np.ndarray:
 
 def vertices_of_faces(mesh, faces: np.ndarray) -> np.ndarray:
     """Return the vertices of the faces that are True in `faces`, (nf,) bool, as (nv,) bool."""
-    corner = np.empty(len(mesh.loops), dtype=np.int32)
-    sides = np.empty(len(mesh.polygons), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", corner)
-    mesh.polygons.foreach_get("loop_total", sides)
+    corner = transforms.values_of(mesh.loops, "vertex_index", np.int32)
+    sides = transforms.values_of(mesh.polygons, "loop_total", np.int32)
     chosen = np.zeros(len(mesh.vertices), dtype=bool)
     chosen[corner[np.repeat(faces, sides)]] = True
     return chosen

@@ -11,6 +11,7 @@ import numpy as np
 from ...core.errors import ImageError
 from ...core.geometry.texels import Texels
 from ...core.geometry.texture_maps import UVLayout, mapped_layout
+from ..session import transforms
 from . import mesh_arrays, stored_names
 
 IMAGE_PROPERTIES = ("image_layout", "image_map", "image_size", "image_filter")
@@ -34,8 +35,7 @@ def with_uv_layout(obj, texels: Texels) -> Texels:
     loops, corner = _triangles(obj.data)
     triangles = texel_of_vertex[corner[loops]]
     inside = (triangles >= 0).all(axis=1)
-    uv = np.empty(2 * len(corner), dtype=np.float32)
-    layer.uv.foreach_get("vector", uv)
+    uv = transforms.values_of(layer.uv, "vector", width=2)
     triangles, corner_uv = triangles[inside], uv.reshape(-1, 2).astype(float)[loops[inside]]
     if obj.matrix_world.is_negative:  # the sensor's triangles are turned too, so that both are anticlockwise from outside
         triangles, corner_uv = triangles[:, ::-1], corner_uv[:, ::-1]
@@ -91,7 +91,5 @@ def _layout(triangles: bytes, corner_uv: bytes, size: int, name: str, nearest: b
 def _triangles(mesh) -> tuple[np.ndarray, np.ndarray]:
     """Return the (m, 3) corners of the mesh's triangles, and the vertex of each corner."""
     mesh.calc_loop_triangles()
-    loops = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
-    mesh.loop_triangles.foreach_get("loops", loops)
-    corner = mesh_arrays.corner_vertices(mesh)
-    return loops.reshape(-1, 3), corner
+    loops = transforms.values_of(mesh.loop_triangles, "loops", np.int32, 3)
+    return loops.reshape(-1, 3), mesh_arrays.corner_vertices(mesh)

@@ -45,6 +45,13 @@ def as_array(matrix) -> np.ndarray:
     return np.array([*map(tuple, matrix)])
 
 
+def values_of(items, key: str, kind: type = np.float32, width: int = 1) -> np.ndarray:
+    """Return a property of all items of one of Blender's collections, (width · n,) of the type in which Blender holds it."""
+    found = np.empty(width * len(items), dtype=kind)
+    items.foreach_get(key, found)
+    return found
+
+
 def decompose(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Decompose a matrix into location, rotation and stretch.
 
