@@ -83,8 +83,7 @@ def simulate(
     prepare_solver()
     recording = finished(solve(scenario), progress, "simulate", "frame")
     recording.warnings = (*warnings, *recording.warnings)
-    read = [sensor for sensor in scenario.sensors if sensor.readout]
-    return Recording.of(recording, {sensor.name: (sensor.texels, sensor.painted, sensor.parameters) for sensor in read})
+    return Recording.of(recording, {one.name: (one.texels, one.painted, one.parameters) for one in scenario.read_out})
 
 
 def _require_nothing_else(bodies: Any, duration: Any, motion: Any, dt: Any) -> None:

@@ -28,14 +28,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", default="palpate-demo", help="folder for all files (default: %(default)s)")
-    parser.add_argument(
-        "--size",
-        metavar=("W", "H"),
-        nargs=2,
-        type=figure_options.pixels,
-        default=(1280, 720),
-        help="size of the picture, pixels (default: 1280 720)",
-    )
+    figure_options.add_size_argument(parser, 1280, 720, "the picture, pixels")
     parser.add_argument(
         "--samples",
         metavar="N",
@@ -81,16 +74,11 @@ def _build_and_bake(blend: Path, size: tuple[int, int]) -> tuple[Any, BakeResult
     return scene, baked
 
 
-def _sensors(baked: BakeResult) -> dict[str, Sensor]:
-    """Return the sensors that are read out, by name."""
-    return {sensor.name: sensor for sensor in baked.scenario.sensors if sensor.readout}
-
-
 def _draw(scene: Any, baked: BakeResult, folder: Path, arguments: argparse.Namespace) -> dict[str, Path]:
     """Draw tactile strip and forces, and render the picture; return the files by what they show."""
     from ..sample_blends import demo
 
-    sensors = _sensors(baked)
+    sensors = {sensor.name: sensor for sensor in baked.scenario.read_out}
     texels = {name: sensor.texels for name, sensor in sensors.items()}
     parameters = {name: sensor.parameters for name, sensor in sensors.items()}
     style = FigureStyle(scene.palpate.color_map, limit=demo.RANGE, dpi=200)
@@ -136,7 +124,8 @@ def _report_on_contacts(baked: BakeResult) -> str:
     """Return the measurements of the pads as text: friction under the ball, and the weight of the cube."""
     from ..sample_blends import demo
 
-    slide = _slide(baked.recording, _sensors(baked)[demo.PAD_A])
+    pressed = next(sensor for sensor in baked.scenario.read_out if sensor.name == demo.PAD_A)
+    slide = _slide(baked.recording, pressed)
     required, measured = _weight(baked), baked.recording.sensors[demo.PAD_B].normal_force[-1].sum()
     return f"{slide}\n\n{demo.CUBE} at rest on {demo.PAD_B}: required {required:.6f} N, measured {measured:.6f} N"
 

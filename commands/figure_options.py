@@ -32,6 +32,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--dpi", metavar="N", type=int, help="resolution of PNG figures (default: 300)")
 
 
+def add_size_argument(parser: argparse.ArgumentParser, width: int, height: int, what: str) -> None:
+    """Add --size, of what it says."""
+    parser.add_argument(
+        "--size",
+        metavar=("W", "H"),
+        nargs=2,
+        type=pixels,
+        default=(width, height),
+        help=f"size of {what} (default: {width} {height})",
+    )
+
+
 def add_gel_arguments(parser: argparse.ArgumentParser) -> None:
     low, high = figure_style.LIGHT_ANGLES
     parser.add_argument(

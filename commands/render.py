@@ -54,14 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def _add_picture_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what concerns renders of the scene."""
     parser.add_argument("--engine", choices=("cycles", "eevee", "workbench"), help="render engine (default: the scene's)")
-    parser.add_argument(
-        "--size",
-        metavar=("W", "H"),
-        nargs=2,
-        type=figure_options.pixels,
-        default=(1280, 960),
-        help="size of renders, pixels; images of the gel fit into it (default: 1280 960)",
-    )
+    figure_options.add_size_argument(parser, 1280, 960, "renders, pixels; images of the gel fit into it")
     parser.add_argument(
         "--samples", metavar="N", type=figure_options.pixels, help="samples per pixel of renders (default: the scene's)"
     )

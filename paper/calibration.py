@@ -15,7 +15,7 @@ from ..core.gap.calibration.stiffness import FoamData, fit_stiffness, texel_stif
 from ..core.gap.dataset.column_names import GRAVITY
 from ..core.model.sensor_parameters import SensorParameters
 from ..core.simulators.openrave_file import OpenRaveSensor, openrave_xml, read_openrave
-from .chapter import Chapter, Picture, Row, compare
+from .chapter import Chapter, Picture, Row, compare, draw_both
 
 AREA, TEXELS = 0.00125, 84  # m², and how many texels share it (section 3.4.1)
 PRESSURE, COMPRESSION = 9810.0, 2.5e-3  # Pa at m: the printed reference point
@@ -49,9 +49,8 @@ def stiffness(folder: Path, progress: Callable) -> Chapter:
         compare("line with offset, synthetic foam", "—", k, fit.k_offset.value, 0.05 * k, "N/m", "noise of 150 Pa"),
         compare("compression without force", "—", 0.3, fit.dead_zone * 1e3, 0.05, "mm", "noise of 150 Pa"),
     ]
-    for kind in ("pdf", "png"):
-        plot_stiffness(folder / f"fig6-foam.{kind}", fit)
-    chapter.pictures.append(Picture(folder / "fig6-foam.png", "Foam compression with both straight lines (synthetic points)."))
+    foam = draw_both(folder / "fig6-foam", lambda path: plot_stiffness(path, fit))
+    chapter.pictures.append(Picture(foam, "Foam compression with both straight lines (synthetic points)."))
     progress()
     return chapter
 
@@ -90,9 +89,8 @@ def friction(folder: Path, progress: Callable) -> Chapter:
             "the printed formula lacks its exponential",
         ),
     ]
-    for kind in ("pdf", "png"):
-        plot_friction(folder / f"fig7-friction.{kind}", fit)
-    chapter.pictures.append(Picture(folder / "fig7-friction.png", "Friction of one texel under 0.08 N."))
+    curve = draw_both(folder / "fig7-friction", lambda path: plot_friction(path, fit))
+    chapter.pictures.append(Picture(curve, "Friction of one texel under 0.08 N."))
     progress()
     return chapter
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -55,6 +56,13 @@ class Picture:
     path: Path
     caption: str
     wide: bool = False
+
+
+def draw_both(stem: Path, draw: Callable[[Path], object]) -> Path:
+    """Draw a figure as PDF and as PNG, and return the PNG."""
+    for kind in (".pdf", ".png"):
+        draw(stem.with_suffix(kind))
+    return stem.with_suffix(".png")
 
 
 @dataclass

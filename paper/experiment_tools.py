@@ -30,8 +30,7 @@ def new_scene(build: Callable) -> bpy.types.Scene:
 
 def scenario_of(scene) -> Scenario:
     """Return the scenario of a scene, the input of the solver."""
-    scenario = run_job(scene_reader.read_scene(scene)).scenario
-    return scenario
+    return run_job(scene_reader.read_scene(scene)).scenario
 
 
 def bake(scene, folder: Path, on_progress=None) -> Recording:

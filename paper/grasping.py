@@ -19,7 +19,7 @@ from ..core.model.scenario import Scenario
 from ..core.solver.simulation import run
 from ..sample_blends import grasps, gripper, hand, pick_and_place
 from . import experiment_tools
-from .chapter import Chapter, Picture, Row, below, compare
+from .chapter import Chapter, Picture, Row, below, compare, draw_both
 
 STYLE = FigureStyle(colour_map="PAPER", width="single")
 """White is no force and black the largest force, as in the paper."""
@@ -50,15 +50,16 @@ def _one_object(chapter: Chapter, kind: str, folder: Path, progress: Callable) -
     name = grasps.OBJECTS[kind].name
     scene = experiment_tools.new_scene(partial(grasps.build, kind=kind))
     scenario = experiment_tools.scenario_of(scene)
-    texels = {sensor.name: sensor.texels for sensor in scenario.sensors if sensor.readout}
+    texels = {sensor.name: sensor.texels for sensor in scenario.read_out}
     recording = experiment_tools.bake(scene, folder / f"bake-grasp-{kind}")
     last = int(recording.frames[-1])
-    numbers = folder / f"fig10-{kind}-numbers"
-    _as_pdf_and_png(numbers, lambda path: texel_numbers(path, recording, texels, gripper.RIGHT, last, STYLE))
+    numbers = draw_both(
+        folder / f"fig10-{kind}-numbers", lambda path: texel_numbers(path, recording, texels, gripper.RIGHT, last, STYLE)
+    )
     chapter.pictures += [
         Picture(experiment_tools.picture(scene, folder / f"fig10-{kind}.png", last), f"{name}: the grasp."),
         _strip(folder / f"fig10-{kind}-images", recording, texels, [last], f"{name}: both pads."),
-        Picture(numbers.with_suffix(".png"), f"{name}: each texel of the right finger."),
+        Picture(numbers, f"{name}: each texel of the right finger."),
     ]
     progress()
     chapter.rows += held_rows(scenario, name, gripper.LEFT, grasps.FORCE)
@@ -149,7 +150,7 @@ def work_cycle(folder: Path, progress: Callable) -> Chapter:
     )
     scene = experiment_tools.new_scene(pick_and_place.build)
     scenario = experiment_tools.scenario_of(scene)
-    texels = {sensor.name: sensor.texels for sensor in scenario.sensors if sensor.readout}
+    texels = {sensor.name: sensor.texels for sensor in scenario.read_out}
     recording = experiment_tools.bake(scene, folder / "bake-pick-and-place")
     progress()
     for stage, frame in pick_and_place.STAGES.items():
@@ -158,9 +159,11 @@ def work_cycle(folder: Path, progress: Callable) -> Chapter:
         progress()
     frames = list(pick_and_place.STAGES.values())
     chapter.pictures.append(_strip(folder / "fig12-images", recording, texels, frames, "Both pads at each stage."))
-    parameters = {sensor.name: sensor.parameters for sensor in scenario.sensors if sensor.readout}
-    _as_pdf_and_png(folder / "fig12-forces", lambda path: time_curves(path, recording, texels, parameters, ("force",), STYLE))
-    chapter.pictures.append(Picture(folder / "fig12-forces.png", "Forces over the work cycle."))
+    parameters = {sensor.name: sensor.parameters for sensor in scenario.read_out}
+    forces = draw_both(
+        folder / "fig12-forces", lambda path: time_curves(path, recording, texels, parameters, ("force",), STYLE)
+    )
+    chapter.pictures.append(Picture(forces, "Forces over the work cycle."))
     chapter.rows += cycle_rows(recording)
     progress()
     return chapter
@@ -199,7 +202,7 @@ def finger_and_thumb(folder: Path, progress: Callable) -> Chapter:
     scene = experiment_tools.new_scene(hand.build)
     recording = experiment_tools.bake(scene, folder / "bake-hand")
     scenario = experiment_tools.scenario_of(scene)
-    texels = {sensor.name: sensor.texels for sensor in scenario.sensors if sensor.readout}
+    texels = {sensor.name: sensor.texels for sensor in scenario.read_out}
     chapter.pictures.append(Picture(experiment_tools.picture(scene, folder / "fig13-hand.png", scene.frame_end), "The grasp."))
     last = [int(recording.frames[-1])]
     chapter.pictures.append(_strip(folder / "fig13-images", recording, texels, last, "Both finger tips, laid flat."))
@@ -211,11 +214,4 @@ def finger_and_thumb(folder: Path, progress: Callable) -> Chapter:
 
 def _strip(stem: Path, recording: Recording, texels, frames, caption: str) -> Picture:
     """Draw the tactile images of some frames."""
-    _as_pdf_and_png(stem, lambda path: tactile_strip(path, recording, texels, frames, STYLE))
-    return Picture(stem.with_suffix(".png"), caption)
-
-
-def _as_pdf_and_png(stem: Path, draw: Callable[[Path], None]) -> None:
-    """Draw a figure as PDF and as PNG."""
-    for kind in (".pdf", ".png"):
-        draw(stem.with_suffix(kind))
+    return Picture(draw_both(stem, lambda path: tactile_strip(path, recording, texels, frames, STYLE)), caption)

@@ -16,7 +16,7 @@ from ..core.model.scenario import Scenario
 from ..core.solver.simulation import run
 from ..sample_blends import tilt, weighing
 from . import experiment_tools
-from .chapter import Chapter, Picture, Row, below, compare
+from .chapter import Chapter, Picture, Row, below, compare, draw_both
 
 PRINTED = {0.1: ("0.9800 N", 0.98), 1.0: ("9.7999 N", 9.8), 4.0: ("—", 39.2), 10.0: ("97.9899 N", 98.0)}
 PAPERS_GRAVITY = 9.8
@@ -88,12 +88,11 @@ def hold(folder: Path, progress: Callable, minutes: float = MINUTES) -> Chapter:
     )
     chapter.rows.append(_with_table_2(sampled, weight * math.sin(slope)))
     progress()
-    for kind in ("pdf", "png"):
-        _draw_creep(folder / f"fig9-creep.{kind}", times, moved)
+    creep = draw_both(folder / "fig9-creep", lambda path: _draw_creep(path, times, moved))
     experiment_tools.bake(scene, folder / "bake-tilt")
     chapter.pictures += [
         Picture(experiment_tools.picture(scene, folder / "tilt.png", scene.frame_end), "1 kg held at 10 degrees."),
-        Picture(folder / "fig9-creep.png", "Distance of the cube from its start (Fig. 9)."),
+        Picture(creep, "Distance of the cube from its start (Fig. 9)."),
     ]
     progress()
     return chapter

@@ -70,10 +70,9 @@ def metrics_of(scenario: Scenario, recording: Recording, press: Press | None = N
     press : Press, optional
         That the run has made.
     """
-    read_out = [sensor for sensor in scenario.sensors if sensor.readout]
     found: dict[str, float] = {}
-    for sensor in read_out:
-        start = f"{sensor.name}." if len(read_out) > 1 else ""
+    for sensor in scenario.read_out:
+        start = f"{sensor.name}." if len(scenario.read_out) > 1 else ""
         own = _sensor_metrics(sensor, recording.sensors[sensor.name], recording.times)
         found |= {f"{start}{name}": value for name, value in own.items()}
     for index, body in enumerate(scenario.bodies):
@@ -156,9 +155,7 @@ def write_run_folder(folder: Path, scenario: Scenario, recording: Recording, ima
         A file cannot be written.
     """
     names = folder_names(recording.sensors)
-    for sensor in scenario.sensors:
-        if not sensor.readout:
-            continue
+    for sensor in scenario.read_out:
         own = folder / names[sensor.name]
         own.mkdir()
         for part in recording.blocks() if images else ():
@@ -251,7 +248,7 @@ class RunComputer:
             }
             press = replace(press, **own)
         metrics = metrics_of(scenario, recording, press)
-        sensors = {own.name: (own.texels, own.painted, own.parameters) for own in scenario.sensors if own.readout}
+        sensors = {own.name: (own.texels, own.painted, own.parameters) for own in scenario.read_out}
         frames = frames_of(recording, sensors, self._shared, study.points, study.half_precision)
         if study.has_folders:
             with _run_folder(self.opened.folder, run) as folder:

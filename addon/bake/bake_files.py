@@ -168,7 +168,7 @@ class BakeFiles:
         self.folder = Path(os.path.abspath(folder))
         self.bake_id = ""
         self._scenario, self._owner, self._digest = scenario, owner, scenario.digest()
-        self._sensors = {sensor.name: sensor for sensor in scenario.sensors if sensor.readout}
+        self._sensors = {sensor.name: sensor for sensor in scenario.read_out}
         self._names = folder_names(self._sensors)
         self.folders = {name: self.folder / self._names[name] for name in self._sensors}
         if not is_private_folder(self.folder / PRIVATE_FOLDER):

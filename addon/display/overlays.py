@@ -99,7 +99,9 @@ def show(scene, run, frame) -> None:
 def sensor_overlays(scene, run, frame) -> list[SensorOverlay]:
     """Return the heat maps and arrows of one frame of a live simulation; all sensors share one scale."""
     scale, metres, overlays = live_scale(scene, run), run.reading.metres_per_unit, []
-    length = ARROW_SHARE * max((_size(sensor.texels) for sensor in _read_out(run)), default=0.0) / run.largest_net_force()
+    length = (
+        ARROW_SHARE * max((_size(sensor.texels) for sensor in run.scenario.read_out), default=0.0) / run.largest_net_force()
+    )
     settings = scene.palpate
     factor = settings.indentation_factor if settings.show_indentation else 0.0
     for sensor, obj in zip(run.scenario.sensors, run.reading.sensor_objects(scene), strict=True):
@@ -154,14 +156,9 @@ def baked_overlays(scene, bake, number: int, scale: Scale) -> list[SensorOverlay
 def inset_content(scene, run, frame) -> inset.InsetContent:
     """Return the tactile images and curves of one frame of a live simulation."""
     known = sorted(run.frames)
-    texels = {sensor.name: sensor.texels for sensor in _read_out(run)}
+    texels = {sensor.name: sensor.texels for sensor in run.scenario.read_out}
     loads = {name: np.array([run.total_forces(number)[name] for number in known]) for name in texels}
     return inset.inset_content(scene, frame, texels, np.array(known, float), loads, live_scale(scene, run))
-
-
-def _read_out(run) -> list:
-    """Return the sensors of a live simulation that are read out."""
-    return [sensor for sensor in run.scenario.sensors if sensor.readout]
 
 
 def live_scale(scene, run) -> Scale:

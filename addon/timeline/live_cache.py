@@ -82,7 +82,7 @@ class LiveRun:
     def extent(self, quantity: Quantity) -> Extent:
         """Return the extent of a quantity in the frames that were computed."""
         count, known = self._extents.get(quantity.name, (0, None))
-        texels = {sensor.name: sensor.texels for sensor in self.scenario.sensors if sensor.readout}
+        texels = {sensor.name: sensor.texels for sensor in self.scenario.read_out}
         frames = list(self.frames.values())
         new = ((frame.sensors[name], own) for frame in frames[count:] for name, own in texels.items())
         found = Extent.of(quantity, ((felt, own) for felt, own in new if quantity.is_in(felt)), known)

@@ -79,6 +79,11 @@ class Scenario:
         """The recorded frames."""
         return range(self.frame_start, self.frame_end + 1)
 
+    @property
+    def read_out(self) -> list[Sensor]:
+        """Sensors that are read out, without pads."""
+        return [sensor for sensor in self.sensors if sensor.readout]
+
     def check(self) -> None:
         """Raise a :class:`.PalpateError` when the parts do not make a run.
 

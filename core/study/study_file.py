@@ -437,7 +437,7 @@ def _press(study: Study, scenario: Scenario) -> Press:
     """Return the press of a study with default numbers; sensor and target may go unnamed where there is only one."""
     table = study.press or {}
     known_words(table, ("sensor", "target", *PRESS_PARAMETERS), "[press]", A_STUDY)
-    readable = [sensor.name for sensor in scenario.sensors if sensor.readout]
+    readable = [sensor.name for sensor in scenario.read_out]
     carriers = {sensor.body for sensor in scenario.sensors}
     pressing = [target.name for target in scenario.targets if target.sensor is None and target.body not in carriers]
     names = {}
