@@ -18,7 +18,7 @@ from mathutils.interpolate import poly_3d_calc
 
 from ..display import materials
 from ..properties import parameter_properties
-from ..scene import deforming_objects, mesh_arrays, participants, sensor_regions
+from ..scene import deforming_objects, mesh_arrays, participants, scene_fingerprint, sensor_regions
 from ..session import transforms
 
 MODIFIER = NODES = "Palpate Cling"
@@ -45,7 +45,7 @@ def _deforms_without_scale(carrier) -> bool:
 def is_bound(sensor) -> bool:
     """Return True when the texels of a laid sensor are bound to its carrier."""
     modifier = sensor.modifiers.get(MODIFIER)
-    return modifier is not None and modifier.node_group is not None and _surface_of(modifier) == sensor.parent
+    return modifier is not None and modifier.node_group is not None and sensor.parent in scene_fingerprint.node_inputs(modifier)
 
 
 def bind(context, sensor, carrier) -> None:
@@ -80,13 +80,6 @@ def _set_surface(modifier, carrier) -> None:
         getattr(modifier.properties.inputs, _surface_input(modifier)).value = carrier
     else:
         modifier[_surface_input(modifier)] = carrier
-
-
-def _surface_of(modifier):
-    """Return the surface of the nodes."""
-    if hasattr(modifier, "properties"):
-        return getattr(modifier.properties.inputs, _surface_input(modifier)).value
-    return modifier.get(_surface_input(modifier))
 
 
 def _store_bound_positions(context, sensor, carrier) -> None:

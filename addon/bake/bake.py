@@ -90,12 +90,11 @@ def bake(scene, into_scene: bool = True, images: bool = True, blend: bake_files.
             warnings = (*reading.warnings, *simulation.warnings)
             recording = with_clipping_warnings(files.recording(simulation.dt, warnings, simulation.step_reason))
             files.seal(recording)
-            shown = _Shown(files.folders, files.bake_id, owner.scene_id)
             if blend is not None:
-                _show(_scene_called(name), reading, recording, shown)
+                _show(_scene_called(name), reading, recording, files.folders, files.bake_id, owner.scene_id)
             files.publish(blend)
         if into_scene and blend is None:
-            _show(_scene_called(name), reading, recording, shown)
+            _show(_scene_called(name), reading, recording, files.folders, files.bake_id, owner.scene_id)
         return BakeResult(recording, scenario, files.folders)
 
 
@@ -138,7 +137,7 @@ def show_bake(scene, found: Bake) -> Job[None]:
                 "changed since, or options of the bake changed it; bake again, or use a .blend that was saved with its bake."
             )
         _scene_writer().check_writable(scene, reading)
-        _show(scene, reading, found.recording, _Shown(found.folders, manifest.bake_id, identity.scene_id(scene)))
+        _show(scene, reading, found.recording, found.folders, manifest.bake_id, identity.scene_id(scene))
 
 
 class _Steps:
@@ -173,23 +172,14 @@ def _owner(scene, into_scene: bool, blend: bake_files.BlendToSave | None) -> Bak
     return BakeOwner(scene_id, saved, opened, others)
 
 
-@dataclass(frozen=True)
-class _Shown:
-    """Where a bake that a scene shows lies, by sensor; its id; and the scene's own."""
-
-    folders: dict[str, Path]
-    bake_id: str
-    scene_id: str
-
-
-def _show(scene, reading: SceneReading, recording: Recording, shown: _Shown) -> None:
+def _show(scene, reading: SceneReading, recording: Recording, folders: dict[str, Path], bake_id: str, scene_id: str) -> None:
     """Put the result into the scene and evaluate the present frame again, so that the new keyframes take effect."""
-    _scene_writer().write(scene, reading, recording, shown.folders)
-    scene.palpate.scene_id, scene.palpate.baked_id = shown.scene_id, shown.bake_id
+    _scene_writer().write(scene, reading, recording, folders)
+    scene.palpate.scene_id, scene.palpate.baked_id = scene_id, bake_id
     scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
     scene.palpate.baked_fingerprint = scene_fingerprint.fingerprint(scene)
     for show in session_state.when_baked:
-        show(scene, recording, shown.folders)
+        show(scene, recording, folders)
 
 
 def _scene_called(name: str):

@@ -52,7 +52,7 @@ def apply(sensor: BakedSensor, image, scale: Scale) -> None:
             value = pictures.place(add, add.attribute(column))
             image, mapping = pictures.image, materials.ImageMapping(attribute)
         elif is_in_image:
-            _store_texel_uv(mesh, texels)
+            mesh_arrays.store(mesh, materials.TEXEL_UV, np.column_stack([layout.uv(), np.zeros(len(texels))]), texels.vertex)
             value, image = materials.image_values(add, image, frames), None
         else:
             value, image = _table(sensor, scale).lookup(add), None
@@ -131,11 +131,6 @@ def _write_uv(mesh, texels: Texels, uv: np.ndarray) -> None:
     table[texels.vertex] = uv
     corner = mesh_arrays.corner_vertices(mesh)
     layer.data.foreach_set("uv", table[corner].astype(np.float32).ravel())
-
-
-def _store_texel_uv(mesh, texels: Texels) -> None:
-    uv = np.column_stack([texels.layout.uv(), np.zeros(len(texels))])
-    mesh_arrays.store(mesh, materials.TEXEL_UV, uv, texels.vertex)
 
 
 def region_faces(mesh, texels: Texels) -> np.ndarray:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -36,17 +35,6 @@ MOST_TEXELS, MOST_FRAMES, MOST_HITS = 40, 3, 4
 """Texels per frame and frames that are tried at most, and objects that a line of sight goes through at most."""
 
 
-@dataclass(frozen=True)
-class _Sight:
-    """Loaded texels of one frame, evenly chosen."""
-
-    frame: int
-    loaded: LoadedTexels
-
-    def chosen(self) -> np.ndarray:
-        return np.linspace(0, len(self.loaded) - 1, min(len(self.loaded), MOST_TEXELS)).round().astype(int)
-
-
 def best_view(
     scene,
     loaded: Mapping[int, LoadedTexels],
@@ -72,9 +60,9 @@ def best_view(
     sights = _sights(loaded)
     views = [own, *((float(azimuth), float(elevation)) for elevation in ELEVATIONS for azimuth in AZIMUTHS)]
     seen = np.zeros(len(views))
-    for sight in sights:
-        scene.frame_set(sight.frame)
-        seen += [_share_seen(scene, sight, direction_of(view), see_through) for view in views]
+    for frame, texels in sights:
+        scene.frame_set(frame)
+        seen += [_share_seen(scene, texels, direction_of(view), see_through) for view in views]
     if not seen.any():
         return None
     scores = seen / len(sights) - [_cost(view, own) for view in views]
@@ -98,9 +86,9 @@ def view_of(direction: Iterable[float]) -> tuple[float, float]:
     return math.degrees(math.atan2(y, x)), math.degrees(math.atan2(z, math.hypot(x, y)))
 
 
-def _sights(loaded: Mapping[int, LoadedTexels]) -> list[_Sight]:
-    """Return the texels of the frames that count: those with load, evenly chosen."""
-    found = [_Sight(frame, texels) for frame, texels in loaded.items() if len(texels)]
+def _sights(loaded: Mapping[int, LoadedTexels]) -> list[tuple[int, LoadedTexels]]:
+    """Return the frames that count, those with load, evenly chosen, and their texels."""
+    found = [(frame, texels) for frame, texels in loaded.items() if len(texels)]
     places = np.linspace(0, len(found) - 1, min(len(found), MOST_FRAMES)).round().astype(int)
     return [found[place] for place in places]
 
@@ -136,16 +124,16 @@ def _objects_on_ray(scene, depsgraph, place: Vector, way: Vector) -> Iterator:
         place = where + 1e-4 * max(obj.dimensions) * way
 
 
-def _share_seen(scene, sight: _Sight, towards: np.ndarray, see_through: bool) -> float:
-    """Return how much of the loaded texels a camera far away in a direction sees, 0 to 1."""
-    chosen = sight.chosen()
-    facing = np.clip(sight.loaded.normals[chosen] @ towards / FACING, 0.0, 1.0)
+def _share_seen(scene, loaded: LoadedTexels, towards: np.ndarray, see_through: bool) -> float:
+    """Return how much of the loaded texels a camera far away in a direction sees, 0 to 1; many are evenly chosen."""
+    chosen = np.linspace(0, len(loaded) - 1, min(len(loaded), MOST_TEXELS)).round().astype(int)
+    facing = np.clip(loaded.normals[chosen] @ towards / FACING, 0.0, 1.0)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     seen = [
         _clearness(
             scene,
             depsgraph,
-            sight.loaded.points[i] + LIFT * sight.loaded.radii[i] * sight.loaded.normals[i],
+            loaded.points[i] + LIFT * loaded.radii[i] * loaded.normals[i],
             towards,
             see_through,
         )

@@ -108,19 +108,6 @@ def controlled_sensor(obj, sensor_objects: list) -> int:
     )
 
 
-def matrix_without_drive(matrix: np.ndarray, parent: np.ndarray, parent_now: np.ndarray) -> np.ndarray:
-    """Return the world matrix that a driven object would have now without its drive, (4, 4) float.
-
-    Parameters
-    ----------
-    matrix : (4, 4) float
-        World matrix at the start.
-    parent, parent_now : (4, 4) float
-        The share of its parents in the matrix, at the start and now.
-    """
-    return parent_now @ np.linalg.inv(parent) @ matrix
-
-
 def world_matrix(obj, depsgraph) -> np.ndarray:
     """Return the evaluated world matrix of an object, (4, 4) float."""
     return transforms.as_array(obj.evaluated_get(depsgraph).matrix_world)

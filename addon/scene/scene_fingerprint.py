@@ -100,7 +100,7 @@ def _references_of(block) -> Iterator:
         for modifier in block.modifiers:
             if modifier.name not in stored_names.MODIFIERS:
                 yield from _pointers(modifier)
-                yield from _node_inputs(modifier)
+                yield from node_inputs(modifier)
         for bone in () if block.pose is None else block.pose.bones:
             yield from _constraint_targets(bone.constraints)
     elif isinstance(block, bpy.types.NodeTree):
@@ -120,7 +120,7 @@ def _constraint_targets(constraints) -> Iterator:
         yield from (item.target for item in getattr(constraint, "targets", ()))
 
 
-def _node_inputs(modifier) -> Iterator:
+def node_inputs(modifier) -> Iterator:
     """Yield the data-blocks that are inputs of Geometry Nodes. Blender 5.2 and later has properties for inputs."""
     nodes = modifier.node_group if modifier.type == "NODES" else None
     for item in () if nodes is None else nodes.interface.items_tree:

@@ -137,7 +137,8 @@ class SceneReading:
                 if index not in self.driven_bodies:
                     continue
                 targets[index] = moved_bodies.drive_target(obj, depsgraph)
-                matrix = moved_bodies.matrix_without_drive(matrices[index], self.parent_matrices[index][0], parents[index])
+                # where its parents alone would have carried it
+                matrix = parents[index] @ np.linalg.inv(self.parent_matrices[index][0]) @ matrices[index]
             else:
                 matrix = matrices[index] = moved_bodies.world_matrix(obj, depsgraph)
             poses[index] = self._pose(scene, index, obj, matrix)
