@@ -6,11 +6,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from scipy.ndimage import map_coordinates
 from scipy.spatial.transform import Rotation
 
 from palpate.core.geometry import texture_maps
 from palpate.core.geometry.grid_layout import GridLayout, grid_layout
-from palpate.core.geometry.mesh import checked_mesh
+from palpate.core.geometry.mesh import TriangleMesh, checked_mesh, vertex_normals
 from palpate.core.geometry.texels import texels_from_region
 from palpate.core.geometry.texture_maps import UVLayout, uv_layout
 
@@ -44,12 +45,13 @@ def flat(places, pitch=(0.0034, 0.0034)):
 
 def normals_of(position, triangles):
     """Return unit vertex normals."""
-    a, b, c = position[triangles].transpose(1, 0, 2)
-    face = np.cross(b - a, c - a)
-    normals = np.zeros_like(position)
-    for corner in range(3):
-        np.add.at(normals, triangles[:, corner], face)
-    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    return vertex_normals(TriangleMesh(position, triangles))
+
+
+def compact(position, triangles):
+    """Leave out vertices without a triangle."""
+    used, triangles = np.unique(triangles, return_inverse=True)
+    return np.asarray(position, float)[used], triangles.reshape(-1, 3)
 
 
 def shuffled(rng, position, triangles, quads):
@@ -60,11 +62,6 @@ def shuffled(rng, position, triangles, quads):
     triangles = np.take_along_axis(new[triangles], turn, axis=1)[rng.permutation(len(triangles))]
     quads = None if quads is None else new[quads][rng.permutation(len(quads))]
     return position[old], triangles, quads, old
-
-
-def about_z(angle):
-    """Return the matrix of a turn about z."""
-    return Rotation.from_euler("z", angle).as_matrix()
 
 
 # --- grids
@@ -87,7 +84,7 @@ def test_flat_pad_in_any_order(size, diagonals, with_quads):
 def test_row_and_column_zero_are_lowest_however_the_pad_is_turned():
     places, triangles, _ = grid_mesh(14, 6, "random")
     for degrees in (0, 20, -40, 90, 110, 180, 200, 270):
-        position = flat(places) @ about_z(np.radians(degrees)).T
+        position = Rotation.from_euler("z", degrees, degrees=True).apply(flat(places))
         layout, along = grid_layout(position, normals_of(position, triangles), triangles)
         assert layout.shape == ((14, 6) if degrees % 180 in (0, 20, 140) else (6, 14))
         order = np.lexsort([layout.column, layout.row])
@@ -221,9 +218,7 @@ def not_grids():
 
 @pytest.mark.parametrize(("position", "triangles"), [pytest.param(*rest, id=name) for name, *rest in not_grids()])
 def test_no_grid_is_claimed(position, triangles):
-    used, triangles = np.unique(triangles, return_inverse=True)
-    triangles = triangles.reshape(-1, 3)
-    position = position[used].astype(float)
+    position, triangles = compact(position, triangles)
     assert grid_layout(position, normals_of(position, triangles), triangles) == (None, None)
 
 
@@ -253,8 +248,7 @@ def cap(subdivisions=3, height=0.3):
     """Return a patch of a sphere."""
     mesh = trimesh.creation.icosphere(subdivisions=subdivisions)
     keep = (mesh.vertices[:, 2] > height)[mesh.faces].all(axis=1)
-    used, faces = np.unique(mesh.faces[keep], return_inverse=True)
-    return np.array(mesh.vertices)[used], faces.reshape(-1, 3)
+    return compact(mesh.vertices, mesh.faces[keep])
 
 
 def surfaces():
@@ -286,12 +280,6 @@ def surfaces():
 SURFACES = [pytest.param(*rest, id=name) for name, *rest in surfaces()]
 
 
-def compact(position, triangles):
-    """Leave out vertices without a triangle."""
-    used, triangles = np.unique(triangles, return_inverse=True)
-    return np.asarray(position, float)[used], triangles.reshape(-1, 3)
-
-
 def lay_out(position, triangles, seed=3):
     """Return a shuffled, turned copy of a surface with its texture map."""
     rng = np.random.default_rng(seed)
@@ -318,22 +306,7 @@ def weights_at(corners, points):
 
 def bilinear(picture, points):
     """Look up a picture as Blender does: linear between the centres of pixels."""
-    low = np.floor(points).astype(int)
-    part = points - low
-    x, y = low.T
-    s, t = part.T
-    return (
-        picture[y, x] * (1 - s) * (1 - t)
-        + picture[y, x + 1] * s * (1 - t)
-        + picture[y + 1, x] * (1 - s) * t
-        + picture[y + 1, x + 1] * s * t
-    )
-
-
-def with_area(corners):
-    """Return (m,) bool: triangles that are more than a line on the map."""
-    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    return first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0] > 1e-6
+    return map_coordinates(picture, points.T[::-1], order=1)
 
 
 @pytest.mark.parametrize(("position", "triangles", "in_one_piece"), SURFACES)
@@ -350,7 +323,7 @@ def test_map_is_valid(position, triangles, in_one_piece):
     assert edges.min() >= (3 if in_one_piece else 6) - 1e-9  # texels are pixels apart
     assert (corners >= 2 - 1e-9).all() and (corners <= np.array([layout.width, layout.height]) - 3 + 1e-9).all()
 
-    solid = with_area(corners)
+    solid = np.linalg.det(corners[:, 1:] - corners[:, :1]) > 1e-6  # more than a line on the map
     size = np.linalg.norm(np.cross(*(position[triangles[:, k]] - position[triangles[:, 0]] for k in (1, 2))), axis=1)
     assert solid[size > 1e-9].all()  # none flipped: the area is positive
     points = np.random.default_rng(0).random((4000, 2)) * (layout.width, layout.height) - 0.5
@@ -385,7 +358,7 @@ def test_constant_field_never_bleeds(position, triangles, in_one_piece):
 def test_flattened_map_keeps_shape_and_handedness():
     position, triangles = cap(height=0.8)
     position = position * [3.0, 1.0, 1.0]
-    for matrix in (np.eye(3), about_z(0.4)):
+    for matrix in (np.eye(3), Rotation.from_euler("z", 0.4).as_matrix()):
         moved = position @ matrix.T
         layout, along = uv_layout(moved, normals_of(moved, triangles), triangles)
         np.testing.assert_allclose(along, np.tile(matrix[:, 0], (len(moved), 1)), atol=0.02)

@@ -6,15 +6,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from solver_scenes import shape
 
-from palpate.core.geometry.mesh import checked_mesh
 from palpate.core.geometry.texels import projection_of, texels_from_region
 
 SIDE = 65  # pixels, so that one lies in the middle
 
 
-def texels_of(shape, region=None):
-    mesh, _ = checked_mesh(shape.vertices, shape.faces, "Skin")
+def texels_of(solid, region=None):
+    mesh = shape(solid, "Skin")
     return texels_from_region(mesh, np.ones(len(mesh.vertices), bool) if region is None else region(mesh.vertices))
 
 

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 import trimesh
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+from solver_scenes import shape
 
 from palpate.core.errors import SensorError
 from palpate.core.geometry.mesh import TriangleMesh, checked_mesh, edge_defects, triangle_areas
@@ -51,7 +53,7 @@ def tube(radius=0.01, length=0.06, sides=720):
 def dome(radius=0.01, cut=0.3, subdivisions=4):
     ball = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
     keep = ball.triangles_center[:, 2] > cut * radius
-    return checked_mesh(np.asarray(ball.vertices), np.asarray(ball.faces)[keep], "dome")[0]
+    return checked_mesh(ball.vertices, ball.faces[keep], "dome")[0]
 
 
 def as_mesh(skin):
@@ -89,8 +91,7 @@ def test_a_walk_on_a_cylinder_is_a_helix():
 
 
 def test_a_walk_through_corners_does_not_get_lost():
-    ball = trimesh.creation.icosphere(subdivisions=3, radius=1.0)
-    mesh = checked_mesh(np.asarray(ball.vertices), np.asarray(ball.faces), "ball")[0]
+    mesh = shape(trimesh.creation.icosphere(subdivisions=3, radius=1.0))
     surface = GeodesicTracer(mesh)
     for vertex in range(0, 60, 7):  # a great circle leads back to where it began, from a corner and through corners
         point = mesh.vertices[vertex]
@@ -105,7 +106,7 @@ def test_a_walk_ends_at_the_rim():
 
 def test_nearest_point_is_trimesh_s():
     ball = trimesh.creation.icosphere(subdivisions=2)
-    mesh = checked_mesh(np.asarray(ball.vertices), np.asarray(ball.faces), "ball")[0]
+    mesh = shape(ball)
     points = np.random.default_rng(0).uniform(-2, 2, (50, 3))
     expected, distance, _ = trimesh.proximity.closest_point(ball, points)
     for point, there, far in zip(points, expected, distance, strict=True):
@@ -154,12 +155,10 @@ def test_wrapped_onto_a_plane_it_is_the_flat_pad(degrees):
     angle = math.radians(degrees)
     skin = wrapped_array(sheet(), 8, 6, (0.003, 0.004), angle=angle)
     flat = pad_array(8, 6, (0.003, 0.004)).vertices
-    turn = np.array([[math.cos(angle), -math.sin(angle), 0], [math.sin(angle), math.cos(angle), 0], [0, 0, 1]])
     middle = skin.vertices.mean(axis=0)
     heading = region_middle(sheet()).heading
     own = math.atan2(-heading[0], heading[1])  # the sheet's own direction is not quite +y
-    turn = turn @ np.array([[math.cos(own), -math.sin(own), 0], [math.sin(own), math.cos(own), 0], [0, 0, 1]])
-    assert skin.vertices - middle == pytest.approx(flat @ turn.T, abs=1e-9)
+    assert skin.vertices - middle == pytest.approx(Rotation.from_euler("z", angle + own).apply(flat), abs=1e-9)
 
 
 def test_wrapped_onto_a_cylinder_it_is_the_bent_pad():
@@ -233,7 +232,7 @@ def test_a_seed_is_a_pattern_and_the_mesh_s_own_triangles_do_not_show():
 def test_points_on_a_box_are_spread_evenly():
     """Six rounds of Lloyd's algorithm leave two points at 0.56 of the mean spacing, twenty at 0.68."""
     solid = trimesh.creation.box((0.03, 0.02, 0.01)).subdivide().subdivide().subdivide()
-    points = even_points(TriangleMesh(np.asarray(solid.vertices), np.asarray(solid.faces)), 300).position
+    points = even_points(shape(solid), 300).position
     spacing = cKDTree(points).query(points, 2)[0][:, 1]
     assert spacing.min() > 0.65 * spacing.mean()
 
