@@ -5,15 +5,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import OpenEXR
+from solver_scenes import pad
 
 from palpate.core.geometry.grid_layout import GridLayout
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.texels import Texels, texels_from_region
 from palpate.core.geometry.texture_maps import UVLayout
-from palpate.core.io.bake_folder import folder_names, manifest_of, write_arrays_of, write_image_of, write_manifest
+from palpate.core.io.bake_folder import Manifest, folder_names, manifest_of, write_arrays_of, write_image_of, write_manifest
 from palpate.core.model.body import Body, Motion
 from palpate.core.model.recording import Recording, SensorFrame, SensorRecording
 from palpate.core.model.scenario import Scenario
@@ -25,17 +27,7 @@ ROWS, COLUMNS, PITCH = 5, 3, 0.004
 
 def grid_texels():
     """A flat pad of 5 × 3 texels in z = 0."""
-    y, x = np.mgrid[0:ROWS, 0:COLUMNS]
-    vertices = np.stack([x.ravel() * PITCH, y.ravel() * PITCH, np.zeros(ROWS * COLUMNS)], axis=1)
-    quads = np.array(
-        [
-            [j * COLUMNS + i, j * COLUMNS + i + 1, (j + 1) * COLUMNS + i + 1, (j + 1) * COLUMNS + i]
-            for j in range(ROWS - 1)
-            for i in range(COLUMNS - 1)
-        ]
-    )
-    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    return texels_from_region(TriangleMesh(vertices, triangles, quads), np.ones(len(vertices), bool), "pad")
+    return pad(ROWS, COLUMNS, PITCH)
 
 
 def round_texels():
@@ -100,7 +92,32 @@ def write_bake(folder: Path) -> None:
     write_sensor(folder, "pad", grid_texels(), Painted(k=np.ones(ROWS * COLUMNS)), sensors=names)
 
 
-def tactile_frame(count: int, seed: int = 0) -> SensorFrame:
+def manifest(**changes: Any) -> Manifest:
+    """Return a manifest with something in every field."""
+    return replace(
+        Manifest(
+            sensor="Pad ü/1",
+            palpate="0.1.0",
+            frame_start=1,
+            frame_end=40,
+            fps=24.0,
+            dt=1 / 3e4,
+            digest="ab" * 32,
+            unit="kPa",
+            shape=(14, 6),
+            parameters={"k": 58.5, "unit": "N", "list": [1, 2.5]},
+            warnings=("Texel 3 of 'Pad' bottomed out at frame 7: raise k.",),
+            step_reason="Steps of 1 ms.",
+            complete=True,
+            scene_file="Hände.blend",
+            files={"recording.npz": "ab" * 32, "sensor.npz": "cd" * 32},
+            effects=[{"name": "creep", "amount": 0.2}],
+        ),
+        **changes,
+    )
+
+
+def tactile_frame(count: int, seed: int | np.random.Generator = 0) -> SensorFrame:
     """Return a frame of random numbers."""
     rng = np.random.default_rng(seed)
     return SensorFrame(
@@ -111,9 +128,9 @@ def tactile_frame(count: int, seed: int = 0) -> SensorFrame:
         slip=rng.random(count),
         contact=rng.random(count) < 0.5,
         reading=rng.normal(size=count) * 1e3,
-        net_force=np.zeros(3),
-        net_torque=np.zeros(3),
-        centre_of_pressure=np.zeros(3),
+        net_force=rng.normal(size=3),
+        net_torque=rng.normal(size=3),
+        centre_of_pressure=rng.normal(size=3),
     )
 
 

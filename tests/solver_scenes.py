@@ -18,9 +18,11 @@ GRAVITY = 9.81
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 
 
-def grid_mesh(rows: int = 14, columns: int = 6, pitch: float = 0.0034) -> TriangleMesh:
-    """A flat sheet in z = 0, centred, rows along +y, columns along +x, normals +z."""
-    y, x = np.mgrid[0:rows, 0:columns] * pitch
+def grid_mesh(rows: int = 14, columns: int = 6, pitch: float | tuple[float, float] = 0.0034) -> TriangleMesh:
+    """A flat sheet in z = 0, centred, rows along +y, columns along +x, normals +z; a pitch or one of x and one of y."""
+    x_pitch, y_pitch = np.broadcast_to(pitch, 2)
+    y, x = np.mgrid[0:rows, 0:columns]
+    x, y = x * x_pitch, y * y_pitch
     vertices = np.stack([x - x.mean(), y - y.mean(), np.zeros_like(x)], axis=-1).reshape(-1, 3)
     corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     quads = np.stack([corner, corner + 1, corner + columns + 1, corner + columns], axis=1)
@@ -28,7 +30,7 @@ def grid_mesh(rows: int = 14, columns: int = 6, pitch: float = 0.0034) -> Triang
     return checked_mesh(vertices, triangles, "pad", quads)[0]
 
 
-def pad(rows: int = 14, columns: int = 6, pitch: float = 0.0034) -> Texels:
+def pad(rows: int = 14, columns: int = 6, pitch: float | tuple[float, float] = 0.0034) -> Texels:
     """The texels of :func:`grid_mesh`."""
     mesh = grid_mesh(rows, columns, pitch)
     return texels_from_region(mesh, np.ones(len(mesh.vertices), bool), "pad")

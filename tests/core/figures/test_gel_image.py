@@ -8,28 +8,23 @@ import numpy as np
 import pytest
 from sample_bake import recording_of, round_texels
 from scipy import ndimage
+from solver_scenes import pad
 
 from palpate.core.errors import ParameterError, SensorError
 from palpate.core.figures import color_maps, gel_image
 from palpate.core.figures.figure_style import GelStyle
 from palpate.core.figures.gel_image import gel_pixels, write_gel_image
-from palpate.core.geometry.mesh import TriangleMesh
-from palpate.core.geometry.texels import texels_from_region
 
-ROWS, COLUMNS, PITCH_X, PITCH_Y = 37, 45, 0.5e-3, 0.4e-3
+PITCH_X, PITCH_Y = 0.5e-3, 0.4e-3
 SIGMA0 = 40.0
 SIZE = (600, 600)
 
 
 @pytest.fixture(scope="module")
 def texels():
-    """A flat gel whose columns are farther apart than its rows."""
-    y, x = np.mgrid[:ROWS, :COLUMNS]
-    vertices = np.stack([x.ravel() * PITCH_X, y.ravel() * PITCH_Y, np.zeros(ROWS * COLUMNS)], axis=1)
-    corner = (y[:-1, :-1] * COLUMNS + x[:-1, :-1]).ravel()
-    quads = np.stack([corner, corner + 1, corner + COLUMNS + 1, corner + COLUMNS], axis=1)
-    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    return texels_from_region(TriangleMesh(vertices, triangles, quads), np.ones(len(vertices), bool), "gel")
+    """A flat gel whose columns are farther apart than its rows, from a corner in the origin on."""
+    centred = pad(37, 45, (PITCH_X, PITCH_Y))
+    return replace(centred, position=centred.position - centred.position[0])
 
 
 def frame_of(texels, depth=None, shear=None):

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whose bake it is: told by the id of the scene and the path of its .blend, wherever both lie."""
 
-import pytest
+from dataclasses import replace
 
-from palpate.core.io.bake_folder import BakeOwner, Manifest, other_owner
+import pytest
+import sample_bake
+
+from palpate.core.io.bake_folder import BakeOwner, other_owner
 
 
 @pytest.fixture
@@ -18,21 +21,8 @@ def project(tmp_path):
 
 def manifest(folder, owner):
     """The manifest that a bake of this owner leaves."""
-    about = {
-        "palpate": "1",
-        "frame_start": 1,
-        "frame_end": 2,
-        "fps": 24.0,
-        "dt": 1e-3,
-        "digest": "d",
-        "unit": "N",
-        "shape": (1, 1),
-        "parameters": {},
-        "warnings": (),
-        "complete": True,
-    }
     name = "" if owner.blend is None else owner.blend.name
-    return Manifest("Pad", **about, scene_file=name, scene_id=owner.scene_id, scene_path=owner.scene_path(folder))
+    return sample_bake.manifest(scene_file=name, scene_id=owner.scene_id, scene_path=owner.scene_path(folder))
 
 
 @pytest.mark.parametrize("one", ["", "a" * 32])
@@ -118,5 +108,5 @@ def test_scenes_that_were_never_saved(project):
 @pytest.mark.parametrize("path", ["\0", "//server/share/x.blend", "\\\\server\\share\\x.blend", "x" * 10_000, "../" * 500])
 def test_a_path_from_a_hostile_manifest(project, path):
     folder, blend = project
-    left = Manifest(**{**vars(manifest(folder, BakeOwner("a", None))), "scene_path": path})
+    left = replace(manifest(folder, BakeOwner("a", None)), scene_path=path)
     assert other_owner(left, folder, BakeOwner("b", blend)) == ""

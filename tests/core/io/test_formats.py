@@ -12,13 +12,14 @@ import os
 import stat
 import sys
 import zipfile
+from contextlib import contextmanager
 from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import OpenEXR
 import pytest
-from sample_bake import read_exr, tactile_frame
+from sample_bake import manifest, read_exr, tactile_frame
 
 from palpate.core.errors import FileError, PalpateError
 from palpate.core.geometry.grid_layout import GridLayout
@@ -26,31 +27,27 @@ from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.texels import texels_from_region
 from palpate.core.geometry.texture_maps import uv_layout
 from palpate.core.io import file_writing, recording_npz, tactile_exr
-from palpate.core.io.bake_folder import (
-    OWN_DIGEST,
-    Manifest,
-    folder_names,
-    read_manifest,
-    write_manifest,
-)
+from palpate.core.io.bake_folder import OWN_DIGEST, folder_names, read_manifest, write_manifest
 from palpate.core.io.file_writing import atomic_write, require_space, writable_file, writable_folder
 from palpate.core.io.recording_npz import load_recording, save_recording
 from palpate.core.io.tactile_exr import CHANNELS, describe, write_exr
-from palpate.core.model.recording import Frame, Recording, SensorRecording, VectorReadings
+from palpate.core.model.recording import SENSOR_FIELDS, Frame, Recording, SensorRecording, VectorReadings
 from palpate.core.model.sensor import Effect, Sensor
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
 
 on_linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks at Linux's /proc and /dev")
 
 
-def one_sentence(error, *words):
-    """Check that a message is a single line that names what it is about."""
+@contextmanager
+def assert_one_sentence(*words):
+    """Check that the body is refused in a single line that has these words."""
+    with pytest.raises(FileError) as error:
+        yield
     text = str(error.value)
     assert isinstance(error.value, PalpateError)
     assert "\n" not in text and text.endswith(".") and ":" in text
     for word in words:
         assert str(word) in text
-    return text
 
 
 # --- writing whole files
@@ -90,9 +87,8 @@ def test_full_disk(tmp_path, monkeypatch):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(file_writing.os, "replace", full)
-    with pytest.raises(FileError) as error, atomic_write(target) as temporary:
+    with assert_one_sentence(target, "free some space"), atomic_write(target) as temporary:
         temporary.write_text("new")
-    assert "free some space" in one_sentence(error, target)
     assert target.read_text() == "old" and os.listdir(tmp_path) == ["a.txt"]
 
 
@@ -115,20 +111,19 @@ def test_umask_decides_who_may_read(tmp_path):
     assert stat.S_IMODE((tmp_path / "a").stat().st_mode) == 0o640
 
 
-def cannot_write(path, *words):
+def assert_cannot_write(path, *words):
     """Check that nothing can be written at `path`."""
-    with pytest.raises(FileError) as error, atomic_write(path) as temporary:
+    with assert_one_sentence(*words), atomic_write(path) as temporary:
         temporary.write_text("never")
-    return one_sentence(error, *words)
 
 
 def test_wrong_places(tmp_path):
     (tmp_path / "file").write_text("text")
-    assert "does not exist" in cannot_write(tmp_path / "missing" / "a.exr", tmp_path / "missing")
-    assert "is a file" in cannot_write(tmp_path / "file" / "a.exr", tmp_path / "file")
-    assert "is a file" in cannot_write(tmp_path / "file" / "deeper" / "a.exr", tmp_path / "file")
-    assert "is a folder" in cannot_write(tmp_path, tmp_path)
-    assert "shorter" in cannot_write(tmp_path / ("x" * 250), tmp_path)
+    assert_cannot_write(tmp_path / "missing" / "a.exr", tmp_path / "missing", "does not exist")
+    assert_cannot_write(tmp_path / "file" / "a.exr", tmp_path / "file", "is a file")
+    assert_cannot_write(tmp_path / "file" / "deeper" / "a.exr", tmp_path / "file", "is a file")
+    assert_cannot_write(tmp_path, tmp_path, "is a folder")
+    assert_cannot_write(tmp_path / ("x" * 250), tmp_path, "shorter")
     assert os.listdir(tmp_path) == ["file"] and (tmp_path / "file").read_text() == "text"
 
 
@@ -145,11 +140,10 @@ def test_a_file_is_checked_before_there_is_work(tmp_path):
 
 @on_linux
 def test_places_where_not_even_root_may_write():
-    cannot_write("/proc/a.exr", "/proc")
-    with pytest.raises(FileError) as error:
+    assert_cannot_write("/proc/a.exr", "/proc")
+    with assert_one_sentence("/proc"):
         writable_folder("/proc")
-    one_sentence(error, "/proc")
-    assert "device" in cannot_write("/dev/null", "/dev/null")
+    assert_cannot_write("/dev/null", "/dev/null", "device")
     assert Path("/dev/null").is_char_device()
 
 
@@ -158,10 +152,9 @@ def test_read_only_folder(tmp_path, monkeypatch):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
     monkeypatch.setattr(file_writing.os, "open", forbidden)
-    assert "read-only" in cannot_write(tmp_path / "a.exr", tmp_path)
-    with pytest.raises(FileError) as error:
+    assert_cannot_write(tmp_path / "a.exr", tmp_path, "read-only")
+    with assert_one_sentence(tmp_path, "read-only"):
         writable_folder(tmp_path)
-    assert "read-only" in one_sentence(error, tmp_path)
 
 
 def test_read_only_file(tmp_path, monkeypatch):
@@ -169,15 +162,14 @@ def test_read_only_file(tmp_path, monkeypatch):
     target.write_text("old")
     target.chmod(0o444)
     monkeypatch.setattr(file_writing.os, "access", lambda path, mode: path != target)  # root may write anything
-    assert "read-only" in cannot_write(target, target)
+    assert_cannot_write(target, target, "read-only")
     assert target.read_text() == "old"
 
 
 def test_writable_folder(tmp_path):
     assert writable_folder(tmp_path) == tmp_path
-    with pytest.raises(FileError) as error:
+    with assert_one_sentence(tmp_path / "new"):
         writable_folder(tmp_path / "new")
-    one_sentence(error, tmp_path / "new")
     assert writable_folder(tmp_path / "new", create=True).is_dir()
     assert writable_folder(tmp_path / "new", create=True).is_dir()
     assert writable_folder(tmp_path / "x" / "y" / "z", create=True).is_dir()
@@ -187,9 +179,8 @@ def test_writable_folder(tmp_path):
         assert "\n" not in str(error.value) and str(error.value).endswith(".")
     (tmp_path / "file").write_text("")
     for place in ("file", "file/deeper"):
-        with pytest.raises(FileError) as error:
+        with assert_one_sentence(tmp_path / "file"):
             writable_folder(tmp_path / place, create=True)
-        one_sentence(error, tmp_path / "file")
     assert sorted(os.listdir(tmp_path)) == ["file", "new", "x"]
 
 
@@ -220,31 +211,6 @@ def test_folder_names():
 
 
 # --- the manifest
-
-
-def manifest(**changes):
-    """Return a manifest with something in every field."""
-    return replace(
-        Manifest(
-            sensor="Pad ü/1",
-            palpate="0.1.0",
-            frame_start=1,
-            frame_end=40,
-            fps=24.0,
-            dt=1 / 3e4,
-            digest="ab" * 32,
-            unit="kPa",
-            shape=(14, 6),
-            parameters={"k": 58.5, "unit": "N", "list": [1, 2.5]},
-            warnings=("Texel 3 of 'Pad' bottomed out at frame 7: raise k.",),
-            step_reason="Steps of 1 ms.",
-            complete=True,
-            scene_file="Hände.blend",
-            files={"recording.npz": "ab" * 32, "sensor.npz": "cd" * 32},
-            effects=[{"name": "creep", "amount": 0.2}],
-        ),
-        **changes,
-    )
 
 
 def test_manifest_round_trip(tmp_path):
@@ -283,9 +249,8 @@ def test_manifest_without_meaning_is_our_fault(tmp_path, value):
 
 
 def test_damaged_manifest(tmp_path):
-    with pytest.raises(FileError) as error:
+    with assert_one_sentence(tmp_path, "does not exist"):
         read_manifest(tmp_path)
-    one_sentence(error, tmp_path, "does not exist")
     path = write_manifest(tmp_path, manifest())
     whole = path.read_bytes()
     good = json.loads(whole)
@@ -299,14 +264,12 @@ def test_damaged_manifest(tmp_path):
     broken.append(json.dumps({**good, "format": "palpate-bake/2"}).encode())
     for content in broken:
         path.write_bytes(content)
-        with pytest.raises(FileError) as error:
+        with assert_one_sentence(path):
             read_manifest(tmp_path)
-        one_sentence(error, path)
     path.unlink()
     path.mkdir()
-    with pytest.raises(FileError) as error:
+    with assert_one_sentence(path):
         read_manifest(tmp_path)
-    one_sentence(error, path)
 
 
 # --- recordings
@@ -317,18 +280,8 @@ def recording(seed=0, frames=5, sensors=(("Pad", 6), ("a/b\\..", 3)), bodies=3, 
     rng = np.random.default_rng(seed)
     parts = {}
     for name, count in sensors:
-        values = {
-            "normal_force": rng.random((frames, count)),
-            "shear": rng.normal(size=(frames, count, 2)),
-            "friction": rng.random((frames, count)),
-            "depth": rng.random((frames, count)) * 1e-3,
-            "slip": rng.random((frames, count)),
-            "contact": rng.random((frames, count)) < 0.5,
-            "reading": rng.normal(size=(frames, count)),
-            "net_force": rng.normal(size=(frames, 3)),
-            "net_torque": rng.normal(size=(frames, 3)),
-            "centre_of_pressure": rng.normal(size=(frames, 3)),
-        }
+        felt = [tactile_frame(count, rng) for _ in range(frames)]
+        values = {field: np.stack([getattr(frame, field) for frame in felt]) for field in SENSOR_FIELDS}
         values["shear"][0, 0] = -0.0, 5e-324
         values["reading"][0, :2] = np.finfo(float).max, -np.finfo(float).tiny
         shape = frames, 5, 3
@@ -424,29 +377,28 @@ def test_recording_with_nan_is_our_fault(tmp_path, value):
     assert os.listdir(tmp_path) == ["recording.npz"]
 
 
-def cannot_load(read, path):
+def assert_cannot_load(path, *words):
     """Check that reading gives one sentence with the path."""
-    with pytest.raises(FileError) as error:
-        read(path)
-    return one_sentence(error, path)
+    with assert_one_sentence(path, *words):
+        load_recording(path)
 
 
 def test_other_files_are_no_recordings(tmp_path):
     path = tmp_path / "other.npz"
-    assert "does not exist" in cannot_load(load_recording, path)
-    cannot_load(load_recording, tmp_path)
+    assert_cannot_load(path, "does not exist")
+    assert_cannot_load(tmp_path)
     np.savez(path, a=np.zeros(3))
-    assert "not a recording" in cannot_load(load_recording, path)
+    assert_cannot_load(path, "not a recording")
     np.savez(path, header=np.array([{"a": 1}], dtype=object))  # a pickle is never opened
-    cannot_load(load_recording, path)
+    assert_cannot_load(path)
     for header in ("[]", "{}", "nonsense", '{"format": "palpate-recording/9"}', '{"format": "palpate-recording/2"}'):
         np.savez(path, header=np.array(header))
-        cannot_load(load_recording, path)
+        assert_cannot_load(path)
     with open(path, "wb") as file:
         np.save(file, np.zeros(3))
-    cannot_load(load_recording, path)
+    assert_cannot_load(path)
     path.write_text("sensor,force\n")
-    cannot_load(load_recording, path)
+    assert_cannot_load(path)
     save_recording(path, recording())
     with zipfile.ZipFile(path) as archive:
         members = {info.filename: archive.read(info) for info in archive.infolist()}
@@ -455,7 +407,7 @@ def test_other_files_are_no_recordings(tmp_path):
             for name, content in members.items():
                 if name != gone:
                     archive.writestr(name, content)
-        cannot_load(load_recording, path)
+        assert_cannot_load(path)
 
 
 # --- tactile images

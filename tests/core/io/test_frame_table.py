@@ -7,30 +7,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from sample_bake import tactile_frame
 
 from palpate.core.errors import FileError
 from palpate.core.io import row_tables
 from palpate.core.io.recording_npz import save_recording
 from palpate.core.io.row_tables import FrameTable, motion_table
 from palpate.core.model import recording as model
-from palpate.core.model.recording import SENSOR_FIELDS, Frame, Recording, SensorFrame
+from palpate.core.model.recording import SENSOR_FIELDS, Frame, Recording
 
 TEXELS = {"Finger/A": 5, "pad": 1}
 BODIES = ("world", "finger")
 
 
 def frames(count, seed=3):
-    rng = np.random.default_rng(seed)
-
-    def sensor(n):
-        shapes = [(n,), (n, 2), (n,), (n,), (n,), (n,), (n,), (3,), (3,), (3,)]
-        arrays = dict(zip(SENSOR_FIELDS, (rng.normal(size=shape) for shape in shapes), strict=True))
-        return SensorFrame(**{**arrays, "contact": arrays["contact"] > 0})
-
-    return [
-        Frame(i + 7, i / 24, {name: sensor(n) for name, n in TEXELS.items()}, rng.normal(size=(2, 7)), rng.normal(size=(2, 6)))
-        for i in range(count)
-    ]
+    rng, found = np.random.default_rng(seed), []
+    for i in range(count):
+        sensors = {name: tactile_frame(n, rng) for name, n in TEXELS.items()}
+        found.append(Frame(i + 7, i / 24, sensors, rng.normal(size=(2, 7)), rng.normal(size=(2, 6))))
+    return found
 
 
 def written(folder, wanted):
