@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rig_files import write
 from scipy.integrate import dblquad
 
 from palpate.core.errors import FileError
@@ -87,9 +88,7 @@ def test_an_even_depth_gives_the_stiffness_and_the_net_force_of_the_area(tmp_pat
     level = np.interp(time, [0, 0.5, 1.0, 2.0], [0, 0, 1e-3, 1e-3])
     header = "time,depth,force_z," + ",".join(f"texel_{i}" for i in range(8))
     rows = [f"{t},{d}," + ",".join(["0.1"] * 9) for t, d in zip(time, level, strict=True)]
-    (tmp_path / "even.csv").write_text("\n".join([header, *rows]) + "\n")
-    (tmp_path / "rig.toml").write_text(text + '[[trial]]\nfile = "even.csv"\n')
-    rig = read_rig(tmp_path / "rig.toml")
+    rig = read_rig(write(tmp_path, text + '[[trial]]\nfile = "even.csv"\n', even="\n".join([header, *rows]) + "\n"))
     (one,) = predictors_of(rig.trials, rig)
     found = one.predict(Model(replace(rig.parameters, cn=0.0)))
     assert found.force[-1, 2] == pytest.approx(-8 * K * 1e-3, rel=1e-9)  # eight texels cover the whole area
@@ -107,10 +106,8 @@ def test_strips_carry_what_lies_on_them(tmp_path):
         [[0.005, -0.009], [0.015, -0.009], [0.01, 0.009]],
     ]
     text = RIG.replace(f"sensors = {PLACES}", f"strips = {strips}").replace(f", depth = {DEPTH}", "")
-    columns = recording(0).splitlines()
-    (tmp_path / "press_0.csv").write_text("\n".join(",".join(line.split(",")[:7]) for line in columns) + "\n")
-    (tmp_path / "rig.toml").write_text(text + '[[trial]]\nfile = "press_0.csv"\n')
-    rig = read_rig(tmp_path / "rig.toml")
+    trial, columns = '[[trial]]\nfile = "press_0.csv"\n', [line.split(",")[:7] for line in recording(0).splitlines()]
+    rig = read_rig(write(tmp_path, text + trial, press_0=columns))
     areas = np.array([1.8e-4, 0.72e-4, 0.9e-4])
     np.testing.assert_allclose(rig.texels.area, areas, rtol=0.02)
     np.testing.assert_allclose(rig.cover.weights.sum(axis=1), areas / areas.mean(), rtol=0.02)
@@ -122,8 +119,7 @@ def test_strips_carry_what_lies_on_them(tmp_path):
     on_first = pressed & (x < -0.012)
     assert (reading[on_first, 2] == 0.0).all() and (~on_first | (reading[:, 0] > reading[:, 1])).all()
     shallow = text.replace("size", "depth = 0.001, size")
-    (tmp_path / "rig.toml").write_text(shallow + '[[trial]]\nfile = "press_0.csv"\n')
-    spread = read_rig(tmp_path / "rig.toml").cover.weights
+    spread = read_rig(write(tmp_path, shallow + trial)).cover.weights
     assert ((spread > 0).sum(axis=1) > (rig.cover.weights > 0).sum(axis=1)).all()
 
 
@@ -162,6 +158,5 @@ def test_eight_transducers_of_which_nothing_is_wrong_but_creep(tmp_path):
 def test_mistakes_are_said(tmp_path, old, new, said):
     assert old in RIG
     trial = '\n[[trial]]\nfile = "a.csv"\n'
-    (tmp_path / "rig.toml").write_text(RIG.replace(old, new) + trial)
     with pytest.raises(FileError, match=said):
-        read_rig(tmp_path / "rig.toml")
+        read_rig(write(tmp_path, RIG.replace(old, new) + trial))

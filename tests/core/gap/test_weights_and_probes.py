@@ -59,15 +59,8 @@ def weighed(seed, gain=300.0):
     return "\n".join(rows) + "\n"
 
 
-def rig_of(folder, text=WEIGHTS, **files):
-    for name, content in files.items():
-        (folder / f"{name}.csv").write_text(content)
-    (folder / "rig.toml").write_text(text)
-    return read_rig(folder / "rig.toml")
-
-
 def test_texels_share_a_weight_as_springs_do(tmp_path):
-    rig = rig_of(tmp_path, a=weighed(0), b=weighed(1))
+    rig = read_rig(write(tmp_path, WEIGHTS, a=weighed(0), b=weighed(1)))
     trial = rig.trials[0]
     load = stimulus_of(trial, rig).load
     np.testing.assert_allclose(load.sum(axis=1), trial.level, rtol=1e-6)
@@ -84,9 +77,8 @@ def test_weights_of_any_depth_are_carried_with_a_load_cells_noise(tmp_path, k):
     cells = [line.split(",") for line in lines[1:]]
     for row in cells:
         row[3] = f"{float(row[3]) + 2e-4 * rng.normal():.9g}"
-    rig = rig_of(
-        tmp_path, WEIGHTS.replace(f"k = {K}", f"k = {k}"), a="\n".join([lines[0], *map(",".join, cells)]) + "\n", b=weighed(1)
-    )
+    text = WEIGHTS.replace(f"k = {K}", f"k = {k}")
+    rig = read_rig(write(tmp_path, text, a=[lines[0].split(","), *cells], b=weighed(1)))
     trial = rig.trials[0]
     load = stimulus_of(trial, rig).load.sum(axis=1)
     heavy = trial.level > 1e-3
@@ -95,7 +87,7 @@ def test_weights_of_any_depth_are_carried_with_a_load_cells_noise(tmp_path, k):
 
 
 def test_weights_at_places_give_the_gain_of_each_texel(tmp_path):
-    found = run_job(diagnose(rig_of(tmp_path, a=weighed(0), b=weighed(1))))
+    found = run_job(diagnose(read_rig(write(tmp_path, WEIGHTS, a=weighed(0), b=weighed(1)))))
     assert found.verdict == "explained"
     assert [one.name for one in found.findings if one.confidence >= 0.5] == ["gain-mismatch"]
     factors = np.asarray(found.best.model.effects[0].values["factor"])
@@ -104,12 +96,12 @@ def test_weights_at_places_give_the_gain_of_each_texel(tmp_path):
 
 def test_mistakes_with_weights_are_said(tmp_path):
     with pytest.raises(FileError, match="no k"):
-        rig_of(tmp_path, WEIGHTS.replace(f"k = {K}", ""), a=weighed(0), b=weighed(1))
+        read_rig(write(tmp_path, WEIGHTS.replace(f"k = {K}", ""), a=weighed(0), b=weighed(1)))
     with pytest.raises(FileError, match="where a force acts"):
-        rig_of(tmp_path, WEIGHTS.replace("[indenter]", "").replace(f"shape = {{ sphere = {RADIUS} }}", ""))
+        read_rig(write(tmp_path, WEIGHTS.replace("[indenter]", "").replace(f"shape = {{ sphere = {RADIUS} }}", "")))
     beside = weighed(0).splitlines()
     beside[25:] = [",".join([*line.split(",")[:1], "0.03", *line.split(",")[2:]]) for line in beside[25:]]
-    rig = rig_of(tmp_path, a="\n".join(beside) + "\n")
+    rig = read_rig(write(tmp_path, WEIGHTS, a="\n".join(beside) + "\n"))
     with pytest.raises(SceneError, match=r"do not rest.*"):
         predictors_of(rig.trials, rig)
 

@@ -25,7 +25,6 @@ from palpate.core.gap.report.comparison import nrmse
 from palpate.core.gap.report.sentences import next_experiment, noise_sentence
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.findings import Diagnosis
-from palpate.core.io.hidden_folder import FileList
 from palpate.core.io.sensor_toml import read_sensor
 from palpate.core.jobs import run_job
 
@@ -161,12 +160,7 @@ def test_nothing_hidden_but_wrong_parameters_is_no_gap():
 
 @pytest.mark.slow("a whole diagnosis, the one that names an effect in this tier")
 def test_creep_is_named_and_the_gap_closes(tmp_path, monkeypatch):
-    """The report takes the place of an earlier one, and a plan that fails takes no finished result with it."""
-    earlier = FileList(tmp_path)
-    with earlier.new_files("report") as new:
-        (new / "next_experiment.csv").write_text("of the earlier one")
-        earlier.replace(new, {"gap": [new / "next_experiment.csv"]})
-    (tmp_path / "notes.txt").write_text("mine")
+    """A plan that fails takes no finished result with it; test_report_exchange.py has the place of an earlier report."""
 
     def plan_after(_result):
         raise FileError("0.1 N do not rest on the sensor.")
@@ -179,7 +173,7 @@ def test_creep_is_named_and_the_gap_closes(tmp_path, monkeypatch):
     for _ in summary.write_report(result, tmp_path):
         pass
     found = json.loads((tmp_path / "gap.json").read_text())
-    assert not (tmp_path / "next_experiment.csv").exists() and (tmp_path / "notes.txt").exists()
+    assert not (tmp_path / "next_experiment.csv").exists()
     assert "No further recording was planned: 0.1 N do not rest on the sensor." in found["warnings"]
     assert found["format"] == "palpate-gap/1" and found["found"][0]["effect"] == "creep"
     floor, before, after = found["gap"]["noise_floor"], found["gap"]["before"]["check"], found["gap"]["after"]["check"]

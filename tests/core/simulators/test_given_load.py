@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from exported_sensors import ball, pad
+from pressed_poses import LEVEL, pose
 from scipy.spatial.transform import Rotation
 from solver_scenes import box
 
@@ -19,15 +20,10 @@ from palpate.core.simulators.pressed_sensors import PressedSensors
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="a search of hundreds of steps takes minutes without numba")
 
-LEVEL = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 SIZE = 0.04
 WEIGHT = 9.81
 EXACT = 1e-6  # of the load, as the issue asks; the search ends at a thousandth of it
 LAW = {"k": 1000.0, "cn": 10.0, "sigma0": 1000.0, "sigma1": 10.0}
-
-
-def pose(row):
-    return row[:3], row[3:]
 
 
 def at(x=0.0, y=0.0, z=0.0):

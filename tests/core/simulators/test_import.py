@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bad_files import TOUCH_GRID
 from exported_sensors import FLOAT32, ball, pad
 from scipy.spatial.transform import Rotation
 
@@ -162,10 +161,8 @@ def test_a_mesh_beside_the_file_is_read(tmp_path):
 
 @pytest.mark.parametrize("size", ["0", "-1 0.1"])
 def test_a_touch_grid_without_a_size_is_one_sentence(tmp_path, size):
-    path = tmp_path / "grid.xml"
-    path.write_text(TOUCH_GRID.replace('size="0.01"', f'size="{size}"'))
     with pytest.raises(FileError, match="size 0 must be positive in"):
-        import_sensors(path)
+        read(tmp_path, GRID.format(config=CONFIG).replace('size="0.01"', f'size="{size}"'))
 
 
 def test_a_texel_that_is_immeasurably_far_is_one_sentence():

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from exported_sensors import ball, pad
 from scipy.spatial.transform import Rotation
+from solver_scenes import box
 
 from palpate.core.effects.engine.registry import effect
 from palpate.core.errors import PalpateError, ParameterError
@@ -19,14 +20,8 @@ from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.simulators.pressed_sensor import PressedSensor
 from palpate.core.simulators.probe_list import read_probe_list, write_probe_list
 
+BOX = box(0.04, 0.04, 0.04)
 K, DEPTH, OFFSET = 1000.0, 0.0004, np.array([0.004, -0.003, 0.02])
-
-
-def box(size=0.04):
-    import trimesh
-
-    shape = trimesh.creation.box([size, size, size])
-    return TriangleMesh(np.array(shape.vertices), np.array(shape.faces))
 
 
 @pytest.mark.parametrize("turn", [Rotation.identity(), Rotation.from_rotvec([0.4, -1.1, 2.0])], ids=["level", "turned"])
@@ -37,7 +32,7 @@ def test_force_and_torque_are_those_of_springs(turn):
     quaternion = np.roll(turn.as_quat(), 1)
     above, below = OFFSET + [0, 0, 0.001], OFFSET - [0, 0, DEPTH]
     poses = [(place + turn.apply(where), quaternion) for where in (above, below)]
-    pressed = PressedSensor(item, box(), 0.01, (place, quaternion), poses[0])
+    pressed = PressedSensor(item, BOX, 0.01, (place, quaternion), poses[0])
     contact = pressed.step((place, quaternion), poses[0])
     for _ in range(3):
         assert pressed.step((place, quaternion), poses[1], contact) is contact  # it stands still after the first step
@@ -55,9 +50,9 @@ def test_force_and_torque_are_those_of_springs(turn):
 
 @pytest.mark.parametrize("several", [False, True])
 def test_a_target_whose_faces_point_inwards_is_turned(several):
-    outside, rest = box(), np.array([1.0, 0.0, 0.0, 0.0])
-    inside = TriangleMesh(outside.vertices, outside.triangles[:, ::-1])
-    pressed = PressedSensor(pad(4, 4), outside, 0.01)
+    rest = np.array([1.0, 0.0, 0.0, 0.0])
+    inside = TriangleMesh(BOX.vertices, BOX.triangles[:, ::-1])
+    pressed = PressedSensor(pad(4, 4), BOX, 0.01)
     place = [0.0, 0.0, 0.02 - DEPTH], rest
     expected = pressed.step((np.zeros(3), rest), place).force_on_target
     with pytest.warns(UserWarning, match="faces of 'the target' point inwards"):
@@ -71,8 +66,8 @@ def test_poses_that_are_none_are_refused():
     item = pad(4, 4)
     rest = (np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
     with pytest.raises(ParameterError, match="The step is 0 s"):
-        PressedSensor(item, box(), 0.0, rest, rest)
-    pressed = PressedSensor(item, box(), 0.01, rest, (OFFSET, rest[1]))
+        PressedSensor(item, BOX, 0.0, rest, rest)
+    pressed = PressedSensor(item, BOX, 0.01, rest, (OFFSET, rest[1]))
     for bad in (([np.nan, 0, 0], rest[1]), (rest[0], np.zeros(4)), (np.zeros(2), rest[1])):
         with pytest.raises(ParameterError, match="The pose of the target is not a position"):
             pressed.step(rest, bad)

@@ -55,9 +55,8 @@ def test_the_sum_of_fields_is_that_of_single_dipoles():
 def test_the_stress_below_a_point_load_carries_it():
     x = np.linspace(-0.3, 0.3, 1201)
     stress = pressure_below_point_load(4e-3, x[:, None] ** 2 + x[None] ** 2)
-    assert stress.sum() * (x[1] - x[0]) ** 2 == pytest.approx(
-        1.0, abs=2e-3
-    )  # what lies outside: (d/R)³ / … and the sum's steps
+    carried = stress.sum() * (x[1] - x[0]) ** 2
+    assert carried == pytest.approx(1.0, abs=2e-3)  # what lies outside: (d/R)³ / … and the sum's steps
 
 
 def test_a_layer_that_is_pressed_evenly_moves_evenly():

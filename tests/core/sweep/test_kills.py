@@ -15,6 +15,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+from command_runs import LONGEST, assert_succeeds, command
 from small_study import begun, rows_of, tree, write_study
 
 from palpate.core.study.study_file import counted_runs
@@ -29,8 +30,6 @@ KILLS, SEED, LATEST = 20, 41, 3.0
 """Kills, and the seconds before each at most; half of them wait for the next part, the others mostly hit a start."""
 RUNS = 3000
 """A batch is an eighth of what is to be computed, and a kill follows each part at once: 20 kills come before the end."""
-LONGEST = 300.0
-"""Seconds until a wait counts as hanging; a busy machine may have to compile the solver first."""
 FATAL = """
 import os, time
 from pathlib import Path
@@ -144,11 +143,7 @@ def test_a_study_killed_twenty_times_has_the_table_of_an_undisturbed_one(tmp_pat
             name = dice.choice([name for name in sorted(alive) if alive[name].poll() is None])
             lose(alive[name])
             killed.append((name, sum(counted_runs(out))))
-    finished = subprocess.run(
-        [sys.executable, "-m", "palpate.commands", "sweep", str(study), "--out", str(out), "--workers", "2"],
-        capture_output=True, text=True, timeout=LONGEST, check=False,
-    )  # fmt: skip
-    assert (finished.returncode, finished.stderr) == (0, "")
+    assert_succeeds("sweep", study, "--out", out, "--workers", 2)
     print(f"kills, and how many runs were over: {killed}; runs in {len(Parts(out).files)} parts")
     assert len(killed) == KILLS, f"the study was over after {len(killed)} kills: give it more runs"
     assert (rows_of(out), tree(out / "dataset")) == undisturbed(tmp_path / "expected", RUNS)
@@ -159,8 +154,8 @@ def test_a_study_killed_twenty_times_has_the_table_of_an_undisturbed_one(tmp_pat
 def test_a_stopped_study_goes_on_where_it_was(tmp_path):
     """A terminal's Ctrl-C reaches the whole group; what is done is not computed again."""
     study, out = write_study(tmp_path / "own", RUNS, fails=True, hold=0.5), tmp_path / "out"
-    command = [sys.executable, "-m", "palpate.commands", "sweep", str(study), "--out", str(out), "--workers", "2"]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    words = "sweep", study, "--out", out, "--workers", 2
+    process = subprocess.Popen(command(*words), stderr=subprocess.PIPE, text=True, start_new_session=True)
     until(lambda: sum(counted_runs(out)) >= 10 or process.poll() is not None, "the first part")
     os.killpg(process.pid, signal.SIGINT)
     stderr = process.communicate(timeout=LONGEST)[1]
@@ -168,8 +163,7 @@ def test_a_stopped_study_goes_on_where_it_was(tmp_path):
     assert stderr.splitlines()[-1] == "palpate sweep: stopped; the same command continues.", stderr
     assert "Traceback" not in stderr
     before = {path: path.read_bytes() for path in Parts(out).files}
-    finished = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST, check=False)
-    assert (finished.returncode, finished.stderr) == (0, "")
+    assert_succeeds(*words)
     assert before and all(path.read_bytes() == content for path, content in before.items())
     assert sum(counted_runs(out)) == RUNS, "a run was computed twice"
     assert rows_of(out) == undisturbed(tmp_path / "expected", RUNS)[0]
@@ -181,10 +175,8 @@ def test_a_run_that_ends_its_worker_fails_alone(tmp_path, job, more):
     (tmp_path / "job.py").write_text(job, encoding="utf-8")
     study = tmp_path / "study.toml"
     study.write_text(JOB.format(more=more, numbers=", ".join(map(str, range(30)))), encoding="utf-8")
-    command = ["palpate.commands", "sweep", str(study), "--out", str(tmp_path / "out"), "--workers", "2", "--allow-scripts"]
-    finished = subprocess.run([sys.executable, "-m", *command], capture_output=True, text=True, timeout=LONGEST, check=False)
-    assert (finished.returncode, finished.stderr) == (0, "")
-    assert "30 runs: 29 done, 1 failed, 0 left" in finished.stdout
+    said = assert_succeeds("sweep", study, "--out", tmp_path / "out", "--workers", 2, "--allow-scripts")
+    assert "30 runs: 29 done, 1 failed, 0 left" in said
     (row,) = [row for row in rows_of(tmp_path / "out") if row["status"] == "failed"]
     advice = "raise run_memory, 600 MB" if more else "it may need more memory"
     assert row["message"] == f"Run 25 ended its worker each time that it was computed: {advice}, or vary less widely."

@@ -2,11 +2,10 @@
 """Studies whose runs a Python file computes, and the hidden-effect benchmark as one of them."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from command_runs import assert_succeeds
 from small_study import begun
 
 from palpate.commands import main
@@ -59,12 +58,8 @@ def computed(opened: OpenStudy) -> BatchResult:
 
 @pytest.mark.slow("the one study of a job from the command line in this tier")
 def test_a_job_computes_its_runs(tmp_path, capsys):
-    words = ["sweep", str(write(tmp_path)), "--out", str(tmp_path / "out"), "--allow-scripts", "--workers", "1"]
-    command = [sys.executable, "-m", "palpate.commands", *words]
-    finished = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
-    assert (finished.returncode, finished.stderr) == (0, "")
-    assert "6 runs: 5 done, 1 failed, 0 left" in finished.stdout
-    assert "Three is too many." in finished.stdout
+    said = assert_succeeds("sweep", write(tmp_path), "--out", tmp_path / "out", "--allow-scripts", "--workers", 1)
+    assert "6 runs: 5 done, 1 failed, 0 left" in said and "Three is too many." in said
     table = parquet.read_table(tmp_path / "out" / "runs.parquet").to_pylist()
     done = [row for row in table if row["status"] == "finished"]
     assert [row["metric.product"] for row in done] == [2.0, 3.0, 4.0, 6.0, 9.0]

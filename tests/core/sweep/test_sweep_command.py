@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_runs import LONGEST, assert_succeeds, run_command
 from sample_bake import read_exr
 from small_study import begun, rows_of, write_study
 from study_scenes import HEAD, tiny_scene
@@ -44,16 +45,6 @@ depth = { uniform = [0.5e-3, 2e-3] }
 slide = { uniform = [0, 1e-3] }
 """
 )
-LONGEST = 300
-"""Seconds until a command counts as hanging; a busy machine may have to compile the solver first."""
-
-
-def command(*words):
-    return [sys.executable, "-m", "palpate.commands", "sweep", *map(str, words)]
-
-
-def sweep(*words):
-    return subprocess.run(command(*words), capture_output=True, text=True, timeout=LONGEST, check=False)
 
 
 def write(folder: Path, text: str = STUDY) -> Path:
@@ -66,9 +57,8 @@ def write(folder: Path, text: str = STUDY) -> Path:
 def undisturbed(tmp_path_factory):
     """The output folder of the study, computed in one go."""
     folder = tmp_path_factory.mktemp("undisturbed")
-    finished = sweep(write(folder), "--out", folder / "out", "--workers", 2)
-    assert (finished.returncode, finished.stderr) == (0, "")
-    assert "24 runs: 24 done, 0 failed, 0 left" in finished.stdout
+    said = assert_succeeds("sweep", write(folder), "--out", folder / "out", "--workers", 2)
+    assert "24 runs: 24 done, 0 failed, 0 left" in said
     return folder / "out"
 
 
@@ -95,16 +85,15 @@ def test_failed_runs_are_left_alone_until_they_are_asked_for(undisturbed, tmp_pa
     folder = tmp_path / "study"
     opened = open_study(write(tmp_path), folder)
     write_part(folder, [RunResult(run, "The lamp went out.") for run in opened.runs[::20]])
-    finished = sweep(folder, "--workers", 1)
-    assert (finished.returncode, finished.stderr) == (0, "")
-    assert "24 runs: 22 done, 2 failed, 0 left" in finished.stdout and "--retry-failed computes them again" in finished.stdout
+    said = assert_succeeds("sweep", folder, "--workers", 1)
+    assert "24 runs: 22 done, 2 failed, 0 left" in said and "--retry-failed computes them again" in said
     table = parquet.read_table(folder / "runs.parquet").to_pylist()
     expected = parquet.read_table(undisturbed / "runs.parquet").to_pylist()
     for row in (table[0], table[20]):
         assert (row["status"], row["message"]) == ("failed", "The lamp went out.")
         assert all(row[name] == expected[row["run"]][name] for name in row if name.startswith("varied.") or name == "digest")
-    again = sweep(folder, "--workers", 1, "--retry-failed")
-    assert "24 runs: 24 done, 0 failed, 0 left" in again.stdout
+    said = assert_succeeds("sweep", folder, "--workers", 1, "--retry-failed")
+    assert "24 runs: 24 done, 0 failed, 0 left" in said
     assert rows_of(folder) == rows_of(undisturbed)
     assert (folder / "runs.parquet").read_bytes() == (undisturbed / "runs.parquet").read_bytes()
 
@@ -210,20 +199,17 @@ def test_parts_make_the_whole(undisturbed, tmp_path):
     """As on a farm: the study is begun, its parts are computed by themselves, and a last command exports the dataset."""
     h5py = pytest.importorskip("h5py")
     study, out = write(tmp_path), tmp_path / "out"
-    refused = sweep(study, "--out", out, "--part", "1/2")
+    refused = run_command("sweep", study, "--out", out, "--part", "1/2")
     assert (refused.returncode, refused.stderr.count("\n")) == (1, 1)
     assert "--begin" in refused.stderr
-    begin = sweep(study, "--out", out, "--begin")
-    assert (begin.returncode, begin.stderr) == (0, "")
+    assert_succeeds("sweep", study, "--out", out, "--begin")
     for part, count in (("2/2", 12), ("1/2", 24)):
-        finished = sweep(out, "--part", part, "--workers", 1)
-        assert (finished.returncode, finished.stderr) == (0, "")
+        assert_succeeds("sweep", out, "--part", part, "--workers", 1)
         assert len(Parts(out).done) == count
     assert not (out / "dataset").exists()
-    finished = sweep(out, "--format", "hdf5")
-    assert (finished.returncode, finished.stderr) == (0, "")
+    said = assert_succeeds("sweep", out, "--format", "hdf5")
     assert rows_of(out) == rows_of(undisturbed)
-    assert f"export: {out / 'dataset.h5'}" in finished.stdout.splitlines()
+    assert f"export: {out / 'dataset.h5'}" in said.splitlines()
     with h5py.File(out / "dataset.h5") as file:
         assert len(file["episodes/run"]) == 24
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from solver_scenes import box, shape
 
 from palpate.core.errors import PalpateError
 from palpate.core.gap.dataset.rig import Indenter, Rig, grid_texels
@@ -15,10 +16,10 @@ from palpate.core.gap.forward.closed_form_contact import box_contact, sphere_con
 from palpate.core.gap.forward.force_model import _equal_columns
 from palpate.core.gap.forward.predictor import Predictor
 from palpate.core.gap.forward.stimulus import stimulus_of
-from palpate.core.geometry.mesh import checked_mesh
 from palpate.core.model.sensor_parameters import SensorParameters
 
 RADIUS = 0.008
+BALL = Indenter(shape(trimesh.creation.icosphere(2, RADIUS)), RADIUS)
 
 
 def trial(position, quaternion=None, time=None, **changes):
@@ -35,10 +36,6 @@ def rig(indenter, one):
     return Rig("rig", grid_texels(14, 6, 0.0034, 0.0034), SensorParameters(), frozenset(), None, None, indenter, (one,))
 
 
-def solid(shape):
-    return checked_mesh(shape.vertices, shape.faces, "solid")[0]
-
-
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_box_is_its_mesh(turned):
     """Closed form and the solver's contact search agree to rounding, for boxes smaller and larger than the pad, and askew.
@@ -51,7 +48,7 @@ def test_a_box_is_its_mesh(turned):
         turns = np.column_stack([np.ones(40), 0.08 * rng.normal(size=(40, 3))])
         turns /= np.linalg.norm(turns, axis=1)[:, None]
         one = trial(where, turns if turned else None)
-        own = rig(Indenter(solid(trimesh.creation.box(edges)), None, "box", edges), one)
+        own = rig(Indenter(box(*edges), None, "box", edges), one)
         if turned:
             normal = own.texels.normal + 0.5 * rng.normal(size=own.texels.normal.shape)
             own = replace(own, texels=replace(own.texels, normal=normal / np.linalg.norm(normal, axis=1)[:, None]))
@@ -66,7 +63,7 @@ def test_depth_rate_and_slide_of_a_ball_are_those_of_geometry():
     time = np.linspace(0.0, 1.0, 201)
     path = np.column_stack([2e-3 * time, 1e-3 * time, RADIUS - 1e-3 - 5e-4 * time**2])
     one = trial(path, time=time)
-    found = stimulus_of(one, rig(Indenter(solid(trimesh.creation.icosphere(2, RADIUS)), RADIUS), one))
+    found = stimulus_of(one, rig(BALL, one))
     texels = grid_texels(14, 6, 0.0034, 0.0034)
     for texel in np.flatnonzero((found.depth > 0).all(axis=0)):
         offset = texels.position[texel, :2] - path[:, :2]
@@ -88,7 +85,7 @@ def test_a_turning_cylinder_rubs():
     angle = 2.0 * time
     turns = np.column_stack([np.cos(angle / 2), 0 * time, 0 * time, np.sin(angle / 2)])
     one = trial(np.tile([0.0, 0.0, 0.004], (26, 1)), turns, time)
-    cylinder = Indenter(solid(trimesh.creation.cylinder(0.007, 0.01, sections=128)))
+    cylinder = Indenter(shape(trimesh.creation.cylinder(0.007, 0.01, sections=128)))
     found = stimulus_of(one, rig(cylinder, one))
     away = np.linalg.norm(grid_texels(14, 6, 0.0034, 0.0034).position[:, :2], axis=1)
     inside = away < 0.0069
@@ -113,10 +110,10 @@ def test_depth_and_force_trials_load_all_texels_alike():
 def test_deeper_than_the_model_reaches_still_counts_and_right_through_is_refused():
     path = np.tile([0.0, 0.0, RADIUS - 0.015], (10, 1))
     one = trial(path)
-    found = stimulus_of(one, rig(Indenter(solid(trimesh.creation.icosphere(2, RADIUS)), RADIUS), one))
+    found = stimulus_of(one, rig(BALL, one))
     assert 0.012 < found.depth.max() < 0.015 and found.overpressed > 0
     through = trial(path - [0, 0, 1.0])
-    hollow = Indenter(solid(trimesh.creation.box((0.01, 0.01, 4.0))))
+    hollow = Indenter(box(0.01, 0.01, 4.0))
     with pytest.raises(PalpateError, match="right through"):
         stimulus_of(through, rig(hollow, through))
 

@@ -8,14 +8,13 @@ from dataclasses import replace
 import gap_cases as cases
 import numpy as np
 import pytest
-import trimesh
+from solver_scenes import box
 
 from palpate.core.errors import ParameterError
 from palpate.core.gap.dataset.rig import Indenter
 from palpate.core.gap.forward.predictor import predictors_of
 from palpate.core.gap.forward.stimulus import stimulus_of
 from palpate.core.gap.planning.paths import Ground, Limits, Wishes
-from palpate.core.geometry.mesh import checked_mesh
 from palpate.core.model.sensor_parameters import SensorParameters
 
 LIMITS = Limits(depth=0.0012, speed=0.02, duration=11.0, area=(-0.004, 0.006, -0.0052, 0.0052))
@@ -25,11 +24,10 @@ ROUNDING = 1e-6
 
 def _rigs():
     ball = cases.rig(trials=2, seconds=5.0)
-    box = trimesh.creation.box((0.006, 0.005, 0.004))
-    mesh = checked_mesh(box.vertices, box.faces, "box")[0]
     domed = replace(ball.texels, position=ball.texels.position.copy())
     domed.position[:, 2] = 0.002 * np.cos(300.0 * domed.position[:, 0])
     edges = (0.006, 0.005, 0.004)
+    mesh = box(*edges)
     return {
         "ball": ball,
         "box": replace(ball, indenter=Indenter(mesh, None, "box", edges)),
