@@ -8,7 +8,10 @@ from scipy.signal import lfilter
 from palpate.benchmarks._recordings import Recording
 from palpate.core.gap.dataset.rig import Indenter, Rig, grid_texels
 from palpate.core.gap.dataset.trial import Trial
+from palpate.core.gap.selection.diagnosis import diagnose
+from palpate.core.gap.selection.findings import Diagnosis
 from palpate.core.geometry.mesh import checked_mesh
+from palpate.core.jobs import run_job
 from palpate.core.model.sensor_parameters import SensorParameters
 
 ROWS, COLUMNS, PITCH, RADIUS, RATE = 6, 4, 0.0034, 0.010, 40.0
@@ -73,6 +76,13 @@ def rig(change=None, seed=0, trials=5, seconds=12.0, noise=0.004, colour=0.0, k=
     grid = (ROWS, COLUMNS, (PITCH, PITCH))
     words = {"grid": {"rows": ROWS, "columns": COLUMNS, "pitch": [PITCH, PITCH]}}
     return Rig("small", texels, parameters, frozenset({"k"}), 0.006, grid, indenter, tuple(recorded), words)
+
+
+def diagnosed(rig):
+    """The whole diagnosis of a rig."""
+    result = run_job(diagnose(rig))
+    assert isinstance(result, Diagnosis)
+    return result
 
 
 def relaxing(amount=0.3, times=(0.4, 2.0)):

@@ -5,14 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gap_cases import diagnosed
 from rig_files import write
 from scipy.integrate import dblquad
 
 from palpate.core.errors import FileError
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.forward.predictor import Model, predictors_of
-from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.jobs import run_job
 
 SIZE, DEPTH, RADIUS, K = (0.030, 0.018), 0.003, 0.010, 80.0
 PLACES = [[x, y] for y in (-0.004, 0.004) for x in (-0.0105, -0.0035, 0.0035, 0.0105)]
@@ -130,7 +129,7 @@ def test_eight_transducers_of_which_nothing_is_wrong_but_creep(tmp_path):
     text = text.replace(f"depth = {DEPTH}", f"depth = {DEPTH}, pitch = 0.0015")
     rig = read_rig(written(tmp_path, text, trials=3, relaxing=True, noise=2e-4))
     assert len(rig.texels) == 8 and len(rig.surface) == 20 * 12
-    found = run_job(diagnose(rig))
+    found = diagnosed(rig)
     assert [one.name for one in found.findings if one.confidence >= 0.5] == ["creep"]
     assert found.verdict == "explained"
     assert found.best.model.parameters.k == pytest.approx(K, rel=0.05)

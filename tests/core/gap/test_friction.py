@@ -13,9 +13,7 @@ from palpate.core.gap.forward.contact_phases import TRAVEL_BANDS, features
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.report import sentences, summary
 from palpate.core.gap.report.comparison import gap_errors
-from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.rule_numbers import SURE
-from palpate.core.jobs import run_job
 from palpate.core.model.sensor_parameters import SensorParameters
 
 # --- friction that the base model lacks shows in net forces alone
@@ -60,7 +58,7 @@ def sliding(change, sway):
     ],
 )
 def test_friction_is_judged_by_the_forces_where_the_readings_leave_noise(name, change):
-    result = run_job(diagnose(sliding(change, sway=0.015)))
+    result = cases.diagnosed(sliding(change, sway=0.015))
     assert [one.name for one in result.findings] == [name] and result.findings[0].confidence > 0.5
     errors = gap_errors(result)
     said, closed = sentences.headline(result, errors), summary.summary(result, errors)["gap"]["closed"]
@@ -92,7 +90,7 @@ def brake(backlash):
 
 @pytest.mark.slow("a whole diagnosis with friction")
 def test_the_report_says_what_friction_does_and_what_is_left(tmp_path):
-    result = run_job(diagnose(brake(backlash=2.0)))
+    result = cases.diagnosed(brake(backlash=2.0))
     errors = gap_errors(result)
     assert all(errors.frictionless[use] > 3.0 * errors.base[use] for use in ("fit", "check"))
     assert not any(named.confidence >= SURE for named in result.findings)

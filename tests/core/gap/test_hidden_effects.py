@@ -13,15 +13,13 @@ from palpate.benchmarks._hidden import cases as hidden
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.report import sentences
 from palpate.core.gap.report.comparison import gap_errors
-from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.rule_numbers import SURE
-from palpate.core.jobs import run_job
 
 
 @pytest.mark.long("a whole diagnosis of two hidden effects")
 def test_two_effects_are_named_of_which_none_joins_alone(tmp_path):
     """Gains of texels alone fit what spreads as well, and fail on unseen stretches."""
-    result = run_job(diagnose(read_rig(hidden.write(hidden.draw("two", 47001), tmp_path))))
+    result = cases.diagnosed(read_rig(hidden.write(hidden.draw("two", 47001), tmp_path)))
     sure = {one.name for one in result.findings if one.confidence >= SURE}
     assert sure == {"load-spreading", "gain-mismatch"} == set(hidden.answer_of("two", 47001))
 
@@ -40,7 +38,7 @@ def beneath_a_cover(force, _time, width):
 @pytest.mark.long("a whole diagnosis of five recordings")
 def test_a_narrow_cover_and_wires_side_by_side_are_not_told_apart():
     """Where the kernel hardly reaches beyond the next texels, leaking wires and another gain give the same readings."""
-    result = run_job(diagnose(cases.rig(partial(beneath_a_cover, width=2e-3), seed=4)))
+    result = cases.diagnosed(cases.rig(partial(beneath_a_cover, width=2e-3), seed=4))
     assert result.verdict == "unexplained" and set(result.ambiguous[0]) == {"load-spreading", "crosstalk"}
     assert sentences.headline(result, gap_errors(result)).startswith(
         "Indistinguishable in these recordings: load-spreading or crosstalk"
@@ -50,6 +48,6 @@ def test_a_narrow_cover_and_wires_side_by_side_are_not_told_apart():
 
 @pytest.mark.long("a whole diagnosis of five recordings")
 def test_a_cover_is_named_where_wires_would_have_to_leak_half_of_each_signal():
-    result = run_job(diagnose(cases.rig(partial(beneath_a_cover, width=3e-3), seed=4)))
+    result = cases.diagnosed(cases.rig(partial(beneath_a_cover, width=3e-3), seed=4))
     assert result.verdict == "explained" and [one.name for one in result.findings] == ["load-spreading"]
     assert result.findings[0].confidence >= SURE

@@ -5,14 +5,13 @@ import json
 
 import numpy as np
 import pytest
+from gap_cases import diagnosed
 
 from palpate.benchmarks._recordings import Recording
 from palpate.core.errors import PalpateError
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.report.comparison import gap_errors
 from palpate.core.gap.report.summary import summary
-from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.jobs import run_job
 
 TIME = 0.05 * np.arange(70)
 RESPONSES = ("texel_0", "texel_1")
@@ -35,11 +34,6 @@ def responses(change):
     return act
 
 
-def one(change):
-    """A fault of one channel."""
-    return lambda columns: columns | {"texel_0": change(columns["texel_0"])}
-
-
 def without_contact(columns):
     return columns | {"depth": 0.0 * TIME - 1e-3} | {name: 1e-3 * np.sin(50.0 * TIME) for name in RESPONSES}
 
@@ -49,7 +43,7 @@ FAULTS = {
     "one press shorter than the others": lambda columns: {name: values[20:28] for name, values in columns.items()},
     "at the rail": responses(lambda values: np.clip(values, 0.0, 0.02)),
     "stuck": responses(lambda values: 0.0 * values + 0.3),
-    "one empty": one(lambda values: values * np.nan),
+    "one empty": lambda columns: columns | {"texel_0": columns["texel_0"] * np.nan},
     "empty but three": responses(lambda values: np.where(np.arange(len(TIME)) < 3, values, np.nan)),
     "nothing but noise": responses(lambda values: np.cos(1e4 * values)),
     "huge": responses(lambda values: 1e25 * values),
@@ -71,7 +65,7 @@ def rig_with(folder, fault, where):
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(("name", "where"), [*((name, "a") for name in FAULTS), ("no contact", "c"), ("stuck", "c")])
 def test_one_odd_recording_is_used(tmp_path, name, where):
-    result = run_job(diagnose(read_rig(rig_with(tmp_path, FAULTS[name], where))))
+    result = diagnosed(read_rig(rig_with(tmp_path, FAULTS[name], where)))
     json.dumps(summary(result, gap_errors(result)), allow_nan=False)
     assert result.verdict in ("explained", "no gap", "unexplained")
 
@@ -80,7 +74,7 @@ def test_one_odd_recording_is_used(tmp_path, name, where):
 def test_rigs_with_nothing_else_are_refused(tmp_path, name):
     fault = {**REFUSED, **FAULTS, "no response at all": responses(lambda values: 0.0 * values)}[name]
     with pytest.raises(PalpateError) as caught:
-        run_job(diagnose(read_rig(rig_with(tmp_path, fault, "abc"))))
+        diagnosed(read_rig(rig_with(tmp_path, fault, "abc")))
     message = str(caught.value)
     assert message.endswith((".", ")")) and "\n" not in message and len(message) < 400
 
@@ -91,5 +85,5 @@ def test_a_rig_of_which_nothing_is_left_to_be_fitted(tmp_path):
     known = {"time": TIME, "force": 1e3 * load, "force_z": -1e3 * load + 1e-3 * np.sin(50.0 * TIME)}
     sensor = "grid = { rows = 1, columns = 2, pitch = 0.004 }\nk = 70.0"
     rig = Recording("odd", sensor, [("a", "fit", known), ("b", "check", known)]).write(tmp_path)
-    result = run_job(diagnose(read_rig(rig)))
+    result = diagnosed(read_rig(rig))
     assert result.verdict in ("explained", "no gap", "unexplained") and np.isfinite(result.best.sse).all()

@@ -20,8 +20,6 @@ from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.fitting.least_squares import TrialView, cross_fitted, fit, free_base_parameters
 from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.forward.stimulus import stimulus_of
-from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.jobs import run_job
 from palpate.core.model.sensor_parameters import SensorParameters
 
 NOISE, STEP = 1e-3, 0.05
@@ -124,7 +122,7 @@ def test_two_specimens_and_two_loggers(tmp_path, repository):
         table = np.column_stack([1e3 * trial.time[:-late], position[:, :2], 1e3 * position[:, 2], reading])
         header = "t,x,y,height," + ",".join(f"texel_{i}" for i in range(reading.shape[1]))
         np.savetxt(tmp_path / f"{trial.name}.csv", table, "%.9g", ",", header=header, comments="")
-    found = run_job(diagnose(read_rig(tmp_path / "rig.toml")))
+    found = cases.diagnosed(read_rig(tmp_path / "rig.toml"))
     assert {(fault.kind, fault.put_right) for fault in found.faults} == {("clock-shift", True)}
     assert found.verdict == "no gap" and not found.findings
     assert found.best.model.parameters.k == pytest.approx(80.0, rel=0.02)
@@ -145,7 +143,7 @@ def lowered(rig, height, **words):
 
 @pytest.mark.parametrize("height", [-OFF, 0.0029])  # with the second one no recording seems to touch
 def test_a_free_height_is_fitted_and_no_effect(height):
-    found = run_job(diagnose(lowered(cases.rig(trials=3, seconds=6.0), height, contact_height="all")))
+    found = cases.diagnosed(lowered(cases.rig(trials=3, seconds=6.0), height, contact_height="all"))
     assert found.verdict == "no gap" and not found.findings
     assert found.best.model.recordings["contact height of all"] == pytest.approx(height, abs=1e-5)
     (interval,) = [one for one in found.intervals if one.name == "contact height of all"]

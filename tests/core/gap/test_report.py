@@ -23,15 +23,6 @@ from palpate.core.gap.report import summary
 from palpate.core.gap.report.comparison import gap_errors
 from palpate.core.gap.report.html_report import _value_and_ends
 from palpate.core.gap.report.sentences import NOT_IDENTIFIABLE, headline, interval_text, said_confidence
-from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.jobs import run_job
-
-
-def shifted(gains, levels):
-    """What is found of recordings with such gains and levels."""
-    names = [f"t{i}" for i in range(len(gains))]
-    own = dict(zip(names, gains, strict=True)), dict(zip(names, levels, strict=True))
-    return RecordingDifferences(0.9, 0.95, 0.05, *own)
 
 
 @pytest.mark.parametrize(("gains", "levels", "odd"), [
@@ -40,7 +31,8 @@ def shifted(gains, levels):
     ([1.0, 0.95, 0.9, 0.85], [0.0] * 4, None),
 ])  # fmt: skip
 def test_one_odd_recording_is_told_from_several(gains, levels, odd):
-    found = shifted(gains, levels).odd_recording(10.0)
+    own = ({f"t{i}": value for i, value in enumerate(values)} for values in (gains, levels))
+    found = RecordingDifferences(0.9, 0.95, 0.05, *own).odd_recording(10.0)
     assert (found.name if found else None) == odd
 
 
@@ -48,7 +40,7 @@ def test_one_odd_recording_is_told_from_several(gains, levels, odd):
 def test_a_shifted_recording_is_named_and_its_gap_is_that_before_it_was_shifted_back():
     count = iter(range(5))
     rig = cases.rig(lambda force, time: force + (0.01 if next(count) == 2 else 0.0), seed=1, trials=5, seconds=6.0)
-    result = run_job(diagnose(rig))
+    result = cases.diagnosed(rig)
     errors = gap_errors(result)
     said, found = headline(result, errors), summary.summary(result, errors)
     assert result.between is not None and result.verdict == "explained"

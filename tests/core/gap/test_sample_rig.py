@@ -2,11 +2,10 @@
 """docs/sample-rig is small, is read without complaint, and what is hidden in it is named."""
 
 import pytest
+from gap_cases import diagnosed
 
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.report.comparison import gap_errors
-from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.jobs import run_job
 
 
 def test_the_sample_rig_is_read_and_small(repository):
@@ -19,7 +18,7 @@ def test_the_sample_rig_is_read_and_small(repository):
 @pytest.mark.long("a whole diagnosis of the sample rig")
 def test_what_is_hidden_in_the_sample_rig_is_named_and_nothing_else(repository):
     """What the library's creep and gain lack beside the generator's is no noise that grows with the reading."""
-    found = run_job(diagnose(read_rig(repository / "docs" / "sample-rig" / "rig.toml")))
+    found = diagnosed(read_rig(repository / "docs" / "sample-rig" / "rig.toml"))
     assert sorted(named.name for named in found.findings) == ["creep", "gain-mismatch"]
     errors = gap_errors(found)
     assert errors.amended["check"] < 0.01 < 0.02 < errors.base["check"]

@@ -13,8 +13,6 @@ from palpate.core.gap.candidates.candidates import candidates, scales_of
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.logs.column_meaning import meaning_of, unit_of
-from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.jobs import run_job
 
 IN_KELVIN = '[columns]\ntemperature = { name = "T", unit = "K" }\n\n[sensor]'
 
@@ -83,6 +81,6 @@ def test_recordings_that_differ_by_their_temperature_do_not_differ_by_gains_of_t
     rig = cases.rig(lambda force, time: force * (1.0 + 0.015 * (next(warmth) - REFERENCE)), trials=6)
     measured = [warm + 0.02 * rng.normal(size=len(one.time)) for warm, one in zip(temperatures, rig.trials, strict=True)]
     trials = [replace(one, temperature=(one.time, values)) for one, values in zip(rig.trials, measured, strict=True)]
-    result = run_job(diagnose(replace(rig, trials=tuple(trials))))
+    result = cases.diagnosed(replace(rig, trials=tuple(trials)))
     assert [one.name for one in result.findings] == ["temperature"] and result.findings[0].confidence > 0.95
     assert result.between is None and result.verdict == "explained"

@@ -10,9 +10,7 @@ import pytest
 from palpate.core.gap.base.recording_differences import as_one_session
 from palpate.core.gap.candidates.candidates import candidates
 from palpate.core.gap.forward.predictor import Model, predictors_of
-from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.rule_numbers import SURE
-from palpate.core.jobs import run_job
 
 
 def warming(clock=True):
@@ -43,5 +41,5 @@ def test_it_needs_a_clock_that_goes_on():
 
 @pytest.mark.long("a whole diagnosis of a session")
 def test_a_gain_that_warms_up_by_a_formula_of_others_is_named():
-    result = run_job(diagnose(warming()))
+    result = cases.diagnosed(warming())
     assert {one.name for one in result.findings if one.confidence >= SURE} == {"warm-up"} and result.verdict == "explained"

@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from gap_cases import diagnosed
 from rig_files import RIG, TEXELS, refusal, write
 from scipy.optimize import brentq
 
@@ -10,8 +11,6 @@ from palpate.core.errors import FileError, SceneError
 from palpate.core.gap.dataset.rig import grid_texels, read_rig
 from palpate.core.gap.forward.predictor import predictors_of
 from palpate.core.gap.forward.stimulus import stimulus_of
-from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.jobs import run_job
 
 K, RADIUS = 80.0, 0.008
 GAINS = np.array([1.0, 1.1, 0.6, 1.2, 0.9, 1.2])
@@ -87,7 +86,7 @@ def test_weights_of_any_depth_are_carried_with_a_load_cells_noise(tmp_path, k):
 
 
 def test_weights_at_places_give_the_gain_of_each_texel(tmp_path):
-    found = run_job(diagnose(read_rig(write(tmp_path, WEIGHTS, a=weighed(0), b=weighed(1)))))
+    found = diagnosed(read_rig(write(tmp_path, WEIGHTS, a=weighed(0), b=weighed(1))))
     assert found.verdict == "explained"
     assert [one.name for one in found.findings if one.confidence >= 0.5] == ["gain-mismatch"]
     factors = np.asarray(found.best.model.effects[0].values["factor"])

@@ -23,16 +23,7 @@ from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.report import summary
 from palpate.core.gap.report.comparison import nrmse
 from palpate.core.gap.report.sentences import next_experiment, noise_sentence
-from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.gap.selection.findings import Diagnosis
 from palpate.core.io.sensor_toml import read_sensor
-from palpate.core.jobs import run_job
-
-
-def diagnosed(rig):
-    result = run_job(diagnose(rig))
-    assert isinstance(result, Diagnosis)
-    return result
 
 
 def views_of(rig, noise=1.0):
@@ -153,7 +144,7 @@ def test_loads_spread_alike_on_a_mesh_whose_rim_has_small_vertices():
 
 
 def test_nothing_hidden_but_wrong_parameters_is_no_gap():
-    result = diagnosed(cases.rig(seed=6, colour=0.8, stated=130.0))
+    result = cases.diagnosed(cases.rig(seed=6, colour=0.8, stated=130.0))
     assert result.verdict == "no gap" and not result.findings and not result.ambiguous
     assert result.best.model.parameters.k == pytest.approx(80.0, rel=0.01)
 
@@ -167,7 +158,7 @@ def test_creep_is_named_and_the_gap_closes(tmp_path, monkeypatch):
         yield  # as the real one is a job
 
     monkeypatch.setattr(summary, "plan_after", plan_after)
-    result = diagnosed(cases.rig(contact=cases.relaxing(), seed=7))
+    result = cases.diagnosed(cases.rig(contact=cases.relaxing(), seed=7))
     assert [named.name for named in result.findings] == ["creep"]
     assert result.verdict == "explained" and result.findings[0].confidence > 0.6
     for _ in summary.write_report(result, tmp_path):
@@ -194,7 +185,7 @@ def test_creep_is_named_and_the_gap_closes(tmp_path, monkeypatch):
 
 @pytest.mark.long("a whole diagnosis")
 def test_hum_is_unexplained():
-    result = diagnosed(cases.rig(change=lambda r, t: r + 0.01 * np.sin(2 * np.pi * 7.3 * t)[:, None], seed=9))
+    result = cases.diagnosed(cases.rig(change=lambda r, t: r + 0.01 * np.sin(2 * np.pi * 7.3 * t)[:, None], seed=9))
     assert result.verdict == "unexplained" and not result.findings and result.line is not None
     assert result.structure.strongest == "common mode"
     assert "without touching" in next_experiment(result)
@@ -204,7 +195,7 @@ def test_hum_is_unexplained():
 def test_intervals_hold_what_was_hidden():
     """The library's own form is hidden; its intervals should hold it, and be narrow enough to mean something."""
     rig = cases.rig(change=lambda r, t: 0.15 * np.tanh(r / 0.15), seed=10)
-    result = diagnosed(rig)
+    result = cases.diagnosed(rig)
     assert [named.name for named in result.findings] == ["saturation"]
     (level,) = (one for one in result.intervals if one.name == "level")
     assert level.low < 0.15 < level.high and level.high - level.low < 0.03
@@ -213,7 +204,7 @@ def test_intervals_hold_what_was_hidden():
 @pytest.mark.long("a whole diagnosis")
 def test_noise_that_grows_with_the_reading_is_named():
     rng = np.random.default_rng(12)
-    result = diagnosed(cases.rig(change=lambda r, t: r * (1 + 0.2 * rng.normal(size=r.shape)), noise=0.003, seed=12))
+    result = cases.diagnosed(cases.rig(change=lambda r, t: r * (1 + 0.2 * rng.normal(size=r.shape)), noise=0.003, seed=12))
     assert [named.name for named in result.findings] == ["noise"] and result.verdict == "explained"
     assert result.best.model.effects[-1].values["share"] == pytest.approx(0.2, rel=0.1)
 

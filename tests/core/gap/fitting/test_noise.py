@@ -15,8 +15,6 @@ from palpate.core.gap.fitting.least_squares import TrialView
 from palpate.core.gap.fitting.noise_floor import ChannelNoise, _load_noise, force_noise, reading_noise, with_repeats
 from palpate.core.gap.fitting.residual_tests import strongest_line
 from palpate.core.gap.forward.predictor import Model, Predictor, predictors_of
-from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.jobs import run_job
 
 NOISE = 0.003
 ERROR = 0.05
@@ -178,7 +176,7 @@ def test_what_repeats_differ_by_is_no_gap(scatter):
             "wander": 0.08 * lfilter([0.2], [1.0, -0.98], rng.normal(size=count))[:, None] * trial.reading,
         }[scatter]
         trials.append(replace(trial, reading=trial.reading + change))
-    found = run_job(diagnose(replace(rig, trials=tuple(trials))))
+    found = cases.diagnosed(replace(rig, trials=tuple(trials)))
     assert found.verdict == "no gap" and not found.findings
 
 
