@@ -55,13 +55,9 @@ def out(tmp_path, formats):
     return out
 
 
-def files_in(folder):
-    return {path.relative_to(folder).as_posix(): path.read_text() for path in folder.rglob("*") if path.is_file()}
-
-
 def exported(folder):
     """The files of exports, without the list and the user's own."""
-    found = files_in(folder).items()
+    found = {path.relative_to(folder).as_posix(): path.read_text() for path in folder.rglob("*") if path.is_file()}.items()
     return {name: text for name, text in found if not any(part[0] == "." for part in name.split("/")) and "mine" not in name}
 
 

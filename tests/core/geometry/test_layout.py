@@ -304,11 +304,6 @@ def weights_at(corners, points):
     return (np.linalg.inv(matrix) @ right).transpose(0, 2, 1)
 
 
-def bilinear(picture, points):
-    """Look up a picture as Blender does: linear between the centres of pixels."""
-    return map_coordinates(picture, points.T[::-1], order=1)
-
-
 @pytest.mark.parametrize(("position", "triangles", "in_one_piece"), SURFACES)
 def test_map_is_valid(position, triangles, in_one_piece):
     position, triangles, normal, layout, along = lay_out(position, triangles)
@@ -346,7 +341,8 @@ def test_constant_field_never_bleeds(position, triangles, in_one_piece):
     corners = corner_pixels(layout)
     weights = rng.dirichlet([0.3, 0.3, 0.3], size=(len(triangles), 40))  # often near the rim
     points = np.concatenate([(weights @ corners).reshape(-1, 2), corners.reshape(-1, 2)])
-    np.testing.assert_allclose(bilinear(picture, points), 7.0, rtol=1e-12)
+    looked_up = map_coordinates(picture, points.T[::-1], order=1)  # linear between the centres of pixels, as Blender does
+    np.testing.assert_allclose(looked_up, 7.0, rtol=1e-12)
     # every pixel within two of the surface is filled
     near = points[:, None, :] + 2 * np.array([[np.cos(a), np.sin(a)] for a in np.arange(8) * np.pi / 4])
     pixel = np.round(near.reshape(-1, 2)).astype(int)

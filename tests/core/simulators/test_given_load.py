@@ -34,12 +34,10 @@ def pressed_by_box(dt=0.01, item=None):
     return PressedSensor(item or pad(8, 8, **LAW), box(SIZE, SIZE, SIZE), dt, pose(LEVEL), pose(at()))
 
 
-def resultant(contact, target, sensor=LEVEL):
-    """The wrench on the target by the texels' own sums: force, and torque about the target's origin."""
-    turn = Rotation.from_quat(np.roll(sensor[3:], -1))
-    force = -turn.apply(contact.texels.net_force)
-    about_sensor = -turn.apply(contact.texels.net_torque)
-    return np.concatenate([force, about_sensor - np.cross(target - sensor[:3], force)])
+def resultant(contact, target):
+    """The wrench on the target by the own sums of a level sensor's texels: force, and torque about the target's origin."""
+    force = -contact.texels.net_force
+    return np.concatenate([force, -contact.texels.net_torque - np.cross(target, force)])
 
 
 @pytest.mark.slow("compiles the step of a loop when it runs first")

@@ -18,12 +18,12 @@ from palpate.core.skins.magnetic_skin import Magnetometers, Magnets, magnetic_sk
 from palpate.core.solver.simulation import Simulation
 
 
-def skin_under(texels, full_scale=50e-3):
-    """A magnet under each texel, 3 mm deep in a layer of 6 mm, and a magnetometer 4 mm below each."""
+def skin_under(texels, magnet=3e-3, chip=7e-3):
+    """A magnet and a magnetometer under each texel, so many metres below it; the layer is 6 mm thick."""
     count = len(texels)
-    magnets = Magnets(texels.position - [0, 0, 3e-3], np.tile([0.0, 0.0, 4e-3], (count, 1)))
+    magnets = Magnets(texels.position - [0, 0, magnet], np.tile([0.0, 0.0, 4e-3], (count, 1)))
     axes, zero = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
-    return magnetic_skin(texels, magnets, Magnetometers(texels.position - [0, 0, 7e-3], axes, full_scale, zero), 6e-3)
+    return magnetic_skin(texels, magnets, Magnetometers(texels.position - [0, 0, chip], axes, 50e-3, zero), 6e-3)
 
 
 def scene(readout=None, texels=None, frames=9):
@@ -81,10 +81,7 @@ def test_a_load_cell_reads_the_net_force():
 
 def test_a_magnet_that_is_pressed_into_a_magnetometer_is_clipped_and_the_run_goes_on():
     texels = pad(3, 3)
-    count = len(texels)
-    magnets = Magnets(texels.position - [0, 0, 1e-4], np.tile([0.0, 0.0, 4e-3], (count, 1)))
-    chips = Magnetometers(texels.position - [0, 0, 8e-4], np.tile(np.eye(3), (count, 1, 1)), 50e-3, np.zeros((count, 3)))
-    readout = MagneticReadout(magnetic_skin(texels, magnets, chips, 6e-3), texels, 60.0)
+    readout = MagneticReadout(skin_under(texels, magnet=1e-4, chip=8e-4), texels, 60.0)
     felt = Simulation(scene(readout, texels)).advance_all()
     channels = felt.sensors["pad"].channels
     assert np.isfinite(channels.values).all() and channels.clipped[4, 4].all()

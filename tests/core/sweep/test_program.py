@@ -13,8 +13,8 @@ from palpate.core.errors import PalpateError
 from palpate.core.study.study_file import study_of
 from palpate.sweep.parts import Parts
 from palpate.sweep.scene_evaluation import ALLOW, REFUSE
-from palpate.sweep.study_folder import OpenStudy, resume_study
-from palpate.sweep.worker import BatchResult, RunComputer, compute_batch
+from palpate.sweep.study_folder import resume_study
+from palpate.sweep.worker import RunComputer, compute_batch
 
 pytest.importorskip("distributed")
 parquet = pytest.importorskip("pyarrow.parquet")
@@ -50,10 +50,6 @@ def write(folder: Path, text: str = STUDY, job: str = JOB) -> Path:
     (folder / "count.py").write_text(job, encoding="utf-8")
     (folder / "study.toml").write_text(text, encoding="utf-8")
     return folder / "study.toml"
-
-
-def computed(opened: OpenStudy) -> BatchResult:
-    return compute_batch(range(len(opened.runs)), str(opened.folder), ALLOW)
 
 
 @pytest.mark.slow("the one study of a job from the command line in this tier")
@@ -106,7 +102,7 @@ def test_a_job_needs_permission_and_nothing_of_it_is_run_before(tmp_path, capsys
 )
 def test_what_a_job_does_wrong_is_a_failed_run(tmp_path, returned, sentence):
     opened = begun(write(tmp_path, job=f"def run(values, folder):\n    return {returned}\n"))
-    found = computed(opened)
+    found = compute_batch(range(len(opened.runs)), str(opened.folder), ALLOW)
     assert (found.done, found.failed) == (0, 6)
     assert found.failures[0][1].startswith(sentence)
     assert not len(Parts(opened.folder).done)
