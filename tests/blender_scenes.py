@@ -4,14 +4,19 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 import bpy
 import numpy as np
+import pytest
 
+from palpate.addon.authoring import sensor_report
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import markers, materials
-from palpate.addon.scene import scene_reader
+from palpate.addon.render import render
+from palpate.addon.scene import mesh_arrays, participants, scene_reader
+from palpate.addon.timeline import live_cache
 from palpate.core.io.hidden_folder import PRIVATE_FOLDER
 from palpate.core.jobs import run_job
 
@@ -23,8 +28,15 @@ def grid(name="Pad", location=(0.0, 0.0, 0.0), columns=6, rows=14, size=0.05):
     return bpy.context.object
 
 
-def ball(name="Ball", location=(0.0, 0.0, 0.01), radius=0.008):
-    bpy.ops.mesh.primitive_uv_sphere_add(radius=radius, location=location, segments=24, ring_count=12)
+def pad_sensor(**options):
+    """Return a flat pad that is a sensor all over, made by the button."""
+    pad = grid(**options)
+    bpy.ops.palpate.sensor_add(source="MESH")
+    return pad
+
+
+def ball(name="Ball", location=(0.0, 0.0, 0.01), radius=0.008, segments=24):
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=radius, location=location, segments=segments, ring_count=segments // 2)
     bpy.context.object.name = name
     return bpy.context.object
 
@@ -33,6 +45,34 @@ def cube(name="Cube", location=(0.2, 0.0, 0.0101), size=0.02, rotation=(0.0, 0.0
     bpy.ops.mesh.primitive_cube_add(size=size, location=location, rotation=rotation)
     bpy.context.object.name = name
     return bpy.context.object
+
+
+def scene_of(last):
+    """Return the scene, whose frames are from 1 to the last."""
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, last
+    return scene
+
+
+def keyframe(owner, path, values):
+    """Give a property keyframes: its values by their frames."""
+    for frame, value in values.items():
+        setattr(owner, path, value)
+        owner.keyframe_insert(path, frame=frame)
+
+
+def play_to(scene, last):
+    """Show the frames up to one, as playing does; return what is computed of them."""
+    for frame in range(scene.frame_start, last + 1):
+        scene.frame_set(frame)
+    return live_cache.get(scene)
+
+
+def choose(*objects):
+    """Select some objects alone, the last of which is active."""
+    for obj in bpy.context.scene.objects:
+        obj.select_set(obj in objects)
+    bpy.context.view_layer.objects.active = objects[-1]
 
 
 def select(obj, vertices):
@@ -49,14 +89,9 @@ def select(obj, vertices):
 
 def press(frames=8):
     """A ball that is pressed into a pad, 2 mm deep at the last frame."""
-    scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = 1, frames
-    pad, target = grid(), ball()
-    pad.palpate.role = "SENSOR"
-    target.palpate.role = "TARGET"
-    target.keyframe_insert("location", frame=1)
-    target.location = (0.001, 0.0005, 0.006)
-    target.keyframe_insert("location", frame=frames)
+    scene, pad, target = scene_of(frames), grid(), ball()
+    pad.palpate.role, target.palpate.role = "SENSOR", "TARGET"
+    keyframe(target, "location", {1: target.location[:], frames: (0.001, 0.0005, 0.006)})
     scene.frame_set(1)
     return scene, pad, target
 
@@ -76,26 +111,89 @@ def scene_with_readings(frames=8):
     """A slide over a pad that has every quantity: its reading falls under load from 5 V, and a load cell has channels."""
     scene, pad, target = press(frames)
     pad.palpate.gain, pad.palpate.zero, pad.palpate.unit, pad.palpate.readout.kind = -2.0, 5.0, "V", "NET_FORCE"
-    target.location = (0.005, 0.0005, 0.006)
-    target.keyframe_insert("location", frame=frames)
+    keyframe(target, "location", {frames: (0.005, 0.0005, 0.006)})
     scene.frame_set(1)
     return scene
 
 
-def baked(scene, **options):
-    """Bake a scene; return what the bake gives."""
+def baked(scene, folder=None, **options):
+    """Bake a scene, which is saved in a folder first if one is given; return what the bake gives."""
+    if folder is not None:
+        save(folder)
     return run_job(bake(scene, **options))
+
+
+def baked_file(scene, folder, name="scene.blend"):
+    """Bake a scene and save it in a folder with its bake; return the path of the .blend and what the bake gives."""
+    save(folder, name)
+    result = baked(scene)
+    return save(folder, name), result
+
+
+def reading_of(scene):
+    """Read a scene at all of its frames, as a bake does."""
+    return run_job(scene_reader.read_scene(scene))
 
 
 def scenario_of(scene):
     """Return the scenario that a bake of a scene solves."""
-    return run_job(scene_reader.read_scene(scene)).scenario
+    return reading_of(scene).scenario
+
+
+def start_of(scene):
+    """Read a scene at the present frame alone, as playing does."""
+    return scene_reader.read_start(scene, participants.depsgraph_of(scene))
+
+
+def report_of(obj):
+    """Return what the panel says about a sensor as it is now."""
+    bpy.context.view_layer.update()
+    return sensor_report.fresh_report(obj, bpy.context.scene)
+
+
+def problems_of(obj):
+    """Return the kinds of the problems that a sensor has."""
+    return [problem.kind for problem in report_of(obj).problems]
+
+
+def node_of(obj, kind):
+    """Return the only node of a kind in the material of an object's heat map."""
+    (node,) = (node for node in obj.material_slots[-1].material.node_tree.nodes if node.bl_idname == kind)
+    return node
 
 
 def find_marker(objects, uid, kind):
     """The marker of a sensor among some objects; None if there is none."""
     own = (obj for obj in objects if obj.get(materials.SENSOR_KEY) == uid)
     return next((obj for obj in own if obj.get(markers.KIND_KEY) == kind), None)
+
+
+def surface(obj):
+    """Return the vertices of an object as Blender shows them, (n, 3) in world coordinates."""
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    matrix = np.array(obj.matrix_world)
+    return mesh_arrays.vertices(mesh) @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def raw_settings(block):
+    """Return the settings of a data-block as its file has them: another program could have written what it likes."""
+    system = block.bl_system_properties_get() if hasattr(block, "bl_system_properties_get") else block
+    return system["palpate"]
+
+
+def places_of(scene, points):
+    """Return where points are in the picture of the camera, (n, 2) from 0 to 1."""
+    return np.array([render.image_position(scene, point) for point in points])
+
+
+def refusal(operator, **settings) -> str:
+    """Press a button that has to refuse; return the one sentence that it says."""
+    with pytest.raises(RuntimeError) as caught:
+        operator(**settings)
+    (line,) = str(caught.value).strip().splitlines()
+    sentence = line.removeprefix("Error: ")
+    assert re.fullmatch(r"\S.*[^.]\.", sentence) and "Traceback" not in sentence, sentence
+    return sentence
 
 
 def save(folder, name="scene.blend"):
@@ -137,6 +235,7 @@ def dump(uids=True) -> dict[str, str]:
 
 
 KINDS = ("objects", "meshes", "materials", "images", "actions", "node_groups", "collections", "curves")
+KINDS += ("worlds", "lights", "cameras", "scenes")
 
 
 def settings(group, uids=True) -> str:

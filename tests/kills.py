@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stops a function at any of its steps, as a kill does, for tests of what is left behind."""
+"""Stops a function at any of its steps, as a kill or a full disk does, for tests of what is left behind."""
 
 from __future__ import annotations
 
@@ -15,6 +15,18 @@ STEPS = ("replace", "unlink", "rmdir", "mkdir")
 
 class Stopped(BaseException):
     """The process was killed here."""
+
+
+@contextmanager
+def files_up_to(size: int) -> Iterator[None]:
+    """Let no file grow beyond a number of bytes in the body, which stands for a full disk."""
+    resource = pytest.importorskip("resource")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
 
 
 @contextmanager

@@ -26,21 +26,18 @@ def pytest_sessionfinish():
     shutil.rmtree(_USER_FOLDER, ignore_errors=True)
 
 
-def enable_palpate():
-    """Enable the add-on the way Blender does: with preferences, and bpy.data locked while it registers."""
+def factory_settings():
+    """Load factory settings, which disable every add-on, and enable ours the way Blender does.
+
+    That is with preferences, and with bpy.data locked while it registers.
+    """
     import addon_utils  # on the path only once bpy is imported
 
+    bpy.ops.wm.read_factory_settings(use_empty=True)
     errors = []
-    module = addon_utils.enable("palpate", default_set=True, handle_error=errors.append)
+    addon_utils.enable("palpate", default_set=True, handle_error=errors.append)
     if errors:
         raise errors[0]
-    return module
-
-
-def factory_settings():
-    """Load factory settings, which disable every add-on, and enable ours."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    enable_palpate()
 
 
 def is_enabled() -> bool:
@@ -78,3 +75,30 @@ def scene(blender, request):
     # Blender prints through C's own buffer; what earlier tests left there must not appear in what this one captures
     ctypes.CDLL(None).fflush(None)
     return bpy.context.scene
+
+
+@pytest.fixture
+def demo_blend(repository):
+    return repository / "sample_blends" / "demo.blend"
+
+
+@pytest.fixture
+def settings():
+    """Return the settings of a new object."""
+    bpy.ops.mesh.primitive_plane_add()
+    return bpy.context.object.palpate
+
+
+@pytest.fixture
+def refused(capfd):
+    """Return a function that runs a command which has to refuse, and returns the only line that it says."""
+    from palpate.commands import main
+
+    def run(*words) -> str:
+        capfd.readouterr()
+        assert main([*map(str, words)]) == 1, words
+        out, err = capfd.readouterr()
+        assert out == "" and len(err.splitlines()) == 1, (words, out, err)
+        return err.strip()
+
+    return run
