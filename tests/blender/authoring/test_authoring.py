@@ -3,7 +3,7 @@
 
 import bpy
 import pytest
-from blender_scenes import ball, changes, dump, grid, select
+from blender_scenes import ball, changes, choose, dump, grid, pad_sensor, select
 
 
 def members(obj, name):
@@ -63,9 +63,7 @@ def test_the_painted_group():
 
 def test_pad_and_target():
     pad, other, third = grid(), ball(), ball("Other")
-    bpy.context.view_layer.objects.active = other
-    for obj in bpy.context.scene.objects:
-        obj.select_set(obj != pad)
+    choose(third, other)
     bpy.ops.palpate.role_set(role="TARGET")
     assert (pad.palpate.role, other.palpate.role, third.palpate.role) == ("NONE", "TARGET", "TARGET")
     bpy.context.view_layer.objects.active = pad
@@ -121,9 +119,7 @@ def test_poll_says_no_without_a_mesh():
 
 @pytest.mark.parametrize(("size", "expected"), [(2.0, 0.1), (0.2, 0.012), (0.05, 0.012), (0.01, 0.003)])
 def test_the_maximum_penetration_follows_the_size_of_the_region(size, expected):
-    pad = grid(size=size)
-    bpy.ops.palpate.sensor_add()
-    assert pad.palpate.max_penetration == pytest.approx(expected)
+    assert pad_sensor(size=size).palpate.max_penetration == pytest.approx(expected)
 
 
 def test_a_maximum_penetration_that_was_set_stays():

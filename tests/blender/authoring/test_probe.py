@@ -4,18 +4,15 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import grid, scenario_of
+from blender_scenes import grid, pad_sensor, refusal, scenario_of, scene_of
 
 from palpate.core.solver.simulation import run
 
 
 @pytest.mark.parametrize("shape", ["BALL", "BOX", "ROD"])
 def test_it_presses_as_deep_as_it_says_and_goes(shape):
-    scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = 1, 41
-    pad = grid(columns=15, rows=15)
+    scene, pad = scene_of(41), pad_sensor(columns=15, rows=15)
     pad.location, pad.rotation_euler = (0.1, -0.2, 0.3), (0.5, 1.0, -0.7)
-    bpy.ops.palpate.sensor_add()
     assert bpy.ops.palpate.probe_add(shape=shape, size=0.01, depth=0.002) == {"FINISHED"}
     assert bpy.context.object == pad  # the sensor stays active, so that its panel shows what it feels
     assert bpy.data.objects["Probe"].palpate.role == "TARGET"
@@ -24,16 +21,13 @@ def test_it_presses_as_deep_as_it_says_and_goes(shape):
     assert felt.contact.any(axis=1).sum() > 15
     assert not felt.contact[0].any() and not felt.contact[-1].any()
     deepest = felt.depth.max(axis=1).argmax()
-    side = felt.centre_of_pressure[deepest]
-    assert np.linalg.norm(side) < 0.003
+    assert np.linalg.norm(felt.centre_of_pressure[deepest]) < 0.003
 
 
-def test_it_touches_within_two_frames_of_the_usual_range():
+def test_it_touches_within_two_frames_of_the_usual_range(scene):
     """So that the first image does not wait for an approach."""
-    scene = bpy.context.scene
     assert (scene.frame_start, scene.frame_end) == (1, 250)
-    grid(columns=5, rows=5)
-    bpy.ops.palpate.sensor_add()
+    pad_sensor(columns=5, rows=5)
     bpy.ops.palpate.probe_add()
     scene.frame_end = 4
     felt = run(scenario_of(scene)).sensors["Pad"]
@@ -42,9 +36,7 @@ def test_it_touches_within_two_frames_of_the_usual_range():
 
 def test_bumps_beside_the_middle_are_not_pressed_from_the_start():
     """It first touches what is highest under it, and goes as deep as it says from there."""
-    scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = 1, 41
-    pad = grid(columns=15, rows=15)
+    scene, pad = scene_of(41), grid(columns=15, rows=15)
     for vertex in pad.data.vertices:
         vertex.co.z += 0.01 * (vertex.co.xy.length > 0.012)
     pad.rotation_euler = (0.5, 1.0, -0.7)
@@ -85,5 +77,4 @@ def test_without_a_sensor_there_is_no_probe():
     assert not bpy.ops.palpate.probe_add.poll()
     bpy.ops.palpate.sensor_add()
     bpy.context.object.palpate.region = "GROUP"
-    with pytest.raises(RuntimeError, match="no vertex group"):
-        bpy.ops.palpate.probe_add()
+    assert "no vertex group" in refusal(bpy.ops.palpate.probe_add)

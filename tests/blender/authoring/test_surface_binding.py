@@ -4,10 +4,10 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import ball, grid, reopen, save, scenario_of
+from blender_scenes import ball, grid, keyframe, problems_of, reopen, save, scenario_of, scene_of, start_of
 
-from palpate.addon.authoring import laid_sensors, sensor_report, surface_binding
-from palpate.addon.scene import mesh_arrays, participants, scene_reader
+from palpate.addon.authoring import laid_sensors, surface_binding
+from palpate.addon.scene import mesh_arrays
 
 
 def finger():
@@ -18,12 +18,8 @@ def finger():
     for point, vertex in zip(key.data, obj.data.vertices, strict=True):
         x, y, _ = vertex.co
         point.co = (1.2 * x, y + 0.1 * x, 0.01 + 12.0 * x * x + 3.0 * x * y)
-    for frame, value in ((1, 0.0), (11, 1.0)):
-        key.value = value
-        key.keyframe_insert("value", frame=frame)
-    scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = 1, 11
-    scene.frame_set(1)
+    keyframe(key, "value", {1: 0.0, 11: 1.0})
+    scene_of(11).frame_set(1)
     return obj
 
 
@@ -85,11 +81,10 @@ def test_a_rigid_surface_binds_nothing_and_one_that_bends_later_says_so(tmp_path
     assert not skin.modifiers
     carrier.modifiers.new("Wave", "WAVE")
     bpy.context.view_layer.objects.active = skin
-    report = sensor_report.fresh_report(skin, bpy.context.scene)
-    assert [problem.kind for problem in report.problems] == ["STILL"]
+    assert problems_of(skin) == ["STILL"]
     assert bpy.ops.palpate.fix(kind="STILL") == {"FINISHED"}
     assert surface_binding.is_bound(skin)
-    assert [problem.kind for problem in sensor_report.fresh_report(skin, bpy.context.scene).problems] == []
+    assert problems_of(skin) == []
     reopen(save(tmp_path))
     assert surface_binding.is_bound(bpy.data.objects["Sheet Skin"])
 
@@ -124,6 +119,5 @@ def test_a_part_that_was_left_out_stays_out():
     skin.palpate.region, skin.palpate.vertex_group = "GROUP", "Half"
     bpy.ops.palpate.skin_update()
     ball("Target", (0.0, 0.0, 1.0)).palpate.role = "TARGET"
-    scenario = scene_reader.read_start(bpy.context.scene, participants.depsgraph_of(bpy.context.scene)).scenario
-    assert -0.003 < scenario.sensors[0].texels.position[:, 0].min() < 0.003
+    assert -0.003 < start_of(bpy.context.scene).scenario.sensors[0].texels.position[:, 0].min() < 0.003
     assert laid_sensors.is_laid(skin)
