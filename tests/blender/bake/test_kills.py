@@ -4,17 +4,15 @@
 import random
 import shutil
 import subprocess
-import sys
 import time
 from contextlib import suppress
 
 import pytest
-from blender_scenes import press_and_drop, save
+from blender_scenes import baked, press_and_drop, save
+from processes import PALPATE
 
-from palpate.addon.bake.bake import bake
 from palpate.core.errors import FileError
 from palpate.core.io.bake_reader import read_bake
-from palpate.core.jobs import run_job
 
 MIXED = ("of different bakes", "is missing from the bake", "was interrupted")
 """Words of the sentences about files of two bakes."""
@@ -24,7 +22,7 @@ KILLS, LONGEST = 20, 300.0
 
 def begun(path, folder) -> subprocess.Popen:
     """Start a bake, and return its process once it writes into the folder, or has ended."""
-    command, end = [sys.executable, "-m", "palpate.commands", "bake", str(path)], time.monotonic() + LONGEST
+    command, end = [*PALPATE, "bake", str(path)], time.monotonic() + LONGEST
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     while not any((folder / ".palpate").glob("new/*")) and process.poll() is None:
         assert time.monotonic() < end, "the bake does not begin"
@@ -44,7 +42,7 @@ def test_a_bake_killed_at_random_leaves_one_bake_or_says_that_it_is_mixed(tmp_pa
     scene, pad, *_ = press_and_drop(frames=40)
     path = save(tmp_path)
     folder, earlier = tmp_path / "palpate-bake", tmp_path / "earlier"
-    run_job(bake(scene, into_scene=False))
+    baked(scene, into_scene=False)
     before = read_bake(folder).recording.digest
     (folder / "Pad" / "notes.txt").write_text("years of work")
     shutil.copytree(folder, earlier)

@@ -6,7 +6,7 @@ import shutil
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import baked, contents, press, reopen, save
+from blender_scenes import baked, baked_file, contents, press, reopen, save
 
 from palpate.addon.display import bake_display, bake_identity, baked_scene
 from palpate.addon.render import figure_export
@@ -20,10 +20,7 @@ from palpate.core.io.bake_reader import read_bake
 @pytest.fixture
 def saved(tmp_path):
     """A scene, baked, saved and opened again."""
-    scene, *_ = press(frames=3)
-    path = save(tmp_path, "first.blend")
-    baked(scene)
-    bpy.ops.wm.save_mainfile()
+    path, _ = baked_file(press(frames=3)[0], tmp_path, "first.blend")
     return reopen(path), path
 
 
