@@ -2,13 +2,13 @@
 """What a user can get wrong gets one clear sentence and changes nothing; what can be used is used, with a warning."""
 
 import os
-import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import baked, ball, changes, dump, press, press_and_drop, save
+from blender_scenes import baked, ball, changes, dump, press, press_and_drop, raw_settings, refusal, save
 
 from palpate.addon.bake.bake import bake
 from palpate.addon.scene import scene_reader
@@ -26,24 +26,18 @@ def pressed(tmp_path):
     return SimpleNamespace(scene=scene, pad=pad, target=target, folder=tmp_path)
 
 
-def refusal(operator=None) -> str:
-    """Run an operator that has to refuse; return its sentence. Nothing may have changed, in the file and in its folder."""
+def whole_refusal(operator=bpy.ops.palpate.bake, **settings) -> str:
+    """Press a button that has to refuse; return its sentence. Nothing may have changed, in the file and in its folder."""
     folder = os.path.dirname(bpy.data.filepath)
     before, files = dump(), everything_in(folder)
-    with pytest.raises(RuntimeError) as caught:
-        (operator or bpy.ops.palpate.bake)()
+    sentence = refusal(operator, **settings)
     assert changes(before, dump()) == []
     assert everything_in(folder) == files
-    lines = str(caught.value).strip().splitlines()
-    assert len(lines) == 1, lines
-    sentence = lines[0].removeprefix("Error: ")
-    assert re.fullmatch(r"\S.*[^.]\.", sentence), sentence
-    assert "Traceback" not in sentence
     return sentence
 
 
 def everything_in(folder):
-    return sorted(os.path.join(where, name) for where, folders, files in os.walk(folder) for name in folders + files)
+    return sorted(Path(folder).rglob("*"))
 
 
 # --- one sentence each
@@ -74,14 +68,6 @@ def value(what, name, number):
     return lambda it: setattr(what(it), name, number)
 
 
-def write_raw(obj, key, value):
-    """Write a property past its limits, as an older file or another program could have."""
-    if hasattr(obj, "bl_system_properties_get"):
-        obj.bl_system_properties_get()["palpate"][key] = value
-    else:
-        obj["palpate"][key] = value
-
-
 SPOILED = {
     "a region without vertices": (region("Empty"), "The region of sensor 'Pad' is empty"),
     "a region whose group was deleted": (region("Gone", None), "Sensor 'Pad' has no vertex group 'Gone'"),
@@ -92,7 +78,7 @@ SPOILED = {
     ),
     "an object at no place": (value(lambda it: it.pad.location, "x", float("nan")), "'Pad' has a NaN or infinite location"),
     "no scale along one axis": (value(lambda it: it.target, "scale", (1.0, 0.0, 1.0)), "The scale of 'Ball' is zero"),
-    "a stiffness that is no number": (lambda it: write_raw(it.pad, "k", float("nan")), "k of sensor 'Pad' is nan"),
+    "a stiffness that is no number": (lambda it: raw_settings(it.pad).update({"k": float("nan")}), "k of sensor 'Pad' is nan"),
     "a time step of zero": (
         lambda it: (setattr(it.scene.palpate, "use_auto_dt", False), setattr(it.scene.palpate, "dt", 0.0)),
         "The time step of 'Scene' is 0 s",
@@ -110,7 +96,7 @@ SPOILED = {
 def test_a_scene_that_cannot_be_baked_is_one_sentence(pressed, spoil):
     change, words = SPOILED[spoil]
     change(pressed)
-    assert refusal().startswith(words)
+    assert whole_refusal().startswith(words)
 
 
 @pytest.mark.parametrize(("chosen", "words"), [
@@ -120,8 +106,8 @@ def test_a_scene_that_cannot_be_baked_is_one_sentence(pressed, spoil):
 def test_a_selection_that_makes_no_sensor(pressed, chosen, words):
     pressed.pad.data.vertices.foreach_set("select", np.isin(np.arange(84), chosen))
     bpy.context.view_layer.objects.active = pressed.pad
-    assert refusal(lambda: bpy.ops.palpate.sensor_add(source="SELECTION")).startswith(words)
-    assert refusal(lambda: bpy.ops.palpate.sensor_add(source="GROUP")).startswith("'Pad' has no vertex group")
+    assert whole_refusal(bpy.ops.palpate.sensor_add, source="SELECTION").startswith(words)
+    assert whole_refusal(bpy.ops.palpate.sensor_add, source="GROUP").startswith("'Pad' has no vertex group")
 
 
 def test_a_frame_range_that_runs_backwards(pressed):
@@ -146,7 +132,7 @@ def test_a_baked_body_that_is_no_longer_free(tmp_path):
     save(tmp_path)
     bpy.ops.palpate.bake()
     free.palpate.body = "KEYFRAMED"
-    assert refusal().startswith("'Cube' is Keyframed, but its keyframes are those of a bake")
+    assert whole_refusal().startswith("'Cube' is Keyframed, but its keyframes are those of a bake")
     bpy.ops.palpate.bake_clear()
     assert bpy.ops.palpate.bake() == {"FINISHED"}
 
@@ -163,7 +149,7 @@ def test_a_sensor_whose_mesh_is_linked(tmp_path, pressed):
     ball(location=(0.0, 0.0, 0.006)).palpate.role = "TARGET"
     assert pad.is_editable
     bpy.context.view_layer.update()
-    assert refusal().startswith("The mesh of sensor 'Pad' is linked from another file")
+    assert whole_refusal().startswith("The mesh of sensor 'Pad' is linked from another file")
     bpy.ops.object.select_all(action="DESELECT")
     bpy.context.view_layer.objects.active = pad
     pad.select_set(True)
@@ -173,16 +159,20 @@ def test_a_sensor_whose_mesh_is_linked(tmp_path, pressed):
     assert bpy.ops.palpate.bake() == {"FINISHED"}
 
 
+def with_hidden(folder):
+    """The content of all files in a folder, also of those that a bake hides there."""
+    return {path: path.read_bytes() for path in everything_in(folder) if path.is_file()}
+
+
 @pytest.mark.parametrize("steps", [1, 3, 5, 7])
 def test_a_target_deleted_while_its_bake_runs(tmp_path, steps):
     scene, _, target, *_ = press_and_drop(frames=4)
     bpy.ops.palpate.reset()
     scene.palpate.use_live = False
-    save(tmp_path)
-    baked(scene)
+    baked(scene, tmp_path)
     other = ball("Other")
     other.palpate.role = "TARGET"
-    files = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    files = with_hidden(tmp_path)
     work = SlicedJob(bake(scene))
     for _ in range(steps):
         work.work(0.0)
@@ -192,7 +182,7 @@ def test_a_target_deleted_while_its_bake_runs(tmp_path, steps):
     with pytest.raises(PalpateError, match=r"^'Other' was deleted while .*: undo that, or start again without it\.$"):
         while not work.is_done:
             work.work(0.0)
-    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == files
+    assert with_hidden(tmp_path) == files
     scene.frame_set(1)
     assert changes(before, dump()) == []
 
@@ -218,11 +208,11 @@ def test_a_file_that_was_never_saved():
     bpy.context.scene.palpate.use_live = False
     bpy.ops.palpate.reset()
     before = dump()
-    with pytest.raises(RuntimeError, match=r"relative to a file that is not saved yet: save the \.blend first\."):
-        bpy.ops.palpate.bake()
+    said = refusal(bpy.ops.palpate.bake)
+    assert "relative to a file that is not saved yet: save the .blend first." in said
     assert changes(before, dump()) == []
 
 
 def test_a_folder_that_is_missing(pressed):
     pressed.scene.palpate.folder = str(pressed.folder / "not" / "there")
-    assert "not' does not exist" in refusal()
+    assert "not' does not exist" in whole_refusal()

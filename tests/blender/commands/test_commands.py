@@ -2,10 +2,7 @@
 """The command line: what it makes, what it says, and that a mistake of the user's is one line and changes nothing."""
 
 import os
-import signal
-import subprocess
 import sys
-import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,6 +10,8 @@ import bpy
 import numpy as np
 import pytest
 from blender_scenes import contents, press, reopen, save, visible
+from kills import files_up_to
+from processes import PALPATE, interrupted
 
 from palpate.commands import blender, console, main
 from palpate.commands.bake import report
@@ -20,11 +19,6 @@ from palpate.core.errors import FileError
 from palpate.core.io.recording_npz import load_recording
 from palpate.core.io.scenario_npz import load_scenario
 from palpate.core.solver import simulation
-
-
-@pytest.fixture
-def demo_blend(repository):
-    return repository / "sample_blends" / "demo.blend"
 
 
 def lines_of(capfd):
@@ -36,13 +30,21 @@ def lines_of(capfd):
 
 
 @pytest.mark.parametrize(
-    "words", [[], ["frobnicate"], ["bake"], ["bake", "a.blend", "--frobnicate"], ["demo", "--size", "0", "9"]]
+    ("words", "says"),
+    [
+        ([], ""),
+        (["frobnicate"], ""),
+        (["bake"], ""),
+        (["bake", "a.blend", "--frobnicate"], ""),
+        (["demo", "--size", "0", "9"], ""),
+        (["bake", "a.blend", "b.blend"], "one file at a time"),
+        (["bake", "a.blend", "--modle", "x.toml"], "--help"),
+    ],
 )
-def test_wrong_usage_is_status_2(words, capfd):
+def test_wrong_usage_is_status_2(words, says, capfd):
     assert main(words) == 2
-    out, err = lines_of(capfd)
-    assert out == []
-    assert err[0].startswith("usage: palpate")
+    out, err = capfd.readouterr()
+    assert out == "" and err.startswith("usage: palpate") and says in err
 
 
 @pytest.mark.parametrize("words", [["--help"], ["bake", "--help"], ["demo", "--help"], ["--version"]])
@@ -54,7 +56,7 @@ def test_help_is_status_0(words, capfd):
 # --- mistakes
 
 
-def test_files_that_are_no_blend(tmp_path, demo_blend, capfd):
+def test_files_that_are_no_blend(tmp_path, demo_blend, refused):
     (tmp_path / "folder.blend").mkdir()
     (tmp_path / "words.blend").write_bytes(b"hello world" * 100)
     (tmp_path / "empty.blend").write_bytes(b"")
@@ -67,13 +69,8 @@ def test_files_that_are_no_blend(tmp_path, demo_blend, capfd):
         ("empty.blend", "not a .blend"),
         ("cut.blend", "damaged"),
     ):
-        assert main(["bake", str(tmp_path / name), "--out", str(tmp_path / "out")]) == 1
-        out, err = lines_of(capfd)
-        assert out == []
-        assert len(err) == 1
-        assert err[0].startswith("palpate bake: ")
-        assert name in err[0]
-        assert reason in err[0]
+        said = refused("bake", tmp_path / name, "--out", tmp_path / "out")
+        assert said.startswith("palpate bake: ") and name in said and reason in said
         assert not (tmp_path / "out").exists()
 
 
@@ -85,11 +82,9 @@ def test_files_that_are_no_blend(tmp_path, demo_blend, capfd):
         (["--sensor", "Thumb"], "'Finger A', 'Finger B'"),
     ],
 )
-def test_mistakes_are_one_line(more, reason, demo_blend, capfd):
+def test_mistakes_are_one_line(more, reason, demo_blend, refused):
     before = demo_blend.read_bytes()
-    assert main(["bake", str(demo_blend), *more]) == 1
-    out, (line,) = lines_of(capfd)
-    assert out == [] and reason in line
+    assert reason in refused("bake", demo_blend, *more)
     assert demo_blend.read_bytes() == before
 
 
@@ -100,26 +95,14 @@ def test_a_part_cannot_be_saved(tmp_path, demo_blend, capfd):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("words", [["a.blend", "b.blend"], ["a.blend", "--modle", "x.toml"]])
-def test_what_is_too_much_says_what_to_do(words, capfd):
-    assert main(["bake", *words]) == 2
-    assert ("one file at a time" if words[1] == "b.blend" else "--help") in capfd.readouterr().err
-
-
 def test_a_full_disk_leaves_the_scene_as_it_was(tmp_path, demo_blend, capfd):
     """A limit on the size of files stands for the disk: Blender itself then writes half a file and calls it saved."""
     bpy.ops.wm.open_mainfile(filepath=str(demo_blend))
-    resource = pytest.importorskip("resource")
     mine, new = tmp_path / "mine.blend", tmp_path / "new.blend"
     mine.write_bytes(demo_blend.read_bytes())
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (mine.stat().st_size // 2, limits[1]))
-    try:
-        for path in (mine, new):
-            with pytest.raises(FileError, match=f"'{path}' could not be saved .*space"):
-                blender.save_blend(path)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    for path in (mine, new):
+        with files_up_to(mine.stat().st_size // 2), pytest.raises(FileError, match=f"'{path}' could not be saved .*space"):
+            blender.save_blend(path)
     assert mine.read_bytes() == demo_blend.read_bytes()
     assert not new.exists()
     assert {path.name for path in tmp_path.iterdir()} <= {"mine.blend", "mine.blend1"}
@@ -140,8 +123,7 @@ def test_scripts_in_a_file_do_not_run(tmp_path, demo_blend, scripts_allowed):
     text = bpy.data.texts.new("evil.py")
     text.write(f"open({str(tmp_path / 'evil')!r}, 'w').close()")
     text.use_module = True
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
+    reopen(save(tmp_path, "a.blend"))
     assert (tmp_path / "evil").exists()  # Blender would
     (tmp_path / "evil").unlink()
     assert main(["bake", str(tmp_path / "a.blend"), "--frames", "1", "2", "--out", str(tmp_path / "out")]) == 0
@@ -178,7 +160,7 @@ def test_bake_writes_images_and_leaves_the_file_alone(tmp_path, demo_blend, capf
     assert demo_blend.read_bytes() == before
 
 
-def test_bake_with_a_model_from_a_file(tmp_path, demo_blend, capfd):
+def test_bake_with_a_model_from_a_file(tmp_path, demo_blend, refused):
     """`--model` puts parameters and effects on a sensor; of several it wants the name."""
     model = tmp_path / "soft.toml"
     model.write_text(
@@ -188,8 +170,7 @@ def test_bake_with_a_model_from_a_file(tmp_path, demo_blend, capfd):
     )
     words = ["bake", str(demo_blend), "--frames", "24", "26"]
     assert main([*words, "--out", str(tmp_path / "plain")]) == 0
-    assert main([*words, "--out", str(tmp_path / "no"), "--model", str(model)]) == 1
-    assert "NAME=" in capfd.readouterr().err
+    assert "NAME=" in refused(*words, "--out", tmp_path / "no", "--model", model)
     assert not (tmp_path / "no").exists() or not list((tmp_path / "no").iterdir())
     assert main([*words, "--out", str(tmp_path / "soft"), "--model", f"Finger A={model}"]) == 0
     plain, soft = (
@@ -202,27 +183,19 @@ def test_bake_with_a_model_from_a_file(tmp_path, demo_blend, capfd):
 def test_save_as_keeps_the_bake_in_another_file(tmp_path, demo_blend):
     places = ["--out", str(tmp_path / "out"), "--save-as", str(tmp_path / "baked")]
     assert main(["bake", str(demo_blend), "--frames", "1", "4", *places]) == 0
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "baked.blend"))
-    scene = bpy.context.scene
+    scene = reopen(tmp_path / "baked.blend")
     assert (scene.frame_start, scene.frame_end) == (1, 4)
-    assert [obj.name for obj in scene.objects if obj.palpate.is_baked and obj.palpate.role == "SENSOR"] == [
-        "Finger A",
-        "Finger B",
-    ]
+    sensors = [obj.name for obj in scene.objects if obj.palpate.is_baked and obj.palpate.role == "SENSOR"]
+    assert sensors == ["Finger A", "Finger B"]
 
 
-def test_the_bake_that_a_saved_file_plays_is_not_replaced_without_it(tmp_path, demo_blend, capfd):
+def test_the_bake_that_a_saved_file_plays_is_not_replaced_without_it(tmp_path, demo_blend, capfd, refused):
     mine = tmp_path / "mine.blend"
     mine.write_bytes(demo_blend.read_bytes())
     assert main(["bake", str(mine), "--frames", "1", "4", "--save"]) == 0
     before = contents(tmp_path)
-    capfd.readouterr()
-    for more in ([], ["--save-as", str(tmp_path / "other.blend")]):
-        assert main(["bake", str(mine), "--frames", "2", "3", *more]) == 1
-        out, err = lines_of(capfd)
-        assert out == []
-        assert len(err) == 1
-        assert "add --save to renew both, or --out DIR" in err[0]
+    for more in ([], ["--save-as", tmp_path / "other.blend"]):
+        assert "add --save to renew both, or --out DIR" in refused("bake", mine, "--frames", "2", "3", *more)
         assert contents(tmp_path) == before
     assert main(["bake", str(mine), "--frames", "2", "3", "--out", str(tmp_path / "elsewhere")]) == 0
     assert "note: bodies and bristles started at frame 2, not at the scene's 1" in capfd.readouterr().out
@@ -250,11 +223,6 @@ def test_one_sensor_alone_feels_the_same(tmp_path, demo_blend):
 # --- the process
 
 
-def run(*words, **more):
-    command = [sys.executable, "-m", "palpate.commands", *words]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **more)
-
-
 def has_loaded_blender(process):
     """By then the command notes Ctrl-C; before, Python itself is still being loaded."""
     return "/bpy/" in Path(f"/proc/{process.pid}/maps").read_text()
@@ -265,15 +233,9 @@ def test_ctrl_c_keeps_the_earlier_bake(tmp_path, demo_blend):
     out = tmp_path / "out"
     assert main(["bake", str(demo_blend), "--frames", "1", "2", "--out", str(out)]) == 0
     before = contents(out)
-    process = run("bake", str(demo_blend), "--frames", "1", "100000", "--out", str(out))
-    while process.poll() is None and not has_loaded_blender(process):
-        time.sleep(0.02)
-    time.sleep(1.0)
-    process.send_signal(signal.SIGINT)
-    words, err = process.communicate(timeout=120)
-    assert process.returncode == 130
-    assert words == ""
-    assert err == "palpate bake: stopped; an earlier bake is unchanged.\n"
+    command = [*PALPATE, "bake", str(demo_blend), "--frames", "1", "100000", "--out", str(out)]
+    found, _ = interrupted(command, has_loaded_blender, pause=1.0)
+    assert found == (130, "", "palpate bake: stopped; an earlier bake is unchanged.\n")
     assert contents(out) == before
 
 
@@ -287,17 +249,10 @@ def test_ctrl_c_ends_a_call_into_blender_at_once(tmp_path):
         "    print('chatter'); end = time.monotonic() + 30\n"
         "    while time.monotonic() < end: time.sleep(0.01)\n"
     )
-    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    while not (tmp_path / "unfinished").exists():
-        time.sleep(0.05)
-    time.sleep(0.3)
-    began = time.monotonic()
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
-    assert time.monotonic() - began < 5
-    assert process.returncode == 130
-    assert out == ""
-    assert err.strip() == "stopped while rendering"
+    command = [sys.executable, "-c", code]
+    (status, out, err), seconds = interrupted(command, lambda _: (tmp_path / "unfinished").exists(), pause=0.3)
+    assert seconds < 5
+    assert (status, out, err.strip()) == (130, "", "stopped while rendering")
     assert not (tmp_path / "unfinished").exists()
 
 
@@ -326,10 +281,9 @@ def test_peak_shear_adds_forces_and_not_numbers_of_different_axes():
     assert row.split() == ["Tip", "2", "1.0000", "N", "2.0000", "N", "0.0000", "N", "2.0000", "N"]
 
 
-def test_export_of_what_is_not_baked_is_one_line(tmp_path, capsys):
+def test_export_of_what_is_not_baked_is_one_line(tmp_path, refused):
     press(frames=3)
-    assert main(["export", str(save(tmp_path))]) == 1
-    assert "is not baked" in capsys.readouterr().err
+    assert "is not baked" in refused("export", save(tmp_path))
 
 
 # --- scenarios for palpate sweep
@@ -353,11 +307,8 @@ def test_a_scenario_is_what_a_bake_computes(tmp_path, scene, capfd):
 
 
 @pytest.mark.parametrize(("name", "reason"), [("folder", "is a folder"), ("", "not the name of a file")])
-def test_a_scenario_that_cannot_be_written_is_one_sentence(tmp_path, scene, capfd, name, reason):
+def test_a_scenario_that_cannot_be_written_is_one_sentence(tmp_path, scene, refused, name, reason):
     press()
     blend = save(tmp_path)
     (tmp_path / "folder").mkdir()
-    capfd.readouterr()
-    assert main(["bake", str(blend), "--scenario", str(tmp_path / name) if name else ""]) == 1
-    out, (line,) = lines_of(capfd)
-    assert out == [] and reason in line
+    assert reason in refused("bake", blend, "--scenario", tmp_path / name if name else "")

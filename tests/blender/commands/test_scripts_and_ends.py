@@ -2,14 +2,13 @@
 """Python in a .blend, and how processes end: with drivers, Ctrl-C and closed pipes."""
 
 import os
-import signal
 import subprocess
 import sys
-import time
 
 import bpy
 import pytest
 from blender_scenes import press, save
+from processes import interrupted, palpate, python
 
 from palpate.commands import main
 
@@ -26,17 +25,11 @@ import os; os._exit(0)
 """
 
 
-def palpate(*words, **more):
-    command = [sys.executable, "-m", "palpate.commands", *map(str, words)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, **more)
-
-
 @pytest.fixture(scope="module")
 def driven(tmp_path_factory, repository):
     """The demo with one driver that Blender evaluates itself and one that needs Python."""
     path = tmp_path_factory.mktemp("driven") / "driven.blend"
-    demo = repository / "sample_blends" / "demo.blend"
-    subprocess.run([sys.executable, "-c", DRIVEN, str(demo), str(path)], check=True, capture_output=True, timeout=60)
+    python(DRIVEN, repository / "sample_blends" / "demo.blend", path, check=True)
     return path
 
 
@@ -74,20 +67,18 @@ def test_a_script_that_was_not_run_is_named(tmp_path, capfd):
 # --- the end of a process
 
 
-def test_a_closed_pipe_ends_a_command_without_a_word(repository):
+def test_a_closed_pipe_ends_a_command_without_a_word(demo_blend):
     reader, writer = os.pipe()
     os.close(reader)
-    command = [sys.executable, "-m", "palpate.commands", "openrave", "export", str(repository / "sample_blends" / "demo.blend")]
-    done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, timeout=60)
+    done = palpate("openrave", "export", demo_blend, stdout=writer, stderr=subprocess.PIPE, capture_output=False)
     os.close(writer)
-    assert (done.returncode, done.stderr) == (141, b"")
+    assert (done.returncode, done.stderr) == (141, "")
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="this system has no device that is full")
-def test_output_to_a_full_disk_is_one_line(repository):
-    command = [sys.executable, "-m", "palpate.commands", "openrave", "export", str(repository / "sample_blends" / "demo.blend")]
+def test_output_to_a_full_disk_is_one_line(demo_blend):
     with open("/dev/full", "w") as full:
-        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
+        done = palpate("openrave", "export", demo_blend, stdout=full, stderr=subprocess.PIPE, capture_output=False)
     assert done.returncode == 1
     assert done.stderr.startswith("palpate openrave: The output could not be written (no space")
     assert len(done.stderr.splitlines()) == 1
@@ -105,12 +96,6 @@ def test_ctrl_c_ends_work_that_looks_at_no_keyboard(tmp_path):
         "rig.read_rig = wait\n"
         "commands.run_process()\n"
     )
-    words = ["gap", "rig.toml", "--out", "out"]
-    process = subprocess.Popen([sys.executable, "-c", code, *words], cwd=tmp_path, stderr=subprocess.PIPE, text=True)
-    end = time.monotonic() + 30
-    while not (tmp_path / "begun").exists() and time.monotonic() < end:
-        time.sleep(0.02)
-    process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=20)
-    assert process.returncode == 130
-    assert err == "palpate gap: stopped; an earlier bake is unchanged.\n"
+    command = [sys.executable, "-c", code, "gap", "rig.toml", "--out", "out"]
+    found, seconds = interrupted(command, lambda _: (tmp_path / "begun").exists(), cwd=tmp_path)
+    assert found == (130, "", "palpate gap: stopped; an earlier bake is unchanged.\n") and seconds < 20

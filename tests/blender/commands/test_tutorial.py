@@ -3,12 +3,11 @@
 
 import os
 import re
-import subprocess
-import sys
 
 import bpy
 import pytest
 from blender_scenes import visible
+from processes import python
 
 from palpate.commands import main
 from palpate.core.io.recording_npz import load_recording
@@ -53,7 +52,7 @@ def test_a_sensor_made_without_a_window(tmp_path, repository):
     (tmp_path / "soft.toml").write_text(f"{head}k = 100.0\n", encoding="utf-8")
     (tmp_path / "stiff.toml").write_text(f"{head}k = 400.0\n", encoding="utf-8")
     here = {**os.environ, "PWD": str(tmp_path)}  # Blender goes by it, as a shell sets it
-    subprocess.run([sys.executable, "-c", script], cwd=tmp_path, env=here, check=True, timeout=120)
+    python(script, cwd=tmp_path, env=here, check=True)
     felt = {}
     for name in ("soft", "stiff"):
         words = ["--model", str(tmp_path / f"{name}.toml"), "--out", str(tmp_path / name)]

@@ -9,8 +9,6 @@ from __future__ import annotations
 import re
 import shlex
 import shutil
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
@@ -82,8 +80,7 @@ def bake_folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("pages")
     shutil.copytree(ROOT / "docs" / "sample-rig", folder, dirs_exist_ok=True)
     scene = shutil.copy(ROOT / "sample_blends" / "demo.blend", folder)
-    command = [sys.executable, "-m", "palpate.commands", "bake", str(scene), "--frames", "71", "72"]
-    subprocess.run([*command, "--out", str(folder / "palpate-bake")], check=True, capture_output=True, timeout=300)
+    assert main(["bake", str(scene), "--frames", "71", "72", "--out", str(folder / "palpate-bake")]) == 0
     for target in ("probes", "mjcf"):
         scene = str(ROOT / "sample_blends" / "weighing.blend")
         assert main(["sensor", "export", scene, "--to", target, "--sensor", "Finger", "--out", str(folder / "sensors")]) == 0
@@ -104,19 +101,19 @@ def finished_study(bake_folder):
     assert main(["sweep", str(file), "--out", str(bake_folder / "presses"), "--workers", "1"]) == 0
 
 
-def python_blocks() -> list:
+def page_blocks(language: str) -> list:
     found = []
-    for page in PAGES:
-        for number, block in enumerate(blocks(page.read_text(encoding="utf-8"), "python")):
+    for page, text in zip(PAGES, TEXTS, strict=True):
+        for number, block in enumerate(blocks(text, language)):
             # test_tutorial.py runs the block that needs Blender; tests/core/sweep reads a dataset by the libraries of its page
-            if "bpy" not in block and page.stem != "dataset":
+            if language != "python" or ("bpy" not in block and page.stem != "dataset"):
                 marks = LONG if re.search(rf"\b(diagnose|find_gap|plan_experiment)\(|{STUDIED}", block) else ()
                 found.append(pytest.param(block, id=f"{page.stem}-{number}", marks=marks))
     return found
 
 
 @pytest.mark.slow("the first of them makes the bake that all pages share")
-@pytest.mark.parametrize("block", python_blocks())
+@pytest.mark.parametrize("block", page_blocks("python"))
 def test_python_blocks_run(block, bake_folder, request, monkeypatch, capsys):
     import dataclasses
 
@@ -140,15 +137,7 @@ STIMULUS = ("time", "x", "y", "z")
 """Columns before those of the texels."""
 
 
-def toml_blocks() -> list:
-    return [
-        pytest.param(block, id=f"{page.stem}-{number}")
-        for page in PAGES
-        for number, block in enumerate(blocks(page.read_text(encoding="utf-8"), "toml"))
-    ]
-
-
-@pytest.mark.parametrize("block", toml_blocks())
+@pytest.mark.parametrize("block", page_blocks("toml"))
 def test_toml_blocks_are_read(block, bake_folder):
     table = tomllib.loads(block)
     if table.get("format") == "palpate-rig/1":
