@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import bpy
 import pytest
-from blender_scenes import changes, dump, press, save
+from blender_scenes import baked, changes, dump, press
 
-from palpate.addon.bake.bake import bake
 from palpate.addon.display import bake_display, baked_scene
 from palpate.addon.render import figure_export
 from palpate.addon.render.figure_request import FigureRequest
@@ -28,18 +27,6 @@ DAMAGES = {
 }
 
 
-@pytest.fixture
-def baked(tmp_path):
-    """A baked scene with the sensor "pad"."""
-    scene, pad, _ = press(frames=4)
-    bpy.ops.palpate.reset()
-    scene.palpate.use_live = False
-    pad.name = "pad"
-    save(tmp_path)
-    run_job(bake(scene))
-    return scene
-
-
 def readers(scene, folder):
     """What reads a bake, by its name."""
     request = FigureRequest(kinds=("strip",), formats=("png",))
@@ -55,10 +42,15 @@ def status(scene) -> str:
     return frame_status.status_of(scene).text
 
 
-def test_damage_is_one_sentence_and_changes_nothing(baked, tmp_path):
-    for read in readers(baked, tmp_path / "figures").values():
+def test_damage_is_one_sentence_and_changes_nothing(tmp_path):
+    scene, pad, _ = press(frames=4)
+    bpy.ops.palpate.reset()
+    scene.palpate.use_live = False
+    pad.name = "pad"
+    baked(scene, tmp_path)
+    for read in readers(scene, tmp_path / "figures").values():
         read()
-    assert status(baked) == "Frame 1 of the bake."
+    assert status(scene) == "Frame 1 of the bake."
     shutil.rmtree(tmp_path / "figures")
     shutil.copytree(tmp_path / "palpate-bake", tmp_path / "good")
     before = dump()
@@ -66,11 +58,11 @@ def test_damage_is_one_sentence_and_changes_nothing(baked, tmp_path):
         shutil.rmtree(tmp_path / "palpate-bake")
         shutil.copytree(tmp_path / "good", tmp_path / "palpate-bake")
         damage(tmp_path / "palpate-bake" / "pad")
-        for what, read in readers(baked, tmp_path / "figures").items():
+        for what, read in readers(scene, tmp_path / "figures").items():
             with pytest.raises(PalpateError, match=r"^[^\n]*'[^\n]*[.']$"):
                 read()
                 raise AssertionError(f"{what} accepted: {way}")
-        shown = status(baked)
+        shown = status(scene)
         if "image" not in way:  # the timeline reads none
             assert shown.endswith(".") and shown != "Frame 1 of the bake.", f"{way}: {shown}"
     assert changes(before, dump()) == []
@@ -79,8 +71,7 @@ def test_damage_is_one_sentence_and_changes_nothing(baked, tmp_path):
 
 def test_a_bake_without_images_cannot_be_shown(tmp_path):
     scene, *_ = press(frames=3)
-    save(tmp_path)
-    (folder,) = run_job(bake(scene)).folders.values()
+    (folder,) = baked(scene, tmp_path).folders.values()
     manifest = read_manifest(folder)
     files = {name: sha256 for name, sha256 in manifest.files.items() if name != IMAGE_LIST_NAME}
     write_manifest(folder, replace(manifest, files=files))

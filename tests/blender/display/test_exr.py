@@ -31,19 +31,14 @@ def grid():
     return GridLayout(ROWS, COLUMNS, row, column)
 
 
-def as_blender_sees(image):
-    """Return the (height, width, 4) pixels of an image datablock, its first row first."""
-    image.colorspace_settings.name = "Non-Color"
-    width, height = image.size
-    return np.array(image.pixels[:], np.float32).reshape(height, width, 4)
-
-
 def assert_blender_reads_it(path, layout, frame):
     """Write a frame, and compare what Blender makes of it."""
     write_exr(path, layout, frame, {"unit": "kPa"})
     expected = pictures_of(layout, frame)
     image = bpy.data.images.load(str(path))
-    pixels = as_blender_sees(image)
+    image.colorspace_settings.name = "Non-Color"
+    width, height = image.size
+    pixels = np.array(image.pixels[:], np.float32).reshape(height, width, 4)  # the first row first
     assert image.type == "IMAGE" and image.is_float
     for i, name in enumerate("RGB"):
         np.testing.assert_array_equal(pixels[..., i], expected[name])

@@ -4,35 +4,23 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import baked, ball, changes, dump, grid, press, press_and_drop, reopen, save
+from blender_scenes import baked, ball, changes, dump, grid, keyframe, play_to, press, press_and_drop, reopen, save, surface
 
 from palpate.addon.display import indentation, materials, overlays, played_table
 from palpate.addon.scene import mesh_arrays
 from palpate.addon.scene.stored_names import INDENTATION_MODIFIER
 from palpate.addon.session import frame_status
-from palpate.addon.timeline import live_cache
 from palpate.core.figures.figure_style import FigureStyle
-
-
-def surface(obj):
-    """Return the vertices of an object as Blender shows them, (n, 3) in world coordinates."""
-    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-    matrix = np.array(obj.matrix_world)
-    return mesh_arrays.vertices(mesh) @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def press_wide(frames=6):
     """A ball of 40 mm that is pressed 3 mm deep into a turned, stretched pad of 16 by 16 texels."""
-    scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = 1, frames
-    pad = grid(columns=16, rows=16)
-    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.04, location=(0.0, 0.0, 0.0405), segments=128, ring_count=64)
-    target = bpy.context.object
+    scene, pad = bpy.context.scene, grid(columns=16, rows=16)
+    scene.frame_end = frames
+    target = ball(location=(0.0, 0.0, 0.0405), radius=0.04, segments=128)
     pad.palpate.role, target.palpate.role = "SENSOR", "TARGET"
     pad.scale, pad.rotation_euler = (1.0, 0.8, 1.3), (0.0, 0.0, 0.4)
-    target.keyframe_insert("location", frame=1)
-    target.location.z = 0.037
-    target.keyframe_insert("location", frame=frames)
+    keyframe(target, "location", {1: (0.0, 0.0, 0.0405), frames: (0.0, 0.0, 0.037)})
     scene.frame_set(1)
     return scene, pad, target
 
@@ -40,8 +28,7 @@ def press_wide(frames=6):
 def test_the_surface_lies_where_the_ball_is(tmp_path):
     """Also between the texels: nowhere does the ball cut deeper than a tenth of its penetration into the surface."""
     scene, pad, target = press_wide()
-    save(tmp_path)
-    result = baked(scene)
+    result = baked(scene, tmp_path)
     before = surface(pad)
     assert np.ptp(before[:, 2]) < 1e-9  # at the first frame nothing touches
     scene.frame_set(6)
@@ -53,19 +40,15 @@ def test_the_surface_lies_where_the_ball_is(tmp_path):
     assert (0.04 - distance).max() < 0.1 * depth.max()
     outside = np.hypot(*(after[:, :2] - np.array(target.matrix_world.translation)[:2]).T) > 0.022
     assert np.abs(after[outside, 2]).max() < 0.02 * depth.max()
-    frames = [1, 6]
     scene.frame_set(5, subframe=0.5)  # between two frames the surface is between theirs
     half = surface(pad)[:, 2].min()
-    for frame in frames:
-        scene.frame_set(frame)
     assert after[:, 2].min() < half < -0.5 * depth.max()
 
 
 def test_the_scene_reads_as_without(tmp_path):
     """A second bake gives the same bits, and no frame of the first is called out of date."""
     scene, pad, *_ = press_and_drop(frames=6)
-    save(tmp_path)
-    first = baked(scene)
+    first = baked(scene, tmp_path)
     for frame in (1, 4, 6):
         scene.frame_set(frame)
         assert frame_status.status_of(scene).text == f"Frame {frame} of the bake."
@@ -86,9 +69,7 @@ def test_a_sensor_that_deforms_is_not_stale(tmp_path):
     key = pad.shape_key_add(name="Bent")
     for i, vertex in enumerate(pad.data.vertices):
         key.data[i].co.z = 5.0 * vertex.co.x**2
-    key.keyframe_insert("value", frame=1)
-    key.value = 0.5
-    key.keyframe_insert("value", frame=8)
+    keyframe(key, "value", {1: key.value, 8: 0.5})
     scene.frame_set(1)
     save(tmp_path)
     plain = mesh_arrays.evaluated_fingerprint(pad, bpy.context.evaluated_depsgraph_get())
@@ -139,8 +120,7 @@ def test_two_sensors_share_a_mesh(tmp_path):
     other.name, other.location = "Other", (0.0, 0.3, 0.0)
     plate = ball("Second", (0.005, 0.3, 0.007))
     plate.palpate.role = "TARGET"
-    save(tmp_path)
-    result = baked(scene)
+    result = baked(scene, tmp_path)
     scene.frame_set(8)
     assert pad.data == other.data
     for obj in (pad, other):
@@ -151,16 +131,14 @@ def test_two_sensors_share_a_mesh(tmp_path):
 def test_modifiers_that_add_vertices_leave_the_surface_as_it_is(tmp_path):
     scene, pad, _ = press()
     pad.modifiers.new("Subdivision", "SUBSURF")
-    save(tmp_path)
-    baked(scene)
+    baked(scene, tmp_path)
     assert INDENTATION_MODIFIER not in pad.modifiers
 
 
 def test_long_bakes_keep_every_second_frame(tmp_path, monkeypatch):
     scene, pad, _ = press()
     monkeypatch.setattr(played_table, "MOST_PIXELS", 4)
-    save(tmp_path)
-    result = baked(scene)
+    result = baked(scene, tmp_path)
     image = next(image for image in bpy.data.images if image.name.endswith("depth"))
     width, height = image.size
     assert width * height <= 4 and height == 4
@@ -171,8 +149,7 @@ def test_long_bakes_keep_every_second_frame(tmp_path, monkeypatch):
 
 def test_the_overlay_of_solid_view_is_indented_as_the_texels_are(tmp_path):
     scene, pad, _ = press_wide()
-    save(tmp_path)
-    result = baked(scene)
+    result = baked(scene, tmp_path)
     scene.frame_set(6)
     made = type("Bake", (), {})()
     made.recording, made.texels = result.recording, {"Pad": result.scenario.sensors[0].texels}
@@ -193,9 +170,7 @@ def assert_indented(overlay, texels, depth):
 
 def playing(scene, last):
     """Play to a frame; return the overlay of the only sensor and the run."""
-    for frame in range(scene.frame_start, last + 1):
-        scene.frame_set(frame)
-    run = live_cache.get(scene)
+    run = play_to(scene, last)
     (overlay,) = overlays.sensor_overlays(scene, run, run.frames[last])
     return overlay, run
 
@@ -258,18 +233,16 @@ FAN = [[0, 1, 2], [0, 2, 3, 4, 5], [0, 5, 6, 7], [0, 7, 1]]
 """Triangles, a pentagon and a quad around a vertex."""
 
 
-def test_a_sensor_of_any_faces_is_indented(tmp_path):
+def test_a_sensor_of_any_faces_is_indented(scene, tmp_path):
     """Every part of the finer surface moves with the texels around it: the two subdivisions number their vertices alike."""
-    scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = 1, 2
+    scene.frame_end = 2
     ring = [(np.cos(turn), np.sin(turn)) for turn in np.radians([0, 50, 100, 150, 200, 250, 300])]
     mesh = bpy.data.meshes.new("Fan")
     mesh.from_pydata([(0, 0, 0), *((0.02 * x, 0.02 * y, 0.0) for x, y in ring)], [], FAN)
     pad = bpy.data.objects.new("Fan", mesh)
     scene.collection.objects.link(pad)
     ball(location=(0.0, 0.0, 0.006)).palpate.role, pad.palpate.role = "TARGET", "SENSOR"
-    save(tmp_path)
-    result = baked(scene)
+    result = baked(scene, tmp_path)
     scene.frame_set(2)
     depth = result.recording.at(2).sensors["Fan"].depth
     assert (depth > 1e-3).sum() == 1, "only the vertex in the middle is touched"

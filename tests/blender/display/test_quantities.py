@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import baked, press, reopen, save, scene_with_readings
+from blender_scenes import baked, node_of, play_to, press, reopen, save, scene_with_readings
 
 from palpate.addon.authoring import texel_overlay
 from palpate.addon.display import bake_display, baked_scene, heat_map, materials, overlays
@@ -12,7 +12,6 @@ from palpate.addon.properties import scene_properties
 from palpate.addon.render import figure_export, workbench_colors
 from palpate.addon.scene import mesh_arrays
 from palpate.addon.scene.stored_names import GAP_COLORS
-from palpate.addon.timeline import live_cache
 from palpate.core.errors import PalpateError
 from palpate.core.figures import color_maps
 from palpate.core.figures.figure_style import FigureStyle
@@ -20,12 +19,6 @@ from palpate.core.figures.quantities import QUANTITIES, between
 from palpate.panels import sensor as sensor_panel
 
 EVERY = pytest.mark.parametrize("name", QUANTITIES)
-
-
-def play(scene, last=8):
-    for frame in range(1, last + 1):
-        scene.frame_set(frame)
-    return live_cache.get(scene)
 
 
 def both_sides(texels):
@@ -42,7 +35,7 @@ def expected_colors(quantity, felt, texels, scale):
 def test_it_is_seen_while_playing(name):
     scene = scene_with_readings()
     scene.palpate.quantity, scene.palpate.show_indentation = name.upper(), False
-    run = play(scene)
+    run = play_to(scene, 8)
     frame, texels, quantity = run.frames[8], run.scenario.sensors[0].texels, QUANTITIES[name]
     values = np.array([quantity.values(run.frames[number].sensors["Pad"], texels) for number in range(1, 9)])
     scale = overlays.live_scale(scene, run)
@@ -64,11 +57,10 @@ def test_it_is_seen_while_playing(name):
 def test_it_is_seen_on_a_bake(tmp_path, name):
     scene, quantity = scene_with_readings(), QUANTITIES[name]
     pad, scene.palpate.quantity = scene.objects["Pad"], name.upper()
-    save(tmp_path)
-    baked(scene)
+    baked(scene, tmp_path)
     found = figure_export.read_scene_bake(scene)
     scale = bake_display.figure_style(scene).scale(found.recording, found.texels)
-    node = next(node for node in pad.material_slots[-1].material.node_tree.nodes if node.bl_idname == "ShaderNodeMapRange")
+    node = node_of(pad, "ShaderNodeMapRange")
     ends = [node.inputs[key].default_value for key in ("From Min", "From Max")]
     assert ends == pytest.approx([scale.low, scale.high]) and scale.unit in node.label and quantity.title in node.label
     felt, texels = found.recording.at(7).sensors["Pad"], found.texels["Pad"]
@@ -84,9 +76,7 @@ def test_it_is_seen_on_a_bake(tmp_path, name):
             column, row = (place[texels.vertex, :2] * image.size + shift).astype(int).T
             values = quantity.values(felt, texels)
             assert pixels[row, column] == pytest.approx(values, rel=1e-5, abs=1e-5 * np.abs(values).max())
-        texture = next(
-            node for node in pad.material_slots[-1].material.node_tree.nodes if node.bl_idname == "ShaderNodeTexImage"
-        )
+        texture = node_of(pad, "ShaderNodeTexImage")
         assert texture.image == image and texture.interpolation == "Closest"
     colors = expected_colors(quantity, felt, texels, scale)
     assert np.ptp([quantity.values(found.recording.sensors["Pad"].at(i), texels) for i in (0, 6)]) > 0.0
@@ -113,7 +103,7 @@ def test_it_is_seen_on_a_bake(tmp_path, name):
 def test_the_panel_says_it(name, monkeypatch):
     scene = scene_with_readings()
     scene.palpate.quantity = name.upper()
-    run = play(scene)
+    run = play_to(scene, 8)
     felt, texels = run.frames[8].sensors["Pad"], run.scenario.sensors[0].texels
     report = type("Report", (), {"texels": texels})
     monkeypatch.setattr(sensor_panel.sensor_report, "known_report", lambda *_: report)
@@ -125,8 +115,7 @@ def test_the_panel_says_it(name, monkeypatch):
 
 
 @EVERY
-def test_its_ends_are_set_in_its_own_unit(name):
-    scene = bpy.context.scene
+def test_its_ends_are_set_in_its_own_unit(scene, name):
     own, quantity = scene.palpate, QUANTITIES[name]
     own.quantity, own.use_auto_range = name.upper(), False
     names = scene_properties.range_names(own)
@@ -145,20 +134,19 @@ def test_the_automatic_range_is_that_of_the_present_run():
     ends = []
     for k in (100.0, 1000.0, 100.0):
         pad.palpate.k = k
-        ends.append(overlays.live_scale(scene, play(scene)).high)
+        ends.append(overlays.live_scale(scene, play_to(scene, 8)).high)
     bpy.ops.palpate.reset()
-    ends.append(overlays.live_scale(scene, play(scene)).high)
+    ends.append(overlays.live_scale(scene, play_to(scene, 8)).high)
     assert ends[0] == ends[2] == ends[3] and ends[1] > 5.0 * ends[0]
 
 
 def test_a_sensor_without_channels_shows_none(tmp_path):
     scene, pad, _ = press(4)
     scene.palpate.quantity = "CHANNELS"
-    run = play(scene, 4)
+    run = play_to(scene, 4)
     assert overlays.sensor_overlays(scene, run, run.frames[4]) == []
     assert overlays.inset_content(scene, run, run.frames[4]).insets == []
-    save(tmp_path)
-    baked(scene)
+    baked(scene, tmp_path)
     assert not any(slot.material and materials.SENSOR_KEY in slot.material for slot in pad.material_slots)
     found = figure_export.read_scene_bake(scene)
     with pytest.raises(PalpateError, match="without channels"):
@@ -177,15 +165,14 @@ def test_dots_of_texels_stand_on_no_colours():
     assert texel_overlay.hides_dots(scene, pad, shading)
     pad.data.color_attributes.remove(pad.data.color_attributes[GAP_COLORS])
     assert not texel_overlay.hides_dots(scene, pad, shading)
-    play(scene, 4)
+    play_to(scene, 4)
     assert texel_overlay.hides_dots(scene, pad, shading)
 
 
-def test_files_keep_their_choice_and_its_ends(tmp_path):
+def test_files_keep_their_choice_and_its_ends(scene, tmp_path):
     """A .blend stores the number of a choice and the names of the ends, which Palpate 0.1 has chosen."""
-    items = bpy.context.scene.palpate.bl_rna.properties["quantity"].enum_items
+    items = scene.palpate.bl_rna.properties["quantity"].enum_items
     assert [(item.identifier, item.value) for item in items][:2] == [("FORCE", 0), ("PRESSURE", 1)]
-    scene = bpy.context.scene
     scene.palpate.quantity, scene.palpate.use_auto_range = "PRESSURE", False
     scene.palpate.range_max, scene.palpate.range_max_pressure = 0.25, 12.0
     path = save(tmp_path)
@@ -196,8 +183,7 @@ def test_files_keep_their_choice_and_its_ends(tmp_path):
 
 def test_a_heat_map_of_palpate_0_1_is_removed_with_its_areas(tmp_path):
     scene, pad, _ = press(4)
-    save(tmp_path)
-    baked(scene)
+    baked(scene, tmp_path)
     uid = pad.palpate.uid
     pad.data.attributes.new("palpate_area", "FLOAT", "POINT")
     bpy.data.images.new("area", 4, 4)[materials.SENSOR_KEY] = f"{uid}:area"
@@ -208,7 +194,7 @@ def test_a_heat_map_of_palpate_0_1_is_removed_with_its_areas(tmp_path):
 
 def test_a_heat_map_leaves_the_sensor_that_is_painted_alone():
     scene, pad, _ = press(4)
-    run = play(scene, 4)
+    run = play_to(scene, 4)
     (overlay,) = overlays.sensor_overlays(scene, run, run.frames[4])
     bpy.context.view_layer.objects.active = pad
     assert overlay.sensor == pad.session_uid and overlay.sensor not in overlays.edited_objects(bpy.context)
@@ -223,10 +209,8 @@ def test_a_picture_may_show_another_quantity_than_the_scene(tmp_path):
     """tests/core/figures tells the range that it has then."""
     scene, pad, _ = press(4)
     scene.palpate.use_auto_range, scene.palpate.range_max = False, 0.15
-    save(tmp_path)
-    baked(scene)
+    baked(scene, tmp_path)
     found, style = figure_export.read_scene_bake(scene), FigureStyle(quantity="pressure")
     bake_display.take_style(scene, style)
-    node = next(node for node in pad.material_slots[-1].material.node_tree.nodes if node.bl_idname == "ShaderNodeMapRange")
-    high = style.scale(found.recording, found.texels).high
+    node, high = node_of(pad, "ShaderNodeMapRange"), style.scale(found.recording, found.texels).high
     assert node.inputs["From Max"].default_value == pytest.approx(high) and "kPa" in node.label

@@ -4,11 +4,11 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import baked, ball, save
+from blender_scenes import baked, ball, keyframe, node_of, save, scene_of, start_of
 from sample_bake import read_exr
 
 from palpate.addon.display import materials
-from palpate.addon.scene import participants, scene_reader, sensor_reader, uv_layouts
+from palpate.addon.scene import participants, sensor_reader, uv_layouts
 from palpate.addon.session import frame_status
 from palpate.core.errors import SensorError
 from palpate.core.io.bake_folder import frame_file
@@ -16,19 +16,16 @@ from palpate.core.io.bake_folder import frame_file
 
 def tip(kind="uv_sphere", **settings):
     """Return a fingertip all around, with the UV map that Blender gives it, over a ball that is pressed into it."""
-    scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = 1, 4
+    scene = scene_of(4)
     getattr(bpy.ops.mesh, f"primitive_{kind}_add")()
     tip = bpy.context.object
     tip.name, tip.scale = "Tip", (0.01, 0.01, 0.01)
     tip.palpate.role, tip.palpate.image_layout = "SENSOR", "UV"
     for key, value in settings.items():
         setattr(tip.palpate, key, value)
-    target = ball(location=(0.0, 0.0187, 0.0), radius=0.01)
+    target = ball(radius=0.01)
     target.palpate.role = "TARGET"
-    target.keyframe_insert("location", frame=1)
-    target.location = (0.0, 0.017, 0.001)
-    target.keyframe_insert("location", frame=4)
+    keyframe(target, "location", {1: (0.0, 0.0187, 0.0), 4: (0.0, 0.017, 0.001)})
     scene.frame_set(1)
     return scene, tip
 
@@ -50,8 +47,7 @@ def test_the_maps_that_blender_makes_can_be_used(kind):
 @pytest.mark.parametrize("pixels", ["SMOOTH", "NEAREST"])
 def test_files_and_material_show_the_force_on_the_uv_map(tmp_path, pixels):
     scene, obj = tip(image_size=200, image_filter=pixels)
-    save(tmp_path)
-    result = baked(scene)
+    result = baked(scene, tmp_path)
     readings, texels = result.recording.at(4).sensors["Tip"], result.scenario.sensors[0].texels
     channels, about = read_exr(result.folders["Tip"] / frame_file(4))
     assert channels["R"].shape == (200, 200) and about["map"] == "UVMap"
@@ -62,7 +58,7 @@ def test_files_and_material_show_the_force_on_the_uv_map(tmp_path, pixels):
     # Blender's own coordinates, looked up corner by corner in what Blender's own image shows
     scene.frame_set(4)
     image = materials.find_block(bpy.data.images, obj.palpate.uid)
-    node = next(node for node in obj.material_slots[-1].material.node_tree.nodes if node.type == "TEX_IMAGE")
+    node = node_of(obj, "ShaderNodeTexImage")
     assert node.image == image and node.interpolation == {"SMOOTH": "Linear", "NEAREST": "Closest"}[pixels]
     assert node.inputs["Vector"].links[0].from_node.attribute_name == "UVMap"
     assert list(obj.data.uv_layers.keys()) == ["UVMap"]
@@ -80,8 +76,7 @@ def test_images_do_not_change_forces(tmp_path):
         bpy.data.batch_remove(list(bpy.data.objects))
         scene, obj = tip()
         obj.palpate.image_layout = layout
-        save(tmp_path)
-        recordings.append(baked(scene).recording.sensors["Tip"])
+        recordings.append(baked(scene, tmp_path).recording.sensors["Tip"])
     np.testing.assert_allclose(recordings[0].normal_force, recordings[1].normal_force, rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(recordings[0].shear, recordings[1].shear, rtol=1e-12, atol=1e-15)
 
@@ -99,15 +94,13 @@ def test_without_a_map_it_is_one_sentence(tmp_path):
 
 def test_too_coarse_an_image_is_said():
     scene, obj = tip(image_size=16)
-    reading = scene_reader.read_start(scene, participants.depsgraph_of(scene))
-    assert any("smaller than a pixel" in warning for warning in reading.warnings)
+    assert any("smaller than a pixel" in warning for warning in start_of(scene).warnings)
 
 
 def test_a_moved_corner_of_the_map_makes_the_bake_stale(tmp_path):
     """Settings of an image are those of tests/blender/properties/test_fingerprint.py."""
     scene, obj = tip()
-    save(tmp_path)
-    baked(scene)
+    baked(scene, tmp_path)
     scene.frame_set(2)
     assert frame_status.status_of(scene).text == "Frame 2 of the bake."
     obj.data.uv_layers[0].uv[3].vector = (0.1, 0.1)

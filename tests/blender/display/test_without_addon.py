@@ -10,7 +10,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import baked, cube, press_and_drop, save, scene_with_readings
+from blender_scenes import baked, baked_file, cube, keyframe, press_and_drop, save, scene_with_readings
 
 from palpate.addon.display import materials
 from palpate.core import response
@@ -47,26 +47,21 @@ def scene_file(blender, tmp_path_factory):
     """Return a baked file whose folder has moved, and its recording."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     home = tmp_path_factory.mktemp("scene")
-    scene, pad, target, *_ = press_and_drop(frames=8)
+    scene, pad, target, _, free = press_and_drop(frames=8)
     tip, plate = cube("Tip", (0.0, 0.1, 0.0), size=0.02), cube("Plate", (0.0, 0.1, 0.0275), size=0.04)
     tip.palpate.role, plate.palpate.role = "SENSOR", "TARGET"  # a tip's heat map goes by geometry nodes
-    plate.keyframe_insert("location", frame=1)
-    plate.location.z = 0.032
-    plate.keyframe_insert("location", frame=8)
-    for obj in (target, *[o for o in scene.objects if o.name == "Cube"]):
-        obj.hide_render = True  # see the pad and not the indenter
+    keyframe(plate, "location", {1: plate.location[:], 8: (0.0, 0.1, 0.032)})
+    target.hide_render = free.hide_render = True  # see the pad and not the indenter
     figure_style_from_above(scene)
     folder = home / "project"
     folder.mkdir()
-    path = save(folder)
-    recording = baked(scene).recording
+    recording = baked(scene, folder).recording
     for obj in scene.objects:
         if obj.name.startswith("Net Force"):
             obj.hide_render = True
     save(folder)
-    moved = home / "elsewhere"  # the paths are relative, so the folder can travel
-    folder.rename(moved)
-    return moved / path.name, recording
+    folder.rename(home / "elsewhere")  # the paths are relative, so the folder can travel
+    return home / "elsewhere" / "scene.blend", recording
 
 
 @pytest.fixture(scope="module")
@@ -111,9 +106,7 @@ def test_another_quantity_plays_without_the_addon(tmp_path):
     scene.palpate.quantity = "READING"
     cube("Tip", (0.0, 0.1, 0.0), size=0.02)
     figure_style_from_above(scene)
-    path = save(tmp_path)
-    result = baked(scene)
-    save(tmp_path)
+    path, result = baked_file(scene, tmp_path)
     (tmp_path / "palpate-bake").rename(tmp_path / "lost")  # the values are in the .blend
     pad = next(sensor for sensor in result.scenario.sensors if sensor.name == "Pad")
     seen = watch(path, tmp_path, "reading", False)["frames"]
