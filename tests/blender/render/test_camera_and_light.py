@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import baked, ball, changes, cube, dump, grid, reopen, save
+from blender_scenes import baked_file, ball, changes, cube, dump, grid, places_of, reopen, scene_of
 
 from palpate.addon.render import camera_direction, figure_export, loaded_texels, render, render_setup, studio
 from palpate.addon.render.figure_request import FigureRequest
@@ -17,11 +17,8 @@ SIZE = (96, 72)
 @pytest.fixture(scope="module")
 def wall_blend(blender, tmp_path_factory):
     """A pad whose texels face −x, a ball that presses on it from there, and a camera behind the pad, baked and saved."""
-    folder = tmp_path_factory.mktemp("wall")
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = 1, 3
-    pad = grid(columns=12, rows=12)
+    scene, pad = scene_of(3), grid(columns=12, rows=12)
     pad.rotation_euler = (0.0, -np.pi / 2, 0.0)
     target = ball(location=(-0.0085, 0.0, 0.0), radius=0.01)
     pad.palpate.role, target.palpate.role = "SENSOR", "TARGET"
@@ -33,9 +30,7 @@ def wall_blend(blender, tmp_path_factory):
     bpy.ops.object.camera_add(location=(0.5, 0.0, 0.1), rotation=(1.3, 0.0, np.pi / 2))
     scene.camera = bpy.context.object
     scene.render.engine, scene.cycles.samples = "CYCLES", 4
-    save(folder)
-    baked(scene)
-    return save(folder)
+    return baked_file(scene, tmp_path_factory.mktemp("wall"))[0]
 
 
 @pytest.fixture
@@ -43,16 +38,20 @@ def scene(scene, wall_blend):
     return reopen(wall_blend)
 
 
+def loaded_at_3(scene):
+    return loaded_texels.loaded_texels(scene, figure_export.read_scene_bake(scene), 3)
+
+
 def test_the_camera_is_turned_to_the_loaded_texels(scene):
     before = dump()
-    loaded = loaded_texels.loaded_texels(scene, figure_export.read_scene_bake(scene), 3)
+    loaded = loaded_at_3(scene)
     assert len(loaded) >= 4 and loaded.normals[:, 0] == pytest.approx(np.full(len(loaded), -1.0), abs=1e-5)
     assert loaded.points[:, 0].max() > 5e-4  # they lie on the indented surface
     options = render_setup.RenderOptions(size=SIZE, see_through=True)
     with render_setup.render_setup(scene, [3], options, {3: loaded}):
         back = np.array(scene.camera.matrix_world)[:3, 2]
         assert (loaded.normals @ back).min() > camera_direction.FACING - 0.02
-        places = np.array([render.image_position(scene, point) for point in loaded.points])
+        places = places_of(scene, loaded.points)
         assert (places > 0.05).all() and (places < 0.95).all()
     with render_setup.render_setup(scene, [3], options):  # nothing is known of loads: as the scene's camera
         assert np.array(scene.camera.matrix_world)[:3, 2] @ np.array((1.0, 0.0, 0.0)) > 0.9
@@ -60,7 +59,7 @@ def test_the_camera_is_turned_to_the_loaded_texels(scene):
 
 
 def test_a_camera_that_shows_the_texels_keeps_its_direction(scene):
-    loaded = {3: loaded_texels.loaded_texels(scene, figure_export.read_scene_bake(scene), 3)}
+    loaded = {3: loaded_at_3(scene)}
     view = camera_direction.best_view(scene, loaded, (75.0, 20.0), True)
     assert view is not None and np.cos(np.radians(view[0])) < -0.5
     for azimuth in (150.0, -160.0):
@@ -70,7 +69,7 @@ def test_a_camera_that_shows_the_texels_keeps_its_direction(scene):
 
 def test_a_direction_that_shows_things_larger_is_preferred(scene):
     """A pad that is seen equally well from two sides is seen from where a long handle is foreshortened."""
-    loaded = {3: loaded_texels.loaded_texels(scene, figure_export.read_scene_bake(scene), 3)}
+    loaded = {3: loaded_at_3(scene)}
     corners = render.bounding_box_corners([scene.objects["Pad"], scene.objects["Ball"]])
     for side in (-1.0, 1.0):
         # the handle goes to −x and to one side, so the picture is larger from where it points at the camera
@@ -80,7 +79,7 @@ def test_a_direction_that_shows_things_larger_is_preferred(scene):
 
 
 def test_what_stands_before_the_texels_blocks_the_sight_unless_it_is_a_target(scene):
-    loaded = {3: loaded_texels.loaded_texels(scene, figure_export.read_scene_bake(scene), 3)}
+    loaded = {3: loaded_at_3(scene)}
     bpy.ops.mesh.primitive_plane_add(size=0.2, location=(-0.03, 0.1, 0.0), rotation=(0.0, np.pi / 2, 0.0))
     screen = bpy.context.object  # from y = 0 to the left
     bpy.context.view_layer.update()
@@ -99,8 +98,7 @@ def test_what_touches_the_subjects_is_in_the_picture_and_a_backdrop_is_not(scene
     bpy.ops.mesh.primitive_plane_add(size=5.0, location=(0.0, 0.0, -0.06))
     floor = bpy.context.object
     with render_setup.render_setup(scene, [3], render_setup.RenderOptions(size=SIZE)):
-        corners = render.bounding_box_corners([housing, knob])
-        places = np.array([render.image_position(scene, point) for point in corners])
+        places = places_of(scene, render.bounding_box_corners([housing, knob]))
         assert floor.hide_render and not housing.hide_render
     assert (places > 0.0).all() and (places < 1.0).all()
     assert not floor.hide_render
@@ -112,7 +110,7 @@ def test_a_large_housing_is_cropped_so_that_the_pad_stays_large(scene):
 
     def height() -> float:
         with render_setup.render_setup(scene, [3], options):
-            places = np.array([render.image_position(scene, point) for point in central])
+            places = places_of(scene, central)
             assert (places > 0.0).all() and (places < 1.0).all()
             return np.ptp(places[:, 1])
 
@@ -147,8 +145,7 @@ def test_the_subject_stands_out_from_the_background(scene, tmp_path):
     scene.world = bpy.data.worlds.new("Green")
     scene.world.use_nodes = True
     scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.0, 1.0, 0.0, 1.0)
-    before, counts = dump(), [len(blocks) for blocks in (bpy.data.worlds, bpy.data.lights, bpy.data.meshes, bpy.data.materials)]
-    corner = {}
+    before, corner = dump(), {}
     for own_light in (False, True):
         request = FigureRequest(("scene",), frames=(3,), size=SIZE, samples=4, view=(160.0, 20.0), own_light=own_light)
         run_job(figure_export.make_figures(scene, tmp_path / f"{own_light}", request))
@@ -157,7 +154,6 @@ def test_the_subject_stands_out_from_the_background(scene, tmp_path):
     assert corner[False] == pytest.approx(np.full(3, expected), abs=0.05)
     assert corner[True][1] > 0.9 > 0.1 > corner[True][0]
     assert [line for line in changes(before, dump()) if "Render Result" not in line] == []
-    assert counts == [len(blocks) for blocks in (bpy.data.worlds, bpy.data.lights, bpy.data.meshes, bpy.data.materials)]
 
 
 def test_without_denoiser_there_are_more_samples_and_it_is_said(scene, tmp_path, monkeypatch):
@@ -196,15 +192,13 @@ def test_colours_are_those_of_the_colour_bar(scene, tmp_path, engine):
     picture = imread(tmp_path / "out" / "scene_0003.png")
     found = figure_export.read_scene_bake(scene)
     texels, readings = found.texels["Pad"], found.recording.at(3).sensors["Pad"]
-    style = request.style
-    scale = style.scale(found.recording, found.texels)
+    scale = request.style.scale(found.recording, found.texels)
     values = scale.values(readings, texels) / scale.high
     scene.frame_set(3)
     matrix = np.array(scene.objects["Pad"].matrix_world)
     free = readings.normal_force == 0.0
     with render_setup.render_setup(scene, [3], request.render_options(size), {}):
-        points = texels.position @ matrix[:3, :3].T + matrix[:3, 3]
-        places = np.array([render.image_position(scene, point) for point in points])
+        places = places_of(scene, texels.position @ matrix[:3, :3].T + matrix[:3, 3])
     columns, rows = (places * size).astype(int).T
     seen = picture[size[1] - 1 - rows, columns, :3]
     expected = color_maps.colors("VIRIDIS", values)

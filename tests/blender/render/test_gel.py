@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import baked, ball, grid, press, save
+from blender_scenes import baked, baked_file, ball, grid, keyframe, press, scene_of
 
 from palpate.addon.render import figure_export
 from palpate.addon.render.figure_request import FigureRequest
@@ -24,24 +24,10 @@ SIDE, ANGLE = 0.05, 50.0
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return tmp_path_factory.mktemp("gel")
-
-
-@pytest.fixture
-def pressed(scene, folder):
-    """A ball of 40 mm is pressed 3 mm into a gel and drawn aside by 4 mm; the images are drawn by the command, once for all."""
-    if not (folder / "plain").exists():
-        path = press_gel(scene, folder)
-        command = ["render", str(path), "--only", "gel", "--size", "450", "300", "--light-angle", str(ANGLE)]
-        assert main([*command, "--no-markers", "--out", str(folder / "plain")]) == 0
-    bpy.ops.wm.open_mainfile(filepath=str(folder / "scene.blend"))
-    return SimpleNamespace(folder=folder, recording=load_recording(folder / "palpate-bake" / "Gel" / "recording.npz"))
-
-
-def press_gel(scene, folder):
-    """Bake frames 1 to 6 of a gel of 16 × 16 texels and save the scene."""
-    scene.frame_start, scene.frame_end = 1, 6
+def gel_file(blender, tmp_path_factory):
+    """A ball of 40 mm is pressed 3 mm into a gel and drawn aside by 4 mm; the command draws the images into a folder, plain."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    scene, folder = scene_of(6), tmp_path_factory.mktemp("gel")
     gel = grid("Gel", columns=16, rows=16, size=SIDE)
     target = ball(radius=0.04)
     for face in target.data.polygons:
@@ -49,13 +35,19 @@ def press_gel(scene, folder):
     divide = target.modifiers.new("Round", "SUBSURF")
     divide.levels = 2
     gel.palpate.role, target.palpate.role, gel.palpate.sigma0 = "SENSOR", "TARGET", 30.0
-    for frame, place in ((1, (0.006, -0.003, 0.042)), (3, (0.006, -0.003, 0.036)), (6, (0.01, -0.003, 0.036))):
-        target.location = place
-        target.keyframe_insert("location", frame=frame)
+    keyframe(target, "location", {1: (0.006, -0.003, 0.042), 3: (0.006, -0.003, 0.036), 6: (0.01, -0.003, 0.036)})
     scene.frame_set(1)
-    save(folder)
-    baked(scene)
-    return save(folder)
+    path, _ = baked_file(scene, folder)
+    command = ["render", str(path), "--only", "gel", "--size", "450", "300", "--light-angle", str(ANGLE)]
+    assert main([*command, "--no-markers", "--out", str(folder / "plain")]) == 0
+    return path
+
+
+@pytest.fixture
+def pressed(scene, gel_file):
+    bpy.ops.wm.open_mainfile(filepath=str(gel_file))
+    recording = load_recording(gel_file.parent / "palpate-bake" / "Gel" / "recording.npz")
+    return SimpleNamespace(folder=gel_file.parent, recording=recording)
 
 
 def light(path):
@@ -106,8 +98,7 @@ def test_a_sensor_without_rows_and_columns_is_refused(tmp_path):
     group = pad.vertex_groups.new(name="with a hole")
     group.add([vertex for vertex in range(84) if vertex != 40], 1.0, "REPLACE")
     pad.palpate.region, pad.palpate.vertex_group = "GROUP", group.name
-    save(tmp_path)
-    baked(scene)
+    baked(scene, tmp_path)
     for sensors, words in (((), "No sensor of the bake has its texels in rows"), (("Pad",), "'Pad' form no rows and columns")):
         with pytest.raises(SensorError, match=words):
             run_job(figure_export.make_figures(scene, tmp_path / "out", FigureRequest(("gel",), sensors=sensors)))

@@ -4,10 +4,9 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import changes, dump, grid, reopen, save
+from blender_scenes import baked, baked_file, ball, changes, cube, dump, grid, places_of, reopen, scene_of
 from mathutils import Vector
 
-from palpate.addon.bake.bake import bake
 from palpate.addon.render import figure_export, loaded_texels, render, render_setup, see_through
 from palpate.addon.render.figure_request import FigureRequest
 from palpate.core.errors import SceneError
@@ -22,22 +21,16 @@ KINDS = {"opaque": {}, "glass": {"Transmission Weight": 1.0}}
 def ball_blend(blender, tmp_path_factory):
     """A ball on a pad of many texels, baked and saved."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    folder = tmp_path_factory.mktemp("ball")
-    scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = 1, 3
-    pad = grid(columns=24, rows=24)
-    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.014, location=(0.0, 0.0, 0.0125), segments=64, ring_count=32)
-    target = bpy.context.object
-    pad.palpate.role, target.palpate.role, target.name = "SENSOR", "TARGET", "Ball"
+    scene, pad = scene_of(3), grid(columns=24, rows=24)
+    target = ball(location=(0.0, 0.0, 0.0125), radius=0.014, segments=64)
+    pad.palpate.role, target.palpate.role = "SENSOR", "TARGET"
     scene.render.engine = "CYCLES"
     scene.cycles.samples, scene.cycles.use_denoising = 8, False
-    save(folder)
-    run_job(bake(scene))
-    return save(folder)
+    return baked_file(scene, tmp_path_factory.mktemp("ball"))[0]
 
 
 @pytest.fixture
-def baked(ball_blend):
+def pressed(ball_blend):
     scene = reopen(ball_blend)
     return scene, scene.objects["Pad"], scene.objects["Ball"]
 
@@ -57,7 +50,7 @@ def loaded_pixels(scene, pad):
         scene.frame_set(3)
         loaded = loaded_texels.loaded_texels(scene, bake, 3)
         points = [loaded.points[loaded.forces.argmax()], (0.007, 0.0, 0.0125 + 0.0105)]
-        places = np.array([render.image_position(scene, point) for point in points])
+        places = places_of(scene, points)
         weights = see_through.clear_weights(scene, loaded, SIZE)
     columns, rows = (places * SIZE).astype(int).T
     return loaded, SIZE[1] - 1 - rows, columns, weights
@@ -70,9 +63,9 @@ def loaded_pixels(scene, pad):
         for i, kind in enumerate(KINDS)
     ],
 )
-def test_loaded_texels_are_seen_through_what_presses_on_them(baked, tmp_path, kind):
+def test_loaded_texels_are_seen_through_what_presses_on_them(pressed, tmp_path, kind):
     """The picture there is that of a scene without the target; at the target's top it is that of a scene with it."""
-    scene, pad, target = baked
+    scene, pad, target = pressed
     material = bpy.data.materials.new("Own")
     material.use_nodes = True
     for name, value in KINDS[kind].items():
@@ -95,8 +88,8 @@ def test_loaded_texels_are_seen_through_what_presses_on_them(baked, tmp_path, ki
     assert (np.abs(clear - covered).max(axis=2) > 0.02).sum() < 0.3 * clear.shape[0] * clear.shape[1]
 
 
-def test_a_second_render_that_fails_leaves_the_scene_as_it_was(baked, tmp_path, monkeypatch):
-    scene, _, target = baked
+def test_a_second_render_that_fails_leaves_the_scene_as_it_was(pressed, tmp_path, monkeypatch):
+    scene, _, target = pressed
     before, calls, first = dump(), [], render.render_frame
 
     def fail(*arguments, **options):
@@ -113,9 +106,9 @@ def test_a_second_render_that_fails_leaves_the_scene_as_it_was(baked, tmp_path, 
     assert not list((tmp_path / "out").glob("scene*"))
 
 
-def test_one_render_where_nothing_is_covered(baked, tmp_path, monkeypatch):
+def test_one_render_where_nothing_is_covered(pressed, tmp_path, monkeypatch):
     """From below nothing is between the camera and the pad, whose texels face the other way."""
-    scene, *_ = baked
+    scene, *_ = pressed
     calls, first = [], render.render_frame
     monkeypatch.setattr(render, "render_frame", lambda *words, **options: calls.append(1) or first(*words, **options))
     request = FigureRequest(("scene",), frames=(3,), size=(32, 24), samples=1, view=(-90.0, -40.0), own_light=True)
@@ -123,15 +116,15 @@ def test_one_render_where_nothing_is_covered(baked, tmp_path, monkeypatch):
     assert len(calls) == 1
 
 
-def test_an_arrow_is_seen_through_the_target_in_one_piece(baked):
+def test_an_arrow_is_seen_through_the_target_in_one_piece(pressed):
     """The target is clear along the whole arrow, and in less than two fifths of the picture."""
-    scene, pad, *_ = baked
+    scene, pad, *_ = pressed
     weights = loaded_pixels(scene, pad)[3]
     arrow = scene.objects["Net Force Pad"]
     with render_setup.render_setup(scene, [3], FigureRequest(view=VIEW).render_options(SIZE)):
         scene.frame_set(3)
         matrix = arrow.matrix_world
-        spots = [render.image_position(scene, matrix @ Vector((0.0, 0.0, height))) for height in np.linspace(0.1, 0.9, 20)]
+        spots = places_of(scene, [matrix @ Vector((0.0, 0.0, height)) for height in np.linspace(0.1, 0.9, 20)])
     along = [weights[SIZE[1] - 1 - int(y * SIZE[1]), int(x * SIZE[0])] for x, y in spots]
     assert min(along) == pytest.approx(see_through.CLEARNESS)
     assert (weights > 0.0).mean() < 0.4
@@ -140,21 +133,15 @@ def test_an_arrow_is_seen_through_the_target_in_one_piece(baked):
 @pytest.mark.long("a map for every pixel of a picture")
 def test_a_map_has_no_hole_between_two_places_of_contact(tmp_path):
     """A bar with two feet is seen through between its feet, too, and stays opaque where it stands over the pad's edge."""
-    scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = 1, 3
-    pad = grid(columns=12, rows=24)
-    bpy.ops.mesh.primitive_cube_add(size=1.0, location=(0.0, 0.0, 0.011))
-    target = bpy.context.object
+    scene, pad = scene_of(3), grid(columns=12, rows=24)
+    target = cube("Bar", (0.0, 0.0, 0.011), size=1.0)
     target.scale = (0.05, 0.2, 0.012)
     for side in (-1.0, 1.0):
-        bpy.ops.mesh.primitive_cube_add(size=1.0, location=(0.0, side * 0.018, 0.0))
-        foot = bpy.context.object
+        foot = cube("Foot", (0.0, side * 0.018, 0.0048), size=1.0)
         foot.scale = (0.02, 0.006, 0.011)
-        foot.location.z = 0.0048
         foot.palpate.role = "TARGET"
     pad.palpate.role, target.palpate.role = "SENSOR", "TARGET"
-    save(tmp_path)
-    run_job(bake(scene))
+    baked(scene, tmp_path)
     found = figure_export.read_scene_bake(scene)
     with render_setup.render_setup(scene, [3], FigureRequest(view=(-90.0, 60.0)).render_options(SIZE)):
         scene.frame_set(3)

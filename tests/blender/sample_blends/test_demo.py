@@ -2,6 +2,7 @@
 """The demo and the sample files: what they promise to show."""
 
 import re
+from dataclasses import replace
 
 import blender_scenes
 import bpy
@@ -9,21 +10,19 @@ import numpy as np
 import pytest
 
 from palpate.addon.render import render
+from palpate.addon.scene import mesh_arrays
 from palpate.commands import main
 from palpate.core import response
 from palpate.core.errors import SceneError
 from palpate.core.io.recording_npz import load_recording
+from palpate.core.solver import time_step_adviser
+from palpate.core.solver.simulation import run
 from palpate.sample_blends import build_samples, demo, scene_builder
 
 
 def evaluated(obj):
-    """Vertices (n, 3) and faces of an object with its modifiers, in its own frame."""
-    found = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    mesh = found.to_mesh()
-    vertices = np.array([v.co for v in mesh.vertices])
-    faces = [tuple(p.vertices) for p in mesh.polygons]
-    found.to_mesh_clear()
-    return vertices, faces
+    """Vertices (n, 3) of an object with its modifiers, in its own frame."""
+    return mesh_arrays.vertices(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data)
 
 
 # --- the scene
@@ -31,7 +30,7 @@ def evaluated(obj):
 
 def test_the_cube_weighs_what_steel_weighs(scene):
     demo.build(scene)
-    size = np.ptp(evaluated(scene.objects[demo.CUBE])[0], axis=0) * scene.unit_settings.scale_length
+    size = np.ptp(evaluated(scene.objects[demo.CUBE]), axis=0) * scene.unit_settings.scale_length
     assert scene.objects[demo.CUBE].palpate.mass / size.prod() == pytest.approx(8000, rel=0.01)
 
 
@@ -60,8 +59,7 @@ def test_demo_prints_and_draws_what_it_promises(tmp_path, capfd):
     assert required == pytest.approx(9.81, abs=1e-6)
     assert measured == pytest.approx(required, abs=5e-5)  # 9.8100: four digits behind the point
     for name in ("tactile-strip.png", "forces.png", "demo.blend"):
-        assert (out / name).stat().st_size > 10_000
-        assert str(out / name) in words
+        assert (out / name).stat().st_size > 10_000 and str(out / name) in words
     assert not (out / "scene.png").exists()
     assert not (out / "demo.blend1").exists()
     assert (out / "demo.blend").stat().st_size < 1_000_000
@@ -78,8 +76,7 @@ def test_demo_prints_and_draws_what_it_promises(tmp_path, capfd):
     assert readings.depth.max() < 0.012  # nothing bottomed out
 
     # Opened again, the file has the cube where it came to rest, and heat maps on the images of the bake.
-    bpy.ops.wm.open_mainfile(filepath=str(out / "demo.blend"))
-    scene = bpy.context.scene
+    scene = blender_scenes.reopen(out / "demo.blend")
     scene.frame_set(scene.frame_end)
     cube = scene.objects[demo.CUBE]
     sunk = demo.PAD_HEIGHT - (cube.matrix_world.translation.z - demo.CUBE_EDGE / 2)
@@ -112,12 +109,10 @@ def test_the_camera_frames_everything_and_no_more(scene, size, region):
     scene.render.resolution_x, scene.render.resolution_y = size
     points = render.bounding_box_corners([scene.objects[name] for name in (demo.BALL, demo.CUBE, demo.PAD_A)])
     render.fit_camera(scene, points, region)
-    places = np.array([render.image_position(scene, point) for point in points])
+    places = blender_scenes.places_of(scene, points)
     left, bottom, right, top = region
-    assert places[:, 0].min() >= left - 1e-4
-    assert places[:, 0].max() <= right + 1e-4
-    assert places[:, 1].min() >= bottom - 1e-4
-    assert places[:, 1].max() <= top + 1e-4
+    assert (places >= np.array([left, bottom]) - 1e-4).all()
+    assert (places <= np.array([right, top]) + 1e-4).all()
     fills_width = np.ptp(places[:, 0]) == pytest.approx(right - left, abs=1e-3)
     fills_height = np.ptp(places[:, 1]) == pytest.approx(top - bottom, abs=1e-3)
     assert fills_width or fills_height
@@ -150,7 +145,7 @@ def described(scene):
         settings = {}
         if obj.palpate.role != "NONE":
             settings = blender_scenes.settings(obj.palpate, uids=False)
-        shape = evaluated(obj)[0].round(4).tolist() if obj.type == "MESH" else None
+        shape = evaluated(obj).round(4).tolist() if obj.type == "MESH" else None
         found[obj.name] = (settings, shape)
     for frame in range(scene.frame_start, scene.frame_end + 1, 7):
         scene.frame_set(frame)
@@ -169,11 +164,8 @@ LARGE = [pytest.mark.long("the two scenes that take longest to build")]
 def test_samples_are_what_their_scripts_build(name, repository, tmp_path):
     path = repository / "sample_blends" / f"{name}.blend"
     assert path.stat().st_size < 1_000_000
-    bpy.ops.wm.open_mainfile(filepath=str(path))
-    committed = described(bpy.context.scene)
-    made = build_samples.build_one(name, tmp_path)
-    bpy.ops.wm.open_mainfile(filepath=str(made))
-    assert described(bpy.context.scene) == committed
+    committed = described(blender_scenes.reopen(path))
+    assert described(blender_scenes.reopen(build_samples.build_one(name, tmp_path))) == committed
 
 
 @pytest.mark.slow("bakes each sample scene")
@@ -200,3 +192,18 @@ def test_samples_open_to_a_picture_and_bake(name, repository, tmp_path):
     for sensor in recording.sensors.values():
         assert sensor.contact.any()
         assert np.isfinite(sensor.normal_force).all()
+
+
+@pytest.mark.long("steps of 0.02 to 0.04 ms")
+def test_what_the_recommended_step_buys_is_as_the_panel_says(repository):
+    scenario = blender_scenes.scenario_of(blender_scenes.reopen(repository / "sample_blends" / "grasp_bottle.blend"))
+    advice = time_step_adviser.advise(scenario)
+    assert 10.0 < scenario.dt / advice.dt < 25.0
+    set_, fine = run(scenario), run(replace(scenario, dt=None))
+    for sensor, expected in fine.sensors.items():
+        force, found = expected.normal_force, set_.sensors[sensor].normal_force
+        assert np.abs(found.sum(axis=1) - force.sum(axis=1)).max() < time_step_adviser.SUM_ERROR * force.sum(axis=1).max()
+        assert np.abs(found - force).max() < time_step_adviser.TEXEL_ERROR * force.max()
+    words = time_step_adviser.benefit(scenario.dt, advice)
+    assert "sums of forces changed by 0.2%, texels by 2% at most" in words
+    assert time_step_adviser.benefit(advice.dt, advice) == ""
