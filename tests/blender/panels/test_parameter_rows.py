@@ -14,45 +14,40 @@ from palpate.core.model.sensor_parameters import HUNT_CROSSLEY, LINEAR, SENSOR_P
 from palpate.panels import bake, gap, sensor
 
 
-def drawn(settings, part, owner=None) -> Counter:
-    """How often a panel draws each property, in whatever units, on a layout that only writes down what it is asked for.
-
-    Those of all owners, or of one.
-    """
-    found, layout = Counter(), MagicMock()
-    for nested in ("column", "row", "split", "box"):
+def laid_out(settings, *parts):
+    """Draw panels on a layout that only writes down what it is asked for; return the layout."""
+    layout = MagicMock()
+    for nested in ("column", "row", "split", "box", "grid_flow"):
         getattr(layout, nested).return_value = layout
-
-    def prop(one, name, **_how):
-        found.update([name.removesuffix(ENDING)] if owner in (None, one) else [])
-
-    layout.prop.side_effect = prop
     context = MagicMock(scene=bpy.context.scene, object=bpy.context.object, window_manager=bpy.context.window_manager)
     context.region.width, context.preferences.system.ui_scale = 300, 1.0
-    part.draw_part(None, layout, settings, context)
-    return found
+    for part in parts:
+        part.draw_part(None, layout, settings, context)
+    return layout
+
+
+def drawn(settings, part, owner=None) -> Counter:
+    """How often a panel draws each property, in whatever units: those of all owners, or of one."""
+    calls = laid_out(settings, part).prop.call_args_list
+    return Counter(call.args[1].removesuffix(ENDING) for call in calls if owner in (None, call.args[0]))
 
 
 @pytest.mark.parametrize(("law", "without"), [(LINEAR, {"exponent", "dissipation"}), (HUNT_CROSSLEY, {"cn"})])
-def test_every_parameter_is_drawn_once(law, without):
-    bpy.ops.mesh.primitive_plane_add()
-    settings = bpy.context.object.palpate
+def test_every_parameter_is_drawn_once(settings, law, without):
     settings.role, settings.normal_law = "SENSOR", law
     found = Counter()
     for part in (sensor.Contact, sensor.Friction, sensor.Readout):
         found += drawn(settings, part)
-    assert {name: found[name] for name in SENSOR_PARAMETERS} == {
-        name: 0 if name in without else 1 for name in SENSOR_PARAMETERS
-    }
+    expected = {name: 0 if name in without else 1 for name in SENSOR_PARAMETERS}
+    assert {name: found[name] for name in SENSOR_PARAMETERS} == expected
 
 
-def test_a_parameter_without_a_place_comes_last(monkeypatch):
+def test_a_parameter_without_a_place_comes_last(settings, monkeypatch):
     """A new line in the table of parameters is enough to see it."""
-    bpy.ops.mesh.primitive_plane_add()
     more = {**SENSOR_PARAMETERS, "mass": SENSOR_PARAMETERS["mus"]}  # any property that the object has
     monkeypatch.setattr(sensor, "SENSOR_PARAMETERS", more)
-    assert drawn(bpy.context.object.palpate, sensor.Friction)["mass"] == 1
-    assert drawn(bpy.context.object.palpate, sensor.Contact)["mass"] == 0
+    assert drawn(settings, sensor.Friction)["mass"] == 1
+    assert drawn(settings, sensor.Contact)["mass"] == 0
 
 
 @pytest.mark.parametrize(
@@ -63,10 +58,8 @@ def test_a_parameter_without_a_place_comes_last(monkeypatch):
         (gap.Measured, "palpate.gap_plan", {"depth", "speed", "duration"}),
     ],
 )
-def test_a_panel_has_the_settings_of_its_buttons(part, operator, fields):
+def test_a_panel_has_the_settings_of_its_buttons(settings, part, operator, fields):
     """They were only in Adjust Last Operation, after the operator had done its work once with others."""
-    bpy.ops.mesh.primitive_grid_add(size=0.05)
-    settings = bpy.context.object.palpate
     if operator != "palpate.skin_add":
         settings.role = "SENSOR"
     own = bpy.context.window_manager.operator_properties_last(operator)
@@ -84,12 +77,11 @@ def test_a_button_uses_the_settings_of_the_panel():
     own.method, own.spacing = "NOISE", 0.0
 
 
-def test_the_kinds_of_figures_are_check_boxes_of_one_column():
-    bpy.ops.mesh.primitive_grid_add(size=0.05)
+def test_the_kinds_of_figures_are_check_boxes_of_one_column(settings):
     own = bpy.context.scene.palpate.figures
     boxes = {"kinds_scene", "kinds_strip", "kinds_curves", "kinds_numbers", "kinds_video", "kinds_gel"}
     boxes |= {"formats_png", "formats_pdf", "formats_svg", "exports_csv", "exports_hdf5", "exports_mcap"}
-    assert drawn(bpy.context.object.palpate, bake.Figures).keys() >= boxes
+    assert drawn(settings, bake.Figures).keys() >= boxes
     own.kinds_strip, own.kinds_gel, own.exports_csv = False, True, True  # a click each, without Shift
     assert own.kinds == {"SCENE", "CURVES", "NUMBERS", "GEL"} and own.exports == {"CSV"}
     own.kinds = {"VIDEO"}
@@ -97,18 +89,10 @@ def test_the_kinds_of_figures_are_check_boxes_of_one_column():
 
 
 @pytest.mark.parametrize("operator", ["palpate.gap_find", "palpate.gap_plan", "palpate.figures_make", "palpate.catch_up"])
-def test_long_work_has_a_bar_where_its_button_was(operator, monkeypatch):
-    bpy.ops.mesh.primitive_grid_add(size=0.05)
-    settings = bpy.context.object.palpate
+def test_long_work_has_a_bar_where_its_button_was(settings, operator, monkeypatch):
     settings.role = "SENSOR"
     kind = getattr(bpy.types, f"PALPATE_OT_{operator.split('.')[1]}")
     monkeypatch.setattr(session_state.session, "jobs", {kind.__name__: Progress("Working", 1, 4, 7)})
-    layout = MagicMock()
-    for nested in ("column", "row", "split", "box", "grid_flow"):
-        getattr(layout, nested).return_value = layout
-    context = MagicMock(scene=bpy.context.scene, object=bpy.context.object, window_manager=bpy.context.window_manager)
-    context.region.width, context.preferences.system.ui_scale = 300, 1.0
-    for part in (gap.Measured, bake.Bake, bake.Figures):
-        part.draw_part(None, layout, settings, context)
+    layout = laid_out(settings, gap.Measured, bake.Bake, bake.Figures)
     layout.progress.assert_called_once_with(text="Working: frame 7 (ESC: stop)", factor=0.25)
     assert operator not in [call.args[0] for call in layout.operator.call_args_list]

@@ -4,30 +4,18 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import grid, press, reopen, save
+from blender_scenes import baked, pad_sensor, press, reopen, save
 
-from palpate.addon.bake import bake
 from palpate.addon.properties import effect_stack
 from palpate.addon.scene import sensor_reader
 from palpate.addon.session import frame_status
 from palpate.addon.timeline import staleness
 from palpate.core.effects.engine.registry import effect, library
 from palpate.core.errors import EffectError
-from palpate.core.jobs import run_job
 
 
-@pytest.fixture
-def pad():
-    made = grid()
-    bpy.ops.palpate.sensor_add()
-    return made
-
-
-def baked(scene):
-    return run_job(bake.bake(scene)).recording.sensors["Pad"]
-
-
-def test_every_effect_can_be_added_moved_and_removed(pad):
+def test_every_effect_can_be_added_moved_and_removed():
+    pad = pad_sensor()
     for name in library():
         assert bpy.ops.palpate.effect_add(effect=name) == {"FINISHED"}
     assert [item.name for item in effect_stack.stack(pad)] == list(library())
@@ -41,9 +29,10 @@ def test_every_effect_can_be_added_moved_and_removed(pad):
     assert len(effect_stack.stack(pad)) == len(library()) - 2
 
 
-def test_what_is_put_on_is_what_is_sampled(pad):
+def test_what_is_put_on_is_what_is_sampled():
+    pad = pad_sensor()
     pad.palpate.gain = 250.0
-    mesh = _mesh(pad)
+    mesh = sensor_reader.sensor_in_own_frame(bpy.context.scene, pad, bpy.context.evaluated_depsgraph_get())[1]
     for kind in library().values():
         for form in kind.forms:
             one = effect(kind.name, form.name, seed=3, gain=250.0)
@@ -54,12 +43,8 @@ def test_what_is_put_on_is_what_is_sampled(pad):
             assert sensor_reader.read_sensor(pad, 0, mesh, np.eye(3)).effects == (found,)
 
 
-def _mesh(obj):
-    return sensor_reader.sensor_in_own_frame(bpy.context.scene, obj, bpy.context.evaluated_depsgraph_get())[1]
-
-
-def test_numbers_for_each_texel(pad):
-    factors = tuple(np.linspace(0.5, 1.5, 84))
+def test_numbers_for_each_texel():
+    pad, factors = pad_sensor(), tuple(np.linspace(0.5, 1.5, 84))
     effect_stack.put_stack(pad, (effect("gain-mismatch", "listed", factor=factors),))
     assert effect_stack.stack(pad)[0].values["factor"] == factors
     pad.palpate.effects[0].gain_mismatch_listed_factor = "1, 2, three"
@@ -67,7 +52,8 @@ def test_numbers_for_each_texel(pad):
         effect_stack.stack(pad)
 
 
-def test_a_stack_that_means_nothing_leaves_the_old_one(pad):
+def test_a_stack_that_means_nothing_leaves_the_old_one():
+    pad = pad_sensor()
     effect_stack.put_stack(pad, (effect("creep"),))
     with pytest.raises(EffectError, match="no effect 'rust'"):
         effect_stack.put_stack(pad, (effect_stack.Effect("rust", ""),))
@@ -86,14 +72,13 @@ def test_the_tooltips_and_bounds_are_those_of_the_library():
 def test_a_bake_holds_the_readings_and_notices_a_change(tmp_path):
     """A readout effect changes the reading and no force."""
     scene, pad, _ = press(6)
-    save(tmp_path)
-    plain = baked(scene)
+    plain = baked(scene, tmp_path).recording.sensors["Pad"]
     bpy.context.view_layer.objects.active = pad
     bpy.ops.palpate.effect_add(effect="saturation")
     level = 0.4 * float(plain.reading.max())
     pad.palpate.effects[0].saturation_clip_level = level
     assert staleness.is_stale(scene, bpy.context.evaluated_depsgraph_get(), None)
-    limited = baked(scene)
+    limited = baked(scene).recording.sensors["Pad"]
     np.testing.assert_array_equal(limited.normal_force, plain.normal_force)
     np.testing.assert_allclose(limited.reading, np.minimum(plain.reading, level), rtol=1e-6)
     assert not staleness.is_stale(scene, bpy.context.evaluated_depsgraph_get(), None)
@@ -109,12 +94,11 @@ def test_playing_gives_the_bakes_readings(tmp_path):
     for frame in range(1, 7):
         scene.frame_set(frame)
         played.append(frame_status.status_of(scene).frame.sensors["Pad"].reading)
-    save(tmp_path)
-    np.testing.assert_array_equal(np.array(played), baked(scene).reading)
+    np.testing.assert_array_equal(np.array(played), baked(scene, tmp_path).recording.sensors["Pad"].reading)
 
 
-def test_the_stack_is_in_the_file(tmp_path, pad):
+def test_the_stack_is_in_the_file(tmp_path):
     stack = (effect("hysteresis", "bouc-wen", share=0.25), effect("noise", seed=9))
-    effect_stack.put_stack(pad, stack)
+    effect_stack.put_stack(pad_sensor(), stack)
     scene = reopen(save(tmp_path))
     assert effect_stack.stack(scene.objects["Pad"]) == stack

@@ -30,12 +30,6 @@ SCENE_WITHOUT_FORCES = {
 """Properties of a scene that change no force: how results are shown, where they are written, and what a bake has left."""
 
 
-@pytest.fixture
-def settings():
-    bpy.ops.mesh.primitive_plane_add()
-    return bpy.context.object.palpate
-
-
 def own_properties(settings) -> set[str]:
     """Return the properties, but not those that only show another in the scene's units."""
     found = {item.identifier for item in settings.bl_rna.properties} - {"rna_type", "name"}
@@ -103,8 +97,7 @@ def test_the_target_of_a_drive_counts_in_strips_too(settings):
     assert scene_fingerprint.fingerprint(scene) != before
 
 
-def test_without_a_drive_the_fingerprint_is_that_of_earlier_versions(settings, monkeypatch):
-    scene = bpy.context.scene
+def test_without_a_drive_the_fingerprint_is_that_of_earlier_versions(scene, settings, monkeypatch):
     settings.role, settings.body, settings.mass = "TARGET", "FREE", 1.0
     settings.keyframe_insert("drive_force", frame=1)
     found = scene_fingerprint.fingerprint(scene)

@@ -3,7 +3,7 @@
 
 import bpy
 import pytest
-from blender_scenes import press, reopen, save
+from blender_scenes import press, raw_settings, reopen, save
 
 from palpate.addon.properties import migrations
 from palpate.addon.properties.migrations import VERSION
@@ -11,25 +11,10 @@ from palpate.addon.session import session_state
 from palpate.core.io.hidden_folder import FolderLock
 
 
-def saved_settings(block):
-    """The settings of a data-block as its file has them."""
-    if hasattr(block, "bl_system_properties_get"):
-        return block.bl_system_properties_get()["palpate"]
-    return block["palpate"]
-
-
-def write_raw(block, values):
-    """Write settings as another version of Palpate would have saved them."""
-    group = saved_settings(block)
-    for key, value in values.items():
-        group[key] = value
-
-
 def test_a_newer_file_is_left_alone_and_it_is_said(tmp_path):
     _, pad, _ = press()
-    write_raw(pad, {"schema_version": VERSION + 5, "k": 77.0})
-    path = save(tmp_path)
-    reopen(path)
+    raw_settings(pad)["schema_version"], raw_settings(pad)["k"] = VERSION + 5, 77.0
+    reopen(save(tmp_path))
     assert bpy.data.objects["Pad"].palpate.k == 77.0
     assert bpy.data.objects["Pad"].palpate.schema_version == VERSION + 5
     assert session_state.session.unreadable_settings["Pad"].startswith("The settings of 'Pad' were saved by a newer Palpate")
@@ -41,7 +26,7 @@ def test_a_newer_file_is_left_alone_and_it_is_said(tmp_path):
 def test_a_file_that_is_open_when_the_add_on_is_enabled_is_looked_through_as_well(tmp_path):
     """At the first event, since Blender allows nothing while it enables an add-on."""
     _, pad, _ = press()
-    write_raw(pad, {"schema_version": VERSION + 5})
+    raw_settings(pad)["schema_version"] = VERSION + 5
     path = save(tmp_path)
     bpy.ops.preferences.addon_disable(module="palpate")
     reopen(path)
@@ -54,10 +39,10 @@ def test_a_file_that_is_open_when_the_add_on_is_enabled_is_looked_through_as_wel
 
 def test_todays_settings_are_not_touched(tmp_path):
     _, pad, _ = press()
-    before = saved_settings(pad).to_dict()
+    before = raw_settings(pad).to_dict()
     assert before["schema_version"] == VERSION
     migrations.apply()
-    assert saved_settings(pad).to_dict() == before
+    assert raw_settings(pad).to_dict() == before
 
 
 def test_an_older_file_finds_its_bake(tmp_path):
@@ -69,26 +54,20 @@ def test_an_older_file_finds_its_bake(tmp_path):
     scene.palpate.property_unset("folder")  # as an older version saved it: the default of its own
     scene.palpate.property_unset("schema_version")
     bpy.ops.wm.save_mainfile()
-    reopen(path)
-    assert bpy.context.scene.palpate.folder == "//palpate"
+    assert reopen(path).palpate.folder == "//palpate"
     bpy.ops.palpate.bake()
     assert sorted(one.name for one in tmp_path.iterdir() if one.is_dir()) == ["palpate"]
 
 
 def test_an_unfinished_bake_of_an_older_version_goes_on_in_its_folder(tmp_path):
-    path = save_scene_with(tmp_path / "old", private_folder=True)
-    reopen(path)
-    assert bpy.context.scene.palpate.folder == "//palpate"
+    assert reopen(save_scene_with(tmp_path / "old", private_folder=True)).palpate.folder == "//palpate"
 
 
 def test_a_package_beside_the_file_is_no_bake(tmp_path):
     """A folder called palpate that holds no bake, as a checkout of Palpate, is left alone."""
-    path = save_scene_with(tmp_path / "new", private_folder=False)
-    reopen(path)
-    assert bpy.context.scene.palpate.folder == "//palpate-bake"
+    assert reopen(save_scene_with(tmp_path / "new", private_folder=False)).palpate.folder == "//palpate-bake"
     bpy.ops.palpate.bake()
-    reopen(save(path.parent))
-    assert bpy.context.scene.palpate.folder == "//palpate-bake"
+    assert reopen(save(tmp_path / "new")).palpate.folder == "//palpate-bake"
 
 
 def save_scene_with(folder, private_folder):

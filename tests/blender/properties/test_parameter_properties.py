@@ -1,21 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Panels hold every parameter that core specifies, with its bounds and default, and give it back as it was typed."""
 
-import bpy
-import pytest
-
 from palpate.addon.authoring.laid_sensors import COPIED
 from palpate.addon.properties.parameter_properties import CONSTANT, put_sensor_parameters, sensor_parameters
 from palpate.addon.scene import scene_fingerprint
 from palpate.core.model.body import DRIVE_PARAMETERS
 from palpate.core.model.parameter import Parameter
 from palpate.core.model.sensor_parameters import CONTACT, FRICTION, READOUT, SENSOR_PARAMETERS, SensorParameters
-
-
-@pytest.fixture
-def settings():
-    bpy.ops.mesh.primitive_plane_add()
-    return bpy.context.object.palpate
 
 
 def test_defaults_are_those_of_the_model(settings):

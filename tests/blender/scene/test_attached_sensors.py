@@ -4,11 +4,11 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import ball, cube, grid, scenario_of
+from blender_scenes import ball, cube, grid, keyframe, play_to, reading_of, scenario_of, scene_of, start_of
 
-from palpate.addon.scene import participants, scene_reader
+from palpate.addon.session import transforms
+from palpate.addon.timeline import live_cache
 from palpate.core.errors import SceneError
-from palpate.core.jobs import run_job
 from palpate.core.solver.simulation import run
 
 
@@ -22,8 +22,7 @@ def on(parent, part):
 
 def box_on_soles(frames=24):
     """A free box of 0.2 kg with two small soles under it stands on a table, tilted poses and scales included."""
-    scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = 1, frames
+    scene = scene_of(frames)
     box = cube("Box", (0.0, 0.0, 0.0), 0.04, rotation=(0.0, 0.0, 0.4))
     box.scale = (1.0, 1.0, 0.5)
     box.palpate.role, box.palpate.body, box.palpate.mass = "TARGET", "FREE", 0.2
@@ -42,7 +41,7 @@ def box_on_soles(frames=24):
 
 def test_two_soles_carry_a_free_box():
     scene, box, soles, _ = box_on_soles()
-    reading = run_job(scene_reader.read_scene(scene))
+    reading = reading_of(scene)
     scenario = reading.scenario
     assert [body.name for body in scenario.bodies] == ["Box", "Table"]
     assert [sensor.body for sensor in scenario.sensors] == [0, 0]
@@ -58,10 +57,8 @@ def test_texels_of_a_part_are_where_blender_shows_them():
     box.location = (0.1, -0.2, 0.3)
     box.rotation_euler = (0.3, 0.5, -0.4)
     bpy.context.view_layer.update()
-    scenario = scene_reader.read_start(scene, participants.depsgraph_of(scene)).scenario
+    scenario = start_of(scene).scenario
     body = scenario.bodies[0].motion
-    from palpate.addon.session import transforms
-
     rotation = transforms.rotation(body.quaternions[0])
     for sensor, sole in zip(scenario.sensors, soles, strict=True):
         there = body.positions[0] + sensor.texels.position @ rotation.T
@@ -74,12 +71,8 @@ def test_a_part_of_something_that_takes_no_part_follows_it():
     target = ball()
     pad.palpate.role, target.palpate.role = "SENSOR", "TARGET"
     on(stick, pad)
-    stick.keyframe_insert("location", frame=1)
-    stick.location.z += 0.01
-    stick.keyframe_insert("location", frame=10)
-    scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = 1, 10
-    scenario = scenario_of(scene)
+    keyframe(stick, "location", {1: stick.location[:], 10: (0.0, 0.0, -0.01)})
+    scenario = scenario_of(scene_of(10))
     assert [body.name for body in scenario.bodies] == ["Pad", "Ball"]
     assert scenario.bodies[0].motion.positions[-1][2] - scenario.bodies[0].motion.positions[0][2] == pytest.approx(0.01)
 
@@ -94,23 +87,16 @@ def test_a_part_never_touches_its_own_body():
 
 def test_a_part_that_moves_on_its_parent_is_refused():
     scene, _, soles, _ = box_on_soles(4)
-    soles[0].keyframe_insert("location", frame=1)
-    soles[0].location.z -= 0.01
-    soles[0].keyframe_insert("location", frame=4)
+    keyframe(soles[0], "location", {1: soles[0].location[:], 4: (-0.012, 0.0, -0.0205)})
     with pytest.raises(SceneError, match="'Sole 0' moves on its parent"):
-        run_job(scene_reader.read_scene(scene))
+        scenario_of(scene)
 
 
-def test_playing_a_free_body_moves_its_parts_and_does_not_start_anew(monkeypatch):
-    from palpate.addon.timeline import live_cache
-
+def test_playing_a_free_body_moves_its_parts_and_does_not_start_anew():
     scene, box, soles, _ = box_on_soles(6)
     box.location.z = 0.005
     scene.frame_set(1)
-    for frame in range(1, 7):
-        scene.frame_set(frame)
-    found = live_cache.get(scene)
-    assert sorted(found.frames) == [1, 2, 3, 4, 5, 6]
+    assert sorted(play_to(scene, 6).frames) == [1, 2, 3, 4, 5, 6]
     scene.frame_set(3)
     assert sorted(live_cache.get(scene).frames) == [1, 2, 3, 4, 5, 6]
     assert box.location.z < 0.005

@@ -4,32 +4,30 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import ball, grid, scenario_of
+from blender_scenes import ball, grid, reading_of, scenario_of, scene_of
 from mathutils import Matrix
 
-from palpate.addon.scene import participants, scene_reader
+from palpate.addon.scene import participants
+from palpate.addon.session import fcurves
 from palpate.core.errors import SceneError
-from palpate.core.jobs import run_job
 from palpate.core.solver.simulation import run
 
 FRAMES = 7
 RISE = 0.003
 
 
-def raise_object(obj):
-    """Move by 3 mm along the world's z between the first and the last frame, at constant speed, and lean by 0.1 rad."""
-    before = obj.matrix_world.copy()
+def raise_object(obj, moved=None, path="matrix_world"):
+    """Move by 3 mm along the world's z between the first and the last frame, at constant speed, and lean by 0.1 rad.
+
+    What moves is the object itself, or a bone of it by its matrix in the object.
+    """
+    moved = moved or obj
+    before = getattr(moved, path).copy()
     for frame in (1, FRAMES):
         share = (frame - 1) / (FRAMES - 1)
-        obj.matrix_world = Matrix.Translation((0, 0, RISE * share)) @ Matrix.Rotation(0.1 * share, 4, "Y") @ before
-        obj.keyframe_insert("location", frame=frame)
-        obj.keyframe_insert("rotation_euler", frame=frame)
-    _straight(obj)
-
-
-def _straight(obj):
-    from palpate.addon.session import fcurves
-
+        setattr(moved, path, Matrix.Translation((0, 0, RISE * share)) @ Matrix.Rotation(0.1 * share, 4, "Y") @ before)
+        moved.keyframe_insert("location", frame=frame)
+        moved.keyframe_insert("rotation_euler", frame=frame)
     for curve in fcurves.of_object(obj):
         for point in curve.keyframe_points:
             point.interpolation = "LINEAR"
@@ -38,10 +36,6 @@ def _straight(obj):
 def empty():
     bpy.ops.object.empty_add()
     return bpy.context.object
-
-
-def keyframed(pad):
-    raise_object(pad)
 
 
 def grandchild(pad):
@@ -66,13 +60,8 @@ def posed_bone(pad):
     pad.parent, pad.parent_type, pad.parent_bone = rig, "BONE", bone.name
     bpy.context.view_layer.update()
     pad.matrix_world = Matrix.Identity(4)
-    rest, bone.rotation_mode = bone.bone.matrix_local.copy(), "XYZ"
-    for frame in (1, FRAMES):
-        share = (frame - 1) / (FRAMES - 1)
-        bone.matrix = Matrix.Translation((0, 0, RISE * share)) @ Matrix.Rotation(0.1 * share, 4, "Y") @ rest
-        bone.keyframe_insert("location", frame=frame)
-        bone.keyframe_insert("rotation_euler", frame=frame)
-    _straight(rig)
+    bone.rotation_mode = "XYZ"
+    raise_object(rig, bone, "matrix")
 
 
 def driven_by_an_expression(pad):
@@ -80,12 +69,11 @@ def driven_by_an_expression(pad):
         pad.driver_add(path, index).driver.expression = f"{rate} * (frame - 1) / {FRAMES - 1}"
 
 
-WAYS = (keyframed, grandchild, constrained, posed_bone, driven_by_an_expression)
+WAYS = (raise_object, grandchild, constrained, posed_bone, driven_by_an_expression)
 
 
 def scene_with(way):
-    scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = 1, FRAMES
+    scene = scene_of(FRAMES)
     pad, target = grid(), ball(location=(0.0, 0.0, 0.031), radius=0.03)
     pad.palpate.role, target.palpate.role = "SENSOR", "TARGET"
     way(pad)
@@ -116,14 +104,14 @@ def test_whatever_moves_a_sensor_gives_the_same_forces(way, reference):
 
 
 def test_free_bodies_with_constraints_are_refused():
-    scene, _ = scene_with(keyframed)
+    scene, _ = scene_with(raise_object)
     free = bpy.data.objects["Ball"]
     free.palpate.body = "FREE"
     free.constraints.new("COPY_LOCATION")
     with pytest.raises(SceneError, match="Free body 'Ball' has constraints"):
-        run_job(scene_reader.read_scene(scene))
+        reading_of(scene)
     free.constraints[0].enabled = False
-    run_job(scene_reader.read_scene(scene))
+    reading_of(scene)
 
 
 def test_motion_is_read_between_frames_where_that_is_asked_for():

@@ -6,30 +6,16 @@ import math
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import press, press_and_drop
+from blender_scenes import keyframe, press, press_and_drop, reading_of, scenario_of, surface
 
-from palpate.addon.scene import mesh_arrays, participants, scene_reader
+from palpate.addon.scene import mesh_arrays, participants
 from palpate.addon.session import transforms
 from palpate.core.errors import SceneError
-from palpate.core.jobs import run_job
-
-
-def sampled(scene):
-    return run_job(scene_reader.read_scene(scene))
 
 
 def world_of(scenario, values, body, frame):
     motion = scenario.bodies[body].motion
     return values @ transforms.rotation(motion.quaternions[frame]).T + motion.positions[frame]
-
-
-def evaluated(obj):
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    final = obj.evaluated_get(depsgraph)
-    mesh = final.to_mesh()
-    points = np.array([final.matrix_world @ vertex.co for vertex in mesh.vertices])
-    final.to_mesh_clear()
-    return points
 
 
 def grow(target, frames):
@@ -38,10 +24,7 @@ def grow(target, frames):
     key = target.shape_key_add(name="Larger")
     for point in key.data:
         point.co *= 1.5
-    key.value = 0.0
-    key.keyframe_insert("value", frame=1)
-    key.value = 1.0
-    key.keyframe_insert("value", frame=frames)
+    keyframe(key, "value", {1: 0.0, frames: 1.0})
 
 
 def wave(target, _frames):
@@ -50,9 +33,7 @@ def wave(target, _frames):
 
 
 def scale(target, frames):
-    target.keyframe_insert("scale", frame=1)
-    target.scale = (1.2, 0.9, 1.4)
-    target.keyframe_insert("scale", frame=frames)
+    keyframe(target, "scale", {1: (1.0, 1.0, 1.0), frames: (1.2, 0.9, 1.4)})
 
 
 def armature(target, frames):
@@ -65,9 +46,7 @@ def armature(target, frames):
     group.add(range(len(target.data.vertices) // 2), 1.0, "REPLACE")
     bone = rig.pose.bones[0]
     bone.rotation_mode = "XYZ"
-    bone.keyframe_insert("rotation_euler", frame=1)
-    bone.rotation_euler = (0.0, 0.3, 0.0)
-    bone.keyframe_insert("rotation_euler", frame=frames)
+    keyframe(bone, "rotation_euler", {1: (0.0, 0.0, 0.0), frames: (0.0, 0.3, 0.0)})
 
 
 @pytest.mark.parametrize("how", [grow, wave, scale, armature])
@@ -75,13 +54,13 @@ def test_targets_are_sampled_as_they_look(how):
     scene, _, target = press(frames=6)
     how(target, 6)
     scene.frame_set(1)
-    scenario = sampled(scene).scenario
+    scenario = scenario_of(scene)
     values = scenario.targets[0].deformation.values
     assert len(values) == 6
     for frame in (1, 3, 6):
         scene.frame_set(frame)
         world = world_of(scenario, values[frame - 1], scenario.targets[0].body, frame - 1)
-        np.testing.assert_allclose(world, evaluated(target), atol=2e-8)
+        np.testing.assert_allclose(world, surface(target), atol=2e-8)
     assert np.abs(values[-1] - values[0]).max() > 1e-4
 
 
@@ -93,7 +72,7 @@ def test_looks_are_the_fingerprints_of_every_frame(how):
     pad.modifiers.new("Bend", "SIMPLE_DEFORM").angle = math.radians(10)
     how(target, 4)  # and stays as it is at frames 5 and 6
     scene.frame_set(1)
-    reading = sampled(scene)
+    reading = reading_of(scene)
     expected = {"Pad": [], "Ball": []}
     for frame in range(1, 7):
         scene.frame_set(frame)
@@ -108,7 +87,7 @@ def test_what_does_not_change_is_rigid():
     target.modifiers.new("More", "SUBSURF")
     target.shape_key_add(name="Basis")
     pad.modifiers.new("Bend", "SIMPLE_DEFORM").angle = math.radians(10)
-    scenario = sampled(scene).scenario
+    scenario = scenario_of(scene)
     assert scenario.targets[0].deformation is None
     assert scenario.sensors[0].deformation is None
 
@@ -119,16 +98,12 @@ def test_a_bending_sensor_carries_its_texels():
     key = pad.shape_key_add(name="Bent")
     for point in key.data:
         point.co.z = -10.0 * point.co.x**2
-    key.value = 0.0
-    key.keyframe_insert("value", frame=1)
-    key.value = 1.0
-    key.keyframe_insert("value", frame=5)
+    keyframe(key, "value", {1: 0.0, 5: 1.0})
     scene.frame_set(1)
-    scenario = sampled(scene).scenario
-    sensor = scenario.sensors[0]
+    sensor = scenario_of(scene).sensors[0]
     frames = sensor.deformation.values
     scene.frame_set(5)
-    np.testing.assert_allclose(frames[-1][:, :3], evaluated(pad)[sensor.texels.vertex], atol=1e-8)
+    np.testing.assert_allclose(frames[-1][:, :3], surface(pad)[sensor.texels.vertex], atol=1e-8)
     np.testing.assert_allclose(np.linalg.norm(frames[-1][:, 3:6], axis=1), 1.0, atol=1e-9)
     np.testing.assert_allclose(np.einsum("ij,ij->i", frames[-1][:, 3:6], frames[-1][:, 6:9]), 0.0, atol=1e-9)
     # The x axes go on pointing along the rows of the grid.
@@ -145,33 +120,29 @@ def test_another_number_of_vertices_is_named_with_its_frame():
     build = target.modifiers.new("Build", "BUILD")
     build.frame_start, build.frame_duration = 0, 10
     with pytest.raises(SceneError, match=r"'Ball' has \d+ vertices at frame 2 and had \d+ at the first"):
-        sampled(scene)
+        reading_of(scene)
 
 
 def test_a_scale_that_turns_it_inside_out_is_named():
     scene, _, target = press(frames=5)
-    target.keyframe_insert("scale", frame=1)
-    target.scale.x = -3.0
-    target.keyframe_insert("scale", frame=5)
+    keyframe(target, "scale", {1: (1.0, 1.0, 1.0), 5: (-3.0, 1.0, 1.0)})
     scene.frame_set(1)
     with pytest.raises(SceneError, match="turns it inside out at frame"):
-        sampled(scene)
+        reading_of(scene)
 
 
 def test_sensors_that_press_are_targets_as_well():
     """tests/core/solver/test_several_sensors.py tells what they feel."""
     scene, pad, _ = press(frames=1)
     pad.palpate.presses = True
-    assert [part.sensor for part in sampled(scene).scenario.targets] == [0, None]
+    assert [part.sensor for part in scenario_of(scene).targets] == [0, None]
 
 
 def test_only_a_free_body_that_does_deform_is_warned_of():
     """A modifier that rounds the edges changes nothing over time, and is nothing to warn of."""
     cube = press_and_drop(frames=4)[-1]
     cube.modifiers.new("Bevel", "BEVEL").width = 1e-3
-    reading = run_job(scene_reader.read_scene(bpy.context.scene))
-    assert not any("deforms" in warning for warning in reading.warnings)
+    assert not any("deforms" in warning for warning in reading_of(bpy.context.scene).warnings)
     wave = cube.modifiers.new("Wave", "WAVE")
     wave.height, wave.speed = 1e-3, 1e-3
-    reading = run_job(scene_reader.read_scene(bpy.context.scene))
-    assert any("deforms while forces move it" in warning for warning in reading.warnings)
+    assert any("deforms while forces move it" in warning for warning in reading_of(bpy.context.scene).warnings)

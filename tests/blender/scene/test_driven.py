@@ -4,12 +4,10 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import baked, cube, grid, save, scenario_of
+from blender_scenes import baked, cube, grid, keyframe, save, scenario_of, scene_of
 
-from palpate.addon.scene import scene_reader
 from palpate.addon.session import frame_status
 from palpate.core.errors import SceneError
-from palpate.core.jobs import run_job
 
 FRICTION = {"k": 1000.0, "cn": 10.0, "sigma0": 2000.0, "sigma1": 20.0, "mus": 0.8, "mud": 0.7}
 
@@ -30,8 +28,7 @@ def finger(name, side, hand):
 
 def gripper(frames=48):
     """Close until frame 24, then lift by 2 cm until frame 40."""
-    scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = 1, frames
+    scene = scene_of(frames)
     scene.palpate.use_auto_dt, scene.palpate.dt = False, 1e-3
     bpy.ops.object.empty_add(location=(0, 0, 0.1))
     hand = bpy.context.object
@@ -44,17 +41,14 @@ def gripper(frames=48):
         setattr(table.palpate, key, value)
     box = cube("Box", (0, 0, 0.0199), size=0.04)
     box.palpate.role, box.palpate.body, box.palpate.mass = "TARGET", "FREE", 0.1
-    hand.keyframe_insert("location", frame=24)
-    hand.location.z = 0.12
-    hand.keyframe_insert("location", frame=40)
+    keyframe(hand, "location", {24: (0.0, 0.0, 0.1), 40: (0.0, 0.0, 0.12)})
     scene.frame_set(1)
     return scene, hand, left, right, box
 
 
 def test_a_gripper_closes_lifts_and_is_keyframed(tmp_path):
     scene, hand, left, right, box = gripper()
-    save(tmp_path)
-    recording = baked(scene).recording
+    recording = baked(scene, tmp_path).recording
     total = recording.sensors["Left"].normal_force.sum(axis=1)
     assert total[23] == pytest.approx(4.0, rel=1e-3)
     assert total[-1] == pytest.approx(4.0, rel=1e-4)
@@ -93,9 +87,7 @@ def test_playing_gives_the_bake_s_numbers(tmp_path):
 def test_targets_are_keyframed_and_axes_belong_to_whom_they_are_said_to():
     scene, hand, left, right, _ = gripper(frames=5)
     hand.rotation_euler = (0.0, 0.0, np.pi / 2)
-    left.palpate.keyframe_insert("drive_force", frame=1)
-    left.palpate.drive_force = 8.0
-    left.palpate.keyframe_insert("drive_force", frame=5)
+    keyframe(left.palpate, "drive_force", {1: 4.0, 5: 8.0})
     scenario = scenario_of(scene)
     body = {b.name: b for b in scenario.bodies}
     values = body["Left"].drive.target.values
@@ -131,4 +123,4 @@ def test_a_driven_body_that_cannot_be_is_refused_in_one_sentence(spoil, says):
     scene, _, left, right, box = gripper(frames=3)
     spoil(left, right, box)
     with pytest.raises(SceneError, match=says):
-        run_job(scene_reader.read_scene(scene))
+        scenario_of(scene)

@@ -4,33 +4,29 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import ball, grid
+from blender_scenes import ball, grid, keyframe, reading_of, scene_of
 
-from palpate.addon.scene import scene_reader
 from palpate.addon.session import fcurves
-from palpate.core.jobs import run_job
 from palpate.core.solver.simulation import run
 
 
 def reading(size=1.0, unit_scale=1.0, away=0.0, interpolation="BEZIER"):
-    """A ball that is pressed 2 mm deep into a pad, `size` times as large, `away` metres from the origin."""
-    scene = bpy.context.scene
+    """In an empty file, a ball pressed 2 mm deep into a pad, `size` times as large, `away` metres from the origin."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    scene = scene_of(9)
     scene.unit_settings.scale_length = unit_scale
     units = size / unit_scale
-    scene.frame_start, scene.frame_end = 1, 9
     place = np.full(3, away / unit_scale / np.sqrt(3.0))
     pad = grid(location=place, size=0.05 * units)
     target = ball(location=place + (0.0, 0.0, 0.01 * units), radius=0.008 * units)
     pad.palpate.role, target.palpate.role = "SENSOR", "TARGET"
     pad.palpate.max_penetration, pad.palpate.x0 = 0.012 * size, 0.3 * size
-    target.keyframe_insert("location", frame=1)
-    target.location = place + np.array((0.001, 0.0005, 0.006)) * units
-    target.keyframe_insert("location", frame=9)
+    keyframe(target, "location", {1: target.location[:], 9: place + np.array((0.001, 0.0005, 0.006)) * units})
     for curve in fcurves.of_object(target):
         for point in curve.keyframe_points:
             point.interpolation = interpolation
     scene.frame_set(1)
-    return run_job(scene_reader.read_scene(scene))
+    return reading_of(scene)
 
 
 def forces(found):
@@ -41,11 +37,9 @@ def forces(found):
 @pytest.mark.parametrize("size", [1e-6, 1e-3, 10.0, 1e3])
 def test_forces_are_the_same_at_every_unit_scale(size):
     """Unit scale, skin and Stribeck velocity are rounded to 24 bits each; depths are a tenth of what is rounded."""
-    expected, found = reading(), None
-    usual = forces(expected)
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    found = reading(size, unit_scale=size)
+    expected, found = reading(), reading(size, unit_scale=size)
     assert expected.warnings == found.warnings == ()
+    usual = forces(expected)
     assert np.abs(forces(found) / size - usual).max() <= 1e-6 * usual.max()
 
 
@@ -60,9 +54,7 @@ def test_keyframes_that_blender_takes_for_equal_are_named():
 
 
 def test_equal_keyframes_and_a_deep_skin_are_not_named():
-    found = reading(1e-5, interpolation="CONSTANT")
-    assert found.warnings == ()
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    assert reading(1e-5, interpolation="CONSTANT").warnings == ()
     assert reading(1e-2).warnings == ()
 
 
@@ -70,7 +62,6 @@ def test_equal_keyframes_and_a_deep_skin_are_not_named():
 def test_a_scene_far_from_the_origin_is_named_before_its_forces_are_wrong(away, least, most):
     """Rounded positions change the depth of a texel by 2⁻²⁴ of the distance, and the steps of a rounded path its damping."""
     usual = forces(reading()).sum(axis=1)
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     found = reading(away=away)
     off = np.abs(forces(found).sum(axis=1) - usual).max() / usual.max()
     assert least < off < most
@@ -78,14 +69,12 @@ def test_a_scene_far_from_the_origin_is_named_before_its_forces_are_wrong(away, 
         assert found.warnings == ()
     else:
         (warning,) = found.warnings
-        assert warning.startswith(
-            "'Ball' is 1 km from the origin, where Blender rounds positions to 0.06 mm and a skin is 12 mm"
-        )
+        words = "'Ball' is 1 km from the origin, where Blender rounds positions to 0.06 mm and a skin is 12 mm"
+        assert warning.startswith(words)
 
 
 def test_the_distance_that_is_warned_of_follows_the_skin():
     """The same scene in a thousandth of the size is named a thousand times nearer."""
     assert reading(1e-3, away=0.1).warnings == ()
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     (warning,) = reading(1e-3, away=1.0).warnings
     assert "from the origin" in warning

@@ -71,9 +71,8 @@ def test_an_extension_opens_the_same_door(tmp_path, repository):
         "print(pp.Sensor.grid(2, 3, 1e-3), pp.Body.box(0.01), pp.PalpateError.__module__)\n"
         "assert 'palpate' not in sys.modules"
     )
-    run = subprocess.run(
-        [sys.executable, "-P", "-c", code], cwd=tmp_path, env={"PYTHONPATH": str(tmp_path)}, capture_output=True, text=True
-    )
+    command = [sys.executable, "-P", "-c", code]
+    run = subprocess.run(command, cwd=tmp_path, env={"PYTHONPATH": str(tmp_path)}, capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
     assert run.stdout.startswith("<Sensor 'pad': 2 × 3 texels, k 58.5 N/m> <Body 'box': 10 × 10 × 10 mm, fixed>")
     assert run.stdout.strip().endswith("bl_ext.user_default.palpate.core.errors")

@@ -12,8 +12,9 @@ import time
 import bpy
 import numpy as np
 import pytest
+from blender_scenes import baked, ball, grid
 
-from palpate.addon.bake import bake as baking
+from palpate.addon.bake.bake import bake
 from palpate.addon.session import first_use, frame_status
 from palpate.addon.timeline import live_cache, playback
 from palpate.core.compiled import kernels
@@ -40,12 +41,15 @@ def window(monkeypatch, tmp_path):
 
 
 def make_sensor():
-    bpy.ops.mesh.primitive_grid_add(x_subdivisions=4, y_subdivisions=4, size=0.02)
-    pad = bpy.context.object
-    pad.palpate.role = "SENSOR"
-    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.01, location=(0, 0, 0.009))
-    bpy.context.object.palpate.role = "TARGET"
-    return pad
+    grid(columns=5, rows=5, size=0.02).palpate.role = "SENSOR"
+    ball(location=(0.0, 0.0, 0.009), radius=0.01, segments=32).palpate.role = "TARGET"
+    return bpy.context.scene
+
+
+def scene_to_bake(folder):
+    scene = make_sensor()
+    scene.palpate.folder, scene.frame_end = str(folder), 3
+    return scene
 
 
 def is_gone(process):
@@ -80,8 +84,7 @@ def test_it_is_started_once(window):
 
 def test_a_small_scene_plays_at_once_and_changes_over_when_the_solver_is_compiled(window):
     """The frames are the same, bit by bit, as those of compiled kernels alone."""
-    make_sensor()
-    scene = bpy.context.scene
+    scene = make_sensor()
     for frame in (1, 2, 3):
         scene.frame_set(frame)
         assert frame_status.status_of(scene).frame is not None, frame
@@ -101,8 +104,7 @@ def test_a_small_scene_plays_at_once_and_changes_over_when_the_solver_is_compile
 
 def test_a_large_scene_waits_and_goes_on_when_the_solver_is_compiled(window, monkeypatch):
     monkeypatch.setattr(first_use, "MAX_FRAME", 0.0)
-    make_sensor()
-    scene = bpy.context.scene
+    scene = make_sensor()
     scene.frame_set(2)
     assert "solver is compiled" in frame_status.status_of(scene).text
     assert not playback._errors and first_use.STAGE in first_use.progress().text
@@ -113,32 +115,26 @@ def test_a_large_scene_waits_and_goes_on_when_the_solver_is_compiled(window, mon
 
 
 def test_a_small_bake_does_not_wait(window, tmp_path):
-    make_sensor()
-    scene = bpy.context.scene
-    scene.palpate.folder = str(tmp_path / "bake")
-    scene.frame_end = 3
-    run_job(baking.bake(scene))
+    scene = scene_to_bake(tmp_path / "bake")
+    baked(scene)
     assert kernels.are_interpreted() and first_use.progress() is not None
     slowly = {path.relative_to(tmp_path / "bake"): path.read_bytes() for path in (tmp_path / "bake").rglob("tactile_*.exr")}
     precompile.completion_file().touch()
-    run_job(baking.bake(scene))
+    baked(scene)
     assert not kernels.are_interpreted()
     assert len(slowly) == 3 and all((tmp_path / "bake" / path).read_bytes() == content for path, content in slowly.items())
 
 
 def test_a_large_bake_waits_with_progress_and_can_be_stopped(window, monkeypatch, tmp_path):
     monkeypatch.setattr(first_use, "MAX_FRAME", 0.0)
-    make_sensor()
-    scene = bpy.context.scene
-    scene.palpate.folder = str(tmp_path / "bake")
-    scene.frame_end = 3
-    job = baking.bake(scene)
+    scene = scene_to_bake(tmp_path / "bake")
+    job = bake(scene)
     steps = [next(job) for _ in range(8)]
     assert [step.text for step in steps[:3]] == [f"Reading the scene: frame {i}" for i in (1, 2, 3)]
     assert all(step.text.startswith(first_use.STAGE) for step in steps[3:])
     job.close()
     assert not (tmp_path / "bake").exists()
-    job = baking.bake(scene)
+    job = bake(scene)
     for step in job:
         if step.stage.startswith(first_use.STAGE):
             precompile.completion_file().touch()

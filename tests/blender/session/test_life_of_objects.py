@@ -5,31 +5,18 @@ renamed. The sensor stays right, or says what to do."""
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import ball, grid, press, reopen, save, scenario_of, select
+from blender_scenes import ball, choose, grid, press, problems_of, reopen, report_of, save, scenario_of, select
 
-from palpate.addon.authoring import sensor_report
 from palpate.addon.session import identity, transforms
 from palpate.commands import main
 from palpate.core.io.recording_npz import load_recording
 from palpate.core.solver.simulation import run
 
 
-def forces(scene=None):
+def forces():
     """Sum of the normal forces of every sensor at the last frame."""
-    scene = scene or bpy.context.scene
-    recording = run(scenario_of(scene))
+    recording = run(scenario_of(bpy.context.scene))
     return {name: float(felt.normal_force[-1].sum()) for name, felt in recording.sensors.items()}
-
-
-def choose(*objects):
-    for obj in bpy.context.scene.objects:
-        obj.select_set(obj in objects)
-    bpy.context.view_layer.objects.active = objects[-1]
-
-
-def kinds(obj):
-    bpy.context.view_layer.update()
-    return [problem.kind for problem in sensor_report.fresh_report(obj, bpy.context.scene).problems]
 
 
 @pytest.mark.parametrize("linked", [False, True])
@@ -80,8 +67,7 @@ def test_mirrored_upside_down_it_faces_down():
     """As Blender shows it: a negative scale along the normal turns the normal around."""
     scene, pad, _ = press(4)
     pad.scale.z = -1.0
-    bpy.context.view_layer.update()
-    texels = sensor_report.fresh_report(pad, scene).texels
+    texels = report_of(pad).texels
     frame = transforms.rotation(transforms.decompose(np.array(pad.matrix_world, float))[1])
     assert texels.normal @ frame.T == pytest.approx(np.tile([0, 0, -1.0], (84, 1)), abs=1e-6)
 
@@ -96,8 +82,7 @@ def test_joined_by_region():
         bpy.ops.palpate.sensor_add(source="SELECTION")
     choose(other, pad)
     bpy.ops.object.join()
-    assert len(sensor_report.fresh_report(pad, scene).texels) == 24
-    assert kinds(pad) == []
+    assert len(report_of(pad).texels) == 24 and problems_of(pad) == []
 
 
 def test_separated():
@@ -115,7 +100,9 @@ def test_separated():
     assert len(parts) == 2
     assert {obj.palpate.k for obj in parts} == {99.0}
     assert len({identity.key(obj) for obj in parts if identity.ensure_uid(obj) is None}) == 2
-    assert all("GROWN" in kinds(obj) for obj in parts)  # fewer vertices than were made a sensor: said, one click accepts it
+    assert all(
+        "GROWN" in problems_of(obj) for obj in parts
+    )  # fewer vertices than were made a sensor: said, one click accepts it
     assert set(forces()) == {obj.name for obj in parts}
 
 
@@ -146,13 +133,12 @@ def test_appended_and_linked(tmp_path, link):
         assert bpy.ops.palpate.sensor_add(source="MESH") == {"FINISHED"}
 
 
-def test_linked_it_is_baked_into_files_alone(tmp_path, capfd):
+def test_linked_it_is_baked_into_files_alone(tmp_path, refused):
     """What is linked cannot hold heat maps and keyframes; the command line needs none where it does not save."""
     _, expected = _library(tmp_path)
     (tmp_path / "scene").mkdir()
     scene = str(save(tmp_path / "scene", "links.blend"))
-    assert main(["bake", scene, "--save"]) == 1
-    assert "'Pad' is linked from another file" in capfd.readouterr().err
+    assert "'Pad' is linked from another file" in refused("bake", scene, "--save")
     assert main(["bake", scene]) == 0
     felt = load_recording(tmp_path / "scene" / "palpate-bake" / "Pad" / "recording.npz").sensors["Pad"]
     assert felt.normal_force[-1].sum() == pytest.approx(expected["Pad"], rel=0.02)
@@ -163,8 +149,7 @@ def test_overridden(tmp_path):
     pad = pad.override_create(remap_local_usages=True)
     pad.palpate.k = 176.0
     bpy.context.view_layer.update()
-    felt = forces()
-    assert felt[pad.name] == pytest.approx(2 * expected["Pad"], rel=0.02)
+    assert forces()[pad.name] == pytest.approx(2 * expected["Pad"], rel=0.02)
     path = save(tmp_path, "override.blend")
     reopen(path)
     local = next(obj for obj in bpy.data.objects if obj.override_library is not None and obj.name == "Pad")
