@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import baked, changes, dump, press, press_and_drop, reopen, save
+from blender_scenes import baked, baked_file, changes, dump, play_to, press, press_and_drop, reopen, save
 
 from palpate.addon.bake.bake import bake
 from palpate.addon.scene import stored_names
@@ -22,6 +22,11 @@ def play(scene, *frames):
         scene.frame_set(frame)
 
 
+def forces_of(run):
+    """The forces of one sensor as bytes, by their frames."""
+    return {number: frame.sensors["Pad"].normal_force.tobytes() for number, frame in run.frames.items()}
+
+
 def shown_force(obj):
     attribute = obj.data.attributes.get(stored_names.FORCE)
     if attribute is None:
@@ -33,11 +38,9 @@ def shown_force(obj):
 
 def test_playing_gives_the_numbers_of_a_bake(tmp_path):
     scene, *_ = press_and_drop(frames=8)
-    play(scene, *range(1, 9))
-    frames = dict(live_cache.get(scene).frames)
+    frames = dict(play_to(scene, 8).frames)
     assert sorted(frames) == list(range(1, 9))
-    save(tmp_path)
-    recording = baked(scene).recording
+    recording = baked(scene, tmp_path).recording
     for number, frame in frames.items():
         expected = recording.at(number)
         assert frame.poses.tobytes() == expected.poses.tobytes()
@@ -127,8 +130,7 @@ def test_sub_frames_loops_steps_and_handlers_off_give_the_same_pictures(tmp_path
     play(scene, *range(1, 9))
     played = watched(scene, free, moments)
     bpy.ops.palpate.reset()
-    save(tmp_path)
-    baked(scene)
+    baked(scene, tmp_path)
     shown = watched(scene, free, moments)
     assert played == pytest.approx(shown, abs=1e-6)
     playback.forget()
@@ -144,8 +146,7 @@ def test_sub_frames_loops_steps_and_handlers_off_give_the_same_pictures(tmp_path
 def test_time_stretching_shows_the_same_bake_slower(tmp_path):
     """Twice as slow: frame 2 n of the timeline is frame n of the animation, for bodies, images and numbers alike."""
     scene, pad, _, _, free = press_and_drop(frames=8)
-    save(tmp_path)
-    plain = baked(scene).recording
+    plain = baked(scene, tmp_path).recording
     at_speed = watched(scene, free, [(number, 0.0) for number in range(1, 9)])
     bpy.ops.palpate.bake_clear()
     scene.render.frame_map_old, scene.render.frame_map_new = 100, 200
@@ -190,14 +191,13 @@ def test_a_pose_that_is_not_keyframed_reaches_no_later_frame(is_known):
     """The animation puts the ball back as soon as another frame is shown; before, frame 1 kept it in the pad."""
     scene, _, target = press(frames=8)
     play(scene, *range(1, 9), 1)
-    expected = {number: frame.sensors["Pad"].normal_force.tobytes() for number, frame in live_cache.get(scene).frames.items()}
+    expected = forces_of(live_cache.get(scene))
     if not is_known:
         live_cache.drop_all()
     target.location.z = 0.005
     bpy.context.view_layer.update()
     play(scene, *range(2, 9))
-    found = {number: frame.sensors["Pad"].normal_force.tobytes() for number, frame in live_cache.get(scene).frames.items()}
-    assert found == expected
+    assert forces_of(live_cache.get(scene)) == expected
 
 
 def test_a_free_body_moved_at_the_first_frame_starts_there():
@@ -352,8 +352,7 @@ def test_the_numbers_of_a_bake_follow_a_file_saved_elsewhere(tmp_path):
     (tmp_path / "here").mkdir()
     (tmp_path / "there").mkdir()
     scene, *_ = press(frames=4)
-    save(tmp_path / "here")
-    felt = baked(scene).recording.sensors["Pad"]
+    felt = baked(scene, tmp_path / "here").recording.sensors["Pad"]
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "there" / "scene.blend"), relative_remap=True)
     scene = reopen(tmp_path / "there" / "scene.blend")
     play(scene, 3)
@@ -386,8 +385,7 @@ def test_rendering_never_simulates(tmp_path, capfd):
     render.use_lock_interface, scene.frame_end = True, 2
     bpy.ops.render.render(animation=True)  # computed frames
     assert not session_state.session.render_note
-    save(tmp_path)
-    baked(scene)
+    baked(scene, tmp_path)
     scene.frame_end = 4
     bpy.ops.render.render(animation=True)
     assert not session_state.session.render_note
@@ -395,27 +393,18 @@ def test_rendering_never_simulates(tmp_path, capfd):
 
 def test_a_baked_scene_is_not_simulated_again(tmp_path):
     scene, pad, *_ = press_and_drop(frames=4)
-    save(tmp_path)
-    recording = baked(scene).recording
-    path = save(tmp_path)
-    play(scene, 1, 2, 3)
-    assert live_cache.get(scene) is None
-    assert (
-        frame_status.status_of(scene).frame.sensors["Pad"].normal_force.tolist()
-        == recording.sensors["Pad"].normal_force[2].tolist()
-    )
+    path, result = baked_file(scene, tmp_path)
+    felt = result.recording.sensors["Pad"].normal_force
+    assert play_to(scene, 3) is None
+    assert frame_status.status_of(scene).frame.sensors["Pad"].normal_force.tolist() == felt[2].tolist()
     scene = reopen(path)
     play(scene, 4)
-    assert (
-        frame_status.status_of(scene).frame.sensors["Pad"].normal_force.tolist()
-        == recording.sensors["Pad"].normal_force[3].tolist()
-    )
+    assert frame_status.status_of(scene).frame.sensors["Pad"].normal_force.tolist() == felt[3].tolist()
     play(scene, 9)
     assert frame_status.status_of(scene).frame is None
 
 
-def test_a_scene_without_roles_costs_nothing(monkeypatch):
-    scene = bpy.context.scene
+def test_a_scene_without_roles_costs_nothing(scene, monkeypatch):
     scene.frame_set(1)
     monkeypatch.setattr(playback.baked_scene, "baked_objects", lambda scene: pytest.fail("looked at objects"))
     play(scene, 2, 3)

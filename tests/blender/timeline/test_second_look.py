@@ -4,7 +4,8 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import baked, press, press_and_drop, save
+from blender_scenes import baked, choose, keyframe, play_to, press, press_and_drop
+from mathutils import Vector
 
 from palpate.addon.authoring import sensor_report
 from palpate.addon.display import overlays
@@ -20,16 +21,10 @@ def forget(monkeypatch):
     second_look.stop()
 
 
-def play_to(scene, last):
-    for frame in range(1, last + 1):
-        scene.frame_set(frame)
-
-
 def test_a_bake_is_out_of_date_at_once(tmp_path):
     """After any change of those in test_staleness.py."""
     scene, pad, target = press(frames=4)
-    save(tmp_path)
-    baked(scene)
+    baked(scene, tmp_path)
     scene.frame_set(2)
     second_look.look_again(scene)
     assert frame_status.status_of(scene).text == "Frame 2 of the bake."
@@ -40,8 +35,7 @@ def test_a_bake_is_out_of_date_at_once(tmp_path):
 
 def test_a_renamed_sensor_takes_numbers_and_arrows_along(tmp_path):
     scene, pad, _ = press(frames=4)
-    save(tmp_path)
-    baked(scene)
+    baked(scene, tmp_path)
     scene.frame_set(4)
     for name in ("Skin", "Palm"):
         pad.name = name
@@ -58,12 +52,9 @@ def test_a_renamed_sensor_takes_numbers_and_arrows_along(tmp_path):
 @pytest.mark.parametrize("is_reported_first", [False, True], ids=["", "its report comes first"])
 def test_a_duplicate_of_a_baked_sensor_is_not_baked(tmp_path, linked, is_reported_first):
     scene, pad, _ = press(frames=4)
-    save(tmp_path)
-    baked(scene)
+    baked(scene, tmp_path)
     scene.frame_set(4)
-    for obj in scene.objects:
-        obj.select_set(obj == pad)
-    bpy.context.view_layer.objects.active = pad
+    choose(pad)
     shown = [slot.material for slot in pad.material_slots]
     assert any(shown)
     bpy.ops.object.duplicate(linked=linked)
@@ -83,8 +74,7 @@ def test_a_duplicate_of_a_baked_sensor_is_not_baked(tmp_path, linked, is_reporte
 def test_a_baked_file_that_was_opened_shows_its_numbers_and_warnings_at_once(tmp_path):
     scene, pad, _ = press(frames=8)
     pad.palpate.max_penetration = 0.0003
-    save(tmp_path)
-    baked(scene)
+    baked(scene, tmp_path)
     scene.frame_set(2)
     assert "maximum penetration" in frame_status.status_of(scene).warnings
     bpy.ops.wm.save_mainfile()
@@ -161,8 +151,7 @@ def test_what_is_moved_with_a_keyframe_or_has_none_is_computed_again(is_keyframe
     play_to(scene, 5)
     before = frame_status.status_of(scene).frame.sensors["Pad"].normal_force.sum()
     if is_keyframed:
-        target.location.z -= 1e-3
-        target.keyframe_insert("location", frame=5)
+        keyframe(target, "location", {5: target.location - Vector((0.0, 0.0, 1e-3))})
     else:
         pad.location.z += 1e-3
     bpy.context.view_layer.update()
@@ -205,8 +194,7 @@ def test_the_first_stroke_puts_what_is_shown_out_of_date():
     group.add(list(range(84)), 1.0, "REPLACE")
     pad.palpate.region, pad.palpate.vertex_group = "GROUP", "Texels"
     bpy.context.view_layer.objects.active = pad
-    for frame in range(1, 5):
-        scene.frame_set(frame)
+    play_to(scene, 4)
     bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
     second_look.note_edit(scene, pad)
     assert frame_status.status_of(scene).frame is not None  # entering a mode changes nothing
@@ -227,8 +215,7 @@ def test_the_first_stroke_puts_what_is_shown_out_of_date():
 
 def test_another_quantity_is_shown_at_once(monkeypatch):
     scene, *_ = press(frames=4)
-    for frame in range(1, 5):
-        scene.frame_set(frame)
+    play_to(scene, 4)
     shown = []
     monkeypatch.setattr(overlays, "show", lambda scene, run, frame: shown.append((scene.palpate.quantity, frame.frame)))
     overlays._shown[scene.session_uid] = overlays._settings_of(scene)

@@ -4,12 +4,9 @@
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import ball, press, press_and_drop, reopen, save
+from blender_scenes import baked, baked_file, ball, keyframe, play_to, press, press_and_drop, reopen, save
 
-from palpate.addon.bake.bake import bake
-from palpate.addon.session import frame_status
-from palpate.addon.timeline import live_cache
-from palpate.core.jobs import run_job
+from palpate.addon.session import fcurves, frame_status
 
 FRESH, STALE = "Frame {} of the bake.", "The scene has changed since this bake. Bake again."
 
@@ -21,30 +18,24 @@ def bent(scene, target):
     key = target.shape_key_add(name="Bump")
     for i in range(0, len(key.data), 3):
         key.data[i].co *= 1.05
-    key.value = 0.0
-    key.keyframe_insert("value", frame=1)
-    key.value = 0.5
-    key.keyframe_insert("value", frame=6)
+    keyframe(key, "value", {1: 0.0, 6: 0.5})
     scene.frame_set(1)
 
 
 @pytest.fixture(scope="module")
 def bent_blend(blender, tmp_path_factory):
     """A scene with a ball that bends and a pad with a modifier that keeps its vertices, baked and saved."""
-    folder = tmp_path_factory.mktemp("bent")
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     scene, pad, target = press(frames=6)
     bent(scene, target)
     pad.modifiers.new("Wave", "CAST").factor = 0.0
     scene.collection.objects.link(bpy.data.objects.new("Arm", None))
     target.parent = bpy.data.objects["Arm"]
-    save(folder)
-    run_job(bake(scene))
-    return save(folder)
+    return baked_file(scene, tmp_path_factory.mktemp("bent"))[0]
 
 
 @pytest.fixture
-def baked(bent_blend):
+def shown(bent_blend):
     return reopen(bent_blend)
 
 
@@ -56,23 +47,18 @@ def texts(scene, frames):
     return found
 
 
-def test_nothing_changed_is_fresh_at_every_frame(baked):
+def test_nothing_changed_is_fresh_at_every_frame(shown):
     frames = (1, 2, 3, 4, 5, 6, 4, 2, 1)
-    assert texts(baked, frames) == [FRESH.format(frame) for frame in frames]
-    baked.frame_set(3, subframe=0.5)
-    assert frame_status.status_of(baked).text == FRESH.format(3)
+    assert texts(shown, frames) == [FRESH.format(frame) for frame in frames]
+    shown.frame_set(3, subframe=0.5)
+    assert frame_status.status_of(shown).text == FRESH.format(3)
 
 
-def curves_of(obj):
-    from palpate.addon.session import fcurves
-
-    return fcurves.of_object(obj)
-
-
-def bow(curve):
-    """Leave the curve's values at whole frames far from its middle alone, nearly: an ease that starts differently."""
-    for point in curve.keyframe_points:
-        point.interpolation = "QUAD"
+def bow(obj):
+    """Leave the values at whole frames far from the middle of a curve alone, nearly: an ease that starts differently."""
+    for curve in fcurves.of_object(obj):
+        for point in curve.keyframe_points:
+            point.interpolation = "QUAD"
 
 
 CHANGES = {
@@ -89,7 +75,7 @@ CHANGES = {
     "shape key": lambda pad, ball: setattr(ball.data.shape_keys.key_blocks["Bump"].data[0], "co", (0.0, 0.0, 0.01)),
     "scale": lambda pad, ball: setattr(ball, "scale", (1.0, 1.0, 1.01)),
     "scale of a parent": lambda pad, ball: setattr(ball.parent, "scale", (1.01, 1.01, 1.01)),
-    "interpolation": lambda pad, ball: [bow(curve) for curve in curves_of(ball)],
+    "interpolation": lambda pad, ball: bow(ball),
     "key in between": lambda pad, ball: ball.keyframe_insert("location", frame=2.5),
     "samples per frame": lambda pad, ball: setattr(bpy.context.scene.palpate, "subframes", 4),
     "effect": lambda pad, ball: bpy.ops.palpate.effect_add(effect="offset"),
@@ -97,36 +83,36 @@ CHANGES = {
 
 
 @pytest.mark.parametrize("change", CHANGES)
-def test_a_change_is_noticed_at_whatever_frame_is_shown_next(baked, change):
+def test_a_change_is_noticed_at_whatever_frame_is_shown_next(shown, change):
     pad, target = bpy.data.objects["Pad"], bpy.data.objects["Ball"]
     bpy.context.view_layer.objects.active = pad
-    baked.frame_set(4)
+    shown.frame_set(4)
     CHANGES[change](pad, target)
     bpy.context.view_layer.update()
-    assert texts(baked, [5, 2]) == [STALE, STALE]
-    assert frame_status.status_of(baked).frame is not None  # it is still shown
+    assert texts(shown, [5, 2]) == [STALE, STALE]
+    assert frame_status.status_of(shown).frame is not None  # it is still shown
 
 
 @pytest.mark.parametrize("renamed", ["Pad", "Ball"])
-def test_a_new_name_alone_leaves_a_bake_fresh(baked, renamed, bent_blend):
+def test_a_new_name_alone_leaves_a_bake_fresh(shown, renamed, bent_blend):
     bpy.data.objects[renamed].name = "Renamed"
-    assert texts(baked, [2, 5]) == [FRESH.format(2), FRESH.format(5)]
-    baked = reopen(save(bent_blend.parent, f"{renamed}.blend"))
-    assert texts(baked, [3]) == [FRESH.format(3)]
+    assert texts(shown, [2, 5]) == [FRESH.format(2), FRESH.format(5)]
+    shown = reopen(save(bent_blend.parent, f"{renamed}.blend"))
+    assert texts(shown, [3]) == [FRESH.format(3)]
     bpy.data.objects["Arm"].scale = (1.01, 1.01, 1.01)
     bpy.context.view_layer.update()
-    assert texts(baked, [4]) == [STALE]  # the renamed object is still watched
+    assert texts(shown, [4]) == [STALE]  # the renamed object is still watched
 
 
-def test_a_duplicate_with_the_old_name_makes_a_bake_out_of_date_until_it_is_deleted(baked):
+def test_a_duplicate_with_the_old_name_makes_a_bake_out_of_date_until_it_is_deleted(shown):
     target = bpy.data.objects["Ball"]
     copy = target.copy()
-    baked.collection.objects.link(copy)
+    shown.collection.objects.link(copy)
     target.name, copy.name = "Old", "Ball"
     bpy.context.view_layer.update()
-    assert texts(baked, [3]) == [STALE]
+    assert texts(shown, [3]) == [STALE]
     bpy.data.objects.remove(copy)
-    assert texts(baked, [4]) == [FRESH.format(4)]
+    assert texts(shown, [4]) == [FRESH.format(4)]
 
 
 def keyed(owner, path, index=-1):
@@ -138,7 +124,6 @@ def keyed(owner, path, index=-1):
 @pytest.fixture(scope="module")
 def hung_blend(blender, tmp_path_factory):
     """A baked scene whose ball hangs on others, all of which have keyframes and stay where they are."""
-    folder = tmp_path_factory.mktemp("hung")
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     scene, pad, target, *_ = press_and_drop(frames=8)
     others = {name: bpy.data.objects.new(name, None) for name in ("Leader", "Source", "Far", "Strips", "Nodes")}
@@ -176,9 +161,7 @@ def hung_blend(blender, tmp_path_factory):
     else:
         modifier[socket] = others["Nodes"]
     scene.frame_set(1)
-    save(folder)
-    run_job(bake(scene))
-    return save(folder)
+    return baked_file(scene, tmp_path_factory.mktemp("hung"))[0]
 
 
 @pytest.fixture
@@ -188,14 +171,14 @@ def hung(hung_blend):
 
 def moved_at_4(owner):
     """Change what keyframes say at frame 4, and nowhere else but around it."""
-    curve = curves_of(owner)[0]
+    curve = fcurves.of_object(owner)[0]
     point = next(point for point in curve.keyframe_points if round(point.co.x) == 4)
     point.co.y += 0.001
     curve.update()
 
 
 def shaken():
-    modifier = curves_of(bpy.data.objects["Ball"])[0].modifiers.new("NOISE")
+    modifier = fcurves.of_object(bpy.data.objects["Ball"])[0].modifiers.new("NOISE")
     modifier.use_restricted_range, modifier.frame_start, modifier.frame_end = True, 3.0, 5.0
 
 
@@ -227,8 +210,7 @@ def test_a_target_that_is_a_curve_is_watched(tmp_path):
     bpy.ops.curve.primitive_bezier_circle_add(radius=0.005, location=(0.01, 0.0, 0.002))
     ring = bpy.context.object
     ring.data.bevel_depth, ring.palpate.role = 0.002, "TARGET"
-    save(tmp_path)
-    run_job(bake(scene))
+    baked(scene, tmp_path)
     assert texts(scene, [1, 2]) == [FRESH.format(1), FRESH.format(2)]
     ring.data.bevel_depth = 0.003
     bpy.context.view_layer.update()
@@ -244,22 +226,18 @@ def test_playing_reads_between_frames_as_a_bake_does(tmp_path, stretched, bends)
     arm = bpy.data.objects.new("Arm", None)
     scene.collection.objects.link(arm)
     extra.parent = arm
-    for frame, angle in ((1, 0.0), (6, 6.0)):
-        arm.rotation_euler.z = angle
-        arm.keyframe_insert("rotation_euler", frame=frame)
+    keyframe(arm, "rotation_euler", {1: (0.0, 0.0, 0.0), 6: (0.0, 0.0, 6.0)})
     if bends:
         bent(scene, target)
     scene.palpate.subframes, scene.palpate.interpolation = 3, "SMOOTH"
     if stretched:
         scene.render.frame_map_old, scene.render.frame_map_new = 100, 200
     scene.frame_set(1)
-    for frame in range(1, 13 if stretched else 7):
-        scene.frame_set(frame)
-    assert scene.frame_current == frame and scene.frame_subframe == 0.0
-    played = dict(live_cache.get(scene).frames)
+    last = 12 if stretched else 6
+    played = dict(play_to(scene, last).frames)
+    assert scene.frame_current == last and scene.frame_subframe == 0.0
     bpy.ops.palpate.reset()
-    save(tmp_path)
-    recording = run_job(bake(scene)).recording
+    recording = baked(scene, tmp_path).recording
     felt = recording.sensors["Pad"].normal_force
     assert felt[-1].max() > 0
     for number in range(2 if stretched else 1, 7):
