@@ -2,18 +2,15 @@
 """Studies whose runs read the scene again: each run is what the scene gives when the property is set by hand."""
 
 import json
-import subprocess
-import sys
 
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import press, save
+from blender_scenes import press, save, scenario_of
+from processes import palpate
 
-from palpate.addon.scene import scene_reader
 from palpate.core.errors import PalpateError
 from palpate.core.io.recording_npz import load_recording
-from palpate.core.jobs import run_job
 from palpate.core.solver.simulation import run
 from palpate.core.study.variation import varied_scenario
 from palpate.sweep.study_folder import open_study, resume_study
@@ -46,10 +43,9 @@ def computed(opened):
 def test_a_run_is_what_the_scene_gives_with_these_values(tmp_path):
     opened = begun(tmp_path)
     assert computed(opened).done == 4
-    scene = bpy.context.scene
     for one in opened.runs:
         bpy.data.objects["Ball"].scale[2] = one.values[SCALE]
-        scenario = run_job(scene_reader.read_scene(scene)).scenario
+        scenario = scenario_of(bpy.context.scene)
         expected = run(varied_scenario(scenario, {"Pad.k": one.values["Pad.k"]})).sensors["Pad"]
         found = load_recording(opened.folder / "runs" / one.digest / "Pad" / "recording.npz").sensors["Pad"]
         np.testing.assert_array_equal(found.normal_force, expected.normal_force)
@@ -65,8 +61,7 @@ def test_a_run_that_the_scene_cannot_make_fails_alone(tmp_path):
     found = computed(opened)
     ((index, sentence),) = found.failures
     assert (found.done, index) == (1, 0)
-    assert "'Ball'" in sentence
-    assert "\n" not in sentence
+    assert "'Ball'" in sentence and "\n" not in sentence
 
 
 @pytest.mark.slow("opens a scene in processes of their own")
@@ -82,13 +77,13 @@ def test_mistakes_are_found_before_anything_is_computed(tmp_path):
 def test_the_dry_run_says_why_blender_is_needed_and_a_changed_scene_is_refused(tmp_path):
     pytest.importorskip("distributed")
     begun(tmp_path)
-    command = [sys.executable, "-m", "palpate.commands", "sweep", str(tmp_path / "study.toml"), "--out", str(tmp_path / "out")]
-    said = subprocess.run([*command, "--dry-run"], capture_output=True, text=True, check=False)
+    words = ["sweep", tmp_path / "study.toml", "--out", tmp_path / "out"]
+    said = palpate(*words, "--dry-run")
     assert (said.returncode, said.stderr) == (0, "")
     assert f"each run reads the scene in a Blender of its own, because it sets {SCALE}" in said.stdout
     bpy.data.objects["Ball"].scale[0] = 1.5
     save(tmp_path)
-    refused = subprocess.run(command, capture_output=True, text=True, check=False)
+    refused = palpate(*words)
     assert refused.returncode == 1
     assert "scene.blend' has changed since the study" in refused.stderr
 
@@ -97,13 +92,11 @@ def test_a_bake_takes_the_same_values_from_a_file(tmp_path):
     press()
     save(tmp_path)
     (tmp_path / "o.toml").write_text(f"format = \"palpate-overrides/1\"\n[overrides]\n'{SCALE}' = 1.2\n", encoding="utf-8")
-    words = ["bake", tmp_path / "scene.blend", "--overrides", tmp_path / "o.toml", "--no-images", "--out", tmp_path / "bake"]
-    done = subprocess.run(
-        [sys.executable, "-m", "palpate.commands", *map(str, words)], capture_output=True, text=True, check=False
-    )
+    words = ["--overrides", tmp_path / "o.toml", "--no-images", "--out", tmp_path / "bake"]
+    done = palpate("bake", tmp_path / "scene.blend", *words)
     assert done.returncode == 0, done.stderr
     bpy.data.objects["Ball"].scale[2] = 1.2
-    expected = run(run_job(scene_reader.read_scene(bpy.context.scene)).scenario)
+    expected = run(scenario_of(bpy.context.scene))
     found = load_recording(tmp_path / "bake" / "Pad" / "recording.npz")
     np.testing.assert_array_equal(found.sensors["Pad"].normal_force, expected.sensors["Pad"].normal_force)
     assert json.loads((tmp_path / "bake" / "Pad" / "manifest.json").read_text())["digest"] == expected.digest
