@@ -4,12 +4,11 @@
 import ast
 import importlib.util
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import bpy
 import pytest
+from processes import python
 
 import palpate
 from palpate.addon.properties import registration
@@ -21,6 +20,10 @@ def kinds_of(base):
     for kind in base.__subclasses__():
         yield kind
         yield from kinds_of(kind)
+
+
+def own_kinds(base):
+    return [kind for kind in kinds_of(base) if kind.__module__.startswith("palpate.")]
 
 
 def traces() -> dict:
@@ -129,34 +132,27 @@ def test_a_failure_while_registering_is_seen_and_leaves_nothing(commands, monkey
     monkeypatch.undo()
 
 
-def test_enabling_imports_nothing_heavy():
+def test_enabling_imports_nothing_heavy_and_a_process_that_forgets_to_disable_still_ends():
+    """Blender 4.5 as a module hangs at exit when classes are registered."""
     code = (
-        "import sys, bpy, palpate; palpate.register(); palpate.unregister();"
-        "print(*sorted({name.partition('.')[0] for name in sys.modules}))"
+        "import sys, bpy, palpate; palpate.register(); palpate.unregister(); palpate.register();"
+        "print(*sorted({name.partition('.')[0] for name in sys.modules}), flush=True);"
+        "bpy.ops.wm.read_factory_settings(use_empty=True)"
     )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
-    loaded = set(run.stdout.split())
+    loaded = set(python(code, check=True, timeout=60).stdout.split())
     assert "palpate" in loaded
     assert not loaded & {"numba", "llvmlite", "scipy", "matplotlib", "trimesh", "OpenEXR", "tqdm", "tomli_w", "jinja2", "warp"}
 
 
-def loaded_by(*modules):
-    code = f"import sys, {', '.join(modules)}; print(*[name for name in sys.modules if name.startswith('palpate.')])"
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
-    return run.stdout.split()
-
-
 def test_a_bake_without_a_window_loads_no_panels_and_no_exporters():
-    loaded = loaded_by("palpate.commands.bake", "palpate.addon.bake.bake", "palpate.addon.properties.registration")
+    code = (
+        "import sys, palpate.commands.bake, palpate.addon.bake.bake, palpate.addon.properties.registration;"
+        "print(*[name for name in sys.modules if name.startswith('palpate.')])"
+    )
+    loaded = python(code, check=True).stdout.split()
     unwanted = ("palpate.panels", "palpate.operators", "palpate.core.export.formats", "palpate.addon.display")
     assert "palpate.addon.bake.bake_files" in loaded and len(loaded) <= 150
     assert not [name for name in loaded if name.startswith(unwanted)]
-
-
-def test_a_process_that_forgets_to_disable_still_ends():
-    """Blender 4.5 as a module hangs at exit when classes are registered."""
-    code = "import bpy, palpate; palpate.register(); bpy.ops.wm.read_factory_settings(use_empty=True)"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, timeout=60).returncode == 0
 
 
 def test_no_class_mixes_made_properties_with_written_ones():
@@ -170,15 +166,13 @@ def test_no_class_mixes_made_properties_with_written_ones():
 
 
 def test_every_operator_and_panel_has_a_name_and_a_tooltip():
-    for base in (bpy.types.Operator, bpy.types.Panel, bpy.types.Menu):
-        for kind in kinds_of(base):
-            if kind.__module__.startswith("palpate."):
-                assert kind.bl_label
-                if base is bpy.types.Operator:
-                    assert kind.__doc__, kind
-                    room, name = kind.bl_idname.split(".")
-                    assert "\n" not in getattr(getattr(bpy.ops, room), name).get_rna_type().description, kind
-                    assert kind.__name__ == f"{room.upper()}_OT_{name}"
+    for kind in (*own_kinds(bpy.types.Operator), *own_kinds(bpy.types.Panel), *own_kinds(bpy.types.Menu)):
+        assert kind.bl_label
+    for kind in own_kinds(bpy.types.Operator):
+        assert kind.__doc__, kind
+        room, name = kind.bl_idname.split(".")
+        assert "\n" not in getattr(getattr(bpy.ops, room), name).get_rna_type().description, kind
+        assert kind.__name__ == f"{room.upper()}_OT_{name}"
     for group in (bpy.types.Object.bl_rna, bpy.types.Scene.bl_rna):
         for item in group.properties["palpate"].fixed_type.properties:
             assert item.is_hidden or item.identifier in ("rna_type", "name") or item.description, item.identifier
@@ -202,14 +196,12 @@ CHANGE_NOTHING = {
 
 def test_every_operator_that_changes_the_scene_can_be_undone():
     """A new operator is undoable, or is named here as one that only writes files, looks or computes."""
-    kinds = [kind for kind in kinds_of(bpy.types.Operator) if kind.__module__.startswith("palpate.")]
-    without = {kind.bl_idname for kind in kinds if "UNDO" not in getattr(kind, "bl_options", ())}
+    without = {kind.bl_idname for kind in own_kinds(bpy.types.Operator) if "UNDO" not in getattr(kind, "bl_options", ())}
     assert without == CHANGE_NOTHING
 
 
 def test_every_icon_exists(repository):
     """A panel with a wrong icon fails only when it is drawn, in a window."""
-
     known = bpy.types.UILayout.bl_rna.functions["operator"].parameters["icon"].enum_items.keys()
     for file in (repository / "panels").glob("*.py"):
         for name in re.findall(r'icon="(\w+)"', file.read_text(encoding="utf-8")):

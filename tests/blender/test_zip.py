@@ -32,26 +32,18 @@ def zip_path(tmp_path_factory):
 def life(zip_path, tmp_path_factory):
     """Run the whole life of the extension in a process of its own and return what it noted at each stage."""
     folder = tmp_path_factory.mktemp("life")
-    blender = folder / "only-blender"
-    blender.mkdir()
+    blender, user, home = (folder / name for name in ("only-blender", "user", "home"))
+    for made in (blender, user, home):
+        made.mkdir()
     for name, path in what_blender_brings().items():
         (blender / name).symlink_to(path)
-    user = folder / "user"
-    user.mkdir()
-    home = folder / "home"
-    home.mkdir()
     own = {key: value for key, value in os.environ.items() if not key.startswith(("XDG_", "MPL", "NUMBA"))}
     report = folder / "report.json"
     script = Path(__file__).with_name("zip_life.py")
     # -I -S: this environment's own packages, among them our dependencies, are out of sight
     command = [sys.executable, "-I", "-S", str(script), str(blender), str(zip_path), str(report)]
-    run = subprocess.run(
-        command,
-        env=own | {"BLENDER_USER_RESOURCES": str(user), "HOME": str(home)},
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
+    own |= {"BLENDER_USER_RESOURCES": str(user), "HOME": str(home)}
+    run = subprocess.run(command, env=own, capture_output=True, text=True, timeout=300)
     assert run.returncode == 0, run.stdout + run.stderr
     assert "Traceback" not in run.stdout + run.stderr, run.stdout + run.stderr
     return json.loads(report.read_text(encoding="utf-8")) | {"user": user, "home": home}
