@@ -7,18 +7,7 @@ import matplotlib
 import numpy as np
 import pytest
 
-ROADS = [
-    "first_use",
-    "tutorial",
-    "bake",
-    "paint",
-    "authoring",
-    "files",
-    "gap",
-    "study",
-    "sample",
-    "long_use",
-]
+ROADS = ["first_use", "tutorial", "bake", "paint", "authoring", "files", "gap", "study", "sample", "long_use"]
 PADS = 3
 TABLE_TOLERANCE = 9
 """Of 255, in each channel, between the screen and matplotlib's table: Blender shows what is drawn over its 3D views up to 8

@@ -2,20 +2,18 @@
 """Ways of making a sensor: the Add menu, the sidebar, a problem and its button, F3, fields and undo."""
 
 import bpy
-from steps import add, adjust, empty, obj, over_view, palpate, undo
+from steps import add, adjust, empty, key_over_view, obj, palpate, undo
 
 
 def road(ui):
     # A pad, its texels numbered in the view, a stiffness in a closed panel
-    yield from over_view(ui)
-    yield from ui.key("DEL")
+    yield from key_over_view(ui, "DEL")
     yield from add(ui, "tactile pad")
     ui.check(obj("Tactile Pad").palpate.role == "SENSOR", "Add › Mesh › Tactile Pad makes a sensor")
     yield from adjust(ui, 10, 8, None, None, 0.02)  # rows, columns, and the radius of the bend
     ui.check(len(obj("Tactile Pad").data.vertices) == 80, "rows and columns can be changed in the box")
     yield from ui.tab("PHYSICS")
-    yield from over_view(ui)
-    yield from ui.key("NUMPAD_PERIOD")
+    yield from key_over_view(ui, "NUMPAD_PERIOD")
     yield from ui.press("palpate.show_numbers")
     yield 1.0
     yield from ui.screenshot("pad")
@@ -35,8 +33,7 @@ def road(ui):
     # Texels on a fingertip, from the sidebar
     empty()
     view, finger = ui.area("VIEW_3D"), fingertip()
-    yield from over_view(ui)
-    yield from ui.key("NUMPAD_PERIOD")
+    yield from key_over_view(ui, "NUMPAD_PERIOD")
     yield from ui.key("N")
     yield 0.5
     ui.region(view, "UI").active_panel_category = "Palpate"

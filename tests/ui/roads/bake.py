@@ -2,7 +2,7 @@
 """What is played and baked follows what is done: jumps, ESC, undo, edits, saving, opening, renaming and copies."""
 
 import bpy
-from steps import forces, obj, over_view, palpate, press_scene, solver, status, timeline, undo
+from steps import forces, key_over_view, obj, palpate, press_scene, solver, status, timeline, undo
 
 
 def says(words):
@@ -29,8 +29,7 @@ def road(ui):
 def play(ui, scene):
     """Space plays and computes, and arrows show what is known; an edit renews it."""
     scene.frame_end = 100_000  # however slow or fast the machine is, playing does not start again, nor ends a bake before ESC
-    yield from over_view(ui)
-    yield from ui.key("SPACE")
+    yield from key_over_view(ui, "SPACE")
     yield from ui.wait_until(lambda: scene.frame_current >= 25, "the timeline played to frame 25")
     yield from ui.key("SPACE")
     frame = scene.frame_current
@@ -79,8 +78,7 @@ def jump(ui, scene):
     scene.frame_set(1)
     yield from timeline(ui, "frame_current", 90_000)
     yield from ui.wait_until(lambda: ui.works("palpate.catch_up"), "the frames up to the jump are computed")
-    yield from over_view(ui)
-    yield from ui.key("G")
+    yield from key_over_view(ui, "G")
     ui.check(ui.works("transform.translate"), "G moves the pad meanwhile")
     ui.check(not ui.works("palpate.catch_up"), "and ends the computation")
     ui.check(scene.frame_current == 90_000, "at the frame that was jumped to")
@@ -129,8 +127,7 @@ def figures(ui):
 
 def change(ui):
     """The file is saved, and a setting that is changed makes the bake out of date."""
-    yield from over_view(ui)
-    yield from ui.key("S", ctrl=True)
+    yield from key_over_view(ui, "S", ctrl=True)
     yield from ui.becomes(lambda: not bpy.data.is_dirty, "Ctrl S saves the file")
     obj("Pad").palpate.mus = 0.123
     yield from ui.becomes(says("has changed since this bake"), "a changed friction makes it out of date at once")

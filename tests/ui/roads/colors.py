@@ -6,7 +6,7 @@ A plate presses three pads of different stiffness evenly, so that each pad has o
 
 import bpy
 from mathutils import Quaternion
-from steps import empty, over_view, palpate, solver, status
+from steps import empty, key_over_view, palpate, solver, status
 
 PADS = {"Stiff": (-1.2, 400.0), "Middle": (0.0, 200.0), "Soft": (1.2, 40.0)}
 BESIDE = (0.27, 0.27)  # from a pad's middle, where its arrow is not
@@ -124,8 +124,7 @@ def road(ui):
     yield from ui.tab("PHYSICS")
     yield from solver(ui)
     look(view, BELOW)
-    yield from over_view(ui)
-    yield from ui.key("RIGHT_ARROW")
+    yield from key_over_view(ui, "RIGHT_ARROW")
     yield from ui.becomes(lambda: scene.frame_current == 2 and status().frame, "frame 2")
     yield from views(ui, "live")
     yield from ui.press("palpate.bake()")

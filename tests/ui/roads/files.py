@@ -4,7 +4,7 @@
 import math
 
 import bpy
-from steps import add, choose_file, close_plots, obj, over_view
+from steps import add, choose_file, close_plots, key_over_view, obj
 
 TEXELS = 84
 
@@ -24,8 +24,7 @@ def pressed():
 def road(ui):
     bpy.context.preferences.filepaths.use_relative_paths = False
     bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
-    yield from over_view(ui)
-    yield from ui.key("DEL")
+    yield from key_over_view(ui, "DEL")
     yield from add(ui, "tactile pad")
     bpy.ops.wm.save_as_mainfile(filepath=str(ui.out / "files.blend"))
     yield from ui.tab("PHYSICS")

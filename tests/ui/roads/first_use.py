@@ -5,7 +5,7 @@ import os
 import signal
 
 import bpy
-from steps import forces, obj, over_view, palpate, press_scene
+from steps import forces, key_over_view, obj, palpate, press_scene
 
 
 def preparing():
@@ -36,16 +36,14 @@ def road(ui):
     yield from ui.screenshot("preparing")
 
     # Playing computes, slowly
-    yield from over_view(ui)
-    yield from ui.key("SPACE")
+    yield from key_over_view(ui, "SPACE")
     yield from ui.wait_until(lambda: max(forces("Pad")) > 0.0, "what plays is computed")
     ui.check(preparing().progress() is not None and not preparing().is_ready(), "by interpreted kernels")
     yield from ui.key("SPACE")
 
     hold(signal.SIGCONT)
     scene.frame_set(scene.frame_start)
-    yield from over_view(ui)
-    yield from ui.key("SPACE")
+    yield from key_over_view(ui, "SPACE")
     yield from ui.wait_until(preparing().is_ready, "the solver is compiled", timeout=900)
     ui.check(preparing()._gave_up is False, "beside the window")
     kernels = palpate("core.compiled.kernels")

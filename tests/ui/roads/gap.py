@@ -2,7 +2,7 @@
 """docs/gap.md on its sample rig: measurements are opened, what is missing is found, shown, and put on the sensor."""
 
 import bpy
-from steps import add, close_plots, obj, over_view, palpate, undo
+from steps import add, close_plots, key_over_view, obj, palpate, undo
 
 
 def found():
@@ -15,11 +15,9 @@ def brightest():
 
 
 def road(ui):
-    yield from over_view(ui)
-    yield from ui.key("DEL")
+    yield from key_over_view(ui, "DEL")
     yield from add(ui, "tactile pad")
-    yield from over_view(ui)
-    yield from ui.key("NUMPAD_7")
+    yield from key_over_view(ui, "NUMPAD_7")
     yield from ui.key("NUMPAD_PERIOD")
     yield from ui.tab("PHYSICS")
     yield from ui.filter("Measured Data")

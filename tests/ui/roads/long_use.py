@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 import bpy
-from steps import obj, over_view, press_scene, solver, undo
+from steps import key_over_view, obj, press_scene, solver, undo
 
 LEAST_ROUNDS = 5
 """In Solid view and Material Preview in turn: two of each can be compared after Material Preview was first shown."""
@@ -21,8 +21,7 @@ def resident():
 
 
 def play_a_while(ui, seconds):
-    yield from over_view(ui)
-    yield from ui.key("SPACE")
+    yield from key_over_view(ui, "SPACE")
     yield seconds
     yield from ui.key("SPACE")
     for _ in range(5):
@@ -60,8 +59,7 @@ def road(ui):
         with ui.context(ui.area("PROPERTIES")):  # what a click leaves active
             bpy.context.view_layer.objects.active = obj("Pad")
         yield from bake_and_undo(ui)
-        yield from over_view(ui)
-        yield from ui.key("S", ctrl=True)
+        yield from key_over_view(ui, "S", ctrl=True)
         blocks = {kind: len(getattr(bpy.data, kind)) for kind in KINDS}
         gc.collect()
         now = {"shading": shading, "minutes": (time.monotonic() - began) / 60, "MB": resident()}

@@ -2,17 +2,15 @@
 """A fingertip is painted with real strokes and gets a probe."""
 
 import bpy
-from steps import add, adjust, over_view
+from steps import add, adjust, key_over_view
 
 
 def road(ui):
     view = ui.area("VIEW_3D")
-    yield from over_view(ui)
-    yield from ui.key("DEL")
+    yield from key_over_view(ui, "DEL")
     yield from add(ui, "uv sphere")
     yield from adjust(ui, 64, 48, 0.01, None, None, None)
-    yield from over_view(ui)
-    yield from ui.key("NUMPAD_PERIOD")
+    yield from key_over_view(ui, "NUMPAD_PERIOD")
     yield 1.0
     finger = bpy.context.object
     yield from ui.tab("PHYSICS")

@@ -74,10 +74,15 @@ def over_view(ui):
     yield from ui.move(*ui.centre(ui.area("VIEW_3D")))
 
 
+def key_over_view(ui, kind, **modifiers):
+    """Press a key while the mouse is over the 3D view."""
+    yield from over_view(ui)
+    yield from ui.key(kind, **modifiers)
+
+
 def undo(ui, **modifiers):
     """Press Ctrl Z over the 3D view."""
-    yield from over_view(ui)
-    yield from ui.key("Z", ctrl=True, **modifiers)
+    yield from key_over_view(ui, "Z", ctrl=True, **modifiers)
     yield 0.5
 
 
@@ -101,8 +106,7 @@ def timeline(ui, name, value):
 
 def add(ui, words):
     """Shift A over the 3D view, then type what to add."""
-    yield from over_view(ui)
-    yield from ui.key("A", shift=True)
+    yield from key_over_view(ui, "A", shift=True)
     yield 0.5
     yield from ui.type(words)
     yield 0.5

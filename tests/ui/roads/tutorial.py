@@ -4,18 +4,16 @@
 import math
 
 import bpy
-from steps import add, adjust, forces, obj, over_view, solver, timeline
+from steps import add, adjust, forces, key_over_view, obj, solver, timeline
 
 
 def road(ui):
     # 1. A pad
-    yield from over_view(ui)
-    yield from ui.key("DEL")
+    yield from key_over_view(ui, "DEL")
     ui.check("Cube" not in bpy.data.objects, "the cube is deleted")
     yield from add(ui, "grid")
     yield from adjust(ui, 5, 13, 0.05)
-    yield from over_view(ui)
-    yield from ui.key("S")
+    yield from key_over_view(ui, "S")
     yield from ui.key("X")
     yield from ui.type("0.4")
     yield from ui.key("RET")
@@ -39,12 +37,10 @@ def road(ui):
     ui.check(obj("Sphere").palpate.role == "TARGET", "the sphere is a target")
 
     # 4. A motion
-    yield from over_view(ui)
-    yield from ui.key("I")
+    yield from key_over_view(ui, "I")
     yield 0.5
     yield from timeline(ui, "frame_current", 30)
-    yield from over_view(ui)
-    yield from ui.key("G")
+    yield from key_over_view(ui, "G")
     yield from ui.key("Z")
     yield from ui.type("-0.0075")
     yield from ui.key("RET")
@@ -60,13 +56,11 @@ def road(ui):
     yield from ui.click(*ui.at((0.008, -0.023, 0)))
     ui.check(bpy.context.view_layer.objects.active == obj("Grid"), "a click selects the grid")
     yield from solver(ui)
-    yield from over_view(ui)
-    yield from ui.key("SPACE")
+    yield from key_over_view(ui, "SPACE")
     yield from ui.wait_until(lambda: scene.frame_current >= 40, "frame 40 plays")
     yield from ui.screenshot("5-playing")
     yield from ui.wait_until(lambda: scene.frame_current < 30, "it plays again from its start")
-    yield from over_view(ui)
-    yield from ui.key("SPACE")
+    yield from key_over_view(ui, "SPACE")
     ui.check(not ui.window.screen.is_animation_playing, "Space stops")
     yield from timeline(ui, "frame_current", 60)
     ui.check(abs(sum(forces("Grid")) - 0.97) < 0.005, "the pad feels 0.97 N at frame 60")
@@ -85,8 +79,7 @@ def road(ui):
     names = {path.name for path in (folder / "palpate-bake" / "Grid").iterdir()}
     ui.check({f"tactile_{frame:04d}.exr" for frame in range(1, 61)} <= names, "there is an image for each frame")
     ui.check({"manifest.json", "recording.npz", "sensor.npz"} <= names, "with recording, sensor and manifest")
-    yield from over_view(ui)
-    yield from ui.key("Z")
+    yield from key_over_view(ui, "Z")
     yield 0.5
     yield from ui.key("M")
     yield 5.0
