@@ -132,16 +132,20 @@ def test_a_failure_while_registering_is_seen_and_leaves_nothing(commands, monkey
     monkeypatch.undo()
 
 
-def test_enabling_imports_nothing_heavy_and_a_process_that_forgets_to_disable_still_ends():
-    """Blender 4.5 as a module hangs at exit when classes are registered."""
+def test_enabling_imports_nothing_heavy():
     code = (
-        "import sys, bpy, palpate; palpate.register(); palpate.unregister(); palpate.register();"
-        "print(*sorted({name.partition('.')[0] for name in sys.modules}), flush=True);"
-        "bpy.ops.wm.read_factory_settings(use_empty=True)"
+        "import sys, bpy, palpate; palpate.register(); palpate.unregister();"
+        "print(*sorted({name.partition('.')[0] for name in sys.modules}))"
     )
     loaded = set(python(code, check=True, timeout=60).stdout.split())
     assert "palpate" in loaded
     assert not loaded & {"numba", "llvmlite", "scipy", "matplotlib", "trimesh", "OpenEXR", "tqdm", "tomli_w", "jinja2", "warp"}
+
+
+def test_a_process_that_forgets_to_disable_still_ends():
+    """Blender 4.5 as a module hangs at exit when classes are registered."""
+    code = "import bpy, palpate; palpate.register(); bpy.ops.wm.read_factory_settings(use_empty=True)"
+    assert python(code, timeout=60).returncode == 0
 
 
 def test_a_bake_without_a_window_loads_no_panels_and_no_exporters():
