@@ -14,7 +14,7 @@ from palpate.core.study.study_file import counted_runs
 
 LONGEST = 300
 """Seconds until a study counts as hanging; a busy machine may have to compile the solver first."""
-RUNS = 16
+RUNS = 30
 FRAMES = 1500
 """Frames of a run: one takes as long as it takes until the process is asked how far it is."""
 
