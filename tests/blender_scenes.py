@@ -15,7 +15,7 @@ from palpate.addon.authoring import sensor_report
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import markers, materials
 from palpate.addon.render import render
-from palpate.addon.scene import mesh_arrays, participants, scene_reader
+from palpate.addon.scene import participants, scene_reader
 from palpate.addon.timeline import live_cache
 from palpate.core.io.hidden_folder import PRIVATE_FOLDER
 from palpate.core.jobs import run_job
@@ -168,11 +168,16 @@ def find_marker(objects, uid, kind):
     return next((obj for obj in own if obj.get(markers.KIND_KEY) == kind), None)
 
 
+def evaluated_vertices(obj):
+    """Return the vertices of an object with its modifiers, (n, 3) in its own frame, not by the add-on's reader of meshes."""
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    return np.array([vertex.co for vertex in mesh.vertices])
+
+
 def surface(obj):
     """Return the vertices of an object as Blender shows them, (n, 3) in world coordinates."""
-    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     matrix = np.array(obj.matrix_world)
-    return mesh_arrays.vertices(mesh) @ matrix[:3, :3].T + matrix[:3, 3]
+    return evaluated_vertices(obj) @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def raw_settings(block):

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from palpate.addon.render import render
-from palpate.addon.scene import mesh_arrays
 from palpate.commands import main
 from palpate.core import response
 from palpate.core.errors import SceneError
@@ -19,18 +18,12 @@ from palpate.core.solver import time_step_adviser
 from palpate.core.solver.simulation import run
 from palpate.sample_blends import build_samples, demo, scene_builder
 
-
-def evaluated(obj):
-    """Vertices (n, 3) of an object with its modifiers, in its own frame."""
-    return mesh_arrays.vertices(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data)
-
-
 # --- the scene
 
 
 def test_the_cube_weighs_what_steel_weighs(scene):
     demo.build(scene)
-    size = np.ptp(evaluated(scene.objects[demo.CUBE]), axis=0) * scene.unit_settings.scale_length
+    size = np.ptp(blender_scenes.evaluated_vertices(scene.objects[demo.CUBE]), axis=0) * scene.unit_settings.scale_length
     assert scene.objects[demo.CUBE].palpate.mass / size.prod() == pytest.approx(8000, rel=0.01)
 
 
@@ -145,7 +138,7 @@ def described(scene):
         settings = {}
         if obj.palpate.role != "NONE":
             settings = blender_scenes.settings(obj.palpate, uids=False)
-        shape = evaluated(obj).round(4).tolist() if obj.type == "MESH" else None
+        shape = blender_scenes.evaluated_vertices(obj).round(4).tolist() if obj.type == "MESH" else None
         found[obj.name] = (settings, shape)
     for frame in range(scene.frame_start, scene.frame_end + 1, 7):
         scene.frame_set(frame)
