@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import baked, ball, grid, pad_sensor, press, refusal, start_of
+from blender_scenes import baked, ball, grid, pad_sensor, press, refusal, save, start_of
 
 from palpate.addon.authoring import laid_sensors
 from palpate.addon.properties.parameter_properties import sensor_parameters
@@ -127,8 +127,9 @@ def test_a_region_by_material_survives_its_own_heat_map(tmp_path):
     scene, pad, _ = press(3)
     right = two_halves(pad)
     pad.palpate.region, pad.palpate.material = "MATERIAL", "Rubber"
+    save(tmp_path)
     for _ in range(2):
-        baked(scene, tmp_path)
+        baked(scene)
         assert (sensor_regions.region_vertices(pad, len(right)) == right).all()
 
 
