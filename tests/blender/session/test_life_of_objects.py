@@ -100,9 +100,8 @@ def test_separated():
     assert len(parts) == 2
     assert {obj.palpate.k for obj in parts} == {99.0}
     assert len({identity.key(obj) for obj in parts if identity.ensure_uid(obj) is None}) == 2
-    assert all(
-        "GROWN" in problems_of(obj) for obj in parts
-    )  # fewer vertices than were made a sensor: said, one click accepts it
+    # fewer vertices than were made a sensor: said, one click accepts it
+    assert all("GROWN" in problems_of(obj) for obj in parts)
     assert set(forces()) == {obj.name for obj in parts}
 
 
