@@ -109,10 +109,10 @@ class ReadoutChain:
                 self._links.append(_Law(form, values, len(transducers.position)))
             elif form.coupling is not None:
                 self._links.append(_Coupling(form.coupling(values, transducers)))
-            elif form.delay is not None:
-                self._links.append(_Delay(form.delay(values), len(transducers.position)))
-            else:
+            elif form.memoryless is not None:
                 self._links.append(_Memoryless(form, values, transducers, item.seed))
+            if form.delay is not None:
+                self._links.append(_Delay(form.delay(values), len(transducers.position)))
         if not converted:
             self._links.append(_Conversion(transducers))
 

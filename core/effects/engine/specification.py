@@ -2,7 +2,7 @@
 """Kinds of effects and their forms: plain data on a sensor, a kind in the library, and the mechanism by which a form acts.
 
 Each module of the library defines one ``KIND``. A kind has several forms: different formulas
-for the same phenomenon, because publications differ. A form acts by exactly one mechanism:
+for the same phenomenon, because publications differ. A form acts by one mechanism; a law may have a delay behind it:
 
 ================  ===========================================================================================================
 ``law``           law with memory, equal in the solver, over whole signals and over streams (see :data:`Law`)
@@ -230,7 +230,7 @@ class Form:
     neutral : dict of str to float
         Values at which the effect vanishes; they may lie outside the bounds. Examples: strength zero, level infinity.
     law, memoryless, coupling, delay, friction_law, placement
-        The mechanism; exactly one is given (see the text of the module).
+        The mechanism: one is given, or a law and a delay (see the text of the module).
     constants : callable
         ``constants(values, dt (m,)) → (m, c)``: the constants of a law for steps of these lengths (s). The constants of a
         friction law must not depend on the length.
@@ -285,7 +285,7 @@ class Form:
 
     @cached_property
     def mechanism(self) -> str:
-        """The name of the mechanism that is given."""
+        """The name of the mechanism that is given; of two, the law."""
         mechanisms = ("law", "memoryless", "coupling", "delay", "friction_law", "placement")
         return next(name for name in mechanisms if getattr(self, name) is not None)
 

@@ -4,11 +4,15 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.polynomial.polynomial import polyval
 
 from ...model.parameter import Parameter
 from ...model.sensor import Values
 from ..engine.specification import Drawing, Form, Kind, TexelInput, scalar
 from .creep import step_weights
+
+LEAST_QUALITY = 0.05
+"""Below it a second order counts as a first one: its faster stage is 400 times as fast as the slower one."""
 
 
 def first_order(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
@@ -26,23 +30,7 @@ def first_order(texel: TexelInput, constants: np.ndarray, state: np.ndarray, com
 
 
 def second_order(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
-    """Two equal lags in series, p and q.
-
-    State: 1 once started, the last x, p, q. Constants: as for the first order, for p; then the weights of p, the old x and the
-    new x in the new q.
-    """
-    before, p, q = texel.force, texel.force, texel.force
-    if state[0] != 0.0:
-        before, p, q = state[1], state[2], state[3]
-    q = constants[0] * q + constants[3] * p + constants[4] * before + constants[5] * texel.force
-    p = constants[0] * p + constants[1] * before + constants[2] * texel.force
-    if commit:
-        state[0], state[1], state[2], state[3] = 1.0, texel.force, p, q
-    return q, texel.slope * constants[5]
-
-
-def resonance(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
-    """An oscillator: place q, and speed v as a share of ω; x is linear over the step, for which this is exact.
+    """A damped oscillator: place q, and speed v in units of 1/τ; x is linear over the step, for which this is exact.
 
     State: 1 once started, the last x, q, v. Constants: the weights of q, v, the old x and the new x in the new q, then in the
     new v.
@@ -61,34 +49,44 @@ def _first(values: Values, dt: np.ndarray) -> np.ndarray:
     return np.stack(step_weights(np.asarray(dt, float) / max(scalar(values, "time"), 1e-12)), axis=1)
 
 
-def _second(values: Values, dt: np.ndarray) -> np.ndarray:
-    first = _first(values, dt)
-    x = np.asarray(dt, float) / max(scalar(values, "time"), 1e-12)
-    keep = first[:, 0]
-    turn = np.where(np.isfinite(keep * x), keep * x, 0.0)
-    # Responses at the end of the step to an input of 1, and to one that grows from 0 to 1; series avoid cancellation.
-    small = x < 1e-2
-    whole = np.where(small, x * x / 2.0 - x**3 / 3.0 + x**4 / 8.0, 1.0 - keep - turn)
-    exact = (x - 2.0 + 2.0 * keep + turn) / np.maximum(x, 1e-300)
-    new = np.where(small, x * x / 6.0 - x**3 / 12.0 + x**4 / 40.0, exact)
-    return np.column_stack([first, turn, whole - new, new])
+def _second_order(time: float, damping: float, dt: np.ndarray) -> np.ndarray:
+    """Return the constants of :func:`second_order` for ``τ² q̈ + 2 ζ τ q̇ + q = x``."""
+    x = np.minimum(np.asarray(dt, float) / max(time, 1e-300), 1e300)
+    # Roots -ζ ± s, real or conjugate; where they are equal, a difference of 2e-8 stands for none.
+    split = np.sqrt(complex(damping**2 - 1.0)) or 1e-8
+    slow = np.exp((split - damping) * x)
+    sine = (slow * -np.expm1(-2.0 * split * x) / (2.0 * split)).real
+    cosine = (slow * (1.0 + np.exp(-2.0 * split * x)) / 2.0).real
+    # Responses of place and speed to an x of 1; and, over the step, to one that grows from 0 to 1. Small steps have series in
+    # powers of the step, whose coefficients follow from the equation, because the formulas would cancel.
+    kept = cosine + damping * sine
+    seam = 0.1 / max(1.0, 2.0 * damping)
+    small, near, size = x < seam, np.minimum(x, seam), np.maximum(x, 1e-300)
+    powers = [0.0, 0.0, 0.5]
+    for n in range(1, 8):
+        powers.append(-(2.0 * damping * (n + 1) * powers[n + 1] + powers[n]) / ((n + 1) * (n + 2)))
+    whole = np.where(small, polyval(near, powers), 1.0 - kept)
+    place = polyval(near, [c / (n + 1) for n, c in enumerate(powers)])
+    place = np.where(small, place, 1.0 - (2.0 * damping * whole + sine) / size)
+    speed = whole / size
+    return np.column_stack([kept, sine, whole - place, place, -sine, cosine - damping * sine, sine - speed, speed])
+
+
+def _critically_damped(values: Values, dt: np.ndarray) -> np.ndarray:
+    return _second_order(scalar(values, "time"), 1.0, dt)
 
 
 def _resonance(values: Values, dt: np.ndarray) -> np.ndarray:
-    damping = scalar(values, "damping")
-    x = np.minimum(2.0 * np.pi * np.asarray(dt, float) / max(scalar(values, "period"), 1e-300), 1e300)  # phase, undamped
-    sharp = np.sqrt(1.0 - damping**2)
-    decay = np.exp(-damping * x)
-    cosine, sine = decay * np.cos(sharp * x), decay * np.sin(sharp * x) / sharp
-    # Responses of place and speed to an x of 1; and, over the step, to one that grows from 0 to 1 (series avoid cancellation).
-    kept = cosine + damping * sine
-    small, near, late = x < 1e-2, np.minimum(x, 1e-2), 4.0 * damping**2 - 1.0
-    place = near * near / 6.0 - damping * near**3 / 12.0 + late * near**4 / 120.0
-    speed = near / 2.0 - damping * near * near / 3.0 + late * near**3 / 24.0
-    size = np.maximum(x, 1e-300)
-    place = np.where(small, place, 1.0 - (2.0 * damping * (1.0 - kept) + sine) / size)
-    speed = np.where(small, speed, (1.0 - kept) / size)
-    return np.column_stack([kept, sine, 1.0 - kept - place, place, -sine, cosine - damping * sine, sine - speed, speed])
+    return _second_order(scalar(values, "period") / (2.0 * np.pi), scalar(values, "damping"), dt)
+
+
+def _dead_time(values: Values) -> float:
+    return scalar(values, "time") * scalar(values, "dead_share")
+
+
+def _behind_dead_time(values: Values, dt: np.ndarray) -> np.ndarray:
+    quality = max(scalar(values, "quality"), LEAST_QUALITY)
+    return _second_order((scalar(values, "time") - _dead_time(values)) * quality, 0.5 / quality, dt)
 
 
 _TIME = Parameter("time", "s", 0.05, 0.0, 100.0, "Time constant τ.")
@@ -131,7 +129,7 @@ KIND = Kind(
             (_TIME,),
             neutral={"time": 0.0},
             law=second_order,
-            constants=_second,
+            constants=_critically_damped,
             state_size=4,
             after_conversion=True,
         ),
@@ -144,10 +142,28 @@ KIND = Kind(
                 Parameter("damping", "1", 0.2, 1e-3, 0.95, "Damping ratio ζ.", log=True),
             ),
             neutral={"period": 0.0},
-            law=resonance,
+            law=second_order,
             constants=_resonance,
             state_size=4,
             after_conversion=True,
+            error=0.005,  # it follows what rings longer than the next form can (damping below 0.1)
+        ),
+        Form(
+            "second-order-plus-dead-time",
+            "τ² r̈ + τ ṙ / Q + r = r₀(t − s D), τ = (1 − s) D Q",
+            "Seborg, Edgar and Mellichamp, Process Dynamics and Control (2004), section 7.2: second order plus time delay",
+            (
+                Parameter("time", "s", 0.05, 0.0, 100.0, "Mean delay D: by so much a slow change comes late."),
+                Parameter("quality", "1", 0.5, 0.0, 5.0, "Quality factor Q: 0 is a first order, up to 0.5 nothing oscillates."),
+                Parameter("dead_share", "1", 0.2, 0.0, 1.0, "Share s of the dead time in the mean delay."),
+            ),
+            neutral={"time": 0.0, "dead_share": 0.0},
+            law=second_order,
+            constants=_behind_dead_time,
+            delay=_dead_time,
+            state_size=4,
+            after_conversion=True,
+            error=0.005,  # at most, of the other forms, filters behind a dead time and moving means (benchmarks/RESULTS.md)
         ),
     ),
     experiment="press and release as fast as possible, and record at a high rate",

@@ -115,7 +115,7 @@ def functions_of(sensors: Sequence[Sensor], dt: float) -> EffectFunctions:
     sensor = sensors[0]
     forces, frictions, readings = _chains(sensor)
     for item, form in readings:
-        if form.law is None:
+        if form.law is None or form.delay is not None:
             raise ParameterError(
                 f"The effect '{item.name}' ({form.name}) of '{sensor.name}' has no Warp kernel: "
                 "take it away, or use PressedSensors."

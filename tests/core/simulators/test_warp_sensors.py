@@ -178,7 +178,10 @@ def test_single_precision_errs_by_the_rounding_of_poses():
 
 def test_what_makes_no_environments_is_one_sentence():
     item = pad(4, 4)
-    noisy = replace(item, sensor=replace(item.sensor, effects=(effect("noise"),)))
+    noisy, late = (
+        replace(item, sensor=replace(item.sensor, effects=(effect(*one),)))
+        for one in (("noise",), ("lag", "second-order-plus-dead-time"))
+    )
     for arguments, words in (
         ((item, CUBE, 0.0, 2), "The step is 0 s"),
         ((item, CUBE, DT, 0), "There are 0 environments"),
@@ -186,6 +189,7 @@ def test_what_makes_no_environments_is_one_sentence():
         ((item, ["cube"], DT, 2), r"Target 1 is a str: give a TriangleMesh or a Shape\.$"),
         ((item, CUBE, DT, 2, "cuda:77"), "Warp has no device 'cuda:77' here: take one of cpu"),
         ((noisy, CUBE, DT, 2), r"The effect 'noise' \(\w+\) of 'Pad' has no Warp kernel: .* PressedSensors\.$"),
+        ((late, CUBE, DT, 2), r"The effect 'lag' \([\w-]+\) of 'Pad' has no Warp kernel"),
     ):
         with pytest.raises(ParameterError, match=words):
             WarpSensors(*arguments)

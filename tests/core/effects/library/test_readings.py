@@ -5,10 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import uniform_filter1d
+from scipy.optimize import least_squares
 from scipy.signal import TransferFunction, lsim
 
 from palpate.core.effects.engine.readout_chain import ReadoutChain, readings
-from palpate.core.effects.engine.registry import effect
+from palpate.core.effects.engine.registry import effect, form_of
 from palpate.core.effects.engine.specification import TransducerArray
 from palpate.core.effects.library.load_spreading import stretched_exponential
 from palpate.core.errors import EffectError
@@ -139,6 +141,10 @@ LAGS += [
     ("resonance", {"period": 0.3, "damping": damping}, [TURN**-2, 2.0 * damping / TURN, 1.0])
     for damping in (0.001, 0.05, 0.5, 0.95)
 ]
+LAGS += [
+    ("second-order-plus-dead-time", {"time": 0.3 / quality, "quality": quality, "dead_share": 0.0}, [0.09, 0.3 / quality, 1.0])
+    for quality in (5.0, 0.50000005, 0.5, 0.3, 0.05)
+]
 
 
 @pytest.mark.parametrize(("form", "values", "denominator"), LAGS)
@@ -152,8 +158,12 @@ def test_lag_is_the_linear_system_that_it_says(form, values, denominator):
 
 
 STEPS = (1e-7, 9e-5, 1.1e-4, 9e-3, 1.1e-2, 50.0)
-SEAMS = [(form, {"time": 1.0}, step) for form in ("first-order", "second-order") for step in STEPS]
-SEAMS += [("resonance", {"period": 1.0, "damping": 0.3}, step) for step in (1e-9, 1.5e-3, 1.7e-3, 0.3, 50.0)]
+SEAMS = [(form, {"time": 1.0}, step) for form in ("first-order", "second-order") for step in (*STEPS, 0.049, 0.051)]
+SEAMS += [("resonance", {"period": 1.0, "damping": 0.3}, step) for step in (1e-9, 0.0158, 0.0161, 0.3, 50.0)]
+SEAMS += [
+    ("second-order-plus-dead-time", {"time": 20.0, "quality": 0.05, "dead_share": 0.0}, step)
+    for step in (1e-7, 4.9e-3, 5.1e-3, 1e4)
+]
 
 
 @pytest.mark.parametrize(("form", "values", "step"), SEAMS)
@@ -169,6 +179,8 @@ def test_lag_starts_at_rest():
     assert np.abs(read(effect("lag", "resonance", period=0.5, damping=0.1), np.full((501, 1), 3.0)) - 3.0).max() < 1e-12
     for form in ("first-order", "second-order", "dead-time"):
         np.testing.assert_allclose(read(effect("lag", form, time=0.5), np.full((501, 1), 3.0)), 3.0, rtol=1e-12)
+    delayed = effect("lag", "second-order-plus-dead-time", time=0.5, quality=0.8, dead_share=0.3)
+    np.testing.assert_allclose(read(delayed, np.full((501, 1), 3.0)), 3.0, rtol=1e-12)
 
 
 def test_dead_time():
@@ -176,6 +188,40 @@ def test_dead_time():
     found = read(effect("lag", "dead-time", time=0.5), signal)[:, 0]
     np.testing.assert_allclose(found[TIME >= 0.5], np.sin(TIME[TIME >= 0.5] - 0.5), atol=6e-5)  # linear between samples
     assert (found[TIME < 0.5] == 0.0).all()
+
+
+@pytest.mark.parametrize("quality", [0.2, 0.5, 1.5])
+def test_second_order_plus_dead_time_is_both(quality):
+    """SciPy's linear system of its own τ behind a dead time of six samples; a ramp comes late by the mean delay."""
+    mean, share = 0.3, 0.4
+    own = (1.0 - share) * mean * quality
+    item = effect("lag", "second-order-plus-dead-time", time=mean, quality=quality, dead_share=share)
+    signal = np.sin(3.0 * TIME)
+    _, expected, _ = lsim(TransferFunction([1.0], [own**2, own / quality, 1.0]), signal, TIME)
+    found = read(item, signal[:, None])[:, 0]
+    np.testing.assert_allclose(found[6:], expected[:-6], atol=1e-9)
+    assert (found[:6] == 0.0).all()
+    late = TIME[-1] - read(item, TIME[:, None])[-1, 0]
+    assert late == pytest.approx(mean, rel=1e-4)  # after thirty mean delays
+
+
+def test_second_order_plus_dead_time_follows_other_lags():
+    """Moving means of a converter, and a filter behind a dead time: what is left is at most the form's own φ."""
+    form = form_of("lag", "second-order-plus-dead-time")
+    signal = np.interp(TIME, [0.5, 0.8, 1.5, 1.8, 2.5, 3.5, 4.0, 4.2], [0.0, 1.0, 1.0, 0.0, 0.0, 0.7, 0.7, 0.0])[:, None]
+    delayed = read(effect("lag", "dead-time", time=0.1), signal)
+    means = [signal]
+    for _ in range(3):
+        means.append(uniform_filter1d(means[-1], 15, axis=0, origin=7, mode="nearest"))
+    for law in (means[1], means[3], read(effect("lag", "first-order", time=0.2), delayed)):
+        assert np.square(law - signal).sum() > 0.02 * np.square(signal).sum()
+
+        def left(numbers, law=law):
+            item = effect("lag", form.name, time=numbers[0], quality=numbers[1], dead_share=numbers[2])
+            return (read(item, signal) - law).ravel()
+
+        fit = least_squares(left, [0.1, 0.5, 0.2], bounds=([0.0, 0.0, 0.0], [10.0, 5.0, 1.0]))
+        assert np.square(fit.fun).sum() < form.error * np.square(law - signal).sum()
 
 
 def test_a_reading_that_goes_on_rising():
