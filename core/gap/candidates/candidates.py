@@ -150,11 +150,14 @@ def search_range(parameter: Parameter, scales: Scales, form: Form) -> tuple[floa
     """Return the range of values in which a parameter of a form would show in recordings of these scales, inside its bounds."""
     warmth = max(scales.warmth, LEAST_WARMTH)
     speed = scales.rate if form.friction_law is None else scales.sliding_speed
+    longest = 2.0 * scales.seconds
+    if form.neutral.get(parameter.name) == 0.0:  # a delay is compared with the time in which a load comes
+        longest = max(min(longest, LARGE * scales.depth / scales.rate), LARGE * scales.step)
     known = {
         "N": (SMALL * scales.force, LARGE * scales.force),
         "unit": (SMALL * scales.reading, LARGE * scales.reading),
         "m": (min(0.05 * scales.depth, 0.3 * scales.pitch), max(5.0 * scales.depth, 2.0 * scales.pitch)),
-        "s": (0.5 * scales.step, 2.0 * scales.seconds),
+        "s": (0.5 * scales.step, longest),
         "m/s": (0.02 * speed, 2.0 * speed),
         "N·s": (0.1 * scales.force * scales.seconds, 50.0 * scales.force * scales.seconds),
         "J": (0.1 * scales.force * scales.depth, 50.0 * scales.force * speed * scales.seconds),

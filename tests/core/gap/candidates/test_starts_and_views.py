@@ -166,6 +166,19 @@ def test_a_speed_is_that_of_sliding_for_friction_and_that_of_pressing_for_other_
     assert search_range(drag, scales, creep)[1] == pytest.approx(2.0 * scales.force / fastest)
 
 
+def test_a_delay_is_compared_with_the_time_of_a_loading():
+    """A time constant of creep may be as long as a recording; where nothing is loaded slowly, a delay of four samples shows."""
+    rig = cases.rig(lambda force, _time: force, trials=2, seconds=5.0)
+    scales = scales_of(predictors_of(rig.trials, rig), Model(rig.parameters))
+    lag, creep = form_of("lag", "second-order-plus-dead-time"), form_of("creep")
+    by_name = {p.name: p for p in (*creep.parameters, *lag.parameters[1:])}
+    low, high = search_range(lag.parameters[0], scales, lag)
+    assert low == pytest.approx(0.5 * scales.step) and high == pytest.approx(4.0 * scales.depth / scales.rate)
+    assert high < 0.5 * scales.seconds and search_range(by_name["time"], scales, creep)[1] == 2.0 * scales.seconds
+    assert search_range(lag.parameters[0], replace(scales, rate=1e9), lag)[1] == pytest.approx(4.0 * scales.step)
+    assert search_range(lag.parameters[0], replace(scales, rate=1e-9), lag)[1] == 2.0 * scales.seconds
+
+
 # --- points and quantiles without scipy.stats, which takes half a second to load
 
 
