@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from ...effects.engine.registry import form_of
+from ...model.sensor import Effect
 from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
 from ..fitting.least_squares import Fit, FreeParameter, TrialView, derivatives, value_of
-from ..forward.predictor import Model
 
 RIDGE = 1e-10
 """Added to the diagonal of a Gram matrix, as a share of one plus its trace."""
@@ -76,6 +76,7 @@ class ScoreTest:
             derivatives(view, found.model, common, at, r, table, 0)
         self.derivatives = [table.reshape(len(common), r.size) for table, r in zip(self.tables, self.residual, strict=True)]
         self.gram = ridged(np.sum([c @ c.T for c in self.derivatives], axis=0))
+        self._decreases: dict[int, tuple[Effect, float]] = {}
         self.along = sum(c @ r.ravel() for c, r in zip(self.derivatives, self.residual, strict=True))
 
     @property
@@ -96,16 +97,17 @@ class ScoreTest:
         """
         return self.total - float(self.along @ np.linalg.solve(self.gram, self.along))
 
-    def score(self, model: Model) -> tuple[float, float]:
-        """Test the change from the fit's model to another one.
+    def score(self, effect: Effect) -> tuple[float, float]:
+        """Test the change that one effect more makes.
 
         Returns
         -------
         decrease : float
             By how much the squares fall at best along the change, to first order, if the free parameters follow.
         length : float
-            The best length along the change; 1 is the other model.
+            The best length along the change; 1 is the effect as it is.
         """
+        model = self.model.with_effect(effect)
         cross, square, dot = np.zeros(len(self.gram)), 0.0, 0.0
         for view, r, c in zip(self.views, self.residual, self.derivatives, strict=True):
             change = (r - view.residual(model)).ravel()
@@ -114,25 +116,27 @@ class ScoreTest:
             dot += float(np.vdot(change, r.ravel()))
         if not np.isfinite(square):
             return 0.0, 0.0
+        self._decreases[id(effect)] = effect, 2.0 * dot - square
         weights = np.linalg.solve(self.gram, cross)
         own_square, own_dot = square - float(weights @ cross), dot - float(weights @ self.along)
         if own_square <= LEAST_OWN_SHARE * square or own_square <= 0:
             return 0.0, 0.0
         return own_dot**2 / own_square, own_dot / own_square
 
-    def decrease_with(self, model: Model) -> float:
-        """Return by how much the squares fall with another model as it is, if the free parameters follow, to first order."""
-        promise, length = self.score(model)
+    def decrease_with(self, effect: Effect) -> float:
+        """Return by how much the squares fall with an effect as it is, if the free parameters follow, to first order."""
+        promise, length = self.score(effect)
         return promise * (2.0 * length - 1.0) / length**2 if length != 0.0 else 0.0
 
-    def score_of_texels(self, model: Model) -> float:
+    def score_of_texels(self, effect: Effect) -> float:
         """Return by how much the squares fall at best if each texel has a length of its own, less what noise alone gives.
 
         Parameters
         ----------
-        model : Model
-            In which all texels change.
+        effect : Effect
+            Which changes all texels.
         """
+        model = self.model.with_effect(effect)
         n = len(self.views[0].predictor.rig.texels)
         dot, square = np.zeros(n), np.zeros(n)
         for view, r in zip(self.views, self.residual, strict=True):
@@ -142,16 +146,17 @@ class ScoreTest:
         seen = square > LEAST_SENSITIVITY * max(square.max(initial=0.0), 1e-300)
         return max(float((dot[seen] ** 2 / square[seen]).sum()) - seen.sum(), 0.0)
 
-    def joint_score(self, models: Sequence[Model]) -> tuple[float, np.ndarray]:
-        """Test the changes to several models at once.
+    def joint_score(self, effects: Sequence[Effect]) -> tuple[float, np.ndarray]:
+        """Test the changes that several effects make, all at once.
 
         Returns
         -------
         decrease : float
             By how much the squares fall at best, to first order, beyond what the free parameters can do.
-        lengths : (len(models),) float
+        lengths : (len(effects),) float
             The best lengths along the changes.
         """
+        models = [self.model.with_effect(effect) for effect in effects]
         changes = [
             [(r - view.residual(model)).ravel() for view, r in zip(self.views, self.residual, strict=True)] for model in models
         ]
@@ -164,7 +169,10 @@ class ScoreTest:
         best = np.linalg.solve(ridged(gram), along)
         return self.least - (self.total - float(along @ best)), best[size:]
 
-    def decrease(self, model: Model) -> float:
-        """Return by how much another model lowers the squares as it is; minus infinity if it predicts no numbers."""
-        after = sum(float(np.vdot(r, r)) for r in (view.residual(model) for view in self.views))
-        return self.total - after if np.isfinite(after) else -np.inf
+    def decrease(self, effect: Effect) -> float:
+        """Return by how much an effect lowers the squares as it is; minus infinity if it predicts no numbers."""
+        if id(effect) not in self._decreases:
+            model = self.model.with_effect(effect)
+            after = sum(float(np.vdot(r, r)) for r in (view.residual(model) for view in self.views))
+            self._decreases[id(effect)] = effect, self.total - after if np.isfinite(after) else -np.inf
+        return self._decreases[id(effect)][1]

@@ -43,7 +43,7 @@ def starting_points(
     """
     if candidate.kind.found_by == SILENT_TEXELS:
         effect = unresponsive_texels(view_set.whole, score_test.model, candidate, scales.texels)
-        return [] if effect is None else [(score_test.score(score_test.model.with_effect(effect))[0], effect)]
+        return [] if effect is None else [(score_test.score(effect)[0], effect)]
     if candidate.kind.found_by == STEPS:
         return _quantization_starts(candidate, score_test, view_set)
     if candidate.has_texel_parameters:
@@ -61,10 +61,10 @@ def _scaled_starts(candidate: Candidate, score_test: ScoreTest, scales: Scales, 
 
     The score test is linear and an effect is not: how far loads spread does nothing near a width of zero.
     """
-    model, gain, tried = score_test.model, abs(score_test.model.parameters.gain), []
+    gain, tried = abs(score_test.model.parameters.gain), []
     for values in candidate.starting_values(scales, gain, count):
         effect = candidate.effect(values, scales.texels, gain)
-        promise, length = score_test.score(model.with_effect(effect))
+        promise, length = score_test.score(effect)
         if length > 0.0 or candidate.is_signed:
             tried += [(promise, effect), (promise, candidate.scaled(effect, length, gain))]
     return sorted(tried, key=lambda entry: -entry[0])
@@ -77,7 +77,7 @@ def _quantization_starts(candidate: Candidate, score_test: ScoreTest, view_set: 
     visible = few_levels(values) is not None
     least = VISIBLE_STEPS_PROMISE * score_test.total if visible else 0.0
     starts = quantization_starts(values, view_set.whole, candidate)
-    decreases = [(score_test.decrease(model.with_effect(effect)), effect) for effect in starts]
+    decreases = [(score_test.decrease(effect), effect) for effect in starts]
     return [(max(decrease, least), effect) for decrease, effect in sorted(decreases, key=lambda entry: -entry[0])]
 
 
@@ -88,7 +88,7 @@ def _texel_parameter_starts(candidate: Candidate, score_test: ScoreTest, scales:
     scale = scales.reading if parameter.unit == "unit" else 1.0
     step = float(parameter.default) + TEXEL_STEP * scale
     moved = candidate.effect({parameter.name: step}, scales.texels, gain)
-    promise = score_test.score_of_texels(score_test.model.with_effect(moved))
+    promise = score_test.score_of_texels(moved)
     return [(promise, candidate.effect({}, scales.texels, gain))]
 
 
@@ -98,11 +98,10 @@ def _displacement_start(candidate: Candidate, score_test: ScoreTest, scales: Sca
     parameters = [q for q in candidate.form.parameters if q.name not in candidate.held]
     neutral = {name: 0.0 for name in candidate.form.neutral}
     steps = [SMALL_SHIFT * scales.pitch if q.unit == "m" else SMALL_TURN for q in parameters]
-    models = [
-        score_test.model.with_effect(candidate.effect({**neutral, q.name: step}, scales.texels, gain))
-        for q, step in zip(parameters, steps, strict=True)
+    moved = [
+        candidate.effect({**neutral, q.name: step}, scales.texels, gain) for q, step in zip(parameters, steps, strict=True)
     ]
-    promise, best = score_test.joint_score(models)
+    promise, best = score_test.joint_score(moved)
     limits = [LARGEST_SHIFT * scales.pitch if q.unit == "m" else LARGEST_TURN for q in parameters]
     lengths = [float(np.clip(b * s, -m, m)) for b, s, m in zip(best, steps, limits, strict=True)]
     values = {q.name: length for q, length in zip(parameters, lengths, strict=True)}
@@ -134,7 +133,7 @@ def _large_displacement(candidate: Candidate, score_test: ScoreTest, scales: Sca
     for step, count, name in scans:  # a turn last, because it imitates a shift that is not found yet
         tried = [{**best, name: best[name] + i * step * units[name]} for i in range(-count, count + 1)]
         effects = [candidate.effect(values, scales.texels, gain) for values in tried]
-        decreases = [score_test.decrease_with(score_test.model.with_effect(effect)) for effect in effects]
+        decreases = [score_test.decrease_with(effect) for effect in effects]
         decrease = max(decreases)
         top = np.flatnonzero(np.isclose(decreases, decrease))
         best = tried[top[len(top) // 2]]

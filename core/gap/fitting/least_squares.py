@@ -219,6 +219,14 @@ def write_differences(measured, predicted, noise, out, first):  # type: ignore[n
             out[i, first + j] = (value - predicted[i, j]) / noise if np.isfinite(value) else 0.0
 
 
+@kernel
+def write_quotients(before, after, change, out):  # type: ignore[no-untyped-def]
+    """Write the difference of two residuals (T, c) over a change of each column (c,)."""
+    for i in range(before.shape[0]):
+        for j in range(before.shape[1]):
+            out[i, j] = (before[i, j] - after[i, j]) / change[j]
+
+
 @dataclass
 class NormalEquations:
     """Normal equations ``A x = g`` of one stretch of a trial, for p common parameters and m parameters of each of n texels.
@@ -440,13 +448,12 @@ def derivatives(
         moved = np.where(ahead - at[i] > 0.5 * step, ahead, item.to_coordinate(item.from_coordinate(at[i] - step)))
         change = moved - at[i]
         values = [*here[:i], item.from_coordinate(moved), *here[i + 1 :]]
-        np.subtract(residual, view.residual(with_values(model, free, values)), out=table[i])
-        if item.per_texel:
-            scale = np.broadcast_to(change, (len(view.predictor.rig.texels),))[view.texels]
-            table[i, :, :-3] /= np.where(np.abs(scale) > 0, scale, np.inf)
-            table[i, :, -3:] = 0.0
-        else:
-            table[i] /= float(change) if float(change) != 0.0 else np.inf
+        over = np.full(residual.shape[1], np.inf)
+        over[: len(view.texels)] = np.broadcast_to(change, (len(view.predictor.rig.texels),))[view.texels]
+        if not item.per_texel:
+            over[-3:] = change
+        over[over == 0.0] = np.inf
+        write_quotients(residual, view.residual(with_values(model, free, values)), over, table[i])
 
 
 def _equations_of(

@@ -92,7 +92,8 @@ class ContactHistory:
         Distance of sliding since the sample before.
     rate : (T, g) float, m/s
         Rate of the depth.
-    samples : ContactSamples
+    samples : ContactSamples or None
+        None where no sum of forces is wanted.
     """
 
     time: np.ndarray
@@ -102,27 +103,25 @@ class ContactHistory:
     depth: np.ndarray
     slide_step: np.ndarray
     rate: np.ndarray
-    samples: ContactSamples
+    samples: ContactSamples | None
 
     @classmethod
-    def of(cls, stimulus: Stimulus, subset: np.ndarray | None, rig: Rig) -> ContactHistory:
+    def of(cls, stimulus: Stimulus, subset: np.ndarray | None, rig: Rig, with_samples: bool) -> ContactHistory:
         """Return the contact history of some points of a rig's surface, or of all (`subset` None)."""
         load = stimulus.load
         chosen = np.arange(load.shape[1]) if subset is None else subset
         (touched,) = np.nonzero(load[:, chosen].any(axis=0))
         touched_texels = chosen[touched]
         normal = -rig.surface.normal[None] if stimulus.normal is None else stimulus.normal
-        normal = np.ascontiguousarray(np.broadcast_to(normal, (*load.shape, 3)), dtype=float)
-        slip = np.zeros_like(normal) if stimulus.slip is None else np.ascontiguousarray(stimulus.slip)
-        arrays = [load, stimulus.rate, stimulus.slide_speed, *np.moveaxis(normal, 2, 0), *np.moveaxis(slip, 2, 0)]
-        first, group = _equal_columns(arrays, touched_texels)
+        normal = np.broadcast_to(normal, (*load.shape, 3))
+        arrays = [load.max(axis=0, keepdims=True), load, stimulus.rate, stimulus.slide_speed, *np.moveaxis(normal, 2, 0)]
+        arrays += [] if stimulus.slip is None else [*np.moveaxis(stimulus.slip, 2, 0)]
+        first, group = _equal_columns(arrays, touched_texels)  # most columns differ in their maxima already
         one = touched_texels[first]
         share = None if rig.cover is None else rig.cover.share[touched_texels]
         count = np.bincount(group, share, minlength=len(one)).astype(float)
         step = np.diff(stimulus.time, prepend=stimulus.time[0])
-        pressed = np.ascontiguousarray(load[:, one] > 0)
-        samples = ContactSamples.of_size(int(pressed.sum()))
-        write_samples(pressed, one, count, normal, slip, step, samples)
+        samples = _contact_samples(stimulus, normal, one, count, step) if with_samples else None
         depth, rate, slide = (values[:, one].copy() for values in (stimulus.depth, stimulus.rate, stimulus.slide_speed))
         return cls(stimulus.time, len(chosen), touched, group, depth, slide * step[:, None], rate, samples)
 
@@ -147,6 +146,7 @@ class ContactHistory:
             Normal force of each texel.
         """
         t = self.samples
+        assert t is not None
         column = np.zeros(int(self.group.max(initial=-1)) + 1, dtype=int)
         column[self.group] = self.touched
         pressed = force[t.sample, column[t.texel]]
@@ -157,6 +157,18 @@ class ContactHistory:
         work = np.empty((5, len(pressed)))
         sum_forces(t, pressed, factor, viscous, contact_law(p), work, total)
         return total
+
+
+def _contact_samples(
+    stimulus: Stimulus, normal: np.ndarray, column: np.ndarray, count: np.ndarray, step: np.ndarray
+) -> ContactSamples:
+    """The samples in contact of some columns (see :func:`write_samples`)."""
+    normal = np.ascontiguousarray(normal, dtype=float)
+    slip = np.zeros_like(normal) if stimulus.slip is None else np.ascontiguousarray(stimulus.slip)
+    pressed = np.ascontiguousarray(stimulus.load[:, column] > 0)
+    samples = ContactSamples.of_size(int(pressed.sum()))
+    write_samples(pressed, column, count, normal, slip, step, samples)
+    return samples
 
 
 def _equal_columns(arrays: list[np.ndarray], columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -269,7 +269,8 @@ class Session:
     def _contact_history(self, model: Model, subset: np.ndarray | None) -> ContactHistory:
         which = None if subset is None else subset.tobytes()
         key = which, _effects_key(model.placing_effects), self._heights(model)
-        return self._histories.get_or(key, lambda: ContactHistory.of(self.placed(model), subset, self.rig))
+        sums = subset is None and any(trial.force is not None for trial in self.trials)
+        return self._histories.get_or(key, lambda: ContactHistory.of(self.placed(model), subset, self.rig, sums))
 
 
 class Predictor:
