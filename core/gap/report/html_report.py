@@ -126,7 +126,8 @@ def _evidence_table(found: dict[str, Any]) -> Table:
         near = "no close alternative"
         if rival:
             much = "as much" if rival["leaves"] < AS_MUCH else f"{rival['leaves']:.2g} times as much"
-            near = f"{rival['effect']}, which leaves {much}"
+            is_open = any(one["effect"] == group[0] and rival["effect"] in group for group in found["ambiguous"])
+            near = f"{rival['effect']}, which {'is not distinguished from it' if is_open else f'leaves {much}'}"
         errors = [f"{one[key]:.3%}" for key in ("gap_before", "gap_after")]
         rows.append([one["effect"], *errors, said_confidence(one["confidence"]), near])
     return Table(["effect", "without", "with", "confidence", "next best in its place"], rows, {1, 2, 3})

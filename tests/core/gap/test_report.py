@@ -21,7 +21,7 @@ from palpate.core.gap.fitting.least_squares import BASE
 from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.report import summary
 from palpate.core.gap.report.comparison import gap_errors
-from palpate.core.gap.report.html_report import _value_and_ends
+from palpate.core.gap.report.html_report import _evidence_table, _value_and_ends
 from palpate.core.gap.report.sentences import NOT_IDENTIFIABLE, headline, interval_text, said_confidence
 
 
@@ -95,6 +95,18 @@ def test_numbers_without_an_interval_stand_below_the_others():
         ("misalignment", "y", "0.00255 (0.002 … 0.003)"),
         ("misalignment", "x", "-0.00119 (no interval)"),
     ]
+
+
+def test_what_leaves_more_and_is_a_rival_is_not_distinguished():
+    """The share that a rival leaves would read as evidence against it."""
+
+    def row(ambiguous):
+        one = {"effect": "dead-zone", "gap_before": 0.05, "gap_after": 0.01, "confidence": 0.49}
+        one["next_best"] = {"effect": "misalignment", "leaves": 11.2}
+        return _evidence_table({"found": [one], "ambiguous": ambiguous}).rows[0][-1]
+
+    assert row([["dead-zone", "misalignment"]]) == "misalignment, which is not distinguished from it"
+    assert row([]) == row([["creep", "dead-zone", "misalignment"]]) == "misalignment, which leaves 11 times as much"
 
 
 @pytest.mark.parametrize(("value", "low", "high", "bounds", "is_told"), [

@@ -98,26 +98,25 @@ def free_port() -> str:
         return str(probe.getsockname()[1])
 
 
-def disturbed(folder: Path) -> Path:
-    """Write the study that is killed, and stopped."""
-    return write_study(folder / "own", RUNS, fails=True, hold=0.5)
-
-
-@pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory) -> tuple[list[dict], dict[str, str]]:
-    """The rows of that study when it is computed in this process, and hashes of its dataset."""
+def undisturbed(folder: Path, runs: int) -> tuple[list[dict], dict[str, str]]:
+    """Return the rows of a study that is computed in this process, and hashes of its dataset."""
     from palpate.sweep.dataset import publish
 
-    opened = begun(disturbed(tmp_path_factory.mktemp("undisturbed")))
-    compute_batch(range(RUNS), str(opened.folder))
+    opened = begun(write_study(folder, runs, fails=True, hold=0.5))
+    compute_batch(range(runs), str(opened.folder))
     publish(opened.folder, opened.study)
     return rows_of(opened.folder), tree(opened.folder / "dataset")
 
 
 @pytest.mark.long("kills a study twenty times and computes it again")
-def test_a_study_killed_twenty_times_has_the_table_of_an_undisturbed_one(tmp_path, undisturbed):
+def test_a_study_killed_twenty_times_has_the_table_of_an_undisturbed_one(tmp_path):
     """Of a scheduler and two workers that were started by hand, and the command, one is killed at a random moment."""
-    study, out, dice, killed = disturbed(tmp_path), tmp_path / "out", random.Random(SEED), []
+    study, out, dice, killed = (
+        write_study(tmp_path / "own", RUNS, fails=True, hold=0.5),
+        tmp_path / "out",
+        random.Random(SEED),
+        [],
+    )
     with ExitStack() as files:
         alive: dict[str, subprocess.Popen] = {}
 
@@ -147,14 +146,14 @@ def test_a_study_killed_twenty_times_has_the_table_of_an_undisturbed_one(tmp_pat
     assert_succeeds("sweep", study, "--out", out, "--workers", 2)
     print(f"kills, and how many runs were over: {killed}; runs in {len(Parts(out).files)} parts")
     assert len(killed) == KILLS, f"the study was over after {len(killed)} kills: give it more runs"
-    assert (rows_of(out), tree(out / "dataset")) == undisturbed
+    assert (rows_of(out), tree(out / "dataset")) == undisturbed(tmp_path / "expected", RUNS)
 
 
 @pytest.mark.long("stops a study and computes it again")
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
-def test_a_stopped_study_goes_on_where_it_was(tmp_path, undisturbed):
+def test_a_stopped_study_goes_on_where_it_was(tmp_path):
     """A terminal's Ctrl-C reaches the whole group; what is done is not computed again."""
-    study, out = disturbed(tmp_path), tmp_path / "out"
+    study, out = write_study(tmp_path / "own", RUNS, fails=True, hold=0.5), tmp_path / "out"
     words = "sweep", study, "--out", out, "--workers", 2
     process = subprocess.Popen(command(*words), stderr=subprocess.PIPE, text=True, start_new_session=True)
     until(lambda: sum(counted_runs(out)) >= 10 or process.poll() is not None, "the first part")
@@ -167,7 +166,7 @@ def test_a_stopped_study_goes_on_where_it_was(tmp_path, undisturbed):
     assert_succeeds(*words)
     assert before and all(path.read_bytes() == content for path, content in before.items())
     assert sum(counted_runs(out)) == RUNS, "a run was computed twice"
-    assert rows_of(out) == undisturbed[0]
+    assert rows_of(out) == undisturbed(tmp_path / "expected", RUNS)[0]
 
 
 @pytest.mark.long("a run that ends its worker three times")
