@@ -257,6 +257,8 @@ class Form:
     error : float or None
         φ of a form that is free to follow any law of its kind: the share of the mean square of the kind's change that it leaves
         of other laws, measured on laws that the library does not have. None for formulas of textbooks.
+    is_apart : bool
+        Whether the free forms of its kind explain a part of it and do not follow it, so that it is looked for beside them.
     """
 
     name: str
@@ -282,6 +284,7 @@ class Form:
     same_as: str = ""
     needs: str = ""
     error: float | None = None
+    is_apart: bool = False
 
     @cached_property
     def mechanism(self) -> str:

@@ -102,6 +102,7 @@ KIND = Kind(
             (Parameter("share", "1", 0.2, 0.0, 5.0, "Share c of the mean of all texels that is added."),),
             neutral={"share": 0.0},
             memoryless=common,
+            is_apart=True,
         ),
         Form(
             "previous",
@@ -111,6 +112,7 @@ KIND = Kind(
             (Parameter("share", "1", 0.05, 0.0, 1.0, "Share c that the texel scanned before leaves."),),
             neutral={"share": 0.0},
             memoryless=previous,
+            is_apart=True,
         ),
         Form(
             "wires",

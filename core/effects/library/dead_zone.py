@@ -89,6 +89,7 @@ KIND = Kind(
             (_THRESHOLD,),
             neutral={"threshold": 0.0},
             memoryless=step,
+            is_apart=True,
         ),
     ),
     experiment="approach slowly, with many samples at the first touch, with a flat and with a round indenter",

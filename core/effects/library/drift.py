@@ -92,6 +92,7 @@ KIND = Kind(
             neutral={"amount": 0.0},
             memoryless=listed,
             after_conversion=True,
+            is_apart=True,
         ),
         Form(
             "shifted-power",
@@ -119,6 +120,7 @@ KIND = Kind(
             neutral={"amount": 0.0},
             memoryless=sensitivity,
             needs="no clock",  # on the clock of a session a gain that changes by itself is a warm-up
+            is_apart=True,
         ),
         Form(
             "random-walk",

@@ -88,6 +88,7 @@ KIND = Kind(
             neutral={"factor": 1.0, "curvature": 0.0},
             memoryless=curved,
             is_tried=False,  # that two numbers per texel take no other effect's name has not been measured
+            is_apart=True,
         ),
         Form(
             "random-power",

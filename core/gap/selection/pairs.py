@@ -58,15 +58,17 @@ def best_pairs(screening: Screening, base: Hypothesis) -> Making:
 
 
 def _dictionary(screening: Screening, base: Hypothesis) -> Iterator[_Entry]:
-    """Forms with numbers at which they make a change: of each kind those that are free to follow any law, if it has any."""
+    """Forms with numbers at which they make a change: of each kind those that are free to follow any law, if it has any, and
+    those which these do not follow.
+    """
     by_kind: dict[str, list[Candidate]] = {}
     for one in screening.candidates(base.fit.model):
         if not (is_free_already(one, base.fit.free) or one.name in DIRECTLY_ESTIMATED or one.form.friction_law is not None):
             by_kind.setdefault(one.name, []).append(one)
     gain = abs(base.fit.model.parameters.gain)
     for forms in by_kind.values():
-        free, others = ([one for one in forms if (one.form.error is None) is bound] for bound in (False, True))
-        yield from [*_entries(screening, free, gain)] or _entries(screening, others, gain)
+        wide = [one for one in forms if one.form.error is not None or one.form.is_apart]
+        yield from [*_entries(screening, wide, gain)] or _entries(screening, forms, gain)
 
 
 def _entries(screening: Screening, forms: Iterable[Candidate], gain: float) -> Iterator[_Entry]:
