@@ -258,7 +258,7 @@ class Form:
         φ of a form that is free to follow any law of its kind: the share of the mean square of the kind's change that it leaves
         of other laws, measured on laws that the library does not have. None for formulas of textbooks.
     is_apart : bool
-        Whether the free forms of its kind explain a part of it and do not follow it, so that it is looked for beside them.
+        Whether the free forms of its kind explain a part of it and do not follow it, so that pairs are looked for in it, too.
     """
 
     name: str

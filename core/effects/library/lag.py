@@ -11,9 +11,6 @@ from ...model.sensor import Values
 from ..engine.specification import Drawing, Form, Kind, TexelInput, scalar
 from .creep import step_weights
 
-LEAST_QUALITY = 0.05
-"""Below it a second order counts as a first one: its faster stage is 400 times as fast as the slower one."""
-
 
 def first_order(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
     """``τ q̇ = x − q``, x linear over the step.
@@ -85,7 +82,7 @@ def _dead_time(values: Values) -> float:
 
 
 def _behind_dead_time(values: Values, dt: np.ndarray) -> np.ndarray:
-    quality = max(scalar(values, "quality"), LEAST_QUALITY)
+    quality = max(scalar(values, "quality"), 1e-4)  # no division by zero; it is a first order to rounding
     return _second_order((scalar(values, "time") - _dead_time(values)) * quality, 0.5 / quality, dt)
 
 

@@ -107,7 +107,9 @@ class ContactHistory:
 
     @classmethod
     def of(cls, stimulus: Stimulus, subset: np.ndarray | None, rig: Rig, with_samples: bool) -> ContactHistory:
-        """Return the contact history of some points of a rig's surface, or of all (`subset` None)."""
+        """Return the contact history of some points of a rig's surface, or of all (`subset` None); for a sum of forces
+        `with_samples`.
+        """
         load = stimulus.load
         chosen = np.arange(load.shape[1]) if subset is None else subset
         (touched,) = np.nonzero(load[:, chosen].any(axis=0))
@@ -146,7 +148,7 @@ class ContactHistory:
             Normal force of each texel.
         """
         t = self.samples
-        assert t is not None
+        assert t is not None, "the history was made without samples"
         column = np.zeros(int(self.group.max(initial=-1)) + 1, dtype=int)
         column[self.group] = self.touched
         pressed = force[t.sample, column[t.texel]]

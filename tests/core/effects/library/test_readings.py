@@ -205,6 +205,13 @@ def test_second_order_plus_dead_time_is_both(quality):
     assert late == pytest.approx(mean, rel=1e-4)  # after thirty mean delays
 
 
+def test_without_quality_it_is_a_first_order():
+    signal = np.sin(3.0 * TIME)[:, None]
+    expected = read(effect("lag", "first-order", time=0.3), signal)
+    found = read(effect("lag", "second-order-plus-dead-time", time=0.3, quality=0.0, dead_share=0.0), signal)
+    np.testing.assert_allclose(found, expected, atol=1e-7)  # its faster stage takes 3e-9 s
+
+
 def test_second_order_plus_dead_time_follows_other_lags():
     """Moving means of a converter, and a filter behind a dead time: what is left is at most the form's own φ."""
     form = form_of("lag", "second-order-plus-dead-time")

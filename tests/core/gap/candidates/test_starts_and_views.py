@@ -24,6 +24,7 @@ from palpate.core.gap.fitting.intervals import student_quantile
 from palpate.core.gap.fitting.least_squares import FRICTION_LEVEL, TrialView, fit, free_base_parameters, with_values
 from palpate.core.gap.forward.predictor import Model, Predictor, predictors_of
 from palpate.core.gap.selection.diagnosis import faults_of
+from palpate.core.gap.selection.pairs import _dictionary
 from palpate.core.gap.selection.screening import Screening
 from palpate.core.geometry.mesh import checked_mesh
 from palpate.core.model.parameter import Parameter
@@ -142,6 +143,21 @@ def test_a_shift_starts_from_the_displacement_that_was_fitted_alone():
         candidate = Candidate(kind_of(name), form_of(name, form))
         values[form] = [one.values for one in screening._known(candidate, 1.0)]
     assert values == {"shift": [{"x": 1e-3, "y": -2e-3}], "first-order": [{"time": 0.1}], "second-order": []}
+
+
+def test_pairs_are_looked_for_in_free_forms_and_in_those_that_these_do_not_follow():
+    """Wires explain a part of what leaks from the channel scanned before; a kind without a free form comes in all its forms."""
+    rig = cases.rig(lambda force, _time: force, trials=2, seconds=5.0)
+    predictors, model = predictors_of(rig.trials, rig), Model(rig.parameters)
+    screening = Screening(
+        SimpleNamespace(whole=[TrialView(one) for one in predictors]), None, None, scales_of(predictors, model), "", {}
+    )
+    found = {
+        entry.candidate.label for entry in _dictionary(screening, SimpleNamespace(fit=SimpleNamespace(model=model, free=())))
+    }
+    assert {"crosstalk/wires", "crosstalk/previous", "lag/second-order-plus-dead-time", "dead-zone/step"} <= found
+    assert not found & {"crosstalk/neighbours", "lag/first-order", "dead-zone/hard", "creep/power", "creep/rising-exponential"}
+    assert {one.name for one in kind_of("hysteresis").forms} <= {label.split("/")[1] for label in found}
 
 
 # --- ranges
