@@ -20,8 +20,8 @@ from .score import Hypothesis
 from .screening import LATER_STARTS, Making, Screening, free_with
 
 PAIRS = 3
-"""Pairs of kinds that are fitted: for speed. In 20 of 21 rigs with two effects the hidden pair ranks first or second, of 32 to
-89 pairs, and fourth in one, where it is found without a search for pairs; the third is a margin."""
+"""Pairs of kinds that are fitted: for speed. In 20 of 21 rigs with two effects the hidden pair ranks first or second, of 33 to
+91 pairs, and fourth in one, where it is found without a search for pairs; the third is a margin."""
 SAME_CHANGE = 0.999
 """Cosine above which two changes count as collinear, so that no least squares divide by rounding. Between 0.99 and 0.9999 the
 ranks of the hidden pairs are the same."""

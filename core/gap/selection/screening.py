@@ -35,7 +35,7 @@ from .score import OWN_NUMBERS, Hypothesis
 
 LATER_STARTS = 1
 """Points of the search ranges that are tried on top of an effect, in pairs, or in addition to the form's values alone: for
-speed. With three or six of them the hidden pairs rank no better."""
+speed. With three of them the hidden pairs rank no better."""
 FIRST_STEPS, FIRST_TOLERANCE = 10, 1e-3
 """Of the fits to a part of the data. With 6 steps and 3e-3 they take a quarter less processor time, and rivals are left out
 before they are fitted to everything: in three of 74 rigs crosstalk was sure where load spreading explains as much."""
