@@ -116,7 +116,7 @@ def meet_sphere(center, radius, position, outward, reach, depth, normal, point):
 @kernel
 def meet_box(center, frame, half, position, outward, reach, depth, normal, point):  # type: ignore[no-untyped-def]
     """Write the contacts with a box of these half edges into `depth`, `normal` and `point`; return as :func:`meet_sphere`."""
-    most = 0
+    most, farthest = 0, np.sqrt(half[0] ** 2 + half[1] ** 2 + half[2] ** 2) + reach
     for i in range(center.shape[0]):
         deep = 0
         for j in range(position.shape[0]):
@@ -124,6 +124,8 @@ def meet_box(center, frame, half, position, outward, reach, depth, normal, point
             ox = position[j, 0] - reach * nx - center[i, 0]
             oy = position[j, 1] - reach * ny - center[i, 1]
             oz = position[j, 2] - reach * nz - center[i, 2]
+            if ox * ox + oy * oy + oz * oz > farthest * farthest:
+                continue
             # Into the box's frame, whose axes are columns.
             base = (
                 ox * frame[i, 0, 0] + oy * frame[i, 1, 0] + oz * frame[i, 2, 0],

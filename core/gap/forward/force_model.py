@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from .stimulus import Stimulus
 
 EQUAL_WITHIN = 1e-9
-"""Largest difference, as a share of the largest value, up to which two texels have equal histories."""
+"""Difference of the means of two texels, as a share of the largest value, up to which they have equal histories."""
 
 
 class ContactSamples(NamedTuple):
@@ -116,9 +116,8 @@ class ContactHistory:
         touched_texels = chosen[touched]
         normal = -rig.surface.normal[None] if stimulus.normal is None else stimulus.normal
         normal = np.broadcast_to(normal, (*load.shape, 3))
-        arrays = [load.max(axis=0, keepdims=True), load, stimulus.rate, stimulus.slide_speed, *np.moveaxis(normal, 2, 0)]
-        arrays += [] if stimulus.slip is None else [*np.moveaxis(stimulus.slip, 2, 0)]
-        first, group = _equal_columns(arrays, touched_texels)  # most columns differ in their maxima already
+        arrays = [load, stimulus.rate, stimulus.slide_speed, normal, *([] if stimulus.slip is None else [stimulus.slip])]
+        first, group = _equal_texels(arrays, touched_texels)
         one = touched_texels[first]
         share = None if rig.cover is None else rig.cover.share[touched_texels]
         count = np.bincount(group, share, minlength=len(one)).astype(float)
@@ -173,25 +172,19 @@ def _contact_samples(
     return samples
 
 
-def _equal_columns(arrays: list[np.ndarray], columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """First of each group of columns that are equal in all arrays (g,), and the group of each column (p,).
+def _equal_texels(arrays: list[np.ndarray], texels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First of each group of texels that are equal in all arrays (g,), and the group of each texel (p,).
 
-    Both count the given columns. An array is looked at only in columns that are equal in all arrays before it.
+    Both count the given texels, and groups come in the order of their first ones. Each array (T, n) or (T, n, 3) is compared in
+    one random mean of its samples, in which texels that differ are hardly ever equal.
     """
-    group = np.zeros(len(columns), dtype=int)
-    for values in arrays:
-        (shared,) = np.nonzero(np.bincount(group)[group] > 1)
-        if not len(shared):
-            break
-        quantum = EQUAL_WITHIN * max(float(np.abs(values[:, columns]).max(initial=0.0)), 1e-300)
-        words = np.ascontiguousarray(np.round(values[:, columns[shared]] / quantum).astype(np.int64).T)
-        keys: list[object] = [(int(number),) for number in group]
-        for place, column in zip(shared, words, strict=True):
-            keys[place] = int(group[place]), column.tobytes()
-        seen: dict[object, int] = {}
-        group = np.array([seen.setdefault(key, len(seen)) for key in keys], dtype=int)
-    _, first = np.unique(group, return_index=True)
-    return first, group
+    weights = np.random.default_rng(0).uniform(1.0, 2.0, len(arrays[0]))
+    means = [np.tensordot(weights, values, 1)[texels].reshape(len(texels), -1) for values in arrays]
+    largest = [max(float(np.abs(values).max(initial=0.0)) * weights.sum(), 1e-300) for values in arrays]
+    rounded = np.hstack([np.round(m / (EQUAL_WITHIN * top)) + 0.0 for m, top in zip(means, largest, strict=True)])  # no -0.0
+    groups: dict[bytes, int] = {}
+    group = np.array([groups.setdefault(row.tobytes(), len(groups)) for row in rounded], dtype=int)
+    return np.unique(group, return_index=True)[1], group
 
 
 @kernel

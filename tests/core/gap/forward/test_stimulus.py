@@ -13,7 +13,7 @@ from palpate.core.gap.dataset.rig import Indenter, Rig, grid_texels
 from palpate.core.gap.dataset.trial import Trial
 from palpate.core.gap.fitting.noise_floor import coverage
 from palpate.core.gap.forward.closed_form_contact import box_contact, sphere_contact
-from palpate.core.gap.forward.force_model import _equal_columns
+from palpate.core.gap.forward.force_model import _equal_texels
 from palpate.core.gap.forward.predictor import Predictor
 from palpate.core.gap.forward.stimulus import stimulus_of
 from palpate.core.model.sensor_parameters import SensorParameters
@@ -186,13 +186,14 @@ def test_nothing_touched_keeps_texel_and_normal():
 # --- kernels
 
 
-def test_equal_columns_are_equal_in_all_arrays():
+def test_equal_texels_are_equal_in_all_arrays():
     rng = np.random.default_rng(4)
     for _ in range(20):
-        # Few different columns in each array, so that some are equal in the first and differ in the last.
-        arrays = [rng.normal(size=(12, 3))[:, rng.integers(0, 3, 15)] for _ in range(3)]
+        # Few different histories in each array, so that some are equal in the first and differ in the last.
+        arrays = [rng.normal(size=(12, 3, *more))[:, rng.integers(0, 3, 15)] for more in ((), (), (3,))]
+        arrays[0][rng.integers(12), rng.integers(15)] += 1e-6  # in one sample alone, as a texel that comes into contact there
         columns = rng.permutation(15)[:11]
-        first, group = _equal_columns(arrays, columns)
+        first, group = _equal_texels(arrays, columns)
         equal = np.array([[all((a[:, i] == a[:, j]).all() for a in arrays) for i in columns] for j in columns])
         np.testing.assert_array_equal(group[:, None] == group, equal)
         np.testing.assert_array_equal(first, [np.flatnonzero(group == number)[0] for number in range(group.max() + 1)])
