@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -46,7 +47,8 @@ reaches this share. Chosen by eye from 40 readings behind companding converters.
 def unresponsive_texels(views: Sequence[TrialView], model: Model, candidate: Candidate, texels: int) -> Effect | None:
     """Return the effect for texels that hardly follow the model although they are loaded; None if all follow.
 
-    A texel that goes to a rail at the first touch is dead too: loaded it always reads the same, far from what it should.
+    A texel that goes to a rail at the first touch is dead too: loaded it always reads the same, far from what it should. Others
+    are dead but for the share that they still follow.
 
     Parameters
     ----------
@@ -84,7 +86,31 @@ def unresponsive_texels(views: Sequence[TrialView], model: Model, candidate: Can
         return None
     values = {"dead": silent.astype(float), "level": np.where(silent, level * noise + model.parameters.zero, 0.0)}
     own = [q.name for q in candidate.form.parameters]
-    return Effect(candidate.name, candidate.form.name, {name: tuple(values[name].tolist()) for name in own})
+    effect = Effect(candidate.name, candidate.form.name, {name: tuple(values[name].tolist()) for name in own})
+    for i, follows, rest in _still_followed(views, model, effect, np.flatnonzero(silent & ~railed)):
+        values["dead"][i] = 1.0 - follows
+        values["level"][i] += rest / (1.0 - follows)
+    return replace(effect, values={name: tuple(values[name].tolist()) for name in own})
+
+
+def _still_followed(
+    views: Sequence[TrialView], model: Model, dead: Effect, silent: np.ndarray
+) -> Iterator[tuple[int, float, float]]:
+    """Silent texels, the share of its signal that each follows, and the median that is left of its readings.
+
+    The share is that of the signal which the texel would pass on to the effects behind it, such as a drift of all texels.
+    """
+    half = replace(dead, values={**dead.values, "dead": tuple(0.5 * np.asarray(dead.values["dead"]))})
+    signal, left = [], []
+    for view in views:
+        if view.predictor.trial.reading is not None:
+            gone, weak = (view.predictor.predict(model.with_effect(effect)).reading for effect in (dead, half))
+            signal.append(2.0 * (weak - gone)[:, silent])
+            left.append((view.predictor.trial.reading - gone)[:, silent])
+    for i, x, y in zip(silent, np.concatenate(signal).T, np.concatenate(left).T, strict=True):
+        x, y = x[np.isfinite(y)], y[np.isfinite(y)]
+        follows = float(np.clip((x - x.mean()) @ y / max(float((x - x.mean()) @ (x - x.mean())), 1e-300), 0.0, LEAST_SLOPE))
+        yield int(i), follows, float(np.median(y - follows * x))
 
 
 def quantization_starts(values: np.ndarray, views: Sequence[TrialView], candidate: Candidate) -> list[Effect]:

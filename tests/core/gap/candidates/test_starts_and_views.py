@@ -229,12 +229,20 @@ def railed(reading, _time):
     reading[:, GONE] = np.where(reading[:, GONE] > TOUCH, 2.0, reading[:, GONE])
 
 
+def deaf(reading, _time):
+    """Stuck but for a twentieth of the signal."""
+    reading[:, GONE] = 0.3 + 0.05 * reading[:, GONE]
+
+
 def clipped(reading, _time):
     np.minimum(reading, 0.03, out=reading)
 
 
-@pytest.mark.parametrize(("change", "level"), [(silent, 0.0), (stuck, 0.3), (railed, 2.0), (clipped, None)])
-def test_texels_that_do_not_answer(change, level):
+@pytest.mark.parametrize(
+    ("change", "level", "follows"),
+    [(silent, 0.0, 0.0), (stuck, 0.3, 0.0), (deaf, 0.3 / 0.95, 0.05), (railed, 2.0, 0.0), (clipped, None, 0.0)],
+)
+def test_texels_that_do_not_answer(change, level, follows):
     def changed(reading, time):
         reading = reading.copy()
         change(reading, time)
@@ -250,4 +258,5 @@ def test_texels_that_do_not_answer(change, level):
         assert found is None
         return
     assert np.flatnonzero(found.values["dead"]).tolist() == GONE
+    np.testing.assert_allclose(np.asarray(found.values["dead"])[GONE], 1.0 - follows, atol=5e-3)
     np.testing.assert_allclose(np.asarray(found.values["level"])[GONE], level + rig.parameters.zero, atol=2e-3)
