@@ -3,17 +3,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
 from ...model.sensor import Effect
-from ..fitting.least_squares import TrialView
+from ..fitting.least_squares import TrialView, fit
 from ..forward.contact_phases import relative_load
 from ..forward.predictor import Model
-from .candidates import Candidate
+from .candidates import Candidate, Scales
 from .companded_steps import CHARACTERISTIC_NOISE, LEAST_CHARACTERISTIC, companded_steps
 
 MOST_LEVELS = 48
@@ -33,6 +33,8 @@ noise, its measured reading by less than `LEAST_SPREAD_SHARE` of that, and if it
 predicted."""
 MOST_DEAD_SHARE = 0.4
 """If a larger share of the loaded texels seems dead, the model is wrong and not the texels."""
+TEXEL_STEPS = 2
+"""Steps of the fit to a silent texel: what it reads is linear in its numbers."""
 LEAST_READINGS = 400
 """Number of changing readings from which on steps are looked for."""
 COARSEST_FREQUENCY, FREQUENCY_STEP, STEP_IN_NOISE = 5.0, 0.12, 2.5
@@ -44,11 +46,11 @@ AS_CLEAR = 0.9
 reaches this share. Chosen by eye from 40 readings behind companding converters."""
 
 
-def unresponsive_texels(views: Sequence[TrialView], model: Model, candidate: Candidate, texels: int) -> Effect | None:
+def unresponsive_texels(views: Sequence[TrialView], model: Model, candidate: Candidate, scales: Scales) -> Effect | None:
     """Return the effect for texels that hardly follow the model although they are loaded; None if all follow.
 
-    A texel that goes to a rail at the first touch is dead too: loaded it always reads the same, far from what it should. Others
-    are dead but for the share that they still follow.
+    Their numbers are then fitted: a texel may be dead but for a share of its signal. A texel that goes to a rail at the first
+    touch is dead too: loaded it always reads the same, far from what it should.
 
     Parameters
     ----------
@@ -56,8 +58,7 @@ def unresponsive_texels(views: Sequence[TrialView], model: Model, candidate: Can
     model : Model
     candidate : Candidate
         The form of the effect.
-    texels : int
-        Number of texels.
+    scales : Scales
     """
     pairs = [(view.predictor.predict(model).reading, view.predictor.trial.reading) for view in views]
     known = [(a, b) for a, b in pairs if b is not None]
@@ -69,7 +70,7 @@ def unresponsive_texels(views: Sequence[TrialView], model: Model, candidate: Can
     loaded = (predicted**2 * good).sum(axis=0) > LEAST_LOADED_SQUARE
     if loaded.sum() < LEAST_LOADED_TEXELS:
         return None
-    slope, level, railed = np.full(texels, np.nan), np.zeros(texels), np.zeros(texels, bool)
+    slope, level, railed = np.full(scales.texels, np.nan), np.zeros(scales.texels), np.zeros(scales.texels, bool)
     for i in np.flatnonzero(loaded):
         x, y = predicted[good[:, i], i], measured[good[:, i], i]
         slope[i] = (x - x.mean()) @ (y - y.mean()) / max(float((x - x.mean()) @ (x - x.mean())), 1e-12)
@@ -87,30 +88,11 @@ def unresponsive_texels(views: Sequence[TrialView], model: Model, candidate: Can
     values = {"dead": silent.astype(float), "level": np.where(silent, level * noise + model.parameters.zero, 0.0)}
     own = [q.name for q in candidate.form.parameters]
     effect = Effect(candidate.name, candidate.form.name, {name: tuple(values[name].tolist()) for name in own})
-    for i, follows, rest in _still_followed(views, model, effect, np.flatnonzero(silent & ~railed)):
-        values["dead"][i] = 1.0 - follows
-        values["level"][i] += rest / (1.0 - follows)
-    return replace(effect, values={name: tuple(values[name].tolist()) for name in own})
-
-
-def _still_followed(
-    views: Sequence[TrialView], model: Model, dead: Effect, silent: np.ndarray
-) -> Iterator[tuple[int, float, float]]:
-    """Silent texels, the share of its signal that each follows, and the median that is left of its readings.
-
-    The share is that of the signal which the texel would pass on to the effects behind it, such as a drift of all texels.
-    """
-    half = replace(dead, values={**dead.values, "dead": tuple(0.5 * np.asarray(dead.values["dead"]))})
-    signal, left = [], []
-    for view in views:
-        if view.predictor.trial.reading is not None:
-            gone, weak = (view.predictor.predict(model.with_effect(effect)).reading for effect in (dead, half))
-            signal.append(2.0 * (weak - gone)[:, silent])
-            left.append((view.predictor.trial.reading - gone)[:, silent])
-    for i, x, y in zip(silent, np.concatenate(signal).T, np.concatenate(left).T, strict=True):
-        x, y = x[np.isfinite(y)], y[np.isfinite(y)]
-        follows = float(np.clip((x - x.mean()) @ y / max(float((x - x.mean()) @ (x - x.mean())), 1e-300), 0.0, LEAST_SLOPE))
-        yield int(i), follows, float(np.median(y - follows * x))
+    free = candidate.free_parameters(len(model.effects), scales, abs(model.parameters.gain))
+    free = [replace(item, low=1.0 - LEAST_SLOPE) if item.name == "dead" else item for item in free]
+    found = fit(views, model.with_effect(effect), free, max_steps=TEXEL_STEPS, with_equations=False).model.effects[-1].values
+    fitted = {name: np.where(silent & ~railed, found[name], values[name]) for name in own}
+    return replace(effect, values={name: tuple(value.tolist()) for name, value in fitted.items()})
 
 
 def quantization_starts(values: np.ndarray, views: Sequence[TrialView], candidate: Candidate) -> list[Effect]:

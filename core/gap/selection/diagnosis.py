@@ -254,13 +254,13 @@ def _stages(result: Diagnosis, view_set: ViewSet) -> list[Model]:
 
 
 def _structure(view_set: ViewSet, found: Fit) -> ResidualStructure:
-    """Dependence of a fit's residual on what is known of each sample, from few samples: their shares agree to two digits.
+    """Dependence of a fit's residual on what is known of each sample.
 
     Without readings the largest component of the net force stands for all texels.
     """
-    views = view_set.few_samples
-    predictors, width = [view.predictor for view in views], len(views[0].predictor.rig.texels)
-    residuals = [view.residual(found.model) for view in views]
+    width = len(view_set.whole[0].predictor.rig.texels)
+    predictors = [view.predictor for view in view_set.whole]
+    residuals = [view.residual(found.model) for view in view_set.whole]
     if any(predictor.trial.reading is not None for predictor in predictors):
         return residual_structure(predictors, [r[:, :width] for r in residuals])
     total = np.sum([(r[:, width:] ** 2).sum(axis=0) for r in residuals], axis=0)

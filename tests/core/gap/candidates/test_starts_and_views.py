@@ -253,7 +253,8 @@ def test_texels_that_do_not_answer(change, level, follows):
     noise, _ = prepared(rig, predictors)
     view_set = view_set_of(predictors, (noise[0].deviation, 1.0))
     candidate = Candidate(kind_of("dead-texels"), form_of("dead-texels", "held"))
-    found = unresponsive_texels(view_set.whole, Model(rig.parameters), candidate, len(rig.texels))
+    model = Model(rig.parameters)
+    found = unresponsive_texels(view_set.whole, model, candidate, scales_of(predictors, model))
     if level is None:
         assert found is None
         return

@@ -14,7 +14,7 @@ from palpate.core.gap.dataset.trial import Trial
 from palpate.core.gap.fitting.noise_floor import coverage
 from palpate.core.gap.forward.closed_form_contact import box_contact, sphere_contact
 from palpate.core.gap.forward.force_model import _equal_texels
-from palpate.core.gap.forward.predictor import Predictor
+from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.forward.stimulus import stimulus_of
 from palpate.core.model.sensor_parameters import SensorParameters
 
@@ -197,3 +197,21 @@ def test_equal_texels_are_equal_in_all_arrays():
         equal = np.array([[all((a[:, i] == a[:, j]).all() for a in arrays) for i in columns] for j in columns])
         np.testing.assert_array_equal(group[:, None] == group, equal)
         np.testing.assert_array_equal(first, [np.flatnonzero(group == number)[0] for number in range(group.max() + 1)])
+
+
+@pytest.mark.parametrize("samples", [1024, 12288])
+def test_texels_that_are_touched_at_different_times_are_not_equal(samples):
+    """A raster: each texel for one sample, all at the same depth and speed."""
+    raster = np.zeros((samples, 1024))
+    raster[np.arange(1024) * (samples // 1024), np.arange(1024)] = 1e-3
+    first, group = _equal_texels([raster, raster, raster], np.arange(1024))
+    np.testing.assert_array_equal(first, np.arange(1024))
+    np.testing.assert_array_equal(group, np.arange(1024))
+
+
+def test_texels_that_are_never_touched_read_nothing():
+    one = trial(np.tile([0.0, 0.0, 0.05], (20, 1)), force=np.zeros((20, 3)))
+    predicted = Predictor(one, rig(Indenter(box(0.01, 0.01, 0.01), None, "box", (0.01, 0.01, 0.01)), one)).predict(
+        Model(SensorParameters())
+    )
+    assert not predicted.reading.any() and predicted.force is not None and not predicted.force.any()
