@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 EQUAL_WITHIN = 1e-9
 """Difference of the means of two texels, as a share of the largest value, up to which they have equal histories."""
 MEANS = 3
-"""Random means in which histories are compared: two of a million pairs of texels that are touched for one sample each, in 40,000
-samples, are equal in one of them."""
+"""Random means in which histories are compared. Of 1,024 texels that are touched for one sample of 41,000 each, one mean takes
+24 for others, and two means none."""
 
 
 class ContactSamples(NamedTuple):
