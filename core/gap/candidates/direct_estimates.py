@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Effects that are estimated directly from the readings and not fitted: dead texels, and quantization steps."""
+"""What is estimated directly from the readings: which texels are dead, and quantization steps."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
 from ...model.sensor import Effect
-from ..fitting.least_squares import TrialView, fit
+from ..fitting.least_squares import FreeParameter, TrialView
 from ..forward.contact_phases import relative_load
 from ..forward.predictor import Model
-from .candidates import Candidate, Scales
+from .candidates import Candidate
 from .companded_steps import CHARACTERISTIC_NOISE, LEAST_CHARACTERISTIC, companded_steps
 
 MOST_LEVELS = 48
@@ -33,8 +33,6 @@ noise, its measured reading by less than `LEAST_SPREAD_SHARE` of that, and if it
 predicted."""
 MOST_DEAD_SHARE = 0.4
 """If a larger share of the loaded texels seems dead, the model is wrong and not the texels."""
-TEXEL_STEPS = 2
-"""Steps of the fit to a silent texel: what it reads is linear in its numbers."""
 LEAST_READINGS = 400
 """Number of changing readings from which on steps are looked for."""
 COARSEST_FREQUENCY, FREQUENCY_STEP, STEP_IN_NOISE = 5.0, 0.12, 2.5
@@ -46,11 +44,10 @@ AS_CLEAR = 0.9
 reaches this share. Chosen by eye from 40 readings behind companding converters."""
 
 
-def unresponsive_texels(views: Sequence[TrialView], model: Model, candidate: Candidate, scales: Scales) -> Effect | None:
+def unresponsive_texels(views: Sequence[TrialView], model: Model, candidate: Candidate, texels: int) -> Effect | None:
     """Return the effect for texels that hardly follow the model although they are loaded; None if all follow.
 
-    Their numbers are then fitted: a texel may be dead but for a share of its signal. A texel that goes to a rail at the first
-    touch is dead too: loaded it always reads the same, far from what it should.
+    A texel that goes to a rail at the first touch is dead too: loaded it always reads the same, far from what it should.
 
     Parameters
     ----------
@@ -58,7 +55,8 @@ def unresponsive_texels(views: Sequence[TrialView], model: Model, candidate: Can
     model : Model
     candidate : Candidate
         The form of the effect.
-    scales : Scales
+    texels : int
+        Number of texels.
     """
     pairs = [(view.predictor.predict(model).reading, view.predictor.trial.reading) for view in views]
     known = [(a, b) for a, b in pairs if b is not None]
@@ -70,7 +68,7 @@ def unresponsive_texels(views: Sequence[TrialView], model: Model, candidate: Can
     loaded = (predicted**2 * good).sum(axis=0) > LEAST_LOADED_SQUARE
     if loaded.sum() < LEAST_LOADED_TEXELS:
         return None
-    slope, level, railed = np.full(scales.texels, np.nan), np.zeros(scales.texels), np.zeros(scales.texels, bool)
+    slope, level, railed = np.full(texels, np.nan), np.zeros(texels), np.zeros(texels, bool)
     for i in np.flatnonzero(loaded):
         x, y = predicted[good[:, i], i], measured[good[:, i], i]
         slope[i] = (x - x.mean()) @ (y - y.mean()) / max(float((x - x.mean()) @ (x - x.mean())), 1e-12)
@@ -87,12 +85,16 @@ def unresponsive_texels(views: Sequence[TrialView], model: Model, candidate: Can
         return None
     values = {"dead": silent.astype(float), "level": np.where(silent, level * noise + model.parameters.zero, 0.0)}
     own = [q.name for q in candidate.form.parameters]
-    effect = Effect(candidate.name, candidate.form.name, {name: tuple(values[name].tolist()) for name in own})
-    free = candidate.free_parameters(len(model.effects), scales, abs(model.parameters.gain))
-    free = [replace(item, low=1.0 - LEAST_SLOPE) if item.name == "dead" else item for item in free]
-    found = fit(views, model.with_effect(effect), free, max_steps=TEXEL_STEPS, with_equations=False).model.effects[-1].values
-    fitted = {name: np.where(silent & ~railed, found[name], values[name]) for name in own}
-    return replace(effect, values={name: tuple(value.tolist()) for name, value in fitted.items()})
+    return Effect(candidate.name, candidate.form.name, {name: tuple(values[name].tolist()) for name in own})
+
+
+def of_silent_texels(free: Sequence[FreeParameter], effect: Effect) -> Iterator[FreeParameter]:
+    """Yield the parameters of an effect, free for its dead texels alone, which may follow a share of their load."""
+    silent = np.asarray(effect.values["dead"]) > 0.0
+    for item in free:
+        value = np.asarray(effect.values[item.name])
+        low = 1.0 - LEAST_SLOPE if item.name == "dead" else item.low
+        yield replace(item, low=np.where(silent, low, value), high=np.where(silent, item.high, value))
 
 
 def quantization_starts(values: np.ndarray, views: Sequence[TrialView], candidate: Candidate) -> list[Effect]:

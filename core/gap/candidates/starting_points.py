@@ -42,7 +42,7 @@ def starting_points(
         Number of points of the search ranges that are tried.
     """
     if candidate.kind.found_by == SILENT_TEXELS:
-        effect = unresponsive_texels(view_set.whole, score_test.model, candidate, scales)
+        effect = unresponsive_texels(view_set.whole, score_test.model, candidate, scales.texels)
         return [] if effect is None else [(score_test.score(effect)[0], effect)]
     if candidate.kind.found_by == STEPS:
         return _quantization_starts(candidate, score_test, view_set)

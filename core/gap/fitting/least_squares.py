@@ -58,8 +58,8 @@ class FreeParameter:
         Index of the effect in the model's stack; :data:`BASE` for a parameter of the base model, :data:`RECORDING` for a number
         of recordings.
     name : str
-    low, high : float
-        Bounds.
+    low, high : float or (n,) float
+        Bounds; equal where a texel keeps its value.
     log : bool
         True if it is fitted on a logarithmic scale.
     scale : float
@@ -73,8 +73,8 @@ class FreeParameter:
 
     effect: int
     name: str
-    low: float
-    high: float
+    low: Any
+    high: Any
     log: bool = False
     scale: float = 1.0
     per_texel: bool = False
@@ -90,6 +90,10 @@ class FreeParameter:
         """Return the value at a coordinate, inside the bounds."""
         value = np.exp(np.clip(coordinate, -700, 700)) if self.log else np.asarray(coordinate) * self.scale
         return self._inside(value)
+
+    def number_count(self, texels: int) -> int:
+        """Return how many numbers are fitted."""
+        return int(np.broadcast_to(np.less(self.low, self.high), texels if self.per_texel else 1).sum())
 
     def _inside(self, value: np.ndarray) -> np.ndarray:
         """The value inside the bounds; `numpy.clip` takes five times as long for single numbers."""

@@ -86,7 +86,7 @@ class Hypothesis:
         moved = {(index, name) for index, one in moving for name in IN_PLANE if one.values.get(name, 0.0) != 0.0}
         scanned = moved - {(item.effect, item.name) for item in self.fit.free}
         texels = max([len(v) for e in self.fit.model.effects for v in e.values.values() if isinstance(v, tuple)] + [1])
-        return len(scanned) + sum(texels if item.per_texel else 1 for item in self.fit.free if item.effect != BASE)
+        return len(scanned) + sum(item.number_count(texels) for item in self.fit.free if item.effect != BASE)
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -100,7 +100,7 @@ class Hypothesis:
 
     def has_texel_numbers(self, index: int) -> bool:
         """Return whether an effect has a fitted number for each texel."""
-        return any(item.effect == index and item.per_texel for item in self.fit.free)
+        return any(item.effect == index and item.per_texel and np.all(item.low < item.high) for item in self.fit.free)
 
 
 @dataclass

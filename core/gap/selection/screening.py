@@ -11,11 +11,10 @@ from __future__ import annotations
 from collections.abc import Collection, Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from ...effects.engine.specification import scalar
+from ...effects.engine.specification import SILENT_TEXELS, STEPS, scalar
 from ...model.sensor import Effect
 from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
 from ..candidates.candidates import (
-    DIRECTLY_ESTIMATED,
     START_COUNT,
     Candidate,
     FittedCandidate,
@@ -23,6 +22,7 @@ from ..candidates.candidates import (
     candidates,
     is_free_already,
 )
+from ..candidates.direct_estimates import of_silent_texels
 from ..candidates.plausibility import is_plausible
 from ..candidates.rao_score import ScoreTest
 from ..candidates.starting_points import is_large_shift, starting_points
@@ -255,7 +255,7 @@ class Screening:
         found = fit(
             test.views,
             test.model.with_effect(effect),
-            free_with(test.free, test.model, one.candidate, self.scales),
+            free_with(test.free, test.model, one.candidate, effect, self.scales),
             max_steps=FIRST_STEPS,
             tolerance=FIRST_TOLERANCE,
             frozen=0 if is_far else len(test.free),
@@ -270,7 +270,7 @@ class Screening:
         made = []
         for one in first_fits:
             yield f"fitting {one.candidate.name} to everything"
-            free = free_with(parent.fit.free, parent.fit.model, one.candidate, self.scales)
+            free = free_with(parent.fit.free, parent.fit.model, one.candidate, one.fit.model.effects[-1], self.scales)
             found = self.final_fit(one.fit.model, free, len(parent.fit.free))
             if self.shows_signature(one.candidate, found):
                 names, forms = (*parent.names, one.candidate.name), (*parent.forms, one.candidate.label)
@@ -303,11 +303,14 @@ class _Tests:
         return self._made[id(views)]
 
 
-def free_with(free: Sequence[FreeParameter], model: Model, candidate: Candidate, scales: Scales) -> tuple[FreeParameter, ...]:
-    """Return free parameters of a model and those of a candidate on top of it."""
-    if candidate.name in DIRECTLY_ESTIMATED:
+def free_with(
+    free: Sequence[FreeParameter], model: Model, candidate: Candidate, effect: Effect, scales: Scales
+) -> tuple[FreeParameter, ...]:
+    """Return free parameters of a model and those of a candidate on top of it, with which the fit starts at `effect`."""
+    if candidate.kind.found_by == STEPS:
         return tuple(free)
-    return (*free, *candidate.free_parameters(len(model.effects), scales, abs(model.parameters.gain)))
+    own = candidate.free_parameters(len(model.effects), scales, abs(model.parameters.gain))
+    return (*free, *(of_silent_texels(own, effect) if candidate.kind.found_by == SILENT_TEXELS else own))
 
 
 def share_left(found: Fit, before: float) -> float:
