@@ -154,16 +154,14 @@ class Dispatch:
     ----------
     client : distributed.Client
     opened : OpenStudy
-    scripts : str
-        What is done about the Python in a .blend and a job.
     on_progress : callable
         Called several times a second with what is over. An exception that it raises, KeyboardInterrupt included, stops the
         study; what is done is kept.
     """
 
-    def __init__(self, client: Any, opened: OpenStudy, scripts: str, on_progress: Callable[[BatchResult], object]):
+    def __init__(self, client: Any, opened: OpenStudy, on_progress: Callable[[BatchResult], object]):
         self.client, self.opened, self.on_progress = client, opened, on_progress
-        self.words = {"folder": os.fspath(opened.folder), "scripts": scripts, "limit": opened.study.run_limit}
+        self.words = {"folder": os.fspath(opened.folder), "scripts": opened.scripts, "limit": opened.study.run_limit}
         self.over = BatchResult()
 
     def run(self, indices: np.ndarray) -> BatchResult:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ SCRIPTS = REFUSE, IGNORE, ALLOW = ("refuse", "ignore", "allow")
 _COMMANDS = f"{__package__.rpartition('.')[0]}.commands"
 
 
-def read_blend(blend: Path, target: Path, scripts: str, *more: str, limit: float | None = None) -> None:
+def read_blend(blend: Path, target: Path, scripts: str, more: Sequence[str] = (), limit: float | None = None) -> None:
     """Let a Blender write the scenario of a .blend.
 
     Parameters
@@ -27,7 +28,7 @@ def read_blend(blend: Path, target: Path, scripts: str, *more: str, limit: float
         The target ends with ``.npz``.
     scripts : str
         One of :data:`SCRIPTS`.
-    *more : str
+    more : sequence of str
         Further words for ``palpate bake``.
     limit : float, optional
         Seconds that this may take.

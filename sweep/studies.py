@@ -21,7 +21,6 @@ from ..core.study.study_file import STUDY_NAME, read_study
 from . import driver
 from .parts import Parts, remove_unfinished_parts
 from .program import require_allowed
-from .scene_evaluation import REFUSE
 from .study_folder import OpenStudy, frozen_of
 from .worker import BatchResult
 
@@ -83,7 +82,6 @@ def compute_runs(
     opened: OpenStudy,
     show: Callable[[Progress], object],
     workers: int | None = None,
-    scripts: str = REFUSE,
     retry_failed: bool = False,
     part: tuple[int, int] = (1, 1),
     **cluster: Any,
@@ -97,8 +95,6 @@ def compute_runs(
         Called with the progress, and may raise to stop; what is done is kept.
     workers : int, optional
         Processes on this machine. Default: one for each core.
-    scripts : str
-        What is done about Python in scenes and jobs, one of :data:`.scene_evaluation.SCRIPTS`.
     retry_failed : bool
         Compute failed runs again.
     part : (int, int)
@@ -112,7 +108,7 @@ def compute_runs(
     left = np.setdiff1d(indices, parts.done if retry_failed else np.concatenate([parts.done, parts.failed]))
     if not len(left):
         return []
-    require_allowed(opened.study, scripts)
+    require_allowed(opened.study, opened.scripts)
 
     def show_tally(tally: BatchResult) -> None:
         stage = f"sweep, failed={tally.failed}" if tally.failed else "sweep"
@@ -121,7 +117,7 @@ def compute_runs(
     show_tally(BatchResult())
     workers = min(workers or count_of_cores(), len(left))
     with driver.dask_client(workers=workers, memory=opened.study.run_memory, **cluster) as client:
-        return driver.Dispatch(client, opened, scripts, show_tally).run(left).failures
+        return driver.Dispatch(client, opened, show_tally).run(left).failures
 
 
 def write_results(opened: OpenStudy, formats: Sequence[str] = ()) -> tuple[Status, list[Path]]:

@@ -14,6 +14,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from ..core.errors import FileError
@@ -62,15 +63,18 @@ class OpenStudy:
     plans : mapping of str to Plan
         By the names of the scenes.
     runs : Runs
+    scripts : str
+        What is done about the Python of a .blend or a program, one of :data:`.scene_evaluation.SCRIPTS`.
     """
 
     folder: Path
     study: Study
     plans: Mapping[str, Plan]
     runs: Runs
+    scripts: str = REFUSE
 
 
-def open_study(place: Path, folder: Path, scripts: str = REFUSE, check: Callable[[], object] = lambda: None) -> OpenStudy:
+def open_study(place: Path, folder: Path, scripts: str = REFUSE) -> OpenStudy:
     """Open a study by its folder, or by its file: freeze it in an empty folder, or go on in the folder of the same study.
 
     Parameters
@@ -80,9 +84,7 @@ def open_study(place: Path, folder: Path, scripts: str = REFUSE, check: Callable
     folder : Path
         Output folder, which is made if it is missing.
     scripts : str
-        What is done about the Python of a .blend or a program, one of :data:`.scene_evaluation.SCRIPTS`.
-    check : callable
-        Called after each .blend, and may raise to stop.
+        As of :class:`OpenStudy`.
 
     Raises
     ------
@@ -91,11 +93,11 @@ def open_study(place: Path, folder: Path, scripts: str = REFUSE, check: Callable
         one with another scene.
     """
     if place.is_dir():
-        return resume_study(folder)
-    study, read = read_study(place), _blend_reader(scripts, check, "--study", str(place))
+        return resume_study(folder, scripts)
+    study, read = read_study(place), partial(read_blend, scripts=scripts, more=("--study", str(place)))
     sources = _sources(study, place.parent)
     if (folder / STUDY_NAME).exists():
-        opened = resume_study(folder)
+        opened = resume_study(folder, scripts)
         changed = differences(opened.study, study)
         if changed:
             raise FileError(f"'{folder}' belongs to another study ({'; '.join(changed)}): give another folder with --out.")
@@ -106,15 +108,7 @@ def open_study(place: Path, folder: Path, scripts: str = REFUSE, check: Callable
         raise FileError(f"'{folder}' holds other files and no study: give a new or empty folder with --out.")
     program.require_allowed(study, scripts)
     with _whole_or_nothing(folder):
-        return _frozen(study, place, folder, sources, read)
-
-
-def _blend_reader(scripts: str, check: Callable[[], object], *words: str) -> ReadBlend:
-    def read(blend: Path, target: Path) -> None:
-        read_blend(blend, target, scripts, *words)
-        check()
-
-    return read
+        return replace(_frozen(study, place, folder, sources, read), scripts=scripts)
 
 
 def _frozen(study: Study, file: Path, folder: Path, sources: Mapping[str, Path], read: ReadBlend) -> OpenStudy:
@@ -149,15 +143,15 @@ def _whole_or_nothing(folder: Path) -> Iterator[None]:
         raise
 
 
-def scenarios_of(place: Path, scripts: str, check: Callable[[], object]) -> dict[str, Scenario | None]:
+def scenarios_of(place: Path, scripts: str) -> dict[str, Scenario | None]:
     """Return the names that may be varied, without beginning a study, whether or not the names that it varies are right.
 
     Parameters
     ----------
     place : Path
         The file of a study, the folder of one, or a scene.
-    scripts, check
-        As of :func:`open_study`.
+    scripts : str
+        As of :class:`OpenStudy`.
 
     Returns
     -------
@@ -171,27 +165,22 @@ def scenarios_of(place: Path, scripts: str, check: Callable[[], object]) -> dict
     """
     if place.is_dir():
         return {name: plan.scenario for name, plan in resume_study(place).plans.items()}
-    read = _blend_reader(scripts, check)
-    if place.suffix in (BLEND, SCENARIO):
-        sources = {place.stem: place}
-    else:
-        study = read_study(place)
-        sources = _sources(study, place.parent)
-        if study.is_job:
-            return dict.fromkeys(sources)
-    found: dict[str, Scenario | None] = {}
+    is_scene = place.suffix in (BLEND, SCENARIO)
+    sources = {place.stem: place} if is_scene else _sources(read_study(place), place.parent)
+    found: dict[str, Scenario | None] = dict.fromkeys(sources)
     with tempfile.TemporaryDirectory(prefix="palpate-sweep-") as folder:
-        for number, (name, source) in enumerate(sources.items()):
+        for name, source in sources.items():
             scenario = source
             if source.suffix == BLEND:
-                scenario = Path(folder) / f"{number}{SCENARIO}"
-                read(source, scenario)
-            found[name] = load_scenario(scenario)
+                scenario = Path(folder) / SCENARIO
+                read_blend(source, scenario, scripts)
+            if source.suffix != program.SUFFIX:
+                found[name] = load_scenario(scenario)
     return found
 
 
-def resume_study(folder: Path) -> OpenStudy:
-    """Open a study by its folder.
+def resume_study(folder: Path, scripts: str = REFUSE) -> OpenStudy:
+    """Open a study by its folder; `scripts` as of :class:`OpenStudy`.
 
     Raises
     ------
@@ -212,7 +201,7 @@ def resume_study(folder: Path) -> OpenStudy:
         if not _is_as_frozen(study, folder, scene):
             raise FileError(f"The scene '{scene.name}' in '{folder}' is not the one that the study began with: start again.")
         plans[scene.name] = plan_of(study, folder, scene.name, meshes)
-    return OpenStudy(folder, study, plans, Runs(study, plans, _digests(plans, frozen.scenes)))
+    return OpenStudy(folder, study, plans, Runs(study, plans, _digests(plans, frozen.scenes)), scripts)
 
 
 def plan_of(study: Study, folder: Path, scene: str, meshes: Mapping[str, Path]) -> Plan:

@@ -49,7 +49,7 @@ class Estimate:
         return FIXED_SECONDS + self.seconds * runs / min(workers, runs) + self.closing * runs
 
 
-def try_study(place: Path, scripts: str = REFUSE, check: Callable[[], object] = lambda: None) -> tuple[OpenStudy, Estimate]:
+def try_study(place: Path, scripts: str = REFUSE) -> tuple[OpenStudy, Estimate]:
     """Compute some runs, spread over a study, in a folder that is removed; parameters as of :func:`.open_study`."""
     with tempfile.TemporaryDirectory(prefix="palpate-sweep-") as name:
         trial = Path(name)
@@ -57,7 +57,7 @@ def try_study(place: Path, scripts: str = REFUSE, check: Callable[[], object] = 
             (trial / PARTS).mkdir()
             shutil.copy(place / STUDY_NAME, trial)
             shutil.copytree(place / SCENES, trial / SCENES)
-        opened = open_study(trial if place.is_dir() else place, trial, scripts, check)
+        opened = open_study(trial if place.is_dir() else place, trial, scripts)
         total, limit = len(opened.runs), opened.study.run_limit
         compute_batch([0], name, scripts, limit)  # the first run loads what was compiled
         one = _seconds_of(lambda: publish(trial, opened.study))

@@ -204,17 +204,14 @@ class RunComputer:
     Parameters
     ----------
     opened : OpenStudy
-    scripts : str
-        What is done about the Python in a .blend and a job, one of :data:`.scene_evaluation.SCRIPTS`.
-    limit : float, optional
-        Seconds that a run may take, asked for between frames.
+        Its `run_limit` is asked for between frames.
     """
 
-    def __init__(self, opened: OpenStudy, scripts: str = REFUSE, limit: float | None = None):
+    def __init__(self, opened: OpenStudy):
         from ..core.solver import precompile
 
-        require_allowed(opened.study, scripts)
-        self.opened, self._scripts, self._limit = opened, scripts, limit
+        require_allowed(opened.study, opened.scripts)
+        self.opened, self._limit = opened, opened.study.run_limit
         self._read = lru_cache(maxsize=MOST_SCENES_KEPT)(self._read_scene)
         self._program = lru_cache(lambda name: frozen_program(opened.study, opened.folder, name))
         self._shared = SharedResults()
@@ -269,7 +266,8 @@ class RunComputer:
         with temporary_folder(scenes, "scene") as place:
             overrides, target = place / "overrides.toml", place / "scene.npz"
             write_overrides(overrides, dict(values))
-            read_blend(scenes / f"{scene}.blend", target, self._scripts, "--overrides", str(overrides), limit=self._limit)
+            more = "--overrides", str(overrides)
+            read_blend(scenes / f"{scene}.blend", target, self.opened.scripts, more, self._limit)
             return at_rate(load_scenario(target), self.opened.study.fps)
 
     def _recording(self, scenario: Scenario, index: int) -> Recording:
@@ -355,7 +353,8 @@ def _computer_for(folder: Path, scripts: str, limit: float | None) -> RunCompute
     written = (folder / STUDY_NAME).stat()
     key = folder, scripts, limit, written.st_ino, written.st_mtime_ns
     if getattr(_kept, "key", None) != key:
-        _kept.computer, _kept.key = RunComputer(resume_study(folder), scripts, limit), key
+        opened = resume_study(folder, scripts)
+        _kept.computer, _kept.key = RunComputer(replace(opened, study=replace(opened.study, run_limit=limit))), key
     found: RunComputer = _kept.computer
     return found
 
