@@ -165,11 +165,11 @@ def _slurm(arguments: argparse.Namespace) -> Callable[[], Any] | None:
 
 def _estimate(place: Path, folder: Path, arguments: argparse.Namespace) -> int:
     """Print what a study takes."""
-    from ..sweep.trial import try_study
+    from ..sweep import studies
 
     workers = _workers(arguments)
     with console.Interrupt.raised_at_once():
-        opened, found = try_study(place, arguments.scripts)
+        opened, found = studies.try_study(place, arguments.scripts)
     print(_kind_of_runs(opened))
     if arguments.slurm:
         from ..sweep import slurm

@@ -122,29 +122,14 @@ class _LayoutFile:
     sensors: list[str]
 
 
-@dataclass(frozen=True)
-class RunFrames:
-    """The frames of a run as columns.
-
-    Attributes
-    ----------
-    layout : Layout
-    columns : dict of str to (F, …) ndarray
-        By the names of the layout's features.
-    """
-
-    layout: Layout
-    columns: dict[str, np.ndarray]
-
-
 def frames_of(
     recording: Recording,
     sensors: Sensors,
     shared: SharedResults | None = None,
     points: bool = False,
     half_precision: bool = False,
-) -> RunFrames:
-    """Return the frames of a run; raise :class:`PalpateError` for a number that its bits cannot hold.
+) -> tuple[Layout, dict[str, np.ndarray]]:
+    """Return the layout of the frames of a run, and (F, …) columns by the names of its features.
 
     Parameters
     ----------
@@ -157,6 +142,11 @@ def frames_of(
         True for texels as a list in any case, and not as a picture where they form a grid.
     half_precision : bool
         True for forces and readings of texels in 16 bits.
+
+    Raises
+    ------
+    PalpateError
+        A number is too large for its bits.
     """
     names = folder_names(sensors)  # unique and without a slash, which LeRobot does not allow in names
     features, columns = [TIMESTAMP], {TIMESTAMP.name: (recording.times - recording.times[0]).astype(TIMESTAMP.dtype)}
@@ -168,7 +158,7 @@ def frames_of(
     shared = shared or SharedResults()
     digests = tuple(shared.of(digest_of, own) for own in texels.values())
     digest = _layout_digest(tuple(features), fps, tuple(texels), digests)
-    return RunFrames(Layout(tuple(features), fps, texels, digest), columns)
+    return Layout(tuple(features), fps, texels, digest), columns
 
 
 @lru_cache(maxsize=64)

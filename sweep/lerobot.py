@@ -14,10 +14,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..core.errors import FileError, os_error_reason
+from ..core.export.exporter import Exporter, sensor_progress
+from ..core.figures.figure_style import FigureStyle
 from ..core.geometry.grid_layout import GridLayout
 from ..core.geometry.texels import Texels
-from .features import AXES, TIMESTAMP, Feature, Layout, varied_feature
-from .parts import COMPRESSION
+from ..core.io.bake_reader import Bake
+from ..core.jobs import Job
+from .features import AXES, TIMESTAMP, Feature, Layout, frames_of, varied_feature
+from .parts import COMPRESSION, require_pyarrow
 
 if TYPE_CHECKING:
     import pyarrow
@@ -321,3 +326,28 @@ def _write_tasks(path: Path, task: str) -> None:
 def _write_json(path: Path, content: dict[str, Any]) -> None:
     text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
     path.write_text(text + "\n", encoding="utf-8", newline="\n")
+
+
+BAKE_FOLDER = "lerobot"
+
+
+def write_lerobot(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Path]]:
+    """Write the dataset into the folder ``lerobot``; it is a job as every exporter's is."""
+    require_pyarrow()
+    first = next(iter(bake.texels))
+    yield sensor_progress(bake, first)
+    (layout, columns), scene = frames_of(bake.recording, bake.sensors), bake.manifests[first].scene_file
+    try:
+        writer = LeRobotWriter(folder / BAKE_FOLDER, layout, Path(scene).stem if scene else "bake")
+        try:
+            writer.add(0, bake.recording.digest, {}, columns)
+            writer.finish()
+        finally:
+            writer.close()
+    except OSError as error:
+        raise FileError(f"'{folder}' could not be written ({os_error_reason(error)}): free some space there.") from error
+    return sorted(path for path in (folder / BAKE_FOLDER).rglob("*") if path.is_file())
+
+
+EXPORTER = Exporter("lerobot", write_lerobot)
+"""Not among the formats that a .blend may choose."""

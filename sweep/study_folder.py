@@ -38,7 +38,6 @@ from ..core.study.study_file import (
     differences,
     frozen_text,
     plan_for,
-    plan_for_job,
     read_study,
 )
 from ..core.version import VERSION
@@ -207,7 +206,7 @@ def resume_study(folder: Path, scripts: str = REFUSE) -> OpenStudy:
 def plan_of(study: Study, folder: Path, scene: str, meshes: Mapping[str, Path]) -> Plan:
     """Return the distributions of a study on one of its scenes; raise PalpateError where a file is damaged or does not fit."""
     if study.is_job:
-        return plan_for_job(study)
+        return plan_for(study, None)
     start = folder / SCENES / scene
     properties = read_properties(_with(start, ".json"))
     return plan_for(study, load_scenario(_with(start, SCENARIO)), properties, meshes)

@@ -137,23 +137,8 @@ MOST_SCENES_KEPT = 4
 """Scenarios of scenes that a process keeps: the runs of a grid, whose last number changes fastest, share them."""
 
 
-def write_run_folder(folder: Path, scenario: Scenario, recording: Recording, images: bool) -> None:
-    """Write a folder for each sensor into the folder of a run.
-
-    Parameters
-    ----------
-    folder : Path
-    scenario : Scenario
-        That was computed.
-    recording : Recording
-    images : bool
-        True for a tactile image of each frame.
-
-    Raises
-    ------
-    FileError, OSError
-        A file cannot be written.
-    """
+def _write_sensors(folder: Path, scenario: Scenario, recording: Recording, images: bool) -> None:
+    """Write a folder for each sensor into the folder of a run, with a tactile image of each frame where these are wanted."""
     names = folder_names(recording.sensors)
     for sensor in scenario.read_out:
         own = folder / names[sensor.name]
@@ -246,11 +231,11 @@ class RunComputer:
             press = replace(press, **own)
         metrics = metrics_of(scenario, recording, press)
         sensors = {own.name: (own.texels, own.painted, own.parameters) for own in scenario.read_out}
-        frames = frames_of(recording, sensors, self._shared, study.points, study.half_precision)
+        layout, columns = frames_of(recording, sensors, self._shared, study.points, study.half_precision)
         if study.has_folders:
             with _run_folder(self.opened.folder, run) as folder:
-                write_run_folder(folder, scenario, recording, study.images)
-        return RunResult(run, metrics=metrics, frames=frames)
+                _write_sensors(folder, scenario, recording, study.images)
+        return RunResult(run, metrics=metrics, layout=layout, columns=columns)
 
     def _scenario(self, scene: str, values: Mapping[str, Any]) -> Scenario:
         """Return the scenario of a scene with the values of a run; it is read again where they have properties of the scene."""
@@ -381,7 +366,8 @@ def compute_batch(
     PalpateError
         The study cannot be opened.
     """
-    place, batch, waiting = Path(folder), BatchResult(), list[RunResult]()
+    place, batch = Path(folder), BatchResult()
+    waiting, size, layout = list[RunResult](), 0, ""  # what becomes one part: its runs, their bytes and their layout
     computer = _computer_for(place, scripts, limit)
     for index in np.asarray(indices).tolist():
         result = computer.result(index)
@@ -389,14 +375,11 @@ def compute_batch(
         batch.done += not result.message
         if result.message:
             batch.failures.append((index, result.message))
-        if sum(one.size for one in waiting) > PART_BYTES or not _same_layout(waiting, result):
+        digest = "" if result.layout is None else result.layout.digest
+        if size > PART_BYTES or (layout and digest and digest != layout):
             write_part(place, waiting)
-            waiting = []
+            waiting, size, layout = [], 0, ""
         waiting.append(result)
+        size, layout = size + sum(column.nbytes for column in result.columns.values()), layout or digest
     write_part(place, waiting)
     return batch
-
-
-def _same_layout(waiting: Sequence[RunResult], result: RunResult) -> bool:
-    known = next((one.frames.layout.digest for one in waiting if one.frames is not None), None)
-    return known is None or result.frames is None or result.frames.layout.digest == known

@@ -24,9 +24,8 @@ from palpate.core.version import VERSION
 from palpate.sweep import driver
 from palpate.sweep.driver import dask_client
 from palpate.sweep.parts import Parts, RunResult, write_part
-from palpate.sweep.studies import locked_folder
+from palpate.sweep.studies import FIXED_SECONDS, Estimate, locked_folder, try_study
 from palpate.sweep.study_folder import open_study, resume_study
-from palpate.sweep.trial import FIXED_SECONDS, Estimate, try_study
 from palpate.sweep.worker import compute_batch
 
 pytest.importorskip("distributed")
