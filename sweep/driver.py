@@ -127,18 +127,7 @@ def _closing(resource: Any, **words: Any) -> Iterator[Any]:
 
 
 def batches_of(indices: np.ndarray, total: int, seconds: float, workers: int) -> list[np.ndarray]:
-    """Return runs in batches of neighbours.
-
-    Parameters
-    ----------
-    indices : (n,) int
-        Of the runs.
-    total : int
-        Runs of the whole study.
-    seconds : float
-        That a run takes.
-    workers : int
-    """
+    """Return indices of runs in batches of neighbours; the whole study has `total` runs, and one takes so many seconds."""
     size = min(BATCH_SECONDS / max(seconds, 1e-6), len(indices) / (BATCHES_EACH * workers))
     size = max(1, round(size), -(-total // MOST_PARTS))
     return [indices[at : at + size] for at in range(0, len(indices), size)]

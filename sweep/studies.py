@@ -23,8 +23,7 @@ from ..core.study.study_file import PARTS, RUNS, SCENES, STUDY_NAME, read_study
 from . import driver
 from .dataset import DATASET_FOLDER, publish
 from .parts import Parts, remove_unfinished_parts
-from .program import require_allowed
-from .scene_evaluation import REFUSE
+from .scripts import REFUSE, require_allowed
 from .study_folder import OpenStudy, frozen_of, open_study
 from .worker import BatchResult, compute_batch
 

@@ -41,8 +41,7 @@ from ..core.study.study_file import (
     read_study,
 )
 from ..core.version import VERSION
-from . import program
-from .scene_evaluation import REFUSE, read_blend
+from .scripts import REFUSE, SUFFIX, freeze_program, read_blend, require_allowed
 
 BLEND, SCENARIO = ".blend", ".npz"
 ReadBlend = Callable[[Path, Path], None]
@@ -63,7 +62,7 @@ class OpenStudy:
         By the names of the scenes.
     runs : Runs
     scripts : str
-        What is done about the Python of a .blend or a program, one of :data:`.scene_evaluation.SCRIPTS`.
+        What is done about the Python of a .blend or a program, one of :data:`.scripts.SCRIPTS`.
     """
 
     folder: Path
@@ -105,7 +104,7 @@ def open_study(place: Path, folder: Path, scripts: str = REFUSE) -> OpenStudy:
         return replace(opened, study=replace(opened.study, run_limit=study.run_limit, run_memory=study.run_memory))
     if folder.exists() and (not folder.is_dir() or {path.name for path in folder.iterdir()} - {*MADE, STUDY_NAME, ".palpate"}):
         raise FileError(f"'{folder}' holds other files and no study: give a new or empty folder with --out.")
-    program.require_allowed(study, scripts)
+    require_allowed(study, scripts)
     with _whole_or_nothing(folder):
         return replace(_frozen(study, place, folder, sources, read), scripts=scripts)
 
@@ -173,7 +172,7 @@ def scenarios_of(place: Path, scripts: str) -> dict[str, Scenario | None]:
             if source.suffix == BLEND:
                 scenario = Path(folder) / SCENARIO
                 read_blend(source, scenario, scripts)
-            if source.suffix != program.SUFFIX:
+            if source.suffix != SUFFIX:
                 found[name] = load_scenario(scenario)
     return found
 
@@ -216,7 +215,7 @@ def _is_as_frozen(study: Study, folder: Path, scene: FrozenFile) -> bool:
     """Whether a scene or the program in a study's folder is the one that the study began with."""
     start = folder / SCENES / scene.name
     if study.is_job:
-        return file_sha256(_with(start, program.SUFFIX)) == scene.sha256  # the processes that run it look at the rest
+        return file_sha256(_with(start, SUFFIX)) == scene.sha256  # the processes that run it look at the rest
     return load_scenario(_with(start, SCENARIO)).digest() == scene.digest
 
 
@@ -247,8 +246,8 @@ def _sources(study: Study, base: Path) -> dict[str, Path]:
     for file in files:
         if not file.is_file():
             raise FileError(f"There is no scene '{file}': check its name; it is counted from the study's folder.")
-        if study.is_job and file.suffix != program.SUFFIX:
-            raise FileError(f"The job '{file}' is not a Python file: give one that ends with {program.SUFFIX}.")
+        if study.is_job and file.suffix != SUFFIX:
+            raise FileError(f"The job '{file}' is not a Python file: give one that ends with {SUFFIX}.")
         if not study.is_job and file.suffix not in (BLEND, SCENARIO):
             raise FileError(f"The scene '{file}' is neither a .blend nor a scenario (.npz): give one of these.")
     stems: dict[str, Path] = {}
@@ -263,8 +262,8 @@ def _sources(study: Study, base: Path) -> dict[str, Path]:
 
 def _freeze_scene(source: Path, start: Path, read: ReadBlend) -> str:
     """Write a scene, or a program, into a study's folder, under a name that begins with `start`, and return its digest."""
-    if source.suffix == program.SUFFIX:
-        return program.freeze_program(source, _with(start, program.SUFFIX))
+    if source.suffix == SUFFIX:
+        return freeze_program(source, _with(start, SUFFIX))
     target = _with(start, SCENARIO)
     if source.suffix == BLEND:
         read(source, target)

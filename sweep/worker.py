@@ -36,8 +36,7 @@ from ..core.study.study_file import RUNS, SCENE, SCENES, STUDY_NAME, Run, at_rat
 from ..core.study.variation import PRESS, varied_scenario
 from .features import frames_of
 from .parts import RunResult, write_part
-from .program import frozen_program, require_allowed
-from .scene_evaluation import REFUSE, read_blend
+from .scripts import REFUSE, frozen_program, read_blend, require_allowed
 from .study_folder import OpenStudy, resume_study
 
 # Metrics of a run of a study.

@@ -12,7 +12,7 @@ from palpate.commands import main
 from palpate.core.errors import PalpateError
 from palpate.core.study.study_file import study_of
 from palpate.sweep.parts import Parts
-from palpate.sweep.scene_evaluation import ALLOW
+from palpate.sweep.scripts import ALLOW
 from palpate.sweep.study_folder import resume_study
 from palpate.sweep.worker import RunComputer, compute_batch
 
