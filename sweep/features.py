@@ -221,7 +221,7 @@ def by_texel(values: np.ndarray, texels: Texels) -> np.ndarray:
 def varied_feature(name: str, dtype: str) -> Feature:
     """Return the column of what was varied; LeRobot allows no slash."""
     about = "Varied properties; the same in all frames of a run."
-    return Feature(f"varied.{name.replace('/', '_')}", dtype, (1,), (), "", about)
+    return Feature(name.replace("/", "_"), dtype, (1,), (), "", about)
 
 
 def _texel_features(

@@ -117,8 +117,10 @@ def _frozen(study: Study, file: Path, folder: Path, sources: Mapping[str, Path],
     meshes = freeze_meshes(mesh_files, folder / SCENES / MESHES)
     plans, entries = {}, []
     for name, source in sources.items():
-        digest = _freeze_scene(source, folder / SCENES / name, read)
-        plans[name] = plan_of(study, folder, name, meshes)
+        digest = _freeze_scene(source, folder, name, read)
+        plans[name] = plan_for(
+            study, _scene_in(study, folder, name)[0], read_properties(scene_file(folder, name, ".json")), meshes
+        )
         entries.append(FrozenFile(source.name, file_sha256(source), name, digest))
     runs = Runs(study, plans, _digests(plans, entries))
     mesh_entries = tuple(FrozenFile(name, copy.stem) for name, copy in meshes.items())
@@ -196,31 +198,24 @@ def resume_study(folder: Path, scripts: str = REFUSE) -> OpenStudy:
         )
     plans, meshes = {}, {one.file: mesh_copy(folder / SCENES / MESHES, one.file, one.sha256) for one in frozen.meshes}
     for scene in frozen.scenes:
-        if not _is_as_frozen(study, folder, scene):
+        scenario, digest = _scene_in(study, folder, scene.name)
+        if digest not in (scene.digest, scene.sha256):
             raise FileError(f"The scene '{scene.name}' in '{folder}' is not the one that the study began with: start again.")
-        plans[scene.name] = plan_of(study, folder, scene.name, meshes)
+        plans[scene.name] = plan_for(study, scenario, read_properties(scene_file(folder, scene.name, ".json")), meshes)
     return OpenStudy(folder, study, plans, Runs(study, plans, _digests(plans, frozen.scenes)), scripts)
 
 
-def plan_of(study: Study, folder: Path, scene: str, meshes: Mapping[str, Path]) -> Plan:
-    """Return the distributions of a study on one of its scenes; raise PalpateError where a file is damaged or does not fit."""
+def scene_file(folder: Path, name: str, suffix: str) -> Path:
+    """Return a file of a scene, or the program, in the folder of a study."""
+    return folder / SCENES / f"{name}{suffix}"
+
+
+def _scene_in(study: Study, folder: Path, name: str) -> tuple[Scenario | None, str]:
+    """Return a scene in a study's folder and its digest; None and the SHA-256 of its program for a job."""
     if study.is_job:
-        return plan_for(study, None)
-    start = folder / SCENES / scene
-    properties = read_properties(_with(start, ".json"))
-    return plan_for(study, load_scenario(_with(start, SCENARIO)), properties, meshes)
-
-
-def _is_as_frozen(study: Study, folder: Path, scene: FrozenFile) -> bool:
-    """Whether a scene or the program in a study's folder is the one that the study began with."""
-    start = folder / SCENES / scene.name
-    if study.is_job:
-        return file_sha256(_with(start, SUFFIX)) == scene.sha256  # the processes that run it look at the rest
-    return load_scenario(_with(start, SCENARIO)).digest() == scene.digest
-
-
-def _with(start: Path, suffix: str) -> Path:
-    return start.parent / f"{start.name}{suffix}"
+        return None, file_sha256(scene_file(folder, name, SUFFIX))  # the processes that run it look at the rest
+    scenario = load_scenario(scene_file(folder, name, SCENARIO))
+    return scenario, scenario.digest()
 
 
 def _digests(plans: Mapping[str, Plan], scenes: Iterable[FrozenFile]) -> dict[str, str]:
@@ -260,11 +255,11 @@ def _sources(study: Study, base: Path) -> dict[str, Path]:
     return {names[stem]: file for stem, file in stems.items()}
 
 
-def _freeze_scene(source: Path, start: Path, read: ReadBlend) -> str:
-    """Write a scene, or a program, into a study's folder, under a name that begins with `start`, and return its digest."""
+def _freeze_scene(source: Path, folder: Path, name: str, read: ReadBlend) -> str:
+    """Write a scene, or a program, into a study's folder and return its digest."""
     if source.suffix == SUFFIX:
-        return freeze_program(source, _with(start, SUFFIX))
-    target = _with(start, SCENARIO)
+        return freeze_program(source, scene_file(folder, name, SUFFIX))
+    target = scene_file(folder, name, SCENARIO)
     if source.suffix == BLEND:
         read(source, target)
     else:
@@ -285,11 +280,10 @@ def _check_sources(opened: OpenStudy, sources: Mapping[str, Path], base: Path, r
             continue
         if opened.study.is_job or opened.plans[name].scene_properties:
             raise _changed(source, opened)
-        start = opened.folder / SCENES / f"now-{name}"
         try:
-            digest = _freeze_scene(source, start, read)
+            digest = _freeze_scene(source, opened.folder, f"now-{name}", read)
         finally:
-            _with(start, SCENARIO).unlink(missing_ok=True)
+            scene_file(opened.folder, f"now-{name}", SCENARIO).unlink(missing_ok=True)
         if digest != before[name].digest:
             raise _changed(source, opened)
     meshes = {one.file: one.sha256 for one in frozen.meshes}

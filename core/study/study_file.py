@@ -321,7 +321,7 @@ def plan_for(
     """
     entries, press, meshes = dict(study.vary), None, meshes or {}
     if scenario is None:
-        variables = {name: _free_variable(name, entry) for name, entry in entries.items()}
+        variables, meshes = {name: _free_variable(name, entry) for name, entry in entries.items()}, {}
     else:
         scenario = at_rate(scenario, study.fps)
         if study.press is not None:
