@@ -149,12 +149,6 @@ def _print_names(place: Path, arguments: argparse.Namespace) -> None:
         print(f"  {PREFIX}…: a property of a .blend by its path, which Copy Full Data Path gives; each run needs Blender then")
 
 
-def _workers(arguments: argparse.Namespace) -> int:
-    from ..core.compiled.thread_team import count_of_cores
-
-    return arguments.workers or count_of_cores()
-
-
 def _slurm(arguments: argparse.Namespace) -> Callable[[], Any] | None:
     """Return the request for workers to SLURM; None without --slurm."""
     from ..sweep import slurm
@@ -165,9 +159,10 @@ def _slurm(arguments: argparse.Namespace) -> Callable[[], Any] | None:
 
 def _estimate(place: Path, folder: Path, arguments: argparse.Namespace) -> int:
     """Print what a study takes."""
+    from ..core.compiled.thread_team import count_of_cores
     from ..sweep import studies
 
-    workers = _workers(arguments)
+    workers = arguments.workers or count_of_cores()
     with console.Interrupt.raised_at_once():
         opened, found = studies.try_study(place, arguments.scripts)
     print(_kind_of_runs(opened))

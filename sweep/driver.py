@@ -171,7 +171,7 @@ class Dispatch:
             workers = max(1, len(self.client.scheduler_info(n_workers=-1)["workers"]))
             first, rest = indices[:workers], indices[workers:]
             lost = self._compute(list(first[:, None]))  # nobody knows how long a run takes before
-            seconds = self.over.seconds / max(1, self.over.finished)
+            seconds = self.over.seconds / max(1, self.over.done + self.over.failed)
             lost += self._compute(batches_of(rest, len(self.opened.runs), seconds, workers))
             for index in self._compute([np.array([index]) for index in lost]):
                 if self._compute([np.array([index])]):

@@ -120,7 +120,7 @@ def compute_runs(
 
     def show_tally(tally: BatchResult) -> None:
         stage = f"sweep, failed={tally.failed}" if tally.failed else "sweep"
-        show(Progress(stage, len(indices) - len(left) + tally.finished, len(indices)))
+        show(Progress(stage, len(indices) - len(left) + tally.done + tally.failed, len(indices)))
 
     show_tally(BatchResult())
     workers = min(workers or count_of_cores(), len(left))

@@ -176,11 +176,6 @@ class BatchResult:
         """Number of runs that failed."""
         return len(self.failures)
 
-    @property
-    def finished(self) -> int:
-        """Runs that are done or failed."""
-        return self.done + self.failed
-
 
 class RunComputer:
     """Computes runs of a study one after the other, in one thread.

@@ -30,7 +30,7 @@ import json
 import math
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -491,7 +491,7 @@ def _distribution(found: Variable, entry: Mapping[str, Any]) -> Distribution:
     return Distribution(kind, (found.read(first), found.read(second)), words.levels, low, high)
 
 
-class Runs(Sequence[Run]):
+class Runs:
     """All runs of a study in order, each made when it is asked for: a million of them take 8 bytes for each varied number.
 
     Parameters
@@ -518,9 +518,7 @@ class Runs(Sequence[Run]):
     def __len__(self) -> int:
         return sum(self._counts.values())
 
-    def __getitem__(self, at: Any) -> Any:
-        if isinstance(at, slice):
-            return [self[i] for i in range(*at.indices(len(self)))]
+    def __getitem__(self, at: int) -> Run:
         row = index = range(len(self))[at]
         for scene, count in self._counts.items():
             if row < count:
