@@ -184,8 +184,9 @@ class Dispatch:
 
     def _compute(self, batches: Sequence[np.ndarray]) -> list[int]:
         """Compute batches and return the runs of those that took their workers down."""
-        from distributed import as_completed
+        from distributed import LocalCluster, as_completed
 
+        cluster = self.client.cluster
         # No other reference than this to a future: Dask forgets a batch that is taken, and does not compute it again when the
         # worker that has its result is lost.
         waiting = dict(zip(self.client.map(compute_batch, batches, **self.words, pure=False, retries=RETRIES), batches))
@@ -196,7 +197,9 @@ class Dispatch:
                 if self.client.status != "running":
                     raise _scheduler_gone()
                 time.sleep(LOOK)
-                self._replace_lost_workers()
+                if isinstance(cluster, LocalCluster):
+                    # A first run can end a worker before its nanny knows it, which then starts no other.
+                    cluster.scale(len(cluster.worker_spec))
                 for future in completed.next_batch(block=False):
                     lost += self._take(future, waiting.pop(future))
             self.on_progress(self.over)
@@ -204,14 +207,6 @@ class Dispatch:
             with suppress(Exception):  # the scheduler may be gone
                 self.client.cancel(list(waiting), force=True)
         return lost
-
-    def _replace_lost_workers(self) -> None:
-        """Start workers of this machine again whose nannies do not, as a first run can end one before its nanny knows it."""
-        from distributed import LocalCluster
-
-        cluster = self.client.cluster
-        if isinstance(cluster, LocalCluster):
-            cluster.scale(len(cluster.worker_spec))
 
     def _take(self, future: Any, batch: np.ndarray) -> list[int]:
         """Note what became of a batch; return its runs if it took its worker down."""

@@ -128,8 +128,7 @@ class LeRobotWriter:
         if self._waiting:
             self._write_frames()
         self._write_episodes(1)
-        self._frames.close()
-        self._episodes.close()
+        self.close()
         meta = self._root / "meta"
         _write_tasks(meta / "tasks.parquet", self._task)
         info = self._info()
@@ -138,7 +137,7 @@ class LeRobotWriter:
         _write_card(self._root / "README.md", self._task, info)
 
     def close(self) -> None:
-        """Let go of files that are open after an error."""
+        """Finish the files that are open."""
         self._frames.close()
         self._episodes.close()
 
@@ -321,17 +320,15 @@ def _write_json(path: Path, content: dict[str, Any]) -> None:
     path.write_text(text + "\n", encoding="utf-8", newline="\n")
 
 
-BAKE_FOLDER = "lerobot"
-
-
 def write_lerobot(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Path]]:
     """Write the dataset into the folder ``lerobot``; it is a job as every exporter's is."""
     require_pyarrow()
     first = next(iter(bake.texels))
     yield sensor_progress(bake, first)
+    target = folder / "lerobot"
     (layout, columns), scene = frames_of(bake.recording, bake.sensors), bake.manifests[first].scene_file
     try:
-        writer = LeRobotWriter(folder / BAKE_FOLDER, layout, Path(scene).stem if scene else "bake")
+        writer = LeRobotWriter(target, layout, Path(scene).stem if scene else "bake")
         try:
             writer.add(0, bake.recording.digest, columns)
             writer.finish()
@@ -339,7 +336,7 @@ def write_lerobot(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Pat
             writer.close()
     except OSError as error:
         raise FileError(f"'{folder}' could not be written ({os_error_reason(error)}): free some space there.") from error
-    return sorted(path for path in (folder / BAKE_FOLDER).rglob("*") if path.is_file())
+    return sorted(path for path in target.rglob("*") if path.is_file())
 
 
 EXPORTER = Exporter("lerobot", write_lerobot)

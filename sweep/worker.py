@@ -30,7 +30,7 @@ from ..core.model.scenario import Scenario
 from ..core.model.sensor import Sensor
 from ..core.model.shared_results import SharedResults
 from ..core.response import net_shear, share_on, slipping
-from ..core.study.presses import Press, place_of
+from ..core.study.presses import PLACE_PARAMETERS, Press, place_of
 from ..core.study.scene_property import is_scene_property, write_overrides
 from ..core.study.study_file import RUNS, SCENE, SCENES, STUDY_NAME, Run, at_rate
 from ..core.study.variation import PRESS, varied_scenario
@@ -76,8 +76,10 @@ def metrics_of(scenario: Scenario, recording: Recording, press: Press | None = N
         found |= {f"{start}{name}": value for name, value in own.items()}
     for index, body in enumerate(scenario.bodies):
         if body.free:
-            found[f"{body.name}.held"] = float(_is_held(index, scenario, recording))
-            found[f"{body.name}.fall"] = _fall(index, scenario, recording)
+            poses, size = recording.poses[[0, -1], index], float(np.linalg.norm(scenario.gravity))
+            first, last = poses[:, :3] + np.einsum("fij,j->fi", rotation_matrices(poses[:, 3:]), body.center_of_mass)
+            found[f"{body.name}.held"] = float(_is_held(index, last, scenario, recording))
+            found[f"{body.name}.fall"] = float((last - first) @ scenario.gravity / size) if size else 0.0
     if press is not None:
         found |= {f"press.{axis}": float(value) for axis, value in zip("xyz", place_of(scenario, press), strict=True)}
     return found
@@ -102,23 +104,8 @@ def _sensor_metrics(sensor: Sensor, measured: SensorRecording, times: np.ndarray
     return found
 
 
-def _fall(index: int, scenario: Scenario, recording: Recording) -> float:
-    size = np.linalg.norm(scenario.gravity)
-    if size == 0.0:
-        return 0.0
-    center = _centers(index, scenario, recording)
-    return float((center[-1] - center[0]) @ scenario.gravity / size)
-
-
-def _centers(index: int, scenario: Scenario, recording: Recording) -> np.ndarray:
-    """Return where the centre of mass of a body is at the first and at the last frame, (2, 3) m, world."""
-    poses = recording.poses[[0, -1], index]
-    return poses[:, :3] + np.einsum("fij,j->fi", rotation_matrices(poses[:, 3:]), scenario.bodies[index].center_of_mass)
-
-
-def _is_held(index: int, scenario: Scenario, recording: Recording) -> bool:
-    """Return whether a free body is near a sensor in contact at the last frame."""
-    center = _centers(index, scenario, recording)[1]
+def _is_held(index: int, center: np.ndarray, scenario: Scenario, recording: Recording) -> bool:
+    """Return whether a free body with its centre of mass at `center`, (3,) m, is near a sensor in contact at the last frame."""
     own = [target for target in scenario.targets if target.body == index]
     middle = scenario.bodies[index].center_of_mass
     reach = max((float(np.linalg.norm(target.mesh.vertices - middle, axis=1).max()) for target in own), default=0.0)
@@ -219,10 +206,8 @@ class RunComputer:
         scenario = self._scenario(run.scene, values)
         recording = self._recording(scenario, run.index)
         if press is not None:
-            own: dict[str, Any] = {
-                key.removeprefix(f"{PRESS}."): value for key, value in values.items() if key.startswith(f"{PRESS}.")
-            }
-            press = replace(press, **own)
+            place: dict[str, Any] = {word: values[f"{PRESS}.{word}"] for word in PLACE_PARAMETERS}
+            press = replace(press, **place)
         metrics = metrics_of(scenario, recording, press)
         sensors = {own.name: (own.texels, own.painted, own.parameters) for own in scenario.read_out}
         layout, columns = frames_of(recording, sensors, self._shared, study.points, study.half_precision)
