@@ -96,6 +96,6 @@ def run_study(
     with studies.locked_folder(place, target):
         opened = study_folder.open_study(place, target, scripts)
         with shown(progress, "sweep", "run") as show:
-            failures = studies.compute_runs(opened, show, number, scripts, retry_failed)
+            failures = studies.compute_runs(opened, show, number, retry_failed)
         found, written = studies.write_results(opened, formats)
     return StudyRun(opened.folder, found.total, found.done, found.failed, tuple(failures), tuple(written))

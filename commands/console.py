@@ -35,7 +35,7 @@ class Interrupt:
     """
 
     pressed = False
-    at_once = False
+    at_once = limits_at_once = False
     reason: PalpateError | None = None
     """Another reason to stop: a limit that is reached."""
     clean_up: Callable[[], object] = staticmethod(lambda: None)
@@ -57,14 +57,18 @@ class Interrupt:
 
     @classmethod
     @contextmanager
-    def raised_at_once(cls) -> Iterator[None]:
-        """Let Ctrl-C raise at once while the body runs: for work without Blender, whose files are written atomically."""
+    def raised_at_once(cls, limits: bool = False) -> Iterator[None]:
+        """Let Ctrl-C raise at once while the body runs: for work without Blender, whose files are written atomically.
+
+        With `limits` a limit raises, too: for work that takes no error for one of a part of it.
+        """
         cls.check()
-        before, cls.at_once = cls.at_once, True
+        before = cls.at_once, cls.limits_at_once
+        cls.at_once, cls.limits_at_once = True, limits
         try:
             yield
         finally:
-            cls.at_once = before
+            cls.at_once, cls.limits_at_once = before
 
     @classmethod
     def _press(cls, *_: object) -> None:
@@ -289,6 +293,8 @@ def kept(arguments: argparse.Namespace) -> Iterator[None]:
             reason = _reached(arguments, time.monotonic() - began)
             if reason:
                 Interrupt.reason = LimitReached(reason)
+                if Interrupt.limits_at_once:
+                    signal.raise_signal(signal.SIGINT)  # as Ctrl-C does
                 if not over.wait(GRACE):
                     with suppress(Exception):
                         Interrupt.clean_up()

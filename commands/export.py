@@ -15,7 +15,7 @@ from ..core.io.bake_reader import Bake, read_bake
 from . import blender, checks, console, figure_options
 
 LEROBOT = "lerobot"
-"""Name of :data:`.sweep.bake_dataset.EXPORTER`: a study's dataset of one run. Blender's extension has no studies."""
+"""Name of :data:`.sweep.lerobot.EXPORTER`: a study's dataset of one run. Blender's extension has no studies."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -51,9 +51,9 @@ def _exporter(name: str) -> str | Exporter:
         raise PalpateError(
             "Blender's extension writes no datasets: run 'pip install .[sweep]' in a checkout of Palpate, with its own Python."
         )
-    from ..sweep import bake_dataset
+    from ..sweep import lerobot
 
-    return bake_dataset.EXPORTER
+    return lerobot.EXPORTER
 
 
 def find_bake(where: str) -> Bake:

@@ -128,7 +128,8 @@ def _part(text: str) -> tuple[int, int]:
 def _opened(place: Path, folder: Path, arguments: argparse.Namespace) -> OpenStudy:
     from ..sweep import study_folder
 
-    return study_folder.open_study(place, folder, arguments.scripts, console.Interrupt.check)
+    with console.Interrupt.raised_at_once(limits=True):  # what a beginning has written is removed again
+        return study_folder.open_study(place, folder, arguments.scripts)
 
 
 def _print_names(place: Path, arguments: argparse.Namespace) -> None:
@@ -137,19 +138,15 @@ def _print_names(place: Path, arguments: argparse.Namespace) -> None:
     from ..core.study.variation import owners_text
     from ..sweep import study_folder
 
-    for name, scenario in study_folder.scenarios_of(place, arguments.scripts, console.Interrupt.check).items():
+    with console.Interrupt.raised_at_once(limits=True):
+        scenarios = study_folder.scenarios_of(place, arguments.scripts)
+    for name, scenario in scenarios.items():
         print(f"{name}:")
         if scenario is None:
             print("  any name that the job knows, for a number, a text, or true and false")
             continue
         print("  " + owners_text(scenario).replace("\n", "\n  "))
         print(f"  {PREFIX}…: a property of a .blend by its path, which Copy Full Data Path gives; each run needs Blender then")
-
-
-def _workers(arguments: argparse.Namespace) -> int:
-    from ..core.compiled.thread_team import count_of_cores
-
-    return arguments.workers or count_of_cores()
 
 
 def _slurm(arguments: argparse.Namespace) -> Callable[[], Any] | None:
@@ -162,10 +159,12 @@ def _slurm(arguments: argparse.Namespace) -> Callable[[], Any] | None:
 
 def _estimate(place: Path, folder: Path, arguments: argparse.Namespace) -> int:
     """Print what a study takes."""
-    from ..sweep.trial import try_study
+    from ..core.compiled.thread_team import count_of_cores
+    from ..sweep import studies
 
-    workers = _workers(arguments)
-    opened, found = try_study(place, arguments.scripts, console.Interrupt.check)
+    workers = arguments.workers or count_of_cores()
+    with console.Interrupt.raised_at_once():
+        opened, found = studies.try_study(place, arguments.scripts)
     print(_kind_of_runs(opened))
     if arguments.slurm:
         from ..sweep import slurm
@@ -214,7 +213,6 @@ def _compute(opened: OpenStudy, arguments: argparse.Namespace) -> int:
             opened,
             show,
             workers=arguments.workers,
-            scripts=arguments.scripts,
             retry_failed=arguments.retry_failed,
             part=arguments.part or (1, 1),
             scheduler=arguments.scheduler,

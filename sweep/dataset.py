@@ -17,6 +17,7 @@ from ..core.errors import FileError, os_error_reason
 from ..core.io.file_writing import atomic_write
 from ..core.io.hidden_folder import temporary_folder
 from ..core.study.study_file import Study
+from .features import varied_feature
 from .lerobot import LeRobotWriter
 from .parts import COMPRESSION, FINISHED, Parts, frames_in
 
@@ -76,8 +77,8 @@ def _write_tables(folder: Path, parts: Parts) -> None:
 def _write_datasets(parts: Parts, folder: Path, task: str, files: ExitStack) -> Path | None:
     """Write a dataset for each layout of the runs and return the folder that is to become the dataset; None without frames."""
     file_bytes = sum(path.stat().st_size for path in parts.files) // MOST_FILES
-    varied = {f.name.removeprefix("varied."): "string" if str(f.type) == "string" else "float64"
-              for f in parts.run_schema if f.name.startswith("varied.")}  # fmt: skip
+    columns_varied = [item for item in parts.run_schema if item.name.startswith("varied.")]
+    varied = [varied_feature(item.name, "string" if str(item.type) == "string" else "float64") for item in columns_varied]
     writers: dict[str, LeRobotWriter] = {}
     for piece in parts.pieces():
         layout = parts.layout(piece)
@@ -87,14 +88,13 @@ def _write_datasets(parts: Parts, folder: Path, task: str, files: ExitStack) -> 
             writer = LeRobotWriter(folder / f"part-{len(writers):03d}", layout, task, varied, file_bytes)
             files.callback(writer.close)
             writers[layout.digest] = writer
-        rows = piece.select(["run", "digest", *(f"varied.{name}" for name in varied)]).to_pylist()
+        rows = piece.select(["run", "digest", *(item.name for item in columns_varied)]).to_pylist()
         lengths, columns = frames_in(piece, layout)
         ends = np.cumsum(lengths)
         for row, begin, end in zip(rows, ends - lengths, ends, strict=True):
             if end > begin:  # a run that failed has no frames
-                values = {name.replace("/", "_"): value for name, value in row.items()}
                 numbers = {name: column[begin:end] for name, column in columns.items()}
-                writers[layout.digest].add(row["run"], row["digest"], values, numbers)
+                writers[layout.digest].add(row.pop("run"), row.pop("digest"), numbers, list(row.values()))
     for writer in writers.values():
         writer.finish()
     if len(writers) == 1:

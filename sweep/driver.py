@@ -127,18 +127,7 @@ def _closing(resource: Any, **words: Any) -> Iterator[Any]:
 
 
 def batches_of(indices: np.ndarray, total: int, seconds: float, workers: int) -> list[np.ndarray]:
-    """Return runs in batches of neighbours.
-
-    Parameters
-    ----------
-    indices : (n,) int
-        Of the runs.
-    total : int
-        Runs of the whole study.
-    seconds : float
-        That a run takes.
-    workers : int
-    """
+    """Return indices of runs in batches of neighbours; the whole study has `total` runs, and one takes so many seconds."""
     size = min(BATCH_SECONDS / max(seconds, 1e-6), len(indices) / (BATCHES_EACH * workers))
     size = max(1, round(size), -(-total // MOST_PARTS))
     return [indices[at : at + size] for at in range(0, len(indices), size)]
@@ -154,16 +143,14 @@ class Dispatch:
     ----------
     client : distributed.Client
     opened : OpenStudy
-    scripts : str
-        What is done about the Python in a .blend and a job.
     on_progress : callable
         Called several times a second with what is over. An exception that it raises, KeyboardInterrupt included, stops the
         study; what is done is kept.
     """
 
-    def __init__(self, client: Any, opened: OpenStudy, scripts: str, on_progress: Callable[[BatchResult], object]):
+    def __init__(self, client: Any, opened: OpenStudy, on_progress: Callable[[BatchResult], object]):
         self.client, self.opened, self.on_progress = client, opened, on_progress
-        self.words = {"folder": os.fspath(opened.folder), "scripts": scripts, "limit": opened.study.run_limit}
+        self.words = {"folder": os.fspath(opened.folder), "scripts": opened.scripts, "limit": opened.study.run_limit}
         self.over = BatchResult()
 
     def run(self, indices: np.ndarray) -> BatchResult:
@@ -184,7 +171,7 @@ class Dispatch:
             workers = max(1, len(self.client.scheduler_info(n_workers=-1)["workers"]))
             first, rest = indices[:workers], indices[workers:]
             lost = self._compute(list(first[:, None]))  # nobody knows how long a run takes before
-            seconds = self.over.seconds / max(1, self.over.finished)
+            seconds = self.over.seconds / max(1, self.over.done + self.over.failed)
             lost += self._compute(batches_of(rest, len(self.opened.runs), seconds, workers))
             for index in self._compute([np.array([index]) for index in lost]):
                 if self._compute([np.array([index])]):
@@ -197,8 +184,9 @@ class Dispatch:
 
     def _compute(self, batches: Sequence[np.ndarray]) -> list[int]:
         """Compute batches and return the runs of those that took their workers down."""
-        from distributed import as_completed
+        from distributed import LocalCluster, as_completed
 
+        cluster = self.client.cluster
         # No other reference than this to a future: Dask forgets a batch that is taken, and does not compute it again when the
         # worker that has its result is lost.
         waiting = dict(zip(self.client.map(compute_batch, batches, **self.words, pure=False, retries=RETRIES), batches))
@@ -209,7 +197,9 @@ class Dispatch:
                 if self.client.status != "running":
                     raise _scheduler_gone()
                 time.sleep(LOOK)
-                self._replace_lost_workers()
+                if isinstance(cluster, LocalCluster):
+                    # A first run can end a worker before its nanny knows it, which then starts no other.
+                    cluster.scale(len(cluster.worker_spec))
                 for future in completed.next_batch(block=False):
                     lost += self._take(future, waiting.pop(future))
             self.on_progress(self.over)
@@ -217,14 +207,6 @@ class Dispatch:
             with suppress(Exception):  # the scheduler may be gone
                 self.client.cancel(list(waiting), force=True)
         return lost
-
-    def _replace_lost_workers(self) -> None:
-        """Start workers of this machine again whose nannies do not, as a first run can end one before its nanny knows it."""
-        from distributed import LocalCluster
-
-        cluster = self.client.cluster
-        if isinstance(cluster, LocalCluster):
-            cluster.scale(len(cluster.worker_spec))
 
     def _take(self, future: Any, batch: np.ndarray) -> list[int]:
         """Note what became of a batch; return its runs if it took its worker down."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -42,16 +43,12 @@ def export_hdf5(folder: Path) -> list[Path]:
     require_packages(["hdf5"])
     import h5py
 
+    packed = {"track_times": False, "compression": "gzip", "shuffle": True}
     written = []
     for part, stem in _parts(folder):
         target = folder / f"{stem}.h5"
         with atomic_write(target) as temporary, h5py.File(temporary, "w", libver="latest", locking=False) as file:
-
-            def create(name: str, shape: tuple[int, ...], kind: str, file: Any = file) -> Any:
-                kind = h5py.string_dtype() if kind == "string" else kind
-                return file.create_dataset(name, shape, kind, track_times=False, compression="gzip", shuffle=True)
-
-            _fill(part, create, file.attrs)
+            _fill(part, file.attrs, partial(file.create_dataset, **packed), h5py.string_dtype())
         written.append(target)
     return written
 
@@ -67,11 +64,7 @@ def export_zarr(folder: Path) -> list[Path]:
         try:
             with temporary_folder(folder, "zarr") as hidden:
                 group = zarr.open_group(hidden / "new", mode="w", zarr_format=2)  # what the most readers know
-
-                def create(name: str, shape: tuple[int, ...], kind: str, group: Any = group) -> Any:
-                    return group.create_array(name, shape=shape, dtype="U64" if kind == "string" else kind)
-
-                _fill(part, create, group.attrs)
+                _fill(part, group.attrs, group.create_array, "U64")
                 replace_folder(hidden / "new", target, hidden, ZARR_FILES)
         except OSError as error:
             raise FileError(f"'{target}' could not be written ({os_error_reason(error)}): free some space.") from error
@@ -90,15 +83,16 @@ def _parts(folder: Path) -> list[tuple[Path, str]]:
     return [(part, "dataset" if part.name == DATASET_FOLDER else f"dataset-{part.name}") for part in found]
 
 
-def _fill(part: Path, create: Callable[..., Any], attributes: Any) -> None:
-    """Create all arrays with `create(name, shape, kind)` and fill them."""
+def _fill(part: Path, attributes: Any, create: Callable[..., Any], text: Any) -> None:
+    """Create all arrays with `create(name, shape=shape, dtype=dtype)`, where that of a text is `text`, and fill them."""
     from pyarrow import parquet
 
     info = json.loads((part / "meta" / "info.json").read_text(encoding="utf-8"))
     attributes["fps"] = info["fps"]
     arrays, at = {}, 0
     for name, feature in info["features"].items():
-        arrays[name] = create(name, (info["total_frames"], *_shape(feature)), feature["dtype"])
+        dtype = text if feature["dtype"] == "string" else feature["dtype"]
+        arrays[name] = create(name, shape=(info["total_frames"], *_shape(feature)), dtype=dtype)
         about = feature.get("palpate", {})
         words = {"names": feature.get("names"), "channels": about.get("channels")}
         arrays[name].attrs.update({"unit": about.get("unit", ""), "about": about.get("about", "")})
@@ -112,7 +106,7 @@ def _fill(part: Path, create: Callable[..., Any], attributes: Any) -> None:
         at += len(table)
     for name in EPISODE_COLUMNS:
         column = parquet.read_table(part / "meta" / "episodes", columns=[name], partitioning=None)[name]
-        array = create(f"episodes/{name}", (len(column),), "string" if name == "digest" else "int64")
+        array = create(f"episodes/{name}", shape=(len(column),), dtype=text if name == "digest" else "int64")
         array[:] = column.to_numpy()
 
 

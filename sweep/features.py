@@ -122,29 +122,14 @@ class _LayoutFile:
     sensors: list[str]
 
 
-@dataclass(frozen=True)
-class RunFrames:
-    """The frames of a run as columns.
-
-    Attributes
-    ----------
-    layout : Layout
-    columns : dict of str to (F, …) ndarray
-        By the names of the layout's features.
-    """
-
-    layout: Layout
-    columns: dict[str, np.ndarray]
-
-
 def frames_of(
     recording: Recording,
     sensors: Sensors,
     shared: SharedResults | None = None,
     points: bool = False,
     half_precision: bool = False,
-) -> RunFrames:
-    """Return the frames of a run; raise :class:`PalpateError` for a number that its bits cannot hold.
+) -> tuple[Layout, dict[str, np.ndarray]]:
+    """Return the layout of the frames of a run, and (F, …) columns by the names of its features.
 
     Parameters
     ----------
@@ -157,6 +142,11 @@ def frames_of(
         True for texels as a list in any case, and not as a picture where they form a grid.
     half_precision : bool
         True for forces and readings of texels in 16 bits.
+
+    Raises
+    ------
+    PalpateError
+        A number is too large for its bits.
     """
     names = folder_names(sensors)  # unique and without a slash, which LeRobot does not allow in names
     features, columns = [TIMESTAMP], {TIMESTAMP.name: (recording.times - recording.times[0]).astype(TIMESTAMP.dtype)}
@@ -168,7 +158,7 @@ def frames_of(
     shared = shared or SharedResults()
     digests = tuple(shared.of(digest_of, own) for own in texels.values())
     digest = _layout_digest(tuple(features), fps, tuple(texels), digests)
-    return RunFrames(Layout(tuple(features), fps, texels, digest), columns)
+    return Layout(tuple(features), fps, texels, digest), columns
 
 
 @lru_cache(maxsize=64)
@@ -195,11 +185,15 @@ def _narrowed(feature: Feature, values: np.ndarray) -> np.ndarray:
 def _all_features(
     recording: Recording, sensors: Sensors, names: Mapping[str, str], points: bool, half_precision: bool
 ) -> Iterator[tuple[Feature, np.ndarray]]:
-    dtype = "float16" if half_precision else "float32"
-    for sensor, (texels, painted, parameters) in sensors.items():
-        layout = None if points or not isinstance(texels.layout, GridLayout) else texels.layout
-        yield from _texel_features(names[sensor], recording.sensors[sensor], texels, painted, parameters, layout, dtype)
-        yield from _net_features(names[sensor], recording.sensors[sensor])
+    frame = "in the frame of the sensor's body"
+    for sensor, own in sensors.items():
+        name, arrays = names[sensor], recording.sensors[sensor]
+        yield from _texel_features(name, arrays, *own, points, "float16" if half_precision else "float32")
+        about = f"Net torque on the sensor about the origin of its body, {frame}."
+        middle = f"Force-weighted mean of the contact points, {frame}; zero without contact."
+        yield _vector(net_force_name(name), "N", f"Net force on the sensor, {frame}."), arrays.net_force
+        yield _vector(f"observation.net_torque.{name}", "N m", about), arrays.net_torque
+        yield _vector(f"contact.centre_of_pressure.{name}", "m", middle), arrays.centre_of_pressure
     count = len(recording.body_names)  # poses of all bodies as one list, which is how LeRobot keeps the state of a robot
     axes = tuple(f"{body}.{axis}" for body in recording.body_names for axis in POSE_AXES)
     about = "Poses of the bodies in the world: position, m, and quaternion."
@@ -227,7 +221,7 @@ def by_texel(values: np.ndarray, texels: Texels) -> np.ndarray:
 def varied_feature(name: str, dtype: str) -> Feature:
     """Return the column of what was varied; LeRobot allows no slash."""
     about = "Varied properties; the same in all frames of a run."
-    return Feature(f"varied.{name.replace('/', '_')}", dtype, (1,), (), "", about)
+    return Feature(name.replace("/", "_"), dtype, (1,), (), "", about)
 
 
 def _texel_features(
@@ -236,10 +230,11 @@ def _texel_features(
     texels: Texels,
     painted: Painted,
     parameters: SensorParameters,
-    layout: GridLayout | None,
+    points: bool,
     dtype: str,
 ) -> Iterator[tuple[Feature, np.ndarray]]:
     """Yield what is recorded of each texel: forces and readings of a type, and the truth about contact."""
+    layout = None if points or not isinstance(texels.layout, GridLayout) else texels.layout
     shape: tuple[int, ...] = (len(texels),) if layout is None else layout.shape
     names = ("row", "column") if len(shape) == 2 else ("texel",)
 
@@ -269,15 +264,6 @@ def _places(layout: GridLayout) -> slice | np.ndarray:
     """Return where the texels are among the pixels, row by row; a slice, which is faster, where all are in their order."""
     places = layout.row * layout.columns + layout.column
     return slice(None) if np.array_equal(places, np.arange(layout.rows * layout.columns)) else places
-
-
-def _net_features(name: str, arrays: SensorRecording) -> Iterator[tuple[Feature, np.ndarray]]:
-    frame = "in the frame of the sensor's body"
-    yield _vector(net_force_name(name), "N", f"Net force on the sensor, {frame}."), arrays.net_force
-    about = f"Net torque on the sensor about the origin of its body, {frame}."
-    yield _vector(f"observation.net_torque.{name}", "N m", about), arrays.net_torque
-    about = f"Force-weighted mean of the contact points, {frame}; zero without contact."
-    yield _vector(f"contact.centre_of_pressure.{name}", "m", about), arrays.centre_of_pressure
 
 
 def _vector(name: str, unit: str, about: str) -> Feature:

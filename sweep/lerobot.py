@@ -9,15 +9,21 @@ Beyond it, ``meta/texels.parquet`` says where the texels are.
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..core.errors import FileError, os_error_reason
+from ..core.export.exporter import Exporter, sensor_progress
+from ..core.figures.figure_style import FigureStyle
 from ..core.geometry.grid_layout import GridLayout
 from ..core.geometry.texels import Texels
-from .features import AXES, TIMESTAMP, Feature, Layout, varied_feature
-from .parts import COMPRESSION
+from ..core.io.bake_reader import Bake
+from ..core.jobs import Job
+from .features import AXES, TIMESTAMP, Feature, Layout, frames_of
+from .parts import COMPRESSION, require_pyarrow
 
 if TYPE_CHECKING:
     import pyarrow
@@ -50,24 +56,16 @@ class LeRobotWriter:
         Of all its runs.
     task : str
         What LeRobot calls the task, the same for all runs.
-    varied : dict of str to str
-        Types of what was varied ("string" or "float64"), by name.
+    varied : sequence of Feature
+        What was varied, the same in all frames of a run.
     file_bytes : int
         Size from which on a file of frames is followed by the next, where it is above :data:`FILE_MEGABYTES`.
     """
 
-    def __init__(
-        self,
-        root: Path,
-        layout: Layout,
-        task: str,
-        varied: dict[str, str] | None = None,
-        file_bytes: int = 0,
-    ):
+    def __init__(self, root: Path, layout: Layout, task: str, varied: Sequence[Feature] = (), file_bytes: int = 0):
         import pyarrow
 
-        self._root, self._layout, self._task = root, layout, task
-        self._varied = [varied_feature(name, dtype) for name, dtype in (varied or {}).items()]
+        self._root, self._layout, self._task, self._varied = root, layout, task, varied
         kinds = [(name, pyarrow.int64()) for name in PLACE_COLUMNS]
         kinds += [(item.name, _arrow_type(item)) for item in (*layout.features, *self._varied)]
         self._frames = _FileSeries(root, DATA_PATH, pyarrow.schema(kinds), max(file_bytes, FILE_MEGABYTES << 20))
@@ -82,8 +80,8 @@ class LeRobotWriter:
         (root / "meta").mkdir(parents=True, exist_ok=True)
         _write_texels(root / "meta" / "texels.parquet", layout.texels)
 
-    def add(self, index: int, digest: str, values: dict[str, Any], columns: dict[str, np.ndarray]) -> None:
-        """Append the frames of a run: its index and digest, what was varied, and the numbers of the layout's features."""
+    def add(self, index: int, digest: str, columns: dict[str, np.ndarray], values: Sequence[Any] = ()) -> None:
+        """Append the frames of a run: its index and digest, the numbers of the layout's features, and what was varied."""
         count = len(columns[TIMESTAMP.name])
         places = {
             "frame_index": np.arange(count),
@@ -91,8 +89,8 @@ class LeRobotWriter:
             "index": np.arange(self._total, self._total + count),
             "task_index": np.zeros(count, np.int64),
         }
-        constant = {item.name: np.full(count, values[item.name], object if item.dtype == "string" else float)
-                    for item in self._varied}  # fmt: skip
+        constant = {item.name: np.full(count, value, object if item.dtype == "string" else float)
+                    for item, value in zip(self._varied, values, strict=True)}  # fmt: skip
         self._waiting.append({**places, **columns, **constant})
         self._waiting_bytes += sum(column.nbytes for column in columns.values())
         numbers = (self._runs, count, *self._frames.place, self._total, self._total + count, index)
@@ -130,8 +128,7 @@ class LeRobotWriter:
         if self._waiting:
             self._write_frames()
         self._write_episodes(1)
-        self._frames.close()
-        self._episodes.close()
+        self.close()
         meta = self._root / "meta"
         _write_tasks(meta / "tasks.parquet", self._task)
         info = self._info()
@@ -140,7 +137,7 @@ class LeRobotWriter:
         _write_card(self._root / "README.md", self._task, info)
 
     def close(self) -> None:
-        """Let go of files that are open after an error."""
+        """Finish the files that are open."""
         self._frames.close()
         self._episodes.close()
 
@@ -321,3 +318,26 @@ def _write_tasks(path: Path, task: str) -> None:
 def _write_json(path: Path, content: dict[str, Any]) -> None:
     text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
     path.write_text(text + "\n", encoding="utf-8", newline="\n")
+
+
+def write_lerobot(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Path]]:
+    """Write the dataset into the folder ``lerobot``; it is a job as every exporter's is."""
+    require_pyarrow()
+    first = next(iter(bake.texels))
+    yield sensor_progress(bake, first)
+    target = folder / "lerobot"
+    (layout, columns), scene = frames_of(bake.recording, bake.sensors), bake.manifests[first].scene_file
+    try:
+        writer = LeRobotWriter(target, layout, Path(scene).stem if scene else "bake")
+        try:
+            writer.add(0, bake.recording.digest, columns)
+            writer.finish()
+        finally:
+            writer.close()
+    except OSError as error:
+        raise FileError(f"'{folder}' could not be written ({os_error_reason(error)}): free some space there.") from error
+    return sorted(path for path in target.rglob("*") if path.is_file())
+
+
+EXPORTER = Exporter("lerobot", write_lerobot)
+"""Not among the formats that a .blend may choose."""

@@ -20,7 +20,7 @@ import numpy as np
 from ..core.errors import FileError, imported
 from ..core.io.file_writing import atomic_write
 from ..core.study.study_file import LAYOUTS, PARTS, Run, part_files, part_name
-from .features import Layout, RunFrames
+from .features import Layout
 
 if TYPE_CHECKING:
     import pyarrow
@@ -53,7 +53,10 @@ class RunResult:
     seconds : float
         That computing took. No result depends on it.
     metrics : dict of str to float
-    frames : RunFrames or None
+    layout : Layout or None
+        Of its frames; None where it has none.
+    columns : dict of str to (F, …) ndarray
+        Of its frames, by the names of the layout's features.
     """
 
     run: Run
@@ -61,12 +64,8 @@ class RunResult:
     traceback: str = ""
     seconds: float = 0.0
     metrics: Mapping[str, float] = field(default_factory=dict)
-    frames: RunFrames | None = None
-
-    @property
-    def size(self) -> int:
-        """Bytes of the frames."""
-        return 0 if self.frames is None else sum(column.nbytes for column in self.frames.columns.values())
+    layout: Layout | None = None
+    columns: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
 def write_part(folder: Path, results: Sequence[RunResult]) -> None:
@@ -81,7 +80,7 @@ def write_part(folder: Path, results: Sequence[RunResult]) -> None:
 
     if not results:
         return
-    layout = next((one.frames.layout for one in results if one.frames is not None), None)
+    layout = next((one.layout for one in results if one.layout is not None), None)
     if layout is not None:
         layout.save(folder / LAYOUTS)
     content = hashlib.sha256(repr([one.run.digest for one in results]).encode()).hexdigest()[:16]
@@ -108,7 +107,7 @@ def _table(results: Sequence[RunResult], layout: Layout | None) -> pyarrow.Table
         columns[f"metric.{name}"] = pyarrow.array([one.metrics.get(name) for one in results], pyarrow.float64())
     for feature in layout.features if layout is not None else ():
         none = np.zeros(0, feature.dtype)
-        own = [none if one.frames is None else one.frames.columns[feature.name].reshape(-1) for one in results]
+        own = [one.columns.get(feature.name, none).reshape(-1) for one in results]
         numbers = np.concatenate(own)
         ends = np.cumsum([0, *map(len, own)], dtype=np.int64)
         columns[feature.name] = pyarrow.LargeListArray.from_arrays(ends, pyarrow.array(numbers))

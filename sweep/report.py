@@ -6,13 +6,19 @@ from __future__ import annotations
 import base64
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..core.errors import counted
+from ..core.figures.figure_canvas import new_figure, save_figure, tidy_axes
+from ..core.figures.figure_style import FONT, GREY, INK, NORMAL_COLOUR, SHEAR_COLOUR, SMALL, FigureStyle
 from ..core.figures.html_templates import render_html
+from ..core.figures.quantities import Extent
+from ..core.figures.tactile_image import SensorView, draw_colour_bar
+from ..core.geometry.texels import Texels
 from ..core.io.file_writing import atomic_write
 from ..core.io.hidden_folder import temporary_folder
 from ..core.study.study_file import Study
@@ -20,13 +26,24 @@ from .dataset import TABLE_NAME, TIMINGS_NAME, UNNAMED_STUDY
 from .dependencies import LEAST_RUNS, RUNS_PER_GROUP, Dependency, dependencies, is_known
 from .features import by_texel, net_force_name, tactile_name
 from .parts import FINISHED, READING, Parts, frames_in
-from .report_figures import MOST_METRICS, MOST_NAMES, MOST_PARAMETERS, RunImage, draw_image_sheet, draw_small_multiples
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 REPORT_NAME = "report.html"
 TEMPLATE = Path(__file__).parent / "templates" / "sweep_report.html"
 MOST_DEPENDENCIES, MOST_MESSAGES, MOST_IMAGES = 15, 12, 24
 PLACE_OF_PRESS = "press."
 """First word of the metrics that say where a press was."""
+MOST_PARAMETERS, MOST_METRICS = 6, 6
+"""Columns and rows of the small multiples."""
+MOST_NAMES = 12
+"""Names of a choice that have room below one column."""
+MOST_POINTS = 2000
+"""Runs that are drawn as points; of more, as many are chosen evenly."""
+MEDIAN_BINS, LEAST_PER_BIN = 10, 4
+DPI = 130
+IMAGES_ACROSS = 6
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(\.\d+)?(e[-+]?\d+)?(?!\w)", re.IGNORECASE)
 
 
@@ -81,9 +98,9 @@ def write_report(folder: Path, study: Study) -> None:
     with temporary_folder(folder, "report") as hidden:
         if all(drawn):
             strong = {(one.parameter, one.metric) for one in found}
-            draw_small_multiples(hidden / "multiples.png", values, metrics, *drawn, strong)
+            _draw_small_multiples(hidden / "multiples.png", values, metrics, drawn, strong)
         if images:
-            draw_image_sheet(hidden / "images.png", images)
+            _draw_image_sheet(hidden / "images.png", images)
         pictures = {path.stem: base64.b64encode(path.read_bytes()).decode() for path in hidden.iterdir()}
     page = render_html(
         TEMPLATE,
@@ -118,8 +135,11 @@ def _most_dependent(values: Columns, metrics: Columns, found: list[Dependency]) 
     return list(parameters)[:MOST_PARAMETERS], list(measured)[:MOST_METRICS]
 
 
-def _images(parts: Parts) -> list[RunImage]:
-    """Return images of the first sensor of runs that are spread evenly over the design."""
+def _images(parts: Parts) -> list[tuple[int, Texels, np.ndarray]]:
+    """Return the first sensor of runs that are spread evenly over the design, when the net force on it is largest.
+
+    Each has the index of the run, the texels, and (n, 3) forces: normal, and shear along the texels' x and y axes.
+    """
     done = parts.done
     chosen = np.unique(np.linspace(0, len(done) - 1, min(len(done), MOST_IMAGES)).round().astype(int))
     images = []
@@ -131,8 +151,7 @@ def _images(parts: Parts) -> list[RunImage]:
         (sensor, texels), *_ = layout.texels.items()
         _, columns = frames_in(run, layout)
         frame = int(np.argmax(np.linalg.norm(columns[net_force_name(sensor)], axis=1)))
-        image = by_texel(columns[tactile_name(sensor)], texels)[frame].astype(float)
-        images.append(RunImage(f"run {index}", texels, image[:, 0], image[:, 1:]))
+        images.append((index, texels, by_texel(columns[tactile_name(sensor)], texels)[frame].astype(float)))
     return images
 
 
@@ -202,3 +221,83 @@ def _metric_row(name: str, known: np.ndarray) -> list[str]:
 
 def _digits(number: float) -> str:
     return f"{number:.4g}".replace("-", "−")
+
+
+def _draw_small_multiples(
+    path: Path, values: Columns, metrics: Columns, drawn: tuple[list[str], list[str]], strong: set[tuple[str, str]]
+) -> None:
+    """Draw parameters as columns and metrics as rows: a point for each run, and the median where there are enough of them.
+
+    The median of `strong` pairs of parameter and metric is drawn in colour, because a dependency was detected.
+    """
+    parameters, measured = drawn
+    figure = new_figure(1.2 + 1.75 * len(parameters), 0.8 + 1.3 * len(measured))
+    figure.set_layout_engine("constrained")
+    grid = figure.subplots(len(measured), len(parameters), sharex="col", sharey="row", squeeze=False)
+    for column, parameter in enumerate(parameters):
+        own = values[parameter]
+        for row, metric in enumerate(measured):
+            axes, numbers = grid[row, column], metrics[metric]
+            tidy_axes(axes)
+            axes.locator_params(axis="y", nbins=3)
+            known = np.isfinite(numbers) & is_known(own)
+            colour = SHEAR_COLOUR if (parameter, metric) in strong else GREY
+            if known.any():
+                (_draw_choices if own.dtype == object else _draw_numbers)(axes, own[known], numbers[known], colour)
+            if column == 0:
+                axes.set_ylabel(_wrapped(metric), fontsize=FONT, color=INK)
+            if row == len(measured) - 1:
+                axes.set_xlabel(_wrapped(parameter), fontsize=FONT, color=INK)
+    save_figure(figure, path, DPI)
+
+
+def _wrapped(name: str) -> str:
+    """Break a long name after the dot or underscore that is nearest to its middle."""
+    cuts = [place + 1 for place, letter in enumerate(name[:-1]) if letter in "._ /"] if len(name) > 16 else []
+    cut = min(cuts, key=lambda place: abs(place - len(name) // 2), default=len(name))
+    return f"{name[:cut]}\n{name[cut:]}"
+
+
+def _draw_numbers(axes: Axes, column: np.ndarray, numbers: np.ndarray, colour: str) -> None:
+    if column.min() > 0.0 and np.median(column) < 0.5 * (column.min() + column.max()) / 2:  # as of a log-uniform distribution
+        axes.set_xscale("log")
+    else:
+        axes.locator_params(axis="x", nbins=3)
+    few = np.linspace(0, len(column) - 1, min(len(column), MOST_POINTS)).round().astype(int)
+    axes.plot(column[few], numbers[few], ".", ms=2.5 if len(few) > 200 else 4, color=NORMAL_COLOUR, alpha=0.45, mew=0)
+    parts = np.array_split(np.argsort(column, kind="stable"), MEDIAN_BINS)
+    if min(map(len, parts)) >= LEAST_PER_BIN:
+        x, y = [[float(np.median(of[part])) for part in parts] for of in (column, numbers)]
+        axes.plot(x, y, "-", color=colour, lw=1.6)
+
+
+def _draw_choices(axes: Axes, column: np.ndarray, numbers: np.ndarray, colour: str) -> None:
+    """Draw a box for each name of a choice."""
+    names = sorted(set(column))
+    groups = [numbers[column == name] for name in names]
+    drawn = axes.boxplot(groups, widths=0.5, showfliers=False, medianprops={"color": colour, "lw": 1.6})
+    for line in (*drawn["boxes"], *drawn["whiskers"], *drawn["caps"]):
+        line.set(color=NORMAL_COLOUR, lw=0.8)
+    axes.set_xticks(range(1, len(names) + 1), names, rotation=90 if len("".join(names)) > 14 else 0)
+
+
+def _draw_image_sheet(path: Path, images: Sequence[tuple[int, Texels, np.ndarray]]) -> None:
+    """Draw tactile images of some runs, one at least, all in one scale of colours and one of arrows."""
+    high = max(float(forces[:, 0].max(initial=0.0)) for _, _, forces in images)
+    scale = FigureStyle().scale_of(Extent(0.0, high, ("N",)))
+    shear = max(float(np.linalg.norm(forces[:, 1:], axis=1).max(initial=0.0)) for _, _, forces in images)
+    views = [SensorView.of(texels, forces[:, 0]) for _, texels, forces in images]
+    across = min(len(images), IMAGES_ACROSS)
+    rows = -(-len(images) // across)
+    tall = float(np.clip(max(view.height / view.width for view in views) * 1.35, 0.5, 2.4))
+    figure = new_figure(max(across * 1.35, 3.4) + 0.9, rows * (tall + 0.3) + 0.1)
+    grid = figure.subplots(rows, across, squeeze=False)
+    drawn: Any = None
+    for axes in grid.flat[len(images) :]:
+        axes.set_axis_off()
+    for axes, (index, _, forces), view in zip(grid.flat, images, views, strict=False):
+        drawn = view.at_size(tall / max(view.height, view.width)).draw(axes, forces[:, 0], forces[:, 1:], shear, scale)
+        axes.set_title(f"run {index}", fontsize=SMALL, color=INK, pad=2)
+    draw_colour_bar(figure, drawn, figure.add_axes((0.9, 0.25, 0.015, 0.5)), scale)
+    figure.subplots_adjust(0.01, 0.01, 0.88, 1.0 - 0.2 / figure.get_figheight(), 0.1, 0.15)
+    save_figure(figure, path, DPI)

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Open a study, compute the runs that are left, and write its dataset and report: what a command and a script call."""
+"""Compute the runs of a study, write its dataset and report, or tell how long that takes: what a command and a script call."""
 
 from __future__ import annotations
 
 import shutil
+import tempfile
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,13 +19,18 @@ from ..core.errors import FileError, PalpateError
 from ..core.io.file_writing import writable_folder
 from ..core.io.hidden_folder import PRIVATE_FOLDER, FolderLock
 from ..core.jobs import Progress
-from ..core.study.study_file import STUDY_NAME, read_study
+from ..core.study.study_file import PARTS, RUNS, SCENES, STUDY_NAME, read_study
 from . import driver
+from .dataset import DATASET_FOLDER, publish
 from .parts import Parts, remove_unfinished_parts
-from .program import require_allowed
-from .scene_evaluation import REFUSE
-from .study_folder import OpenStudy, frozen_of
-from .worker import BatchResult
+from .scripts import REFUSE, require_allowed
+from .study_folder import OpenStudy, frozen_of, open_study
+from .worker import BatchResult, compute_batch
+
+RUNS_TRIED, QUICK_RUNS, QUICK_SECONDS = 5, 50, 0.5
+"""Runs that are computed, and so many where those take no longer than half a second."""
+FIXED_SECONDS = 7.0
+"""Until the workers of a machine have loaded Python, the solver and Dask, and for the report."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +90,6 @@ def compute_runs(
     opened: OpenStudy,
     show: Callable[[Progress], object],
     workers: int | None = None,
-    scripts: str = REFUSE,
     retry_failed: bool = False,
     part: tuple[int, int] = (1, 1),
     **cluster: Any,
@@ -97,8 +103,6 @@ def compute_runs(
         Called with the progress, and may raise to stop; what is done is kept.
     workers : int, optional
         Processes on this machine. Default: one for each core.
-    scripts : str
-        What is done about Python in scenes and jobs, one of :data:`.scene_evaluation.SCRIPTS`.
     retry_failed : bool
         Compute failed runs again.
     part : (int, int)
@@ -112,16 +116,16 @@ def compute_runs(
     left = np.setdiff1d(indices, parts.done if retry_failed else np.concatenate([parts.done, parts.failed]))
     if not len(left):
         return []
-    require_allowed(opened.study, scripts)
+    require_allowed(opened.study, opened.scripts)
 
     def show_tally(tally: BatchResult) -> None:
         stage = f"sweep, failed={tally.failed}" if tally.failed else "sweep"
-        show(Progress(stage, len(indices) - len(left) + tally.finished, len(indices)))
+        show(Progress(stage, len(indices) - len(left) + tally.done + tally.failed, len(indices)))
 
     show_tally(BatchResult())
     workers = min(workers or count_of_cores(), len(left))
     with driver.dask_client(workers=workers, memory=opened.study.run_memory, **cluster) as client:
-        return driver.Dispatch(client, opened, scripts, show_tally).run(left).failures
+        return driver.Dispatch(client, opened, show_tally).run(left).failures
 
 
 def write_results(opened: OpenStudy, formats: Sequence[str] = ()) -> tuple[Status, list[Path]]:
@@ -129,7 +133,6 @@ def write_results(opened: OpenStudy, formats: Sequence[str] = ()) -> tuple[Statu
 
     Each file is written whole or not at all.
     """
-    from .dataset import publish
     from .exports import EXPORTS
     from .report import write_report
 
@@ -140,3 +143,60 @@ def write_results(opened: OpenStudy, formats: Sequence[str] = ()) -> tuple[Statu
         written = [path for kind in dict.fromkeys(formats) for path in EXPORTS[kind](opened.folder)]
         write_report(opened.folder, opened.study)
     return found, written
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Time and memory of a study.
+
+    Attributes
+    ----------
+    seconds, closing : float
+        Of one run in one process, and of adding it to the dataset.
+    size : float
+        Bytes of one run.
+    failures : list of str
+        Sentences of the runs that failed.
+    tried : int
+        Number of runs that were computed.
+    """
+
+    seconds: float
+    closing: float
+    size: float
+    failures: list[str]
+    tried: int
+
+    def seconds_of(self, runs: int, workers: int) -> float:
+        """Return the seconds of a study from the command to the report."""
+        return FIXED_SECONDS + self.seconds * runs / min(workers, runs) + self.closing * runs
+
+
+def try_study(place: Path, scripts: str = REFUSE) -> tuple[OpenStudy, Estimate]:
+    """Compute some runs, spread over a study, in a folder that is removed; parameters as of :func:`.open_study`."""
+    with tempfile.TemporaryDirectory(prefix="palpate-sweep-") as name:
+        trial = Path(name)
+        if place.is_dir():
+            (trial / PARTS).mkdir()
+            shutil.copy(place / STUDY_NAME, trial)
+            shutil.copytree(place / SCENES, trial / SCENES)
+        opened = open_study(trial if place.is_dir() else place, trial, scripts)
+        total, limit = len(opened.runs), opened.study.run_limit
+        compute_batch([0], name, scripts, limit)  # the first run loads what was compiled
+        one = _seconds_of(lambda: publish(trial, opened.study))
+        for count in (RUNS_TRIED, QUICK_RUNS):
+            tried = range(total)[:: max(1, total // count)][:count]
+            found = compute_batch(tried, name, scripts, limit)
+            if found.seconds >= QUICK_SECONDS:
+                break
+        closing = max(0.0, _seconds_of(lambda: publish(trial, opened.study)) - one) / len(tried)
+        written = sum(path.stat().st_size for place in (PARTS, RUNS, DATASET_FOLDER) for path in (trial / place).rglob("*"))
+    failures = [sentence for _, sentence in found.failures]
+    return opened, Estimate(found.seconds / len(tried), closing, written / max(1, found.done), failures, len(tried))
+
+
+def _seconds_of(work: Callable[[], object]) -> float:
+    """Return the seconds of the processor that work takes: what other programs take would be multiplied by the runs."""
+    began = time.process_time()
+    work()
+    return time.process_time() - began

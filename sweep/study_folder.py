@@ -14,6 +14,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from ..core.errors import FileError
@@ -37,12 +38,10 @@ from ..core.study.study_file import (
     differences,
     frozen_text,
     plan_for,
-    plan_for_job,
     read_study,
 )
 from ..core.version import VERSION
-from . import program
-from .scene_evaluation import REFUSE, read_blend
+from .scripts import REFUSE, SUFFIX, freeze_program, read_blend, require_allowed
 
 BLEND, SCENARIO = ".blend", ".npz"
 ReadBlend = Callable[[Path, Path], None]
@@ -62,15 +61,18 @@ class OpenStudy:
     plans : mapping of str to Plan
         By the names of the scenes.
     runs : Runs
+    scripts : str
+        What is done about the Python of a .blend or a program, one of :data:`.scripts.SCRIPTS`.
     """
 
     folder: Path
     study: Study
     plans: Mapping[str, Plan]
     runs: Runs
+    scripts: str = REFUSE
 
 
-def open_study(place: Path, folder: Path, scripts: str = REFUSE, check: Callable[[], object] = lambda: None) -> OpenStudy:
+def open_study(place: Path, folder: Path, scripts: str = REFUSE) -> OpenStudy:
     """Open a study by its folder, or by its file: freeze it in an empty folder, or go on in the folder of the same study.
 
     Parameters
@@ -80,9 +82,7 @@ def open_study(place: Path, folder: Path, scripts: str = REFUSE, check: Callable
     folder : Path
         Output folder, which is made if it is missing.
     scripts : str
-        What is done about the Python of a .blend or a program, one of :data:`.scene_evaluation.SCRIPTS`.
-    check : callable
-        Called after each .blend, and may raise to stop.
+        As of :class:`OpenStudy`.
 
     Raises
     ------
@@ -91,11 +91,11 @@ def open_study(place: Path, folder: Path, scripts: str = REFUSE, check: Callable
         one with another scene.
     """
     if place.is_dir():
-        return resume_study(folder)
-    study, read = read_study(place), _blend_reader(scripts, check, "--study", str(place))
+        return resume_study(folder, scripts)
+    study, read = read_study(place), partial(read_blend, scripts=scripts, more=("--study", str(place)))
     sources = _sources(study, place.parent)
     if (folder / STUDY_NAME).exists():
-        opened = resume_study(folder)
+        opened = resume_study(folder, scripts)
         changed = differences(opened.study, study)
         if changed:
             raise FileError(f"'{folder}' belongs to another study ({'; '.join(changed)}): give another folder with --out.")
@@ -104,17 +104,9 @@ def open_study(place: Path, folder: Path, scripts: str = REFUSE, check: Callable
         return replace(opened, study=replace(opened.study, run_limit=study.run_limit, run_memory=study.run_memory))
     if folder.exists() and (not folder.is_dir() or {path.name for path in folder.iterdir()} - {*MADE, STUDY_NAME, ".palpate"}):
         raise FileError(f"'{folder}' holds other files and no study: give a new or empty folder with --out.")
-    program.require_allowed(study, scripts)
+    require_allowed(study, scripts)
     with _whole_or_nothing(folder):
-        return _frozen(study, place, folder, sources, read)
-
-
-def _blend_reader(scripts: str, check: Callable[[], object], *words: str) -> ReadBlend:
-    def read(blend: Path, target: Path) -> None:
-        read_blend(blend, target, scripts, *words)
-        check()
-
-    return read
+        return replace(_frozen(study, place, folder, sources, read), scripts=scripts)
 
 
 def _frozen(study: Study, file: Path, folder: Path, sources: Mapping[str, Path], read: ReadBlend) -> OpenStudy:
@@ -125,8 +117,10 @@ def _frozen(study: Study, file: Path, folder: Path, sources: Mapping[str, Path],
     meshes = freeze_meshes(mesh_files, folder / SCENES / MESHES)
     plans, entries = {}, []
     for name, source in sources.items():
-        digest = _freeze_scene(source, folder / SCENES / name, read)
-        plans[name] = plan_of(study, folder, name, meshes)
+        digest = _freeze_scene(source, folder, name, read)
+        plans[name] = plan_for(
+            study, _scene_in(study, folder, name)[0], read_properties(scene_file(folder, name, ".json")), meshes
+        )
         entries.append(FrozenFile(source.name, file_sha256(source), name, digest))
     runs = Runs(study, plans, _digests(plans, entries))
     mesh_entries = tuple(FrozenFile(name, copy.stem) for name, copy in meshes.items())
@@ -149,15 +143,15 @@ def _whole_or_nothing(folder: Path) -> Iterator[None]:
         raise
 
 
-def scenarios_of(place: Path, scripts: str, check: Callable[[], object]) -> dict[str, Scenario | None]:
+def scenarios_of(place: Path, scripts: str) -> dict[str, Scenario | None]:
     """Return the names that may be varied, without beginning a study, whether or not the names that it varies are right.
 
     Parameters
     ----------
     place : Path
         The file of a study, the folder of one, or a scene.
-    scripts, check
-        As of :func:`open_study`.
+    scripts : str
+        As of :class:`OpenStudy`.
 
     Returns
     -------
@@ -171,27 +165,22 @@ def scenarios_of(place: Path, scripts: str, check: Callable[[], object]) -> dict
     """
     if place.is_dir():
         return {name: plan.scenario for name, plan in resume_study(place).plans.items()}
-    read = _blend_reader(scripts, check)
-    if place.suffix in (BLEND, SCENARIO):
-        sources = {place.stem: place}
-    else:
-        study = read_study(place)
-        sources = _sources(study, place.parent)
-        if study.is_job:
-            return dict.fromkeys(sources)
-    found: dict[str, Scenario | None] = {}
+    is_scene = place.suffix in (BLEND, SCENARIO)
+    sources = {place.stem: place} if is_scene else _sources(read_study(place), place.parent)
+    found: dict[str, Scenario | None] = dict.fromkeys(sources)
     with tempfile.TemporaryDirectory(prefix="palpate-sweep-") as folder:
-        for number, (name, source) in enumerate(sources.items()):
+        for name, source in sources.items():
             scenario = source
             if source.suffix == BLEND:
-                scenario = Path(folder) / f"{number}{SCENARIO}"
-                read(source, scenario)
-            found[name] = load_scenario(scenario)
+                scenario = Path(folder) / SCENARIO
+                read_blend(source, scenario, scripts)
+            if source.suffix != SUFFIX:
+                found[name] = load_scenario(scenario)
     return found
 
 
-def resume_study(folder: Path) -> OpenStudy:
-    """Open a study by its folder.
+def resume_study(folder: Path, scripts: str = REFUSE) -> OpenStudy:
+    """Open a study by its folder; `scripts` as of :class:`OpenStudy`.
 
     Raises
     ------
@@ -209,31 +198,24 @@ def resume_study(folder: Path) -> OpenStudy:
         )
     plans, meshes = {}, {one.file: mesh_copy(folder / SCENES / MESHES, one.file, one.sha256) for one in frozen.meshes}
     for scene in frozen.scenes:
-        if not _is_as_frozen(study, folder, scene):
+        scenario, digest = _scene_in(study, folder, scene.name)
+        if digest not in (scene.digest, scene.sha256):
             raise FileError(f"The scene '{scene.name}' in '{folder}' is not the one that the study began with: start again.")
-        plans[scene.name] = plan_of(study, folder, scene.name, meshes)
-    return OpenStudy(folder, study, plans, Runs(study, plans, _digests(plans, frozen.scenes)))
+        plans[scene.name] = plan_for(study, scenario, read_properties(scene_file(folder, scene.name, ".json")), meshes)
+    return OpenStudy(folder, study, plans, Runs(study, plans, _digests(plans, frozen.scenes)), scripts)
 
 
-def plan_of(study: Study, folder: Path, scene: str, meshes: Mapping[str, Path]) -> Plan:
-    """Return the distributions of a study on one of its scenes; raise PalpateError where a file is damaged or does not fit."""
+def scene_file(folder: Path, name: str, suffix: str) -> Path:
+    """Return a file of a scene, or the program, in the folder of a study."""
+    return folder / SCENES / f"{name}{suffix}"
+
+
+def _scene_in(study: Study, folder: Path, name: str) -> tuple[Scenario | None, str]:
+    """Return a scene in a study's folder and its digest; None and the SHA-256 of its program for a job."""
     if study.is_job:
-        return plan_for_job(study)
-    start = folder / SCENES / scene
-    properties = read_properties(_with(start, ".json"))
-    return plan_for(study, load_scenario(_with(start, SCENARIO)), properties, meshes)
-
-
-def _is_as_frozen(study: Study, folder: Path, scene: FrozenFile) -> bool:
-    """Whether a scene or the program in a study's folder is the one that the study began with."""
-    start = folder / SCENES / scene.name
-    if study.is_job:
-        return file_sha256(_with(start, program.SUFFIX)) == scene.sha256  # the processes that run it look at the rest
-    return load_scenario(_with(start, SCENARIO)).digest() == scene.digest
-
-
-def _with(start: Path, suffix: str) -> Path:
-    return start.parent / f"{start.name}{suffix}"
+        return None, file_sha256(scene_file(folder, name, SUFFIX))  # the processes that run it look at the rest
+    scenario = load_scenario(scene_file(folder, name, SCENARIO))
+    return scenario, scenario.digest()
 
 
 def _digests(plans: Mapping[str, Plan], scenes: Iterable[FrozenFile]) -> dict[str, str]:
@@ -259,8 +241,8 @@ def _sources(study: Study, base: Path) -> dict[str, Path]:
     for file in files:
         if not file.is_file():
             raise FileError(f"There is no scene '{file}': check its name; it is counted from the study's folder.")
-        if study.is_job and file.suffix != program.SUFFIX:
-            raise FileError(f"The job '{file}' is not a Python file: give one that ends with {program.SUFFIX}.")
+        if study.is_job and file.suffix != SUFFIX:
+            raise FileError(f"The job '{file}' is not a Python file: give one that ends with {SUFFIX}.")
         if not study.is_job and file.suffix not in (BLEND, SCENARIO):
             raise FileError(f"The scene '{file}' is neither a .blend nor a scenario (.npz): give one of these.")
     stems: dict[str, Path] = {}
@@ -273,11 +255,11 @@ def _sources(study: Study, base: Path) -> dict[str, Path]:
     return {names[stem]: file for stem, file in stems.items()}
 
 
-def _freeze_scene(source: Path, start: Path, read: ReadBlend) -> str:
-    """Write a scene, or a program, into a study's folder, under a name that begins with `start`, and return its digest."""
-    if source.suffix == program.SUFFIX:
-        return program.freeze_program(source, _with(start, program.SUFFIX))
-    target = _with(start, SCENARIO)
+def _freeze_scene(source: Path, folder: Path, name: str, read: ReadBlend) -> str:
+    """Write a scene, or a program, into a study's folder and return its digest."""
+    if source.suffix == SUFFIX:
+        return freeze_program(source, scene_file(folder, name, SUFFIX))
+    target = scene_file(folder, name, SCENARIO)
     if source.suffix == BLEND:
         read(source, target)
     else:
@@ -298,11 +280,10 @@ def _check_sources(opened: OpenStudy, sources: Mapping[str, Path], base: Path, r
             continue
         if opened.study.is_job or opened.plans[name].scene_properties:
             raise _changed(source, opened)
-        start = opened.folder / SCENES / f"now-{name}"
         try:
-            digest = _freeze_scene(source, start, read)
+            digest = _freeze_scene(source, opened.folder, f"now-{name}", read)
         finally:
-            _with(start, SCENARIO).unlink(missing_ok=True)
+            scene_file(opened.folder, f"now-{name}", SCENARIO).unlink(missing_ok=True)
         if digest != before[name].digest:
             raise _changed(source, opened)
     meshes = {one.file: one.sha256 for one in frozen.meshes}

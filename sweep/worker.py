@@ -30,14 +30,13 @@ from ..core.model.scenario import Scenario
 from ..core.model.sensor import Sensor
 from ..core.model.shared_results import SharedResults
 from ..core.response import net_shear, share_on, slipping
-from ..core.study.presses import Press, place_of
+from ..core.study.presses import PLACE_PARAMETERS, Press, place_of
 from ..core.study.scene_property import is_scene_property, write_overrides
 from ..core.study.study_file import RUNS, SCENE, SCENES, STUDY_NAME, Run, at_rate
 from ..core.study.variation import PRESS, varied_scenario
 from .features import frames_of
 from .parts import RunResult, write_part
-from .program import frozen_program, require_allowed
-from .scene_evaluation import REFUSE, read_blend
+from .scripts import REFUSE, frozen_program, read_blend, require_allowed
 from .study_folder import OpenStudy, resume_study
 
 # Metrics of a run of a study.
@@ -77,8 +76,10 @@ def metrics_of(scenario: Scenario, recording: Recording, press: Press | None = N
         found |= {f"{start}{name}": value for name, value in own.items()}
     for index, body in enumerate(scenario.bodies):
         if body.free:
-            found[f"{body.name}.held"] = float(_is_held(index, scenario, recording))
-            found[f"{body.name}.fall"] = _fall(index, scenario, recording)
+            poses, size = recording.poses[[0, -1], index], float(np.linalg.norm(scenario.gravity))
+            first, last = poses[:, :3] + np.einsum("fij,j->fi", rotation_matrices(poses[:, 3:]), body.center_of_mass)
+            found[f"{body.name}.held"] = float(_is_held(index, last, scenario, recording))
+            found[f"{body.name}.fall"] = float((last - first) @ scenario.gravity / size) if size else 0.0
     if press is not None:
         found |= {f"press.{axis}": float(value) for axis, value in zip("xyz", place_of(scenario, press), strict=True)}
     return found
@@ -103,23 +104,8 @@ def _sensor_metrics(sensor: Sensor, measured: SensorRecording, times: np.ndarray
     return found
 
 
-def _fall(index: int, scenario: Scenario, recording: Recording) -> float:
-    size = np.linalg.norm(scenario.gravity)
-    if size == 0.0:
-        return 0.0
-    center = _centers(index, scenario, recording)
-    return float((center[-1] - center[0]) @ scenario.gravity / size)
-
-
-def _centers(index: int, scenario: Scenario, recording: Recording) -> np.ndarray:
-    """Return where the centre of mass of a body is at the first and at the last frame, (2, 3) m, world."""
-    poses = recording.poses[[0, -1], index]
-    return poses[:, :3] + np.einsum("fij,j->fi", rotation_matrices(poses[:, 3:]), scenario.bodies[index].center_of_mass)
-
-
-def _is_held(index: int, scenario: Scenario, recording: Recording) -> bool:
-    """Return whether a free body is near a sensor in contact at the last frame."""
-    center = _centers(index, scenario, recording)[1]
+def _is_held(index: int, center: np.ndarray, scenario: Scenario, recording: Recording) -> bool:
+    """Return whether a free body with its centre of mass at `center`, (3,) m, is near a sensor in contact at the last frame."""
     own = [target for target in scenario.targets if target.body == index]
     middle = scenario.bodies[index].center_of_mass
     reach = max((float(np.linalg.norm(target.mesh.vertices - middle, axis=1).max()) for target in own), default=0.0)
@@ -137,23 +123,8 @@ MOST_SCENES_KEPT = 4
 """Scenarios of scenes that a process keeps: the runs of a grid, whose last number changes fastest, share them."""
 
 
-def write_run_folder(folder: Path, scenario: Scenario, recording: Recording, images: bool) -> None:
-    """Write a folder for each sensor into the folder of a run.
-
-    Parameters
-    ----------
-    folder : Path
-    scenario : Scenario
-        That was computed.
-    recording : Recording
-    images : bool
-        True for a tactile image of each frame.
-
-    Raises
-    ------
-    FileError, OSError
-        A file cannot be written.
-    """
+def _write_sensors(folder: Path, scenario: Scenario, recording: Recording, images: bool) -> None:
+    """Write a folder for each sensor into the folder of a run, with a tactile image of each frame where these are wanted."""
     names = folder_names(recording.sensors)
     for sensor in scenario.read_out:
         own = folder / names[sensor.name]
@@ -192,11 +163,6 @@ class BatchResult:
         """Number of runs that failed."""
         return len(self.failures)
 
-    @property
-    def finished(self) -> int:
-        """Runs that are done or failed."""
-        return self.done + self.failed
-
 
 class RunComputer:
     """Computes runs of a study one after the other, in one thread.
@@ -204,17 +170,14 @@ class RunComputer:
     Parameters
     ----------
     opened : OpenStudy
-    scripts : str
-        What is done about the Python in a .blend and a job, one of :data:`.scene_evaluation.SCRIPTS`.
-    limit : float, optional
-        Seconds that a run may take, asked for between frames.
+        Its `run_limit` is asked for between frames.
     """
 
-    def __init__(self, opened: OpenStudy, scripts: str = REFUSE, limit: float | None = None):
+    def __init__(self, opened: OpenStudy):
         from ..core.solver import precompile
 
-        require_allowed(opened.study, scripts)
-        self.opened, self._scripts, self._limit = opened, scripts, limit
+        require_allowed(opened.study, opened.scripts)
+        self.opened, self._limit = opened, opened.study.run_limit
         self._read = lru_cache(maxsize=MOST_SCENES_KEPT)(self._read_scene)
         self._program = lru_cache(lambda name: frozen_program(opened.study, opened.folder, name))
         self._shared = SharedResults()
@@ -243,17 +206,15 @@ class RunComputer:
         scenario = self._scenario(run.scene, values)
         recording = self._recording(scenario, run.index)
         if press is not None:
-            own: dict[str, Any] = {
-                key.removeprefix(f"{PRESS}."): value for key, value in values.items() if key.startswith(f"{PRESS}.")
-            }
-            press = replace(press, **own)
+            place: dict[str, Any] = {word: values[f"{PRESS}.{word}"] for word in PLACE_PARAMETERS}
+            press = replace(press, **place)
         metrics = metrics_of(scenario, recording, press)
         sensors = {own.name: (own.texels, own.painted, own.parameters) for own in scenario.read_out}
-        frames = frames_of(recording, sensors, self._shared, study.points, study.half_precision)
+        layout, columns = frames_of(recording, sensors, self._shared, study.points, study.half_precision)
         if study.has_folders:
             with _run_folder(self.opened.folder, run) as folder:
-                write_run_folder(folder, scenario, recording, study.images)
-        return RunResult(run, metrics=metrics, frames=frames)
+                _write_sensors(folder, scenario, recording, study.images)
+        return RunResult(run, metrics=metrics, layout=layout, columns=columns)
 
     def _scenario(self, scene: str, values: Mapping[str, Any]) -> Scenario:
         """Return the scenario of a scene with the values of a run; it is read again where they have properties of the scene."""
@@ -269,7 +230,8 @@ class RunComputer:
         with temporary_folder(scenes, "scene") as place:
             overrides, target = place / "overrides.toml", place / "scene.npz"
             write_overrides(overrides, dict(values))
-            read_blend(scenes / f"{scene}.blend", target, self._scripts, "--overrides", str(overrides), limit=self._limit)
+            more = "--overrides", str(overrides)
+            read_blend(scenes / f"{scene}.blend", target, self.opened.scripts, more, self._limit)
             return at_rate(load_scenario(target), self.opened.study.fps)
 
     def _recording(self, scenario: Scenario, index: int) -> Recording:
@@ -355,7 +317,8 @@ def _computer_for(folder: Path, scripts: str, limit: float | None) -> RunCompute
     written = (folder / STUDY_NAME).stat()
     key = folder, scripts, limit, written.st_ino, written.st_mtime_ns
     if getattr(_kept, "key", None) != key:
-        _kept.computer, _kept.key = RunComputer(resume_study(folder), scripts, limit), key
+        opened = resume_study(folder, scripts)
+        _kept.computer, _kept.key = RunComputer(replace(opened, study=replace(opened.study, run_limit=limit))), key
     found: RunComputer = _kept.computer
     return found
 
@@ -382,7 +345,8 @@ def compute_batch(
     PalpateError
         The study cannot be opened.
     """
-    place, batch, waiting = Path(folder), BatchResult(), list[RunResult]()
+    place, batch = Path(folder), BatchResult()
+    waiting, size, layout = list[RunResult](), 0, ""  # what becomes one part: its runs, their bytes and their layout
     computer = _computer_for(place, scripts, limit)
     for index in np.asarray(indices).tolist():
         result = computer.result(index)
@@ -390,14 +354,11 @@ def compute_batch(
         batch.done += not result.message
         if result.message:
             batch.failures.append((index, result.message))
-        if sum(one.size for one in waiting) > PART_BYTES or not _same_layout(waiting, result):
+        digest = "" if result.layout is None else result.layout.digest
+        if size > PART_BYTES or (layout and digest and digest != layout):
             write_part(place, waiting)
-            waiting = []
+            waiting, size, layout = [], 0, ""
         waiting.append(result)
+        size, layout = size + sum(column.nbytes for column in result.columns.values()), layout or digest
     write_part(place, waiting)
     return batch
-
-
-def _same_layout(waiting: Sequence[RunResult], result: RunResult) -> bool:
-    known = next((one.frames.layout.digest for one in waiting if one.frames is not None), None)
-    return known is None or result.frames is None or result.frames.layout.digest == known

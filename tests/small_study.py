@@ -13,7 +13,7 @@ from study_scenes import tiny_scene
 from palpate.core.io.scenario_npz import save_scenario
 from palpate.core.model.scenario import Scenario
 from palpate.sweep.parts import Parts
-from palpate.sweep.scene_evaluation import ALLOW
+from palpate.sweep.scripts import ALLOW
 from palpate.sweep.study_folder import OpenStudy, open_study
 
 STUDY = """format = "palpate-sweep/1"

@@ -21,7 +21,7 @@ from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.solver.simulation import run
 from palpate.core.study.study_file import Run, read_study
 from palpate.sweep.dataset import publish
-from palpate.sweep.features import RunFrames, frames_of
+from palpate.sweep.features import Layout, frames_of
 from palpate.sweep.parts import RunResult, write_part
 
 FPS, SECONDS = 50.0, 0.3
@@ -67,12 +67,12 @@ def solved_press(index: int) -> tuple[RunResult, Recording]:
     scenario, values = press(index)
     recording = run(scenario)
     force = np.linalg.norm(recording.sensors["pad"].net_force, axis=1)
-    frames = frames_by(scenario, recording)
-    done = RunResult(run_of(index, values), metrics={"largest_force": float(force.max())}, seconds=0.01, frames=frames)
-    return done, recording
+    layout, columns = frames_by(scenario, recording)
+    metrics = {"largest_force": float(force.max())}
+    return RunResult(run_of(index, values), metrics=metrics, seconds=0.01, layout=layout, columns=columns), recording
 
 
-def frames_by(scenario: Scenario, recording: Recording, **style: bool) -> RunFrames:
+def frames_by(scenario: Scenario, recording: Recording, **style: bool) -> tuple[Layout, dict[str, np.ndarray]]:
     """The frames of a recording of a scenario."""
     sensors = {own.name: (own.texels, own.painted, own.parameters) for own in scenario.sensors}
     return frames_of(recording, sensors, **style)
@@ -91,8 +91,8 @@ def made_up(index: int, values: dict[str, Any], texels: dict[str, Texels] | None
     recording = replace(recording_of(first, 5 + index % 10), sensors=arrays)
     sensors = tuple(Sensor(name, 0, own, SensorParameters()) for name, own in texels.items())
     scenario = replace(press(0)[0], sensors=sensors)
-    frames = frames_by(scenario, recording, **style)
-    return RunResult(run_of(index, values), metrics={"load": load}, seconds=0.01, frames=frames)
+    layout, columns = frames_by(scenario, recording, **style)
+    return RunResult(run_of(index, values), metrics={"load": load}, seconds=0.01, layout=layout, columns=columns)
 
 
 def failed(index: int, sentence: str, values: dict[str, Any] | None = None) -> RunResult:

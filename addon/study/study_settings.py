@@ -16,7 +16,8 @@ import bpy
 
 from ...core.errors import ParameterError, SceneError
 from ...core.io.file_writing import atomic_write, writable_file
-from ...core.model.parameter import ChoiceParameter, Parameter, Specification
+from ...core.model.body import DRIVE_PARAMETERS
+from ...core.model.parameter import Choice, ChoiceParameter, Parameter, Specification
 from ...core.model.sensor_parameters import SENSOR_PARAMETERS
 from ...core.study import study_file
 from ...core.study.scene_property import WholeNumber
@@ -70,14 +71,6 @@ def entry_for(path: str) -> Entry:
     return Entry(path, variable.specification, found.get())
 
 
-def components(path: str) -> list[str]:
-    """Return the paths of the components of a vector; the path itself for anything else."""
-    value = scene_overrides.find_property(path).get()
-    if hasattr(value, "__len__") and not isinstance(value, str | set):
-        return [f"{path}[{i}]" for i in range(len(value))]
-    return [path]
-
-
 def _known_to_solver(found: Found) -> Entry | None:
     """Return the entry of a property whose number the solver knows, so that runs need no Blender."""
     block, kind = found.owner.id_data, found.owner.bl_rna.identifier
@@ -103,19 +96,13 @@ def _object_entry(found: Found, obj) -> Entry | None:
     if key in ("velocity", "angular_velocity") and settings.body == "FREE" and found.index is not None:
         unit = "m/s" if key == "velocity" else "rad/s"
         return Entry(f"{obj.name}.{key}.{AXES[found.index]}", Parameter(key, unit, 0.0, -math.inf, math.inf, ""), number)
-    if settings.body == "DRIVEN" and settings.drive_leader in (None, obj):
-        return _drive_entry(obj, key, number)
-    return None
-
-
-def _drive_entry(obj, key: str, number: float) -> Entry | None:
-    from ...core.model.body import DRIVE_PARAMETERS
-
+    if settings.body != "DRIVEN" or settings.drive_leader not in (None, obj):
+        return None
     if key in DRIVE_PARAMETER_PROPERTIES:
         name = DRIVE_PARAMETER_PROPERTIES[key]
         return Entry(f"{obj.name}.drive.{name}", DRIVE_PARAMETERS[name], number)
-    if key == TARGET_PROPERTIES[obj.palpate.drive_control]:
-        unit = {"POSITION": "m", "VELOCITY": "m/s", "FORCE": "N"}[obj.palpate.drive_control]
+    if key == TARGET_PROPERTIES[settings.drive_control]:
+        unit = {"POSITION": "m", "VELOCITY": "m/s", "FORCE": "N"}[settings.drive_control]
         return Entry(f"{obj.name}.drive.target", Parameter("target", unit, 0.0, -math.inf, math.inf, ""), number)
     return None
 
@@ -128,8 +115,6 @@ def _effect_entry(found: Found, obj) -> Entry | None:
     if found.key == "seed":
         return Entry(f"{start}.seed", WholeNumber("seed", "1", 0.0, 0.0, 2**31 - 1, ""), found.get())
     if found.key == effect_stack.form_key(kind):
-        from ...core.model.parameter import Choice
-
         forms = tuple(Choice(form.name, form.name, "") for form in kind.forms)
         return Entry(f"{start}.form", ChoiceParameter("form", kind.forms[0].name, forms, ""), found.get())
     for parameter, key in effect_stack.parameters(item):
@@ -147,7 +132,9 @@ def vary(scene, path: str) -> list[str]:
     ParameterError
         It cannot vary, or it varies already.
     """
-    entries = [entry_for(one) for one in components(path)]
+    value = scene_overrides.find_property(path).get()
+    is_vector = hasattr(value, "__len__") and not isinstance(value, str | set)
+    entries = [entry_for(one) for one in ([f"{path}[{i}]" for i in range(len(value))] if is_vector else [path])]
     variables = scene.palpate.study.variables
     present = {item.name for item in variables}
     fresh = [entry for entry in entries if entry.name not in present]

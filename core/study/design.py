@@ -45,17 +45,6 @@ def expanded(words: Iterable[str], known: Iterable[str]) -> list[str]:
     return found
 
 
-def words_for_meshes(vary: Mapping[str, Any]) -> list[str]:
-    """Return the files and patterns that a study's table of what varies has for targets."""
-    found: list[str] = []
-    for name, entry in vary.items():
-        if not name.endswith(f".{MESH}") or is_scene_property(name):
-            continue
-        words = entry.get(CHOICE, []) if isinstance(entry, Mapping) else [entry]
-        found += [word for word in words if isinstance(word, str)] if isinstance(words, list) else []
-    return list(dict.fromkeys(found))
-
-
 def find_meshes(vary: Mapping[str, Any], base: Path) -> dict[str, Path]:
     """Return the mesh files of a study by the names that it gives, each read once to see that it is one.
 
@@ -71,8 +60,13 @@ def find_meshes(vary: Mapping[str, Any], base: Path) -> dict[str, Path]:
     PalpateError
         A file is missing or no mesh, or no file fits a pattern.
     """
+    words: list[str] = []
+    for name, entry in vary.items():
+        if name.endswith(f".{MESH}") and not is_scene_property(name):
+            given = entry.get(CHOICE) if isinstance(entry, Mapping) else [entry]
+            words += [word for word in given if isinstance(word, str)] if isinstance(given, list) else []
     files: dict[str, Path] = {}
-    for word in words_for_meshes(vary):
+    for word in words:
         if not glob.has_magic(word):
             files[word] = base / word
             continue

@@ -95,12 +95,12 @@ def with_press(scenario: Scenario, press: Press) -> Scenario:
     for name, specification in PRESS_PARAMETERS.items():
         specification.check(getattr(press, name), "the press")
     sensor, body = _sensor_of(scenario, press), _body_of(scenario, press)
-    frame = _Frame.at(scenario, sensor, press)
+    place, axis, sideways, upright = _frame(sensor.texels, press)
     lowest = min(float(target.mesh.vertices[:, 2].min()) for target in scenario.targets if target.body == body)
     times, depth, share = _phases(press)
-    origin = frame.place + (-(depth + lowest))[:, None] * frame.axis + (share * press.slide)[:, None] * frame.sideways
+    origin = place + (-(depth + lowest))[:, None] * axis + (share * press.slide)[:, None] * sideways
     turn = share * press.twist + press.spin
-    own = quaternion_product(frame.upright[None], quaternions_from_vectors(turn[:, None] * np.array([0.0, 0.0, 1.0])))
+    own = quaternion_product(upright[None], quaternions_from_vectors(turn[:, None] * np.array([0.0, 0.0, 1.0])))
     base = scenario.bodies[sensor.body].motion
     to_world = rotation_matrices(base.quaternions[:1])[0]
     motion = Motion(
@@ -110,8 +110,7 @@ def with_press(scenario: Scenario, press: Press) -> Scenario:
     )
     pressing = replace(scenario.bodies[body], motion=motion, free=False, drive=None)
     if press.force > 0.0:
-        down = -to_world @ frame.axis
-        pressing = _driven(pressing, scenario, body, press, down)
+        pressing = _driven(pressing, scenario, body, press, -to_world @ axis)
     bodies = tuple(pressing if index == body else other for index, other in enumerate(scenario.bodies))
     last = scenario.frame_start + max(1, math.ceil(times[-1] * scenario.fps - 1e-9))
     return replace(scenario, bodies=bodies, frame_end=last, interpolation="linear")
@@ -122,29 +121,19 @@ def place_of(scenario: Scenario, press: Press) -> np.ndarray:
     return _place_on(_sensor_of(scenario, press).texels, press)[1]
 
 
-@dataclass(frozen=True)
-class _Frame:
-    """Where a press is: the place, the unit vectors out of it and along the slide, and the object's upright orientation."""
+def _frame(texels: Texels, press: Press) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return the place, the unit vectors out of it and along the slide, and the object's upright orientation."""
+    from scipy.spatial.transform import Rotation
 
-    place: np.ndarray
-    axis: np.ndarray
-    sideways: np.ndarray
-    upright: np.ndarray
-
-    @classmethod
-    def at(cls, scenario: Scenario, sensor: Sensor, press: Press) -> _Frame:
-        from scipy.spatial.transform import Rotation
-
-        texels = sensor.texels
-        texel, place = _place_on(texels, press)
-        normal, x_axis, y_axis = _axes_of(texels, texel)
-        leaning = math.cos(press.tilt_direction) * x_axis + math.sin(press.tilt_direction) * y_axis
-        # The object stands on the texel's frame and is turned about the axis that leans it.
-        lean = quaternions_from_vectors((press.tilt * np.cross(normal, leaning))[None])[0]
-        axis = math.cos(press.tilt) * normal + math.sin(press.tilt) * leaning
-        sideways = math.cos(press.slide_direction) * x_axis + math.sin(press.slide_direction) * y_axis
-        standing = np.roll(Rotation.from_matrix(np.stack([x_axis, y_axis, normal], axis=1)).as_quat(), 1)
-        return cls(place, axis, sideways, quaternion_product(lean[None], standing[None])[0])
+    texel, place = _place_on(texels, press)
+    normal, x_axis, y_axis = _axes_of(texels, texel)
+    leaning = math.cos(press.tilt_direction) * x_axis + math.sin(press.tilt_direction) * y_axis
+    # The object stands on the texel's frame and is turned about the axis that leans it.
+    lean = quaternions_from_vectors((press.tilt * np.cross(normal, leaning))[None])[0]
+    axis = math.cos(press.tilt) * normal + math.sin(press.tilt) * leaning
+    sideways = math.cos(press.slide_direction) * x_axis + math.sin(press.slide_direction) * y_axis
+    standing = np.roll(Rotation.from_matrix(np.stack([x_axis, y_axis, normal], axis=1)).as_quat(), 1)
+    return place, axis, sideways, quaternion_product(lean[None], standing[None])[0]
 
 
 def _place_on(texels: Texels, press: Press) -> tuple[int, np.ndarray]:
@@ -212,14 +201,10 @@ def _sensor_of(scenario: Scenario, press: Press) -> Sensor:
         known = ", ".join(f"'{sensor.name}'" for sensor in scenario.sensors)
         raise SceneError(f"There is no sensor '{press.sensor}' in '{scenario.name}' to press on: choose from {known}.")
     body = scenario.bodies[sensor.body]
-    if body.moved_by_forces or (len(body.motion.times) > 1 and _moves(body.motion)):
+    path = np.hstack([body.motion.positions, body.motion.quaternions])
+    if body.moved_by_forces or np.abs(path - path[0]).max() > 1e-9:
         raise SceneError(f"The body of sensor '{press.sensor}' moves: a press needs a sensor that rests, remove its motion.")
     return sensor
-
-
-def _moves(motion: Motion) -> bool:
-    path = np.hstack([motion.positions, motion.quaternions])
-    return bool(np.abs(path - path[0]).max() > 1e-9)
 
 
 def _body_of(scenario: Scenario, press: Press) -> int:

@@ -30,7 +30,7 @@ import json
 import math
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -298,7 +298,7 @@ def _flattened(table: Mapping[str, Any], start: str = "") -> Iterable[tuple[str,
 
 def plan_for(
     study: Study,
-    scenario: Scenario,
+    scenario: Scenario | None,
     properties: Mapping[str, SceneProperty] | None = None,
     meshes: Mapping[str, Path] | None = None,
 ) -> Plan:
@@ -307,7 +307,8 @@ def plan_for(
     Parameters
     ----------
     study : Study
-    scenario : Scenario
+    scenario : Scenario or None
+        None for a job, which takes any names: numbers, texts, and switches.
     properties : mapping of str to SceneProperty, optional
         What the properties of the scene are that the study names.
     meshes : mapping of str to Path, optional
@@ -318,70 +319,56 @@ def plan_for(
     ParameterError, FileError
         A name is not known in the scene, or its values are not possible.
     """
-    scenario, meshes = at_rate(scenario, study.fps), meshes or {}
-    press, entries = None, dict(study.vary)
-    if study.press is not None:
-        press = _press(study, scenario)
-        with_press(scenario, press)  # refuses what no press of this study could do
-        entries |= _press_entries(study)
-    elif any(name.startswith(f"{PRESS}.") for name in entries):
-        raise ParameterError("The study varies numbers of a press and has no [press]: add that table.")
-    known = variables_of(scenario, press is not None)
-    known |= {name: item.variable() for name, item in (properties or {}).items()}
-
-    def find(name: str, _entry: Any) -> Variable:
-        if is_scene_property(name) and name not in known:
-            raise ParameterError(
-                f"'{name}' is a property of Blender, and '{scenario.name}' is no .blend: give the .blend itself."
-            )
-        found = variable(name, known, scenario)
-        _check_acts(found, scenario, press)
-        return found
-
-    plan = _with_values(Plan(scenario, {}, {}, press, meshes), study, entries, find)
-    for name, (other, factor) in plan.tied.items():
-        own = plan.varied.get(other)
-        ends = own.words if own is not None and own.kind != NORMAL else (plan.fixed[other],) if own is None else ()
-        for end in ends:
-            variable(name, known, scenario).read(_times(end, factor))  # refuses what some run could not have
-    return plan
-
-
-def _with_values(plan: Plan, study: Study, entries: Mapping[str, Any], find: Callable[[str, Any], Variable]) -> Plan:
-    """Return a plan with the values that entries say; `find` returns the variable of a name and its entry."""
+    entries, press, meshes = dict(study.vary), None, meshes or {}
+    if scenario is None:
+        variables, meshes = {name: _free_variable(name, entry) for name, entry in entries.items()}, {}
+    else:
+        scenario = at_rate(scenario, study.fps)
+        if study.press is not None:
+            press = _press(study, scenario)
+            with_press(scenario, press)  # refuses what no press of this study could do
+            entries |= _press_entries(study)
+        variables = _variables(entries, scenario, press, properties or {})
     varied: dict[str, Distribution] = {}
     fixed: dict[str, Value] = {}
     tied: dict[str, tuple[str, float | None]] = {}
     for name, entry in entries.items():
-        found = find(name, entry)
         if isinstance(entry, Mapping) and SAME in entry:
-            tied[name] = _tie(found, entry, entries)
+            tied[name] = _tie(variables[name], entry, entries)
         elif isinstance(entry, Mapping):
-            varied[name] = _distribution(found, _with_files(found, entry, plan.meshes))
+            varied[name] = _distribution(variables[name], _with_files(variables[name], entry, meshes))
         else:
-            fixed[name] = found.read(entry)
+            fixed[name] = variables[name].read(entry)
     if not varied and study.design.kind == GRID:
         raise ParameterError("The study varies nothing: give [vary] or [press] at least one distribution.")
-    return replace(plan, varied=varied, fixed=fixed, tied=tied)
+    for name, (other, factor) in tied.items() if scenario is not None else ():
+        own = varied.get(other)
+        ends = own.words if own is not None and own.kind != NORMAL else (fixed[other],) if own is None else ()
+        for end in ends:
+            variables[name].read(_times(end, factor))  # refuses what some run could not have
+    return Plan(scenario, varied, fixed, press, meshes, tied)
 
 
-def _check_acts(found: Variable, scenario: Scenario, press: Press | None) -> None:
-    """Refuse what a press replaces: the motion of the object that presses."""
-    if press is None or found.words[0] not in MOTION_WORDS:
-        return
-    if any(target.name == press.target and scenario.bodies[target.body].name == found.owner for target in scenario.targets):
-        raise ParameterError(f"'{found.name}' has no effect, because [press] moves '{found.owner}': leave it out of [vary].")
-
-
-def plan_for_job(study: Study) -> Plan:
-    """Return the distributions of a study for its program, which takes any names: numbers, texts, and switches.
-
-    Raises
-    ------
-    ParameterError, FileError
-        Its values are not possible.
-    """
-    return _with_values(Plan(None, {}, {}, None), study, study.vary, _free_variable)
+def _variables(
+    names: Iterable[str], scenario: Scenario, press: Press | None, properties: Mapping[str, SceneProperty]
+) -> dict[str, Variable]:
+    """Return what the names of a study mean in a scene; refuse what does not vary there."""
+    known = variables_of(scenario, press is not None) | {name: item.variable() for name, item in properties.items()}
+    found: dict[str, Variable] = {}
+    for name in names:
+        if press is None and name.startswith(f"{PRESS}."):
+            raise ParameterError("The study varies numbers of a press and has no [press]: add that table.")
+        if is_scene_property(name) and name not in known:
+            raise ParameterError(
+                f"'{name}' is a property of Blender, and '{scenario.name}' is no .blend: give the .blend itself."
+            )
+        found[name] = own = variable(name, known, scenario)
+        is_pressing = press is not None and any(
+            target.name == press.target and scenario.bodies[target.body].name == own.owner for target in scenario.targets
+        )
+        if is_pressing and own.words[0] in MOTION_WORDS:
+            raise ParameterError(f"'{name}' has no effect, because [press] moves '{own.owner}': leave it out of [vary].")
+    return found
 
 
 def _free_variable(name: str, entry: Any) -> Variable:
@@ -504,7 +491,7 @@ def _distribution(found: Variable, entry: Mapping[str, Any]) -> Distribution:
     return Distribution(kind, (found.read(first), found.read(second)), words.levels, low, high)
 
 
-class Runs(Sequence[Run]):
+class Runs:
     """All runs of a study in order, each made when it is asked for: a million of them take 8 bytes for each varied number.
 
     Parameters
@@ -531,9 +518,7 @@ class Runs(Sequence[Run]):
     def __len__(self) -> int:
         return sum(self._counts.values())
 
-    def __getitem__(self, at: Any) -> Any:
-        if isinstance(at, slice):
-            return [self[i] for i in range(*at.indices(len(self)))]
+    def __getitem__(self, at: int) -> Run:
         row = index = range(len(self))[at]
         for scene, count in self._counts.items():
             if row < count:

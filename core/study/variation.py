@@ -77,11 +77,6 @@ class Variable:
     specification: Specification | None
 
     @property
-    def unit(self) -> str:
-        """Unit of the number; "" where it is none."""
-        return self.specification.unit if isinstance(self.specification, Parameter) else ""
-
-    @property
     def bounds(self) -> tuple[float, float]:
         """Lowest and highest value."""
         found = self.specification
@@ -186,7 +181,7 @@ def owners_text(scenario: Scenario) -> str:
     for item in variables_of(scenario, has_press=True).values():
         specification = item.specification
         if isinstance(specification, Parameter):
-            unit = "" if item.unit in ("", "1") else f" {item.unit}"
+            unit = "" if specification.unit in ("", "1") else f" {specification.unit}"
             lines.append(f"{item.name}{unit}: {specification.bounds}")
         elif isinstance(specification, ChoiceParameter):
             lines.append(f"{item.name}: one of {', '.join(str(choice.value) for choice in specification.choices)}")

@@ -12,7 +12,7 @@ from palpate.commands import main
 from palpate.core.errors import PalpateError
 from palpate.core.study.study_file import study_of
 from palpate.sweep.parts import Parts
-from palpate.sweep.scene_evaluation import ALLOW, REFUSE
+from palpate.sweep.scripts import ALLOW
 from palpate.sweep.study_folder import resume_study
 from palpate.sweep.worker import RunComputer, compute_batch
 
@@ -87,7 +87,7 @@ def test_a_job_needs_permission_and_nothing_of_it_is_run_before(tmp_path, capsys
     assert not (tmp_path / "mine").exists()
     folder = begun(write(tmp_path)).folder
     with pytest.raises(PalpateError, match="--allow-scripts"):
-        RunComputer(resume_study(folder), REFUSE)
+        RunComputer(resume_study(folder))
 
 
 @pytest.mark.parametrize(
@@ -141,7 +141,7 @@ def test_what_a_job_calls_may_not_change_either(tmp_path):
     assert compute_batch([0], str(opened.folder), ALLOW).done == 1
     (tmp_path / "state").write_text("2")
     with pytest.raises(PalpateError, match="What the job 'count.py' computes with is not what the study in "):
-        RunComputer(opened, ALLOW).result(1)  # no other run can be computed, so the study stops
+        RunComputer(opened).result(1)  # no other run can be computed, so the study stops
 
 
 def test_words_of_scenes_mean_nothing_to_a_job():

@@ -24,9 +24,8 @@ from palpate.core.version import VERSION
 from palpate.sweep import driver
 from palpate.sweep.driver import dask_client
 from palpate.sweep.parts import Parts, RunResult, write_part
-from palpate.sweep.studies import locked_folder
+from palpate.sweep.studies import FIXED_SECONDS, Estimate, locked_folder, try_study
 from palpate.sweep.study_folder import open_study, resume_study
-from palpate.sweep.trial import FIXED_SECONDS, Estimate, try_study
 from palpate.sweep.worker import compute_batch
 
 pytest.importorskip("distributed")
@@ -84,7 +83,7 @@ def test_a_run_holds_what_it_promises(undisturbed, tmp_path):
 def test_failed_runs_are_left_alone_until_they_are_asked_for(undisturbed, tmp_path):
     folder = tmp_path / "study"
     opened = open_study(write(tmp_path), folder)
-    write_part(folder, [RunResult(run, "The lamp went out.") for run in opened.runs[::20]])
+    write_part(folder, [RunResult(opened.runs[index], "The lamp went out.") for index in (0, 20)])
     said = assert_succeeds("sweep", folder, "--workers", 1)
     assert "24 runs: 22 done, 2 failed, 0 left" in said and "--retry-failed computes them again" in said
     table = parquet.read_table(folder / "runs.parquet").to_pylist()

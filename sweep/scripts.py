@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A study's program: the Python file that its ``job = …`` names, which computes its runs where no solver and no scene do.
+"""What a study runs of others: Blender, which reads a .blend, and the Python file that ``job = …`` names.
 
-It has a function ``run(values, folder)``, which may write files of its own into the folder and returns metrics, and perhaps a
-function ``fingerprint()``, which returns a text that changes with what its results depend on beside the file. The study's
-folder keeps a copy as ``scenes/<name>.py``. Python is run only where the command says ``--allow-scripts``, as that of a .blend.
+A process that computes runs never loads Blender: what a scene leaves in its memory, or what ends it, concerns one run.
+
+A job, the program of a study, computes its runs where no solver and no scene do. It has a function ``run(values, folder)``,
+which may write files of its own into the folder and returns metrics, and perhaps a function ``fingerprint()``, which returns a
+text that changes with what its results depend on beside the file. The study's folder keeps a copy as ``scenes/<name>.py``.
+Python is run only where the command says ``--allow-scripts``, as that of a .blend.
 """
 
 from __future__ import annotations
@@ -11,18 +14,55 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import shutil
-from collections.abc import Callable, Mapping
+import subprocess
+import sys
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from ..core.errors import FileError, PalpateError, SceneError
 from ..core.io.file_writing import file_sha256, os_error_reason
 from ..core.study.study_file import SCENES, Study
-from .scene_evaluation import ALLOW
+
+SCRIPTS = REFUSE, IGNORE, ALLOW = ("refuse", "ignore", "allow")
+"""Treatment of the Python in a .blend; the command line's --ignore-scripts and --allow-scripts."""
+_COMMANDS = f"{__package__.rpartition('.')[0]}.commands"
+
+
+def read_blend(blend: Path, target: Path, scripts: str, more: Sequence[str] = (), limit: float | None = None) -> None:
+    """Let a Blender write the scenario of a .blend.
+
+    Parameters
+    ----------
+    blend, target : Path
+        The target ends with ``.npz``.
+    scripts : str
+        One of :data:`SCRIPTS`.
+    more : sequence of str
+        Further words for ``palpate bake``.
+    limit : float, optional
+        Seconds that this may take.
+
+    Raises
+    ------
+    SceneError
+        The scene makes no run, the limit is reached, or this Python has no Blender.
+    """
+    command = [sys.executable, "-P", "-m", _COMMANDS, "bake", str(blend), "--scenario", str(target), *more]
+    command += [f"--{scripts}-scripts"] if scripts != REFUSE else []
+    words: dict[str, Any] = {"stdin": subprocess.DEVNULL, "capture_output": True, "text": True, "errors": "replace"}
+    try:
+        finished = subprocess.run(command, **words, check=False, timeout=limit)
+    except subprocess.TimeoutExpired as error:
+        raise SceneError(f"Blender read '{blend.name}' for longer than the limit of {limit:g} s: raise run_limit.") from error
+    if finished.returncode:
+        said = [line for line in finished.stderr.strip().splitlines() if line.strip()]
+        if finished.returncode < 0 or not said:
+            said = [f"Blender ended with status {finished.returncode} while it read '{blend.name}': open the file in Blender."]
+        raise SceneError(said[-1].removeprefix("palpate bake: "))
+
 
 SUFFIX = ".py"
-
-
 RunFunction = Callable[[dict[str, Any], Path], Mapping[str, Any]]
 """Takes the values of a run by name, and a folder; returns metrics by name."""
 
