@@ -110,6 +110,13 @@ class Trial:
         """True if any channel of the responses has two different values."""
         return any((np.fmax.reduce(part, axis=0) > np.fmin.reduce(part, axis=0)).any() for part in self.responses)
 
+    def without(self, rows: np.ndarray) -> Trial:
+        """Return the recording without its responses in some samples, (T,) bool."""
+        reading, force = (
+            None if part is None else np.where(rows[:, None], np.nan, part) for part in (self.reading, self.force)
+        )
+        return replace(self, reading=reading, force=force)
+
 
 def runs(flag: np.ndarray) -> list[tuple[int, int]]:
     """Return the first sample of each run in which a flag (T,) is set, and the sample after its end."""
