@@ -56,8 +56,6 @@ BY_SIZE: dict[str, tuple[tuple[float, str], ...]] = {
 press a skin with 0.1 to 100 N while scales show grams, and nobody presses a sensor at 200 °C or at 70 K. Temperatures that are
 larger than both are counts of a converter."""
 _BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(]\s*(?P<unit>[^\])]+?)\s*[\])]\s*$")
-
-
 _RATE = re.compile(r"/\s*(ms|s|sec|min|h)$")
 """The end of a unit of something that is no reading: speeds, and loads over time."""
 
@@ -111,7 +109,7 @@ def meaning_of(column: str) -> Meaning:
             return Meaning(f"slide_{joined[2]}", unit, 3) if joined[2] in "xy" else Meaning("")
         return _of_axis(kind.get(joined[1], ""), joined[2], unit, 2)
     if last in ("x", "y", "z", "w"):
-        if has["velocity"] or (has["torque"] and "torque" in words):
+        if has["velocity"] or "torque" in words:
             return Meaning("")
         kind_of = next((kind for kind in ("rotation", "force", "torque", "position") if has[kind]), "")
         if kind_of == "" and len(words) == 1:
