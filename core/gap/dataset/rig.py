@@ -552,24 +552,22 @@ def _clock(columns: Mapping[str, np.ndarray], file: Path) -> np.ndarray:
 
 def _stimulus_kind(columns: Mapping[str, np.ndarray], file: Path, has_indenter: bool) -> str:
     """Kind of the rig's stimulus: "pose", "depth" or "force"."""
-    some_pose = [name for name in POSE if name in columns]
+    lacking = [name for name in POSE if name not in columns]
     kinds = [kind for kind in ("depth", "force") if kind in columns]
-    if {"x", "y"} <= set(some_pose) and kinds == ["force"]:
-        if not has_indenter:
-            raise FileError(f"'{file.name}' says where a force acts and the rig has no [indenter]: describe its shape.")
-        return "force"
-    if some_pose and len(some_pose) < 3:
-        lacking = ", ".join(name for name in POSE if name not in columns)
-        raise FileError(f"'{file.name}' has no column {lacking}: a pose needs x, y and z.")
-    kinds += ["pose"] if some_pose else []
+    is_at_place = kinds == ["force"] and lacking in ([], ["z"])
+    if len(lacking) < 3 and not is_at_place:
+        if lacking:
+            raise FileError(f"'{file.name}' has no column {', '.join(lacking)}: a pose needs x, y and z.")
+        kinds.append("pose")
     if not kinds:
         raise FileError(f"'{file.name}' has no stimulus: it needs the columns x y z, or depth, or force.")
     if len(kinds) > 1:
         raise FileError(
             f"'{file.name}' has more than one stimulus ({' and '.join(sorted(kinds))}): keep the one that drove the rig."
         )
-    if kinds[0] == "pose" and not has_indenter:
-        raise FileError(f"'{file.name}' gives the indenter's pose and the rig has no [indenter]: describe its shape.")
+    if (is_at_place or kinds == ["pose"]) and not has_indenter:
+        what = "says where a force acts" if is_at_place else "gives the indenter's pose"
+        raise FileError(f"'{file.name}' {what} and the rig has no [indenter]: describe its shape.")
     return kinds[0]
 
 
