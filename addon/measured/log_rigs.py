@@ -62,4 +62,4 @@ def _with_grid_of(context, obj, proposal: Proposal) -> Proposal:
         return proposal
     if any(grid.value[word] not in ("?", known[word]) for word in ("rows", "columns")):
         return proposal
-    return proposal.with_guess(replace(grid, value=known, reason=f"that of '{obj.name}' in the scene", evidence="stated"))
+    return proposal.with_guess(replace(grid, value=known, reason=f"that of '{obj.name}' in the scene", is_thin=False))

@@ -81,9 +81,7 @@ def test_a_unit_that_only_the_size_tells_is_asked(tmp_path):
     logs = [write_csv(tmp_path / "a.csv", {"time": time, "indentation": depth * 1e3, "reading": force[:, 0]})]
     found = propose([read_log(logs[0])])
     column = found.columns()["depth"]
-    assert (
-        column.value["unit"] == "mm" and column.evidence == "thin" and "no unit is stated, and it changes by 2" in column.reason
-    )
+    assert column.value["unit"] == "mm" and column.is_thin and "no unit is stated, and it changes by 2" in column.reason
     with pytest.raises(
         FileError, match='depth of .a.csv. is .*"mm" }, because no unit is stated, and it changes by 2: answer it'
     ):
@@ -289,7 +287,7 @@ def test_questions_at_the_terminal_are_answered_as_in_the_file(tmp_path):
     time, depth, force = press()
     log = write_csv(tmp_path / "a.csv", {"time": time, "way": depth * 1e3, "indentation": depth * 1e3, "reading": force[:, 0]})
     found = propose([read_log(log)])
-    assert found.columns()["depth"].evidence == "thin"
+    assert found.columns()["depth"].is_thin
     for typed, value in {
         "way mm": {"name": "way", "unit": "mm"},
         "way": {"name": "way", "unit": "mm"},
