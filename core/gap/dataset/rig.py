@@ -66,14 +66,12 @@ class Indenter:
         In metres, in the indenter's own frame. Its origin is the point whose position a pose gives.
     radius : float or None, metres
         Of a sphere; then contact is computed with the exact sphere.
-    name : str
     edges : (3,) float or None, metres
         Full sizes of a box about the origin; then contact is computed with the exact box.
     """
 
     mesh: TriangleMesh
     radius: float | None = None
-    name: str = "indenter"
     edges: tuple[float, ...] | None = None
 
 
@@ -114,7 +112,6 @@ class Rig:
         Those that the rig states, and defaults for the others.
     given : frozenset of str
         Names of the parameters that the rig states.
-    thickness : float or None, metres
     grid : (int, int, (float, float)) or None
         Rows, columns and pitch, if the sensor is given as a grid.
     indenter : Indenter or None
@@ -134,7 +131,6 @@ class Rig:
     texels: Texels
     parameters: SensorParameters
     given: frozenset[str]
-    thickness: float | None
     grid: tuple[int, int, tuple[float, float]] | None
     indenter: Indenter | None
     trials: tuple[Trial, ...]
@@ -177,7 +173,7 @@ def read_rig(path: str | Path) -> Rig:
     found = read_words(words, RigWords, f"'{path.name}'", besides=("format",))
     folder, sensor = path.resolve().parent, found.sensor
     texels, grid, cover = _texels(sensor, folder, path)
-    parameters, thickness = _parameters(sensor, path)
+    parameters = _parameters(sensor, path)
     probes = _probes(found.probe, folder, path)
     height = read_words(sensor, SensorHeight, f"[sensor] of '{path.name}'", besides=sensor).contact_height
     reader = _TrialReader(
@@ -195,7 +191,6 @@ def read_rig(path: str | Path) -> Rig:
         texels=texels,
         parameters=parameters,
         given=frozenset(set(sensor) & set(SENSOR_PARAMETERS)),
-        thickness=thickness,
         grid=grid,
         indenter=None if found.indenter is None else _indenter(found.indenter, folder, path),
         trials=tuple(trials),
@@ -333,8 +328,8 @@ def _mesh(path: Path, name: str) -> TriangleMesh:
     return checked_mesh(loaded.vertices, loaded.faces, name)[0]
 
 
-def _parameters(sensor: dict[str, Any], path: Path) -> tuple[SensorParameters, float | None]:
-    """Parameters of the sensor, and its thickness."""
+def _parameters(sensor: dict[str, Any], path: Path) -> SensorParameters:
+    """Parameters of the sensor."""
     where = f"[sensor] of '{path.name}'"
     known_words(sensor, {*SENSOR_PARAMETERS, *SHAPE_WORDS, *RIG_SENSOR_WORDS}, where)
     thickness = None
@@ -350,7 +345,7 @@ def _parameters(sensor: dict[str, Any], path: Path) -> tuple[SensorParameters, f
         values["max_penetration"] = DEPTH_PER_THICKNESS * thickness
     parameters = SensorParameters(**values)
     parameters.check(f"sensor of {path.name}")
-    return parameters, thickness
+    return parameters
 
 
 # --- the indenter
@@ -374,7 +369,7 @@ def _indenter(words: dict[str, Any], folder: Path, path: Path) -> Indenter:
         raise FileError(f"[indenter] of '{path.name}' needs either a shape or a mesh, and not both.")
     if "mesh" in words:
         mesh = _mesh(_inside(words["mesh"], folder, "The indenter's mesh", path), "the indenter")
-        return Indenter(turned_outwards(mesh, "the indenter"), None, str(words["mesh"]))
+        return Indenter(turned_outwards(mesh, "the indenter"))
     shape = words["shape"]
     if not isinstance(shape, dict) or len(shape) != 1 or next(iter(shape)) not in ("sphere", "box", "cylinder"):
         raise FileError(
@@ -389,16 +384,13 @@ def _indenter(words: dict[str, Any], folder: Path, path: Path) -> Indenter:
     if kind == "sphere":
         (radius,) = checked_lengths(size, 1, f"The sphere's radius of '{path.name}'")
         solid = trimesh.creation.icosphere(subdivisions=4, radius=radius)
-        name = f"{2e3 * radius:g} mm ball"
     elif kind == "box":
         edges = checked_lengths(size, 3, f"The box's size of '{path.name}'")
         solid = trimesh.creation.box(edges)
-        name = " × ".join(f"{1e3 * edge:g}" for edge in edges) + " mm box"
     else:
         across, height = checked_lengths(size, 2, f"The cylinder's size of '{path.name}'")
         solid = trimesh.creation.cylinder(radius=across, height=height, sections=256)
-        name = f"cylinder of {2e3 * across:g} mm"
-    return Indenter(checked_mesh(solid.vertices, solid.faces, "the indenter")[0], radius, name, edges)
+    return Indenter(checked_mesh(solid.vertices, solid.faces, "the indenter")[0], radius, edges)
 
 
 # --- trials
