@@ -318,7 +318,7 @@ def _lateness(
     """Return how late the second clock is, by the zeros of both files, and why."""
     if recording.late is not None:
         return recording.late + apart, f"the answers say that the second clock is {recording.late:.6g} s late"
-    found = _shift(driven, answered)
+    found = _shift(recording.name, driven, answered)
     if min(driven["time"][0], answered["time"][0]) > SINCE_1970:
         seen = f" (changes agree best with {found.late:.2g} s)" if found and found.is_sure else ""
         return apart, f"the two clocks show the time of day and count as one{seen}: late = … in its [[recording]] shifts one"
@@ -333,17 +333,22 @@ def _lateness(
     ), f"the second clock is {found.late:.6g} s late, by the correlation of changes ({found.quality})"
 
 
-def _shift(driven: dict[str, np.ndarray], answered: dict[str, np.ndarray]) -> ClockShift | None:
+def _shift(name: str, driven: dict[str, np.ndarray], answered: dict[str, np.ndarray]) -> ClockShift | None:
     """Compare what both loggers saw: a force where the first one has it, else the motion."""
-    cause = next(driven[name] for name in ("force_z", "force", "depth", "z") if name in driven)
-    return clock_shift((driven["time"], cause), (answered["time"], _response(answered)))
+    cause = next((driven[one] for one in ("force_z", "force", "depth", "z") if one in driven), None)
+    answer = _response(answered)
+    if cause is None or answer is None:
+        raise FileError(
+            f"The two files of '{name}' need z, depth or force in one and texel or force_z in the other: name these columns."
+        )
+    return clock_shift((driven["time"], cause), (answered["time"], answer))
 
 
-def _response(table: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return one curve of all readings, counted from their medians and turned alike; without readings the force."""
+def _response(table: Mapping[str, np.ndarray]) -> np.ndarray | None:
+    """Return one curve of all readings, counted from their medians and turned alike; without readings the force, if any."""
     names = [name for name in table if name.startswith("texel_")]
     if not names:
-        return table["force_z"]
+        return table.get("force_z")
     values = np.stack([table[name] for name in names], axis=1)
     values = values - np.nanmedian(values, axis=0)
     low, high = np.nanmin(values, axis=0), np.nanmax(values, axis=0)

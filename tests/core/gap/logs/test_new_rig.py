@@ -144,6 +144,17 @@ def test_a_shift_that_the_recordings_do_not_tell_is_asked(tmp_path):
     assert trial.time[0] == pytest.approx(0.0) and trial.time[-1] == pytest.approx(5.74)
 
 
+@pytest.mark.parametrize(
+    "words", ['texel = { name = "s{}", first = 0, count = 4 }', 'depth = { name = "depth (mm)", unit = "mm" }']
+)
+def test_a_logger_without_what_drove_or_what_answered_is_one_sentence(tmp_path, words):
+    logs = two_loggers(tmp_path)
+    column = re.search(r'name = "([^"]*)"', words)[1].replace("{}", "0")
+    answers = template(tmp_path, logs, **{words: f'temperature = {{ name = "{column}", unit = "°C" }}'})
+    with pytest.raises(FileError, match="need z, depth or force in one and texel or force_z in the other: name these columns"):
+        new_rig(tmp_path / "rig", logs, answers)
+
+
 def test_clocks_of_the_time_of_day_count_as_one_and_a_shift_between_them_is_said(tmp_path):
     logs = two_loggers(tmp_path, late=0.4, start=1.7e9)
     answers = template(tmp_path, logs)
