@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ..log_table import FEWEST_ROWS, LogTable, cleaned, require_size
+from ..log_table import FEWEST_ROWS, MOST_COLUMNS, LogTable, cleaned, require_size
 
 TIME = "time"
 """Column of the time of a message, in seconds."""
@@ -65,6 +65,8 @@ class TopicColumns:
         for name, number in _numbers(message, "", 0):
             self._places.append(self._places_of.setdefault(name, len(self._places_of)))
             self._values.append(number)
+            if len(self._places_of) > MOST_COLUMNS:
+                break
         self._starts.append(len(self._values))
         require_size(len(self._values), len(self._places_of), self._path)
 
