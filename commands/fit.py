@@ -131,9 +131,9 @@ def _readout(arguments: argparse.Namespace) -> None:
             checked = "", "", ""
             if one.check is not None and one.check_median is not None and one.coverage is not None:
                 checked = f"{one.check[i]:.3g}", f"{one.check_median[i]:.3g}", f"{one.coverage[i]:.0%}"
-            memory = " and ".join(f"{tau:g} s" for tau in one.fitted.times) or "none"
+            memory = " and ".join(f"{tau:g} s" for tau in one.times) or "none"
             name = f"{target} ({data.unit(target)})"
-            rows.append((f"{mark}{one.method.name}" if i == 0 else "", name, memory, f"{one.left_out[i]:.3g}", *checked))
+            rows.append((f"{mark}{one.name}" if i == 0 else "", name, memory, f"{one.left_out[i]:.3g}", *checked))
     print(console.text_table(rows, "<<<>>>>"))
     print("\nErrors are root mean squares.")
     print("* is recommended: the simplest within one standard error of the smallest cross-validation error.")

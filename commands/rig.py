@@ -70,13 +70,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _write(logs: list[LogFile], answers: Answers, out: str) -> None:
-    from ..core.gap.dataset.rig import read_rig
     from ..core.gap.logs.answers import PLOT_NAME
     from ..core.gap.logs.new_rig import write_rig
     from ..core.gap.logs.preview import plot_rig
 
     written = console.run_with_progress_bar("rig new", write_rig(logs, answers, out), unit="recording")
-    rig = read_rig(written.path)
+    rig = written.rig
     plot_rig(rig, written.path.parent / PLOT_NAME)
     for note in dict.fromkeys([*(note for log in logs for note in log.notes), *written.notes, *rig.warnings]):
         print(f"note: {note}")

@@ -28,7 +28,7 @@ def grid_rig(rows, columns, pitch, parameters, trials=(), given=()):
     """A rig with a grid of texels and no indenter."""
     texels = grid_texels(rows, columns, pitch, pitch)
     grid = (rows, columns, (pitch, pitch))
-    return Rig("small", texels, parameters, frozenset(given), None, grid, None, tuple(trials))
+    return Rig("small", texels, parameters, frozenset(given), grid, None, tuple(trials))
 
 
 def path(rng, seconds):
@@ -75,7 +75,7 @@ def rig(change=None, seed=0, trials=5, seconds=12.0, noise=0.004, colour=0.0, k=
     parameters = SensorParameters(k=stated, cn=0.01 * stated)
     grid = (ROWS, COLUMNS, (PITCH, PITCH))
     words = {"grid": {"rows": ROWS, "columns": COLUMNS, "pitch": [PITCH, PITCH]}}
-    return Rig("small", texels, parameters, frozenset({"k"}), 0.006, grid, indenter, tuple(recorded), words)
+    return Rig("small", texels, parameters, frozenset({"k"}), grid, indenter, tuple(recorded), words)
 
 
 def diagnosed(rig):

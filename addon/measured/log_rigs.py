@@ -28,7 +28,6 @@ def make(context, obj, paths, folder: Path, accept: bool, replies: Sequence[str]
     FileError
         A log cannot be used, or questions are open: then `answers.toml` in the folder asks them.
     """
-    from ...core.gap.dataset.rig import read_rig
     from ...core.gap.logs.answers import ANSWERS_NAME, PLOT_NAME, answers_or_template, read_answers
     from ...core.gap.logs.log_file import read_log
     from ...core.gap.logs.new_rig import write_rig
@@ -47,7 +46,7 @@ def make(context, obj, paths, folder: Path, accept: bool, replies: Sequence[str]
         answers = answers_or_template(proposal, folder, "with a text editor, and choose the logs again")
     written = run_job(write_rig(logs, answers, folder))
     plot = folder / PLOT_NAME
-    plot_rig(read_rig(written.path), plot)
+    plot_rig(written.rig, plot)
     return written, plot
 
 
@@ -63,4 +62,4 @@ def _with_grid_of(context, obj, proposal: Proposal) -> Proposal:
         return proposal
     if any(grid.value[word] not in ("?", known[word]) for word in ("rows", "columns")):
         return proposal
-    return proposal.with_guess(replace(grid, value=known, reason=f"that of '{obj.name}' in the scene", evidence="stated"))
+    return proposal.with_guess(replace(grid, value=known, reason=f"that of '{obj.name}' in the scene", is_thin=False))

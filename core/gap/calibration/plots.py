@@ -69,7 +69,7 @@ def plot_friction(path: str | Path, fit: FrictionFit) -> None:
 def plot_readout(path: str | Path, fit: ReadoutFit) -> None:
     """Plot what drove the sensor, and what its readings say of it, over a check recording, or else a fitted one."""
     one = (fit.data.check or fit.data.fit)[0]
-    found = fit.best.fitted.estimate(one.time, one.readings)
+    found = fit.best.estimate(one.time, one.readings)
     figure = new_figure(2.0 * COLUMN, 1.9 * len(fit.data.targets) + 0.4)
     for i, target in enumerate(fit.data.targets):
         bottom = 1.0 - (i + 1.0) / len(fit.data.targets)

@@ -8,27 +8,19 @@ what was left out is within one standard error of the least (Breiman et al. 1984
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
-from ...errors import ParameterError
+from ...errors import FileError, ParameterError, counted
 from ..dataset.rig import Rig
-from .readout_methods import (
-    ForwardInverse,
-    GaussianProcess,
-    Prediction,
-    Predictor,
-    ReadoutData,
-    ReadoutRecording,
-    Ridge,
-    forward_curves,
-    memory_of,
-    readout_data,
-)
+from ..dataset.trial import Trial
+from .readout_methods import Prediction, Predictor, forward_curves, forward_inverse, gaussian_process, memory_of, ridge
 
-Method = Ridge | GaussianProcess | ForwardInverse
+Method = Callable[[np.ndarray, np.ndarray, np.ndarray], Predictor]
 MEMORY_TIMES: tuple[tuple[float, ...], ...] = ((), (1.0,), (1.0, 10.0))
 """Seconds: time constants of the low passes that are tried. Rubber and lattices of TPU creep over both."""
 STEPS_PER_TIME = 3.0
@@ -38,10 +30,67 @@ LENGTHS, NOISES = (2.0, 4.0, 8.0), (1e-3, 1e-2)
 """Candidates for the ridge's penalty, and for the length and the noise of the Gaussian process."""
 PARTS = 5
 """Stretches that are left out, one after the other, if there are fewer than three recordings."""
+FEWEST_SAMPLES = 60
+"""Samples with readings and targets that a fit needs."""
 MOST_SAMPLES, MOST_TRIED = 4000, 800
 """Samples from which a method is fitted, and from which its numbers are chosen: evenly taken."""
 LEVEL = 0.95
 """Of intervals."""
+UNITS = {"x": "m", "y": "m", "depth": "m"}
+"""Units of targets that are not in newtons."""
+
+
+@dataclass(frozen=True)
+class ReadoutRecording:
+    """One recording.
+
+    Attributes
+    ----------
+    name : str
+    time : (T,) float, s
+    readings : (T, c) float
+    targets : (T, q) float
+        NaN where one is not known.
+    """
+
+    name: str
+    time: np.ndarray
+    readings: np.ndarray
+    targets: np.ndarray
+
+    @property
+    def is_complete(self) -> np.ndarray:
+        """(T,) bool: samples of which all readings and targets are known."""
+        found: np.ndarray = np.isfinite(self.readings).all(axis=1) & np.isfinite(self.targets).all(axis=1)
+        return found
+
+
+@dataclass(frozen=True)
+class ReadoutData:
+    """All recordings of a rig.
+
+    Attributes
+    ----------
+    targets : tuple of str
+        What is wanted: "force", "x", "y", "depth", "force_x", "force_y", "force_z".
+    texels : int
+        Of the rig.
+    channels : (c,) int
+        Texels whose readings are used; those that never change are not.
+    fit, check : tuple of ReadoutRecording
+    notes : tuple of str
+    """
+
+    targets: tuple[str, ...]
+    texels: int
+    channels: np.ndarray
+    fit: tuple[ReadoutRecording, ...]
+    check: tuple[ReadoutRecording, ...]
+    notes: tuple[str, ...] = ()
+
+    def unit(self, target: str) -> str:
+        """Return the unit of a target."""
+        return UNITS.get(target, "N")
 
 
 @dataclass(frozen=True)
@@ -59,36 +108,8 @@ class ContactEstimate:
     high: np.ndarray
 
 
-@dataclass(frozen=True)
-class FittedMethod:
-    """What estimates the stimulus from readings.
-
-    Attributes
-    ----------
-    predictor : callable
-        From readings and memory to values and standard deviations.
-    times : tuple of float, s
-        Of its memory.
-    factor : (q,) float
-        By which standard deviations are multiplied for the interval.
-    floor : (q,) float
-        Values below it are set to it: zero for a force that was never negative, else minus infinity.
-    """
-
-    predictor: Predictor
-    times: tuple[float, ...]
-    factor: np.ndarray
-    floor: np.ndarray
-
-    def estimate(self, time: np.ndarray, readings: np.ndarray) -> ContactEstimate:
-        """Return the stimulus at times (T,), in s, from the readings (T, c) of the channels that are used."""
-        known = np.isfinite(readings).all(axis=1)
-        found = np.full((3, len(time), len(self.floor)), np.nan)
-        if known.any():
-            value, deviation = self.predictor(readings[known], memory_of(time, readings, self.times)[known])
-            reach = self.factor * deviation
-            found[:, known] = np.maximum(np.stack([value, value - reach, value + reach]), self.floor)
-        return ContactEstimate(*found)
+Estimator = Callable[[np.ndarray, np.ndarray], ContactEstimate]
+"""From times (T,), in s, and the readings (T, c) of the channels that are used to the stimulus."""
 
 
 @dataclass(frozen=True)
@@ -97,8 +118,10 @@ class MethodResult:
 
     Attributes
     ----------
-    method : Ridge, GaussianProcess or ForwardInverse
-    fitted : FittedMethod
+    name : str
+    times : tuple of float, s
+        Of its memory.
+    estimate : Estimator
     left_out : (q,) float
         Root mean square error on what was left out while numbers were chosen.
     check : (q,) float or None
@@ -111,8 +134,9 @@ class MethodResult:
         Mean of `left_out` in units of how much each target varies, and its standard error by the parts that were left out.
     """
 
-    method: Method
-    fitted: FittedMethod = field(repr=False)
+    name: str
+    times: tuple[float, ...]
+    estimate: Estimator = field(repr=False)
     left_out: np.ndarray
     check: np.ndarray | None
     check_median: np.ndarray | None
@@ -163,7 +187,7 @@ class ReadoutFit:
             raise ParameterError(
                 f"{len(time)} times and readings of the shape {readings.shape} do not fit: give (T, {self.data.texels})."
             )
-        return self.best.fitted.estimate(time, readings[:, self.data.channels])
+        return self.best.estimate(time, readings[:, self.data.channels])
 
 
 def fit_readout(rig: Rig) -> ReadoutFit:
@@ -175,37 +199,86 @@ def fit_readout(rig: Rig) -> ReadoutFit:
         The rig has no readings, nothing that drove the sensor, or too few samples.
     """
     data = readout_data(rig)
-    floor = np.array([_floor(data, i) for i in range(len(data.targets))])
-    ways = (
-        (False, True) if {"x", "y"} & set(data.targets) else (False,)
-    )  # where something presses, the pattern tells, not the size
-    methods: list[list[Method]] = [[ForwardInverse()]] if len(data.targets) == 1 else []
-    methods += [
-        [Ridge(penalty) for penalty in PENALTIES],
-        [GaussianProcess(a, b, way) for way in ways for a in LENGTHS for b in NOISES],
+    # Where something presses, the pattern tells, not the size.
+    ways = (False, True) if {"x", "y"} & set(data.targets) else (False,)
+    processes = [
+        partial(gaussian_process, length=a, noise=b, by_direction=way) for way in ways for a in LENGTHS for b in NOISES
     ]
-    results = tuple(_result(data, own, floor) for own in methods)
+    times = _usable_times(data)
+    results = [_result(data, "forward model, inverted", [forward_inverse], [()])] if len(data.targets) == 1 else []
+    results.append(_result(data, "ridge, second degree", [partial(ridge, penalty=one) for one in PENALTIES], times))
+    results.append(_result(data, "Gaussian process", processes, times))
     least = min(results, key=lambda one: one.score)
     best = next(one for one in results if one.score <= least.score + least.score_error)
-    return ReadoutFit(data, results, _forward_check(data), _reasons(data, best.fitted), best)
+    return ReadoutFit(data, tuple(results), _forward_check(data, times), _reasons(data, best.estimate), best)
 
 
-def _size(data: ReadoutData, errors: np.ndarray) -> float:
-    """Errors of all targets in one number, each in units of how much the target varies."""
-    spread = np.nanstd(np.concatenate([part.targets for part in data.fit]), axis=0)
-    return float(np.mean(errors / np.maximum(spread, 1e-300)))
+# --- recordings and their samples
 
 
-def _floor(data: ReadoutData, target: int) -> float:
-    least = min(float(np.nanmin(part.targets[:, target])) for part in data.fit)
-    return 0.0 if data.targets[target] == "force" and least >= 0.0 else -np.inf
+def readout_data(rig: Rig) -> ReadoutData:
+    """Return the recordings of a rig for a read-out.
+
+    Raises
+    ------
+    FileError
+        There are no readings, or nothing that all fitted recordings say of what drove the sensor, or too few samples.
+    """
+    fit, check = ([trial for trial in rig.of(use) if trial.reading is not None] for use in ("fit", "check"))
+    if not fit:
+        raise FileError(
+            f"No recording of '{rig.name}' to be fitted has readings: a read-out needs them beside what drove the sensor."
+        )
+    known = [_targets(trial) for trial in fit]
+    shared = [name for name in known[0] if all(name in one for one in known)]
+    shared = [name for name in shared if any(np.nanmax(one[name]) > np.nanmin(one[name]) for one in known)]
+    if not shared:
+        raise FileError(f"The recordings of '{rig.name}' share no force, depth or place that changes: record one of them.")
+    values = np.concatenate([trial.reading for trial in fit if trial.reading is not None])
+    alive = np.fmax.reduce(values, axis=0) > np.fmin.reduce(values, axis=0)
+    if not alive.any():
+        raise FileError(f"No channel of '{rig.name}' changes in the fitted recordings: check the connection.")
+    notes = []
+    if not alive.all():
+        named = ", ".join(f"texel_{i}" for i in np.flatnonzero(~alive)[:5])
+        notes.append(f"{counted(int((~alive).sum()), 'channel')} never change and are not used: {named}.")
+    channels = np.flatnonzero(alive)
+    parts = tuple(_recording(trial, shared, channels) for trial in fit)
+    count = sum(int(part.is_complete.sum()) for part in parts)
+    if count < FEWEST_SAMPLES:
+        raise FileError(
+            f"The fitted recordings of '{rig.name}' have {counted(count, 'sample')} with all readings and "
+            f"{' and '.join(shared)}: a read-out needs {FEWEST_SAMPLES}."
+        )
+    checks = []
+    for trial in check:
+        if set(shared) <= set(_targets(trial)):
+            checks.append(_recording(trial, shared, channels))
+        else:
+            notes.append(f"'{trial.name}' is no check, because it lacks {' or '.join(shared)}.")
+    return ReadoutData(tuple(shared), len(alive), channels, parts, tuple(checks), tuple(notes))
 
 
-# --- samples
+def _targets(trial: Trial) -> dict[str, np.ndarray]:
+    """Known quantities of the stimulus of a recording, by name."""
+    found: dict[str, np.ndarray] = {}
+    if trial.level is not None:
+        found["force" if trial.stimulus == "force" else "depth"] = trial.level
+    if trial.position is not None:
+        found |= {"x": trial.position[:, 0], "y": trial.position[:, 1]}
+    if trial.force is not None:
+        found |= {f"force_{axis}": column for axis, column in zip("xyz", trial.force.T) if np.isfinite(column).any()}
+    return found
 
 
-@dataclass(frozen=True)
-class _Samples:
+def _recording(trial: Trial, targets: Sequence[str], channels: np.ndarray) -> ReadoutRecording:
+    assert trial.reading is not None
+    known = _targets(trial)
+    own = np.stack([known[name] for name in targets], axis=1)
+    return ReadoutRecording(trial.name, trial.time, trial.reading[:, channels], own)
+
+
+class _Samples(NamedTuple):
     """Complete samples of several recordings: readings, memory, targets, and the number of the part each belongs to."""
 
     readings: np.ndarray
@@ -213,8 +286,8 @@ class _Samples:
     targets: np.ndarray
     part: np.ndarray
 
-    def of(self, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return self.readings[chosen], self.memory[chosen], self.targets[chosen]
+    def of(self, chosen: np.ndarray) -> _Samples:
+        return _Samples(*(column[chosen] for column in self))
 
 
 def _samples(recordings: Sequence[ReadoutRecording], times: Sequence[float], most: int, of_targets: bool = False) -> _Samples:
@@ -223,14 +296,12 @@ def _samples(recordings: Sequence[ReadoutRecording], times: Sequence[float], mos
     stretches = PARTS if len(recordings) < 3 else 1
     for number, one in enumerate(recordings):
         memory = memory_of(one.time, one.targets if of_targets else one.readings, times)
-        (known,) = np.nonzero(np.isfinite(one.readings).all(axis=1) & np.isfinite(one.targets).all(axis=1))
+        (known,) = np.nonzero(one.is_complete)
         part = number * stretches + np.arange(len(known)) * stretches // max(len(known), 1)
         rows.append((one.readings[known], memory[known], one.targets[known], part))
-    readings, memory, targets, part = (np.concatenate(column) for column in zip(*rows, strict=True))
-    if len(part) > most:
-        kept = np.linspace(0, len(part) - 1, most).astype(int)
-        readings, memory, targets, part = readings[kept], memory[kept], targets[kept], part[kept]
-    return _Samples(readings, memory, targets, part)
+    found = _Samples(*(np.concatenate(column) for column in zip(*rows, strict=True)))
+    count = len(found.part)
+    return found.of(np.linspace(0, count - 1, most).astype(int)) if count > most else found
 
 
 def _usable_times(data: ReadoutData) -> list[tuple[float, ...]]:
@@ -241,26 +312,42 @@ def _usable_times(data: ReadoutData) -> list[tuple[float, ...]]:
 # --- choice, fit and check
 
 
-def _result(data: ReadoutData, candidates: Sequence[Method], floor: np.ndarray) -> MethodResult:
+def _result(data: ReadoutData, name: str, candidates: Sequence[Method], memories: Sequence[tuple[float, ...]]) -> MethodResult:
     """Choose among candidates of one kind, fit the best to all, and check it."""
-    best: tuple[float, Method, tuple[float, ...], np.ndarray, np.ndarray, float] | None = None
-    for times in _usable_times(data):
-        if times and isinstance(candidates[0], ForwardInverse):
-            continue
+    lowest = [min(float(np.nanmin(part.targets[:, i])) for part in data.fit) for i in range(len(data.targets))]
+    is_floor = [target == "force" and low >= 0.0 for target, low in zip(data.targets, lowest, strict=True)]
+    floor = np.where(is_floor, 0.0, -np.inf)  # of a force that was never negative
+    spread = np.maximum(np.nanstd(np.concatenate([part.targets for part in data.fit]), axis=0), 1e-300)
+    best: tuple[float, Method, tuple[float, ...], _Samples, Prediction] | None = None
+    for times in memories:
         samples = _samples(data.fit, times, MOST_TRIED)
         for method in candidates:
             error, deviation = _left_out(method, samples, floor)
-            errors = np.sqrt(np.mean(error**2, axis=0))
-            if best is None or _size(data, errors) < best[0]:
-                factor = np.quantile(np.abs(error) / np.maximum(deviation, 1e-300), LEVEL, axis=0)
-                parts = [np.sqrt(np.mean(error[samples.part == k] ** 2, axis=0)) for k in np.unique(samples.part)]
-                spread = float(np.std([_size(data, part) for part in parts], ddof=1) / np.sqrt(len(parts)))
-                best = _size(data, errors), method, times, errors, factor, spread
+            score = float(np.mean(_root_mean_square(error) / spread))
+            if best is None or score < best[0]:
+                best = score, method, times, samples, (error, deviation)
     assert best is not None
-    score, method, times, errors, factor, spread = best
-    whole = _samples(data.fit, times, MOST_SAMPLES)
-    fitted = FittedMethod(method.fitted(whole.readings, whole.memory, whole.targets), times, factor, floor)
-    return MethodResult(method, fitted, errors, *_check(data, fitted), score, spread)
+    score, method, times, samples, (error, deviation) = best
+    factor = np.quantile(np.abs(error) / np.maximum(deviation, 1e-300), LEVEL, axis=0)
+    scores = [float(np.mean(_root_mean_square(error[samples.part == k]) / spread)) for k in np.unique(samples.part)]
+    score_error = float(np.std(scores, ddof=1) / np.sqrt(len(scores)))
+    predictor = method(*_samples(data.fit, times, MOST_SAMPLES)[:3])
+
+    def estimate(time: np.ndarray, readings: np.ndarray) -> ContactEstimate:
+        known = np.isfinite(readings).all(axis=1)
+        found = np.full((3, len(time), len(floor)), np.nan)
+        if known.any():
+            value, deviation = predictor(readings[known], memory_of(time, readings, times)[known])
+            reach = factor * deviation
+            found[:, known] = np.maximum(np.stack([value, value - reach, value + reach]), floor)
+        return ContactEstimate(*found)
+
+    return MethodResult(name, times, estimate, _root_mean_square(error), *_check(data, estimate), score, score_error)
+
+
+def _root_mean_square(errors: np.ndarray) -> np.ndarray:
+    found: np.ndarray = np.sqrt(np.mean(errors**2, axis=0))
+    return found
 
 
 def _left_out(method: Method, samples: _Samples, floor: np.ndarray) -> Prediction:
@@ -268,27 +355,27 @@ def _left_out(method: Method, samples: _Samples, floor: np.ndarray) -> Predictio
     error, deviation = np.zeros_like(samples.targets), np.ones_like(samples.targets)
     for part in np.unique(samples.part):
         out = samples.part == part
-        predictor = method.fitted(*samples.of(~out))
+        predictor = method(*samples.of(~out)[:3])
         value, deviation[out] = predictor(samples.readings[out], samples.memory[out])
         error[out] = np.maximum(value, floor) - samples.targets[out]
     return error, deviation
 
 
-def _check(data: ReadoutData, fitted: FittedMethod) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
+def _check(data: ReadoutData, estimate: Estimator) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
     """Root mean square and median error on the check recordings, and the share inside of intervals."""
     errors, inside = [], []
     for one in data.check:
-        own = fitted.estimate(one.time, one.readings)
+        own = estimate(one.time, one.readings)
         known = np.isfinite(own.value).all(axis=1) & np.isfinite(one.targets).all(axis=1)
         errors.append((own.value - one.targets)[known])
         inside.append(((own.low <= one.targets) & (one.targets <= own.high))[known])
     if not errors:
         return None, None, None
     error = np.concatenate(errors)
-    return np.sqrt(np.mean(error**2, axis=0)), np.median(np.abs(error), axis=0), np.concatenate(inside).mean(axis=0)
+    return _root_mean_square(error), np.median(np.abs(error), axis=0), np.concatenate(inside).mean(axis=0)
 
 
-def _forward_check(data: ReadoutData) -> float | None:
+def _forward_check(data: ReadoutData, memories: Sequence[tuple[float, ...]]) -> float | None:
     """Error of each channel's curve over the target on the check recordings, as a share of the range of all readings.
 
     A curve is a polynomial plus a share of the creep of the target. The time constant of the creep is chosen
@@ -297,54 +384,50 @@ def _forward_check(data: ReadoutData) -> float | None:
     if len(data.targets) > 1 or not data.check:
         return None
 
-    def squares(fitted: _Samples, chosen: np.ndarray, other: _Samples, out: np.ndarray) -> float:
-        curves = forward_curves(fitted.readings[chosen], fitted.targets[chosen, 0], fitted.memory[chosen])
-        return float(np.mean((other.readings[out] - curves(other.targets[out, 0], other.memory[out])) ** 2))
+    def squares(fit: _Samples, other: _Samples) -> float:
+        curves = forward_curves(fit.readings, fit.targets[:, 0], fit.memory)
+        return float(np.mean((other.readings - curves(other.targets[:, 0], other.memory)) ** 2))
 
     def left_out(times: tuple[float, ...]) -> float:
         own = _samples(data.fit, times, MOST_SAMPLES, of_targets=True)
-        return float(np.mean([squares(own, own.part != k, own, own.part == k) for k in np.unique(own.part)]))
+        return float(np.mean([squares(own.of(own.part != k), own.of(own.part == k)) for k in np.unique(own.part)]))
 
-    times = min(_usable_times(data), key=left_out)
+    times = min(memories, key=left_out)
     fit, check = (_samples(own, times, MOST_SAMPLES * 10, of_targets=True) for own in (data.fit, data.check))
-    error = squares(fit, np.ones(len(fit.part), bool), check, np.ones(len(check.part), bool))
-    return float(np.sqrt(error) / np.ptp(check.readings))
+    return float(np.sqrt(squares(fit, check)) / np.ptp(check.readings))
 
 
-def _reasons(data: ReadoutData, best: FittedMethod) -> tuple[str, ...]:
+def _reasons(data: ReadoutData, estimate: Estimator) -> tuple[str, ...]:
     """Say where the error of the best read-out is larger than elsewhere on the check recordings."""
+    if not data.check:
+        return ()
     sentences = []
-    whole = _samples(data.fit, (), MOST_SAMPLES * 10).targets
+    fitted = _samples(data.fit, (), MOST_SAMPLES * 10).targets
+    errors = np.concatenate([estimate(one.time, one.readings).value - one.targets for one in data.check])
+    wanted = np.concatenate([one.targets for one in data.check])
+    ways = np.concatenate([np.sign(np.gradient(one.targets, axis=0)) for one in data.check])
     for i, target in enumerate(data.targets):
-        low, high = float(whole[:, i].min()), float(whole[:, i].max())
-        errors, beyond, rises = [], [], []
-        for one in data.check:
-            own = best.estimate(one.time, one.readings)
-            error = own.value[:, i] - one.targets[:, i]
-            known = np.isfinite(error)
-            errors.append(error[known])
-            beyond.append(((one.targets[:, i] < low) | (one.targets[:, i] > high))[known])
-            rises.append(np.sign(np.gradient(one.targets[:, i]))[known])
-        if not errors:
-            continue
-        error, outside, way = (np.concatenate(part) for part in (errors, beyond, rises))
+        unit, low, high = data.unit(target), float(fitted[:, i].min()), float(fitted[:, i].max())
+        known = np.isfinite(errors[:, i])
+        error, value, way = errors[known, i], wanted[known, i], ways[known, i]
+        outside = (value < low) | (value > high)
         if outside.any():
-            size = float(np.sqrt(np.mean(error[outside] ** 2)))
+            size = float(_root_mean_square(error[outside]))
             sentences.append(
                 f"{outside.mean():.1%} of the check samples have a {target} beyond what was fitted ({low:.4g} to {high:.4g} "
-                f"{data.unit(target)}): the error there is {size:.3g} {data.unit(target)}."
+                f"{unit}): the error there is {size:.3g} {unit}."
             )
         up, down = (float(np.mean(error[way == sign])) if (way == sign).any() else 0.0 for sign in (1.0, -1.0))
-        total = float(np.sqrt(np.mean(error**2)))
+        total = float(_root_mean_square(error))
         if abs(up - down) > total:
             sentences.append(
-                f"The error of {target} is {up:+.3g} while it rises and {down:+.3g} {data.unit(target)} while it falls: the "
-                "sensor answers on another way back, which its readings do not tell."
+                f"The error of {target} is {up:+.3g} while it rises and {down:+.3g} {unit} while it falls: the sensor answers "
+                "on another way back, which its readings do not tell."
             )
         shift = float(np.mean(error))
         if abs(shift) > 0.5 * total:
             sentences.append(
-                f"{target} is {shift:+.3g} {data.unit(target)} off on average, more than half of its error: the sensor, or its "
-                "place, has moved since the fitted recordings."
+                f"{target} is {shift:+.3g} {unit} off on average, more than half of its error: the sensor, or its place, has "
+                "moved since the fitted recordings."
             )
     return tuple(sentences)

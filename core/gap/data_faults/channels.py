@@ -45,11 +45,11 @@ def find_channel_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault
         return 1.0 - float((weight * squared[np.arange(n), order]).sum() / max(float(weight.sum()), 1e-300))
 
     given = left(np.arange(n))
-    best, what = min(((left(order), what) for what, order in _orders(rig, n).items()), default=(1.0, ""))
+    orders = _orders(rig, n)
+    best, what = min(((left(order), what) for what, order in orders.items()), default=(1.0, ""))
     if what and 1.0 - best > LEAST_ORDER and best < BETTER_ORDER * given:
-        order = _orders(rig, n)[what]
         said = f"{what}, the loads explain {1.0 - best:.0%} of the readings, and {1.0 - given:.0%} as they are"
-        return [DataFault("reversed-channels", names, said, dict.fromkeys(names, partial(_reordered, order=order)))]
+        return [DataFault("reversed-channels", names, said, partial(_reordered, order=orders[what]))]
     pairs = _swapped(squared, loaded & (yy > 0))
     if not pairs:
         return []
@@ -64,7 +64,7 @@ def find_channel_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault
         f"{listed} each follow the other's load (texel_{a}: correlation {squared[b, a] ** 0.5:.2f} with the load of texel_{b}, "
         f"{squared[a, a] ** 0.5:.2f} with its own)"
     )
-    return [DataFault("swapped-channels", names, said, dict.fromkeys(names, partial(_reordered, order=order)))]
+    return [DataFault("swapped-channels", names, said, partial(_reordered, order=order))]
 
 
 def _moments(recorded: Sequence[Stimulus], n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -104,4 +104,5 @@ def _swapped(squared: np.ndarray, judged: np.ndarray) -> list[tuple[int, int]]:
 
 
 def _reordered(trial: Trial, order: np.ndarray) -> Trial:
-    return trial if trial.reading is None else replace(trial, reading=trial.reading[:, order])
+    assert trial.reading is not None
+    return replace(trial, reading=trial.reading[:, order])

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from ..dataset.rig import Rig
 from ..dataset.second_logger import peak_offset
 from ..dataset.trial import Trial
 from ..forward.stimulus import Stimulus, stimulus_of
-from .data_fault import Correction, DataFault
+from .data_fault import DataFault
 
 LONGEST_SHIFT, LARGEST_SHIFT_SHARE = 3.0, 0.25
 """Longest shift that is looked for: seconds, and share of a recording."""
@@ -82,8 +81,12 @@ def find_clock_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
         exact = refined_shifts(rig, [s.trial for s in stimuli if s.trial.name in shifts], [s.late for s in shifts.values()])
         shifts = {name: replace(shifts[name], late=late) for name, late in zip(shifts, exact, strict=True)}
     name = max(shifts, key=lambda one: shifts[one].correlation - shifts[one].unshifted)
-    corrections: dict[str, Correction] = {one: partial(with_shift, late=shift.late) for one, shift in shifts.items()}
-    return [DataFault("clock-shift", tuple(shifts), _sentence(shifts[name], name), corrections)]
+    shift, way = shifts[name], "after" if shifts[name].late > 0 else "before"
+    said = (
+        f"in '{name}.csv' the response comes {abs(shift.late):.3g} s {way} the stimulus "
+        f"(correlation of their changes {shift.correlation:.2f}, unshifted {shift.unshifted:.2f})"
+    )
+    return [DataFault("clock-shift", tuple(shifts), said, lambda trial: with_shift(trial, shifts[trial.name].late))]
 
 
 def shift_of(stimulus: Stimulus) -> Shift | None:
@@ -128,7 +131,7 @@ def _explained(rig: Rig, trial: Trial, late: float) -> np.ndarray:
     part = _busiest_part(rig, moved)
     stimulus = stimulus_of(_part_of(moved, part), rig)
     reading = stimulus.trial.reading
-    channels = None if reading is None else _strongest_channels(stimulus, MOST_CHANNELS)
+    channels = None if reading is None else _strongest_channels(stimulus)
     response = _net_force_along_normal(stimulus) if reading is None else reading[:, channels]
     width = max(1, round(SMOOTHING / trial.step))
     good = np.isfinite(response).all(axis=1)
@@ -210,8 +213,6 @@ def _changes(stimulus: Stimulus) -> tuple[np.ndarray, np.ndarray, np.ndarray, fl
     if good.sum() < LEAST_SAMPLES or not load.any():
         return None
     step = max(trial.step, float(np.ptp(trial.time)) / MOST_SAMPLES)
-    if np.ptp(trial.time) / step > 2 * MOST_SAMPLES:
-        return None
     even = np.arange(trial.time[0], trial.time[-1], step)
     on_even = [
         np.stack([np.interp(even, trial.time[good], column[good]) for column in values.T], axis=1)
@@ -228,17 +229,17 @@ def _signals(stimulus: Stimulus) -> tuple[np.ndarray, np.ndarray]:
     """Loads and responses (T, c) of the channels with the largest loads; the net force counts only without readings."""
     if stimulus.trial.reading is None:
         return stimulus.load.sum(axis=1, keepdims=True), _net_force_along_normal(stimulus)
-    chosen = _strongest_channels(stimulus, MOST_CHANNELS)
+    chosen = _strongest_channels(stimulus)
     return stimulus.load[:, chosen], stimulus.trial.reading[:, chosen]
 
 
-def _strongest_channels(stimulus: Stimulus, most: int) -> np.ndarray:
+def _strongest_channels(stimulus: Stimulus) -> np.ndarray:
     """Channels with readings whose loads change most."""
     assert stimulus.trial.reading is not None
     share = np.isfinite(stimulus.trial.reading).mean(axis=0)
     known = share > MOST_KNOWN * share.max()
     strength = np.where(known, (np.diff(stimulus.load, axis=0) ** 2).sum(axis=0), -1.0)
-    chosen = np.argsort(-strength)[:most]
+    chosen = np.argsort(-strength)[:MOST_CHANNELS]
     found: np.ndarray = chosen[strength[chosen] > 0]
     return found
 
@@ -248,14 +249,6 @@ def _net_force_along_normal(stimulus: Stimulus) -> np.ndarray:
     assert stimulus.trial.force is not None
     normal = np.array([0.0, 0.0, -1.0]) if stimulus.normal is None else stimulus.normal.mean(axis=(0, 1))
     return np.nan_to_num(stimulus.trial.force @ normal)[:, None]
-
-
-def _sentence(shift: Shift, name: str) -> str:
-    way = "after" if shift.late > 0 else "before"
-    return (
-        f"in '{name}.csv' the response comes {abs(shift.late):.3g} s {way} the stimulus "
-        f"(correlation of their changes {shift.correlation:.2f}, unshifted {shift.unshifted:.2f})"
-    )
 
 
 def with_shift(trial: Trial, late: float) -> Trial:
@@ -268,9 +261,6 @@ def with_shift(trial: Trial, late: float) -> Trial:
     margin = 1e-6 * trial.step
     outside = (source < trial.time[0] - margin) | (source > trial.time[-1] + margin)
 
-    def known(values: np.ndarray | None) -> np.ndarray | None:
-        return None if values is None else np.where(outside[:, None], np.nan, values)
-
     def at_source(values: np.ndarray) -> np.ndarray:
         return np.stack([np.interp(source, trial.time, column) for column in values.T], axis=1)
 
@@ -278,9 +268,7 @@ def with_shift(trial: Trial, late: float) -> Trial:
     if quaternion is not None:
         quaternion = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
     return replace(
-        trial,
-        reading=known(trial.reading),
-        force=known(trial.force),
+        trial.without(outside),
         position=None if trial.position is None else at_source(trial.position),
         quaternion=quaternion,
         level=None if trial.level is None else at_source(trial.level[:, None])[:, 0],

@@ -8,8 +8,6 @@ from dataclasses import dataclass, field
 
 from ..dataset.trial import FAULT_KINDS, Trial
 
-Correction = Callable[[Trial], Trial]
-
 
 @dataclass(frozen=True)
 class DataFault:
@@ -23,8 +21,8 @@ class DataFault:
         Names of the recordings that have it.
     evidence : str
         What shows it, in one sentence without a full stop.
-    corrections : dict of str to callable
-        For each of these recordings a function that returns it without the fault.
+    correct : callable
+        Returns one of these recordings without the fault.
     put_right : bool
         True if this was done.
     """
@@ -32,7 +30,7 @@ class DataFault:
     kind: str
     trials: tuple[str, ...]
     evidence: str
-    corrections: dict[str, Correction] = field(default_factory=dict, compare=False)
+    correct: Callable[[Trial], Trial] = field(compare=False, repr=False)
     put_right: bool = False
 
     @property

@@ -17,7 +17,7 @@ import numpy as np
 from ..dataset.rig import Rig
 from ..dataset.trial import Trial, runs
 from ..forward.stimulus import Stimulus
-from .data_fault import Correction, DataFault
+from .data_fault import DataFault
 
 MOVING = 0.05
 """Share of the fastest change of the load (95 % quantile) above which a load counts as moving."""
@@ -56,14 +56,11 @@ def find_sample_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]
         name, frozen = max(stuck.items(), key=lambda item: int(item[1].sum()))
         seconds = float(frozen.sum()) * next(s.trial.step for s in stimuli if s.trial.name == name)
         said = f"in '{name}.csv' no response changes for {seconds:.3g} s, to the last digit"
-        faults.append(
-            DataFault("stuck-logger", tuple(stuck), said, {one: partial(_without, rows=rows) for one, rows in stuck.items()})
-        )
+        faults.append(DataFault("stuck-logger", tuple(stuck), said, lambda trial: trial.without(stuck[trial.name])))
     if repeated:
         name, rows = max(repeated.items(), key=lambda item: float(item[1].mean()))
         said = f"in '{name}.csv' {rows.mean():.0%} of the samples repeat the responses of the sample before to the last digit"
-        corrections: dict[str, Correction] = {one: partial(_without, rows=rows) for one, rows in repeated.items()}
-        faults.append(DataFault("repeated-samples", tuple(repeated), said, corrections))
+        faults.append(DataFault("repeated-samples", tuple(repeated), said, lambda trial: trial.without(repeated[trial.name])))
     return [*faults, *_rails(stimuli)]
 
 
@@ -143,7 +140,7 @@ def _rails(stimuli: Sequence[Stimulus]) -> list[DataFault]:
     said = (
         f"{count} readings stay at {rail:.6g}, the {'largest' if rail == high else 'smallest'} of all, while the load changes"
     )
-    return [DataFault("saturated-converter", names, said, dict.fromkeys(names, partial(_without_value, rail=rail)))]
+    return [DataFault("saturated-converter", names, said, partial(_without_value, rail=rail))]
 
 
 def _rests_at(stimulus: Stimulus, reading: np.ndarray, value: float) -> bool:
@@ -161,15 +158,6 @@ def _railed_samples(stimulus: Stimulus, rail: float, least: float) -> int:
             if stop - start >= RAIL_RUN and np.ptp(load[start:stop, texel]) > least * full:
                 count += stop - start
     return count
-
-
-def _without(trial: Trial, rows: np.ndarray) -> Trial:
-    """The trial without its responses in some samples."""
-
-    def known(values: np.ndarray | None) -> np.ndarray | None:
-        return None if values is None else np.where(rows[:, None], np.nan, values)
-
-    return replace(trial, reading=known(trial.reading), force=known(trial.force))
 
 
 def _without_value(trial: Trial, rail: float) -> Trial:

@@ -49,7 +49,7 @@ def _signs(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
             value = clear[wrong[0]]
             said = f"the {what} of '{wrong[0]}.csv' {'go' if part == 'reading' else 'goes'} the other way"
             said += f" (correlation with the load {value:.2f}), and {against}"
-            faults.append(DataFault("sign", wrong, said, dict.fromkeys(wrong, partial(_scaled, part=part, factor=-1.0))))
+            faults.append(DataFault("sign", wrong, said, partial(_scaled, part=part, factor=-1.0)))
     return [*faults, *_friction_signs(stimuli)]
 
 
@@ -63,9 +63,7 @@ def _friction_signs(stimuli: Sequence[Stimulus]) -> list[DataFault]:
         f"the net force along the surface of '{wrong[0]}.csv' drives the slide instead of resisting it (its work is "
         f"{found[wrong[0]]:.2f} of what a force along the travel would do), but forces act on the sensor"
     )
-    return [
-        DataFault("sign", wrong, said, dict.fromkeys(wrong, partial(_scaled, part="force", factor=np.array([-1.0, -1.0, 1.0]))))
-    ]
+    return [DataFault("sign", wrong, said, partial(_scaled, part="force", factor=np.array([-1.0, -1.0, 1.0])))]
 
 
 def _work_share(trial: Trial) -> float:
@@ -115,11 +113,7 @@ def _one_of_many(recorded: Mapping[str, Responses], part: str) -> list[DataFault
         f"the {what} of '{name}.csv' for the same load {'are' if part == 'reading' else 'is'} {ratio:.3g} times those of the "
         f"other recordings, as of a unit {_times(factor)}"
     )
-    return [
-        DataFault(
-            "unit", tuple(found), said, {one: partial(_scaled, part=part, factor=1.0 / f) for one, (f, _) in found.items()}
-        )
-    ]
+    return [DataFault("unit", tuple(found), said, lambda trial: _scaled(trial, part, 1.0 / found[trial.name][0]))]
 
 
 def _against_force(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
@@ -141,7 +135,7 @@ def _against_force(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
         return []
     names = tuple(s.trial.name for s in both)
     said = f"the readings sum to {ratio:.3g} times the measured net force, as of a unit {_times(factor)}"
-    return [DataFault("unit", names, said, dict.fromkeys(names, partial(_scaled, part="reading", factor=1.0 / factor)))]
+    return [DataFault("unit", names, said, partial(_scaled, part="reading", factor=1.0 / factor))]
 
 
 def _against_stiffness(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
@@ -163,7 +157,7 @@ def _against_stiffness(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]
         f"the readings rise by {found:.3g} N per metre of depth, {found / rig.parameters.k:.3g} times the k of the rig, "
         f"as of a unit {_times(factor)}"
     )
-    return [DataFault("unit", names, said, dict.fromkeys(names, partial(_scaled, part="reading", factor=1.0 / factor)))]
+    return [DataFault("unit", names, said, partial(_scaled, part="reading", factor=1.0 / factor))]
 
 
 def unit_factor(ratio: float) -> float | None:

@@ -57,8 +57,7 @@ def put_right(rig: Rig, stimuli: Sequence[Stimulus]) -> tuple[Rig, list[DataFaul
         ]
         if not wanted:
             return rig, [*done, *found]
-        corrections = wanted[0].corrections
-        trials = tuple(corrections[one.name](one) if one.name in corrections else one for one in rig.trials)
+        trials = tuple(wanted[0].correct(one) if one.name in wanted[0].trials else one for one in rig.trials)
         rig = replace(rig, trials=trials)
         stimuli = [s if s.trial is trial else stimulus_of(trial, rig) for s, trial in zip(stimuli, trials, strict=True)]
         done.append(replace(wanted[0], put_right=True))

@@ -27,7 +27,7 @@ from ...model.sensor_parameters import (
     stated_parameters,
     with_dependent_defaults,
 )
-from .column_names import FORCE, POSE, SLIDE, TURN, Column, read_column_rules, translated
+from .column_names import FORCE, POSE, QUANTITIES, SLIDE, TURN, Column, read_column_rules, translated
 from .cover import COVER_WORDS, Cover, flat_texels, read_cover
 from .second_logger import SecondLogger, bridged, joined, with_steady_signs
 from .trial import (
@@ -50,6 +50,8 @@ SMALLEST_RESPONSE = 1e-30
 """Responses of a smaller magnitude, in any unit, count as zero."""
 RIG_SENSOR_WORDS = {"name", "contact_height", *COVER_WORDS}
 """Words of a [sensor] that belong to the measurement and not to the sensor."""
+COLUMNS = set(QUANTITIES) - {"texel"}
+"""Columns that mean something, beside those of texels."""
 LONGEST_STEP = 5.0
 """Seconds between samples above which the clock must be in milliseconds."""
 
@@ -64,14 +66,12 @@ class Indenter:
         In metres, in the indenter's own frame. Its origin is the point whose position a pose gives.
     radius : float or None, metres
         Of a sphere; then contact is computed with the exact sphere.
-    name : str
     edges : (3,) float or None, metres
         Full sizes of a box about the origin; then contact is computed with the exact box.
     """
 
     mesh: TriangleMesh
     radius: float | None = None
-    name: str = "indenter"
     edges: tuple[float, ...] | None = None
 
 
@@ -112,7 +112,6 @@ class Rig:
         Those that the rig states, and defaults for the others.
     given : frozenset of str
         Names of the parameters that the rig states.
-    thickness : float or None, metres
     grid : (int, int, (float, float)) or None
         Rows, columns and pitch, if the sensor is given as a grid.
     indenter : Indenter or None
@@ -132,7 +131,6 @@ class Rig:
     texels: Texels
     parameters: SensorParameters
     given: frozenset[str]
-    thickness: float | None
     grid: tuple[int, int, tuple[float, float]] | None
     indenter: Indenter | None
     trials: tuple[Trial, ...]
@@ -175,7 +173,7 @@ def read_rig(path: str | Path) -> Rig:
     found = read_words(words, RigWords, f"'{path.name}'", besides=("format",))
     folder, sensor = path.resolve().parent, found.sensor
     texels, grid, cover = _texels(sensor, folder, path)
-    parameters, thickness = _parameters(sensor, path)
+    parameters = _parameters(sensor, path)
     probes = _probes(found.probe, folder, path)
     height = read_words(sensor, SensorHeight, f"[sensor] of '{path.name}'", besides=sensor).contact_height
     reader = _TrialReader(
@@ -193,7 +191,6 @@ def read_rig(path: str | Path) -> Rig:
         texels=texels,
         parameters=parameters,
         given=frozenset(set(sensor) & set(SENSOR_PARAMETERS)),
-        thickness=thickness,
         grid=grid,
         indenter=None if found.indenter is None else _indenter(found.indenter, folder, path),
         trials=tuple(trials),
@@ -287,7 +284,7 @@ def _texels(sensor: dict[str, Any], folder: Path, path: Path) -> tuple[Texels, t
         texels, cover = read_cover(sensor, path)
         return texels, None, cover
     if "mesh" in sensor:
-        mesh, _ = _mesh(_inside(sensor["mesh"], folder, "The sensor's mesh", path), "the sensor's mesh")
+        mesh = _mesh(_inside(sensor["mesh"], folder, "The sensor's mesh", path), "the sensor's mesh")
         texels = texels_from_region(mesh, np.ones(len(mesh.vertices), bool), "sensor")
         if len(texels) != len(mesh.vertices):
             raise SensorError(
@@ -317,8 +314,8 @@ def grid_texels(rows: int, columns: int, pitch_x: float, pitch_y: float) -> Texe
     return replace(flat_texels(np.stack([x, y], axis=1), np.full(len(x), pitch_x * pitch_y)), layout=layout)
 
 
-def _mesh(path: Path, name: str) -> tuple[TriangleMesh, list[str]]:
-    """A triangle mesh from a file, and remarks about it."""
+def _mesh(path: Path, name: str) -> TriangleMesh:
+    """A triangle mesh from a file."""
     import trimesh
 
     require_regular(path)
@@ -328,11 +325,11 @@ def _mesh(path: Path, name: str) -> tuple[TriangleMesh, list[str]]:
         raise FileError(f"'{path.name}' is not a mesh that can be read ({error}): give a PLY, STL or OBJ file.") from error
     if not hasattr(loaded, "faces"):
         raise FileError(f"'{path.name}' holds no faces: give a PLY, STL or OBJ file with triangles.")
-    return checked_mesh(loaded.vertices, loaded.faces, name)
+    return checked_mesh(loaded.vertices, loaded.faces, name)[0]
 
 
-def _parameters(sensor: dict[str, Any], path: Path) -> tuple[SensorParameters, float | None]:
-    """Parameters of the sensor, and its thickness."""
+def _parameters(sensor: dict[str, Any], path: Path) -> SensorParameters:
+    """Parameters of the sensor."""
     where = f"[sensor] of '{path.name}'"
     known_words(sensor, {*SENSOR_PARAMETERS, *SHAPE_WORDS, *RIG_SENSOR_WORDS}, where)
     thickness = None
@@ -348,7 +345,7 @@ def _parameters(sensor: dict[str, Any], path: Path) -> tuple[SensorParameters, f
         values["max_penetration"] = DEPTH_PER_THICKNESS * thickness
     parameters = SensorParameters(**values)
     parameters.check(f"sensor of {path.name}")
-    return parameters, thickness
+    return parameters
 
 
 # --- the indenter
@@ -371,8 +368,8 @@ def _indenter(words: dict[str, Any], folder: Path, path: Path) -> Indenter:
     if ("shape" in words) == ("mesh" in words):
         raise FileError(f"[indenter] of '{path.name}' needs either a shape or a mesh, and not both.")
     if "mesh" in words:
-        mesh, _ = _mesh(_inside(words["mesh"], folder, "The indenter's mesh", path), "the indenter")
-        return Indenter(turned_outwards(mesh, "the indenter"), None, str(words["mesh"]))
+        mesh = _mesh(_inside(words["mesh"], folder, "The indenter's mesh", path), "the indenter")
+        return Indenter(turned_outwards(mesh, "the indenter"))
     shape = words["shape"]
     if not isinstance(shape, dict) or len(shape) != 1 or next(iter(shape)) not in ("sphere", "box", "cylinder"):
         raise FileError(
@@ -382,21 +379,18 @@ def _indenter(words: dict[str, Any], folder: Path, path: Path) -> Indenter:
     import trimesh
 
     ((kind, size),) = shape.items()
-    edges = None
+    radius: float | None = None
+    edges: tuple[float, ...] | None = None
     if kind == "sphere":
         (radius,) = checked_lengths(size, 1, f"The sphere's radius of '{path.name}'")
         solid = trimesh.creation.icosphere(subdivisions=4, radius=radius)
-        name = f"{2e3 * radius:g} mm ball"
     elif kind == "box":
-        size, radius = checked_lengths(size, 3, f"The box's size of '{path.name}'"), None
-        solid, edges = trimesh.creation.box(size), tuple(map(float, size))
-        name = " × ".join(f"{1e3 * edge:g}" for edge in size) + " mm box"
+        edges = checked_lengths(size, 3, f"The box's size of '{path.name}'")
+        solid = trimesh.creation.box(edges)
     else:
-        (across, height), radius = checked_lengths(size, 2, f"The cylinder's size of '{path.name}'"), None
+        across, height = checked_lengths(size, 2, f"The cylinder's size of '{path.name}'")
         solid = trimesh.creation.cylinder(radius=across, height=height, sections=256)
-        name = f"cylinder of {2e3 * across:g} mm"
-    mesh = checked_mesh(solid.vertices, solid.faces, "the indenter")[0]
-    return Indenter(mesh, radius if kind == "sphere" else None, name, edges)
+    return Indenter(checked_mesh(solid.vertices, solid.faces, "the indenter")[0], radius, edges)
 
 
 # --- trials
@@ -456,45 +450,46 @@ class _TrialReader:
         """The trial of a CSV file with these columns, and remarks about it."""
         time = _clock(columns, file)
         kind = _stimulus_kind(columns, file, has_indenter)
-        reading, force = _readings(columns, self.texels, file), _vector(columns, FORCE, partial=True)
-        has_columns = reading is not None or force is not None
-        reading, force = (_known_responses(part, np.zeros(len(time), bool)) for part in (reading, force))
+        reading, force = _readings(columns, self.texels, file), _vector(columns, FORCE)
+        if reading is None and force is None:
+            raise FileError(
+                f"'{file.name}' has no response: it needs texel_0 … texel_{self.texels - 1}, or force_x force_y force_z."
+            )
+        reading, force = _known(reading), _known(force)
         if reading is None and force is None:
             raise FileError(
                 f"Every cell of the response in '{file.name}' is empty: record the trial again, or remove its [[trial]]."
-                if has_columns
-                else f"'{file.name}' has no response: it needs texel_0 … texel_{self.texels - 1}, or force_x force_y force_z."
             )
-        travel = _vector(columns, SLIDE, partial=False)
+        travel = _vector(columns, SLIDE, missing=0.0)
         position = quaternion = level = None
         if kind == "pose":
-            position, quaternion = _vector(columns, POSE, partial=False), _turns(columns, file)
+            position, quaternion = _vector(columns, POSE), _turns(columns, file)
         else:
             level = columns[kind].copy()
             if kind == "force" and "x" in columns:  # a known weight at a known place, wherever its z is
                 place = [columns["x"], columns["y"], np.zeros(len(time))]
                 position, quaternion = np.stack(place, axis=1), _turns(columns, file)
-        stimuli = [(POSE, position), (TURN, quaternion), ((kind,), level), (SLIDE, travel)]
+        stimuli: dict[str, np.ndarray] = {}
+        for names, values in ((POSE, position), (TURN, quaternion), ((kind,), level), (SLIDE, travel)):
+            if values is not None:
+                stimuli |= zip(names, values.reshape(len(time), -1).T, strict=True)
         unknown, notes = _gaps_filled(stimuli, time, file)
-        reading, force = (_known_responses(part, unknown) for part in (reading, force))
-        if reading is None and force is None:
-            raise FileError(
-                f"No response in '{file.name}' has a stimulus at the same time: record both at the same time, or cut the file."
-            )
         if quaternion is not None:
             quaternion = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
-        strangers = [name for name in columns if not _meaning(name)]
+        strangers = [name for name in columns if name not in COLUMNS and not name.startswith("texel_")]
         if strangers:
             notes.append(f"'{file.name}': {', '.join(map(repr, strangers))} mean nothing here and were left out.")
         travel = np.zeros((len(time), 2)) if travel is None else travel
         temperature = _temperatures(columns, time, file)
         found = Trial(file.stem, use, time, kind, position, quaternion, level, travel, reading, force, temperature=temperature)
+        if unknown.any():
+            found = found.without(unknown)
+            found = replace(found, reading=_known(found.reading), force=_known(found.force))
+        if not found.responses:
+            raise FileError(
+                f"No response in '{file.name}' has a stimulus at the same time: record both at the same time, or cut the file."
+            )
         return found, notes
-
-
-def _meaning(name: str) -> bool:
-    """True if a column of this name is used."""
-    return name in ("time", "depth", "force", "temperature", *POSE, *TURN, *SLIDE, *FORCE) or name.startswith("texel_")
 
 
 def _temperatures(columns: Mapping[str, np.ndarray], time: np.ndarray, file: Path) -> tuple[np.ndarray, np.ndarray] | None:
@@ -549,24 +544,22 @@ def _clock(columns: Mapping[str, np.ndarray], file: Path) -> np.ndarray:
 
 def _stimulus_kind(columns: Mapping[str, np.ndarray], file: Path, has_indenter: bool) -> str:
     """Kind of the rig's stimulus: "pose", "depth" or "force"."""
-    some_pose = [name for name in POSE if name in columns]
+    lacking = [name for name in POSE if name not in columns]
     kinds = [kind for kind in ("depth", "force") if kind in columns]
-    if {"x", "y"} <= set(some_pose) and kinds == ["force"]:
-        if not has_indenter:
-            raise FileError(f"'{file.name}' says where a force acts and the rig has no [indenter]: describe its shape.")
-        return "force"
-    if some_pose and len(some_pose) < 3:
-        lacking = ", ".join(name for name in POSE if name not in columns)
-        raise FileError(f"'{file.name}' has no column {lacking}: a pose needs x, y and z.")
-    kinds += ["pose"] if some_pose else []
+    is_at_place = kinds == ["force"] and lacking in ([], ["z"])
+    if len(lacking) < 3 and not is_at_place:
+        if lacking:
+            raise FileError(f"'{file.name}' has no column {', '.join(lacking)}: a pose needs x, y and z.")
+        kinds.append("pose")
     if not kinds:
         raise FileError(f"'{file.name}' has no stimulus: it needs the columns x y z, or depth, or force.")
     if len(kinds) > 1:
         raise FileError(
             f"'{file.name}' has more than one stimulus ({' and '.join(sorted(kinds))}): keep the one that drove the rig."
         )
-    if kinds[0] == "pose" and not has_indenter:
-        raise FileError(f"'{file.name}' gives the indenter's pose and the rig has no [indenter]: describe its shape.")
+    if (is_at_place or kinds == ["pose"]) and not has_indenter:
+        what = "says where a force acts" if is_at_place else "gives the indenter's pose"
+        raise FileError(f"'{file.name}' {what} and the rig has no [indenter]: describe its shape.")
     return kinds[0]
 
 
@@ -589,14 +582,17 @@ def _readings(columns: Mapping[str, np.ndarray], texels: int, file: Path) -> np.
     return np.stack([columns[name] for name in wanted], axis=1)
 
 
-def _vector(columns: Mapping[str, np.ndarray], names: tuple[str, ...], partial: bool) -> np.ndarray | None:
-    """Columns of a vector, (T, c); None if they are missing."""
-    found = [name for name in names if name in columns]
-    if not found or (len(found) < len(names) and not partial and names is not SLIDE):
+def _vector(columns: Mapping[str, np.ndarray], names: tuple[str, ...], missing: float = np.nan) -> np.ndarray | None:
+    """Columns of a vector, (T, c), with one value in those that are missing; None if all are."""
+    if not any(name in columns for name in names):
         return None
-    length = len(columns[found[0]])
-    missing = np.zeros(length) if names is SLIDE else np.full(length, np.nan)
-    return np.stack([columns.get(name, missing) for name in names], axis=1)
+    otherwise = np.full(len(columns["time"]), missing)
+    return np.stack([columns.get(name, otherwise) for name in names], axis=1)
+
+
+def _known(part: np.ndarray | None) -> np.ndarray | None:
+    """Responses; None if not one of them is known."""
+    return None if part is None or np.isnan(part).all() else part
 
 
 def _turns(columns: Mapping[str, np.ndarray], file: Path) -> np.ndarray:
@@ -618,10 +614,8 @@ def _turns(columns: Mapping[str, np.ndarray], file: Path) -> np.ndarray:
     return turns
 
 
-def _gaps_filled(
-    stimuli: list[tuple[tuple[str, ...], np.ndarray | None]], time: np.ndarray, file: Path
-) -> tuple[np.ndarray, list[str]]:
-    """Interpolate missing values of the stimulus in place; its columns are given with their names.
+def _gaps_filled(stimuli: Mapping[str, np.ndarray], time: np.ndarray, file: Path) -> tuple[np.ndarray, list[str]]:
+    """Interpolate missing values of the columns of the stimulus in place.
 
     Returns
     -------
@@ -631,8 +625,7 @@ def _gaps_filled(
         Remarks.
     """
     unknown, total = np.zeros(len(time), bool), 0
-    given = [(names, values.reshape(len(time), -1).T) for names, values in stimuli if values is not None]
-    for name, column in (pair for names, columns in given for pair in zip(names, columns, strict=True)):
+    for name, column in stimuli.items():
         missing = np.isnan(column)
         if missing.all():
             raise FileError(f"Every cell of column '{name}' in '{file.name}' is empty: record the trial again.")
@@ -647,14 +640,6 @@ def _gaps_filled(
             "there."
         )
     return unknown, notes
-
-
-def _known_responses(part: np.ndarray | None, unknown: np.ndarray) -> np.ndarray | None:
-    """Responses without those whose stimulus is not known; None if none is left."""
-    if part is None:
-        return None
-    part = np.where(unknown[:, None], np.nan, part) if unknown.any() else part
-    return None if np.isnan(part).all() else part
 
 
 def _responds(trial: Trial) -> bool:

@@ -167,9 +167,14 @@ def joined(
             f"'{files[0].name}' and '{files[1].name}' have {int(inside.sum())} samples at the same time with late = {late:g} "
             "s: check late, it is the time of the second clock minus that of the first."
         )
-    first = with_steady_signs(first)
-    found = {name: interpolated(first["time"], column, time[inside]) for name, column in first.items() if name != "time"}
-    return {"time": time[inside], **found, **{name: column[inside] for name, column in second.items() if name != "time"}}
+    own = {name: column[inside] for name, column in second.items() if name != "time"}
+    return {"time": time[inside], **at_times(first, time[inside]), **own}
+
+
+def at_times(columns: Mapping[str, np.ndarray], wanted: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the columns of a recording but for `time`, interpolated at other times."""
+    steady = with_steady_signs(columns)
+    return {name: interpolated(columns["time"], column, wanted) for name, column in steady.items() if name != "time"}
 
 
 def with_steady_signs(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -109,6 +109,13 @@ class Trial:
     def changes(self) -> bool:
         """True if any channel of the responses has two different values."""
         return any((np.fmax.reduce(part, axis=0) > np.fmin.reduce(part, axis=0)).any() for part in self.responses)
+
+    def without(self, rows: np.ndarray) -> Trial:
+        """Return the recording without its responses in some samples, (T,) bool."""
+        reading, force = (
+            None if part is None else np.where(rows[:, None], np.nan, part) for part in (self.reading, self.force)
+        )
+        return replace(self, reading=reading, force=force)
 
 
 def runs(flag: np.ndarray) -> list[tuple[int, int]]:
@@ -234,18 +241,11 @@ def read_history(session: str, started: Any, where: str) -> TrialHistory:
     if isinstance(started, str):
         with suppress(ValueError):
             date = datetime.fromisoformat(started.strip())
-    if isinstance(date, datetime):
-        return TrialHistory(session, _seconds_of(date), True)
+    if isinstance(date, datetime):  # without a zone it counts as that of Greenwich, because only differences matter
+        return TrialHistory(session, date.replace(tzinfo=date.tzinfo or UTC).timestamp(), True)
     if not is_number(started) or abs(started) > LONGEST_TIME:
         raise FileError(f'started of {where} is {started!r:.60}: write seconds, or a date and time as "2026-05-04T09:30:00".')
     return TrialHistory(session, float(started), False)
-
-
-def _seconds_of(date: datetime) -> float:
-    """Seconds since 1970; a date without a zone counts as that of Greenwich, because only differences matter."""
-    from datetime import UTC
-
-    return (date if date.tzinfo else date.replace(tzinfo=UTC)).timestamp()
 
 
 def on_common_clocks(

@@ -103,8 +103,8 @@ def answers_of(proposal: Proposal) -> Answers:
     FileError
         A question is open, or what was replied to one is not valid.
     """
-    for question in proposal.questions:
-        raise FileError(f"{question[:-1]}: answer it before the rig is written.")
+    if questions := proposal.questions:
+        raise FileError(f"{questions[0][:-1]}: answer it before the rig is written.")
     return _answers(tomllib.loads(proposal.text), "the proposal", proposal.text)
 
 
@@ -125,11 +125,11 @@ def answers_or_template(proposal: Proposal, folder: str | os.PathLike, advice: s
     """
     path = Path(folder) / ANSWERS_NAME
     questions = proposal.questions
-    if path.exists() and questions:
-        raise FileError(f"'{path}' has answers already: give it with --answers, or remove it for a new template.")
     if not path.exists():
         with atomic_write(writable_folder(folder, create=True) / ANSWERS_NAME) as temporary:
             temporary.write_text(proposal.text, encoding="utf-8", newline="\n")
+    elif questions:
+        raise FileError(f"'{path}' has answers already: give it with --answers, or remove it for a new template.")
     if questions:
         how_many = counted(len(questions), "question")
         raise FileError(f"The logs leave {how_many} open, the first: {questions[0][:-1]}; answer in '{path}', {advice}.")

@@ -50,6 +50,11 @@ class ClockShift:
     rival: float
 
     @property
+    def clearness(self) -> float:
+        """How far the correlation is above that at any other shift."""
+        return self.correlation * (1.0 - self.rival)
+
+    @property
     def is_sure(self) -> bool:
         """True if the recordings tell the shift."""
         return self.correlation >= LEAST_CORRELATION and self.rival < MOST_RIVAL
@@ -78,7 +83,7 @@ def clock_shift(first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, 
     step = max(*steps, max(spans) / MOST_SAMPLES)
     driven, answered = _on_grid(*first, step), _on_grid(*second, step)
     offset = float(second[0][0] - first[0][0])
-    best: tuple[float, ClockShift] | None = None
+    best: ClockShift | None = None
     for seconds in SMOOTHING:
         width = max(2, round(seconds / step))
         if seconds != SMOOTHING[0] and 8 * width > min(len(driven), len(answered)):
@@ -88,13 +93,9 @@ def clock_shift(first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, 
             least, most = np.percentile(sign * driven, [1.0, 99.0])
             cause = _changes(np.maximum(sign * driven - least - height * (most - least), 0.0), width)
             found = _shift_of(cause, answer, step, offset)
-            if found is not None and (best is None or _clearness(found) > best[0] + 1e-9):
-                best = _clearness(found), found
-    return None if best is None else best[1]
-
-
-def _clearness(found: ClockShift) -> float:
-    return found.correlation * (1.0 - found.rival)
+            if found is not None and (best is None or found.clearness > best.clearness + 1e-9):
+                best = found
+    return best
 
 
 def _shift_of(cause: np.ndarray, answer: np.ndarray, step: float, offset: float) -> ClockShift | None:

@@ -87,14 +87,8 @@ def missing_code(values: np.ndarray) -> float | None:
         span = float(np.ptp(others))
         is_only_negative = code < 0.0 <= float(others.min())
         gap = min(abs(code - float(others.min())), abs(code - float(others.max())))
-        if span > 0.0 and (is_only_negative or gap > APART * span) and _jumps(known, is_code, JUMP * span) >= FEWEST:
+        jumps = (is_code[1:] != is_code[:-1]) & (np.abs(np.diff(known)) > JUMP * span)
+        does_jump = jumps.sum() >= max(FEWEST, LEAST_JUMPS * is_code.sum())
+        if span > 0.0 and (is_only_negative or gap > APART * span) and does_jump:
             return code
     return None
-
-
-def _jumps(values: np.ndarray, is_code: np.ndarray, far: float) -> int:
-    """Number of samples with the code that are next to a value far from it; zero if they are a small share of them."""
-    border = is_code[1:] != is_code[:-1]
-    jumps = border & (np.abs(np.diff(values)) > far)
-    count = int(jumps.sum())
-    return count if count >= LEAST_JUMPS * is_code.sum() else 0

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..dataset.column_names import LOG_UNITS, PRESSURES, QUANTITIES
-from .guess import Evidence
 
 KNOWN_UNITS = {unit for units in LOG_UNITS.values() for unit in units} | set(PRESSURES)
 KNOWN_UNITS |= set(
@@ -56,8 +55,6 @@ BY_SIZE: dict[str, tuple[tuple[float, str], ...]] = {
 press a skin with 0.1 to 100 N while scales show grams, and nobody presses a sensor at 200 °C or at 70 K. Temperatures that are
 larger than both are counts of a converter."""
 _BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(]\s*(?P<unit>[^\])]+?)\s*[\])]\s*$")
-
-
 _RATE = re.compile(r"/\s*(ms|s|sec|min|h)$")
 """The end of a unit of something that is no reading: speeds, and loads over time."""
 
@@ -111,7 +108,7 @@ def meaning_of(column: str) -> Meaning:
             return Meaning(f"slide_{joined[2]}", unit, 3) if joined[2] in "xy" else Meaning("")
         return _of_axis(kind.get(joined[1], ""), joined[2], unit, 2)
     if last in ("x", "y", "z", "w"):
-        if has["velocity"] or (has["torque"] and "torque" in words):
+        if has["velocity"] or "torque" in words:
             return Meaning("")
         kind_of = next((kind for kind in ("rotation", "force", "torque", "position") if has[kind]), "")
         if kind_of == "" and len(words) == 1:
@@ -197,22 +194,22 @@ def families(columns: Sequence[str], follows: Callable[[str], float]) -> list[Fa
     return sorted(found, key=lambda one: (one.follows < best - MUCH_LESS, not one.is_named, -len(one.columns)))
 
 
-def time_unit(values: np.ndarray, stated: str) -> tuple[str, str, Evidence]:
-    """Return the unit of time stamps, why, and the evidence."""
+def time_unit(values: np.ndarray, stated: str) -> tuple[str, str, bool]:
+    """Return the unit of time stamps, why, and whether it only seems so."""
     if stated in LOG_UNITS["s"]:
-        return stated, "the file says so", "stated"
+        return stated, "the file says so", False
     known = values[np.isfinite(values)]
     steps = np.diff(known)
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
     size = float(np.abs(known).max()) if len(known) else 0.0
     for unit, seconds in (("ns", 1e-9), ("us", 1e-6), ("ms", 1e-3), ("s", 1.0)):
         if 1e9 <= size * seconds < 3e9 and step * seconds < 10.0:
-            return unit, "such numbers count from 1970", "shown"
+            return unit, "such numbers count from 1970", False
     if 0.0 < step <= 0.5:
-        return "s", f"samples are {step:.3g} s apart", "shown"
+        return "s", f"samples are {step:.3g} s apart", False
     if step <= 500.0:
-        return "ms", f"samples are {step:.4g} apart", "thin"
-    return "us", f"samples are {step:.4g} apart", "thin"
+        return "ms", f"samples are {step:.4g} apart", True
+    return "us", f"samples are {step:.4g} apart", True
 
 
 def is_since_1970(values: np.ndarray, unit: str) -> bool:
@@ -221,8 +218,8 @@ def is_since_1970(values: np.ndarray, unit: str) -> bool:
     return len(known) > 0 and float(known.min()) * LOG_UNITS["s"][unit] > SINCE_1970
 
 
-def unit_of(kind: str, stated: str, size: float) -> tuple[str, str, Evidence]:
-    """Return the unit of a length (``m``), a force (``N``) or a temperature (``°C``), why, and the evidence.
+def unit_of(kind: str, stated: str, size: float) -> tuple[str, str, bool]:
+    """Return the unit of a length (``m``), a force (``N``) or a temperature (``°C``), why, and whether it only seems so.
 
     Parameters
     ----------
@@ -233,10 +230,10 @@ def unit_of(kind: str, stated: str, size: float) -> tuple[str, str, Evidence]:
         How far the values span, or what a temperature is.
     """
     if stated in LOG_UNITS[kind] or kind == "N" and stated in PRESSURES:
-        return stated, "the file says so", "stated"
+        return stated, "the file says so", False
     if stated:
-        return "?", f"it is in {stated}: write {kind} as unit, and how much of it one {stated} is as factor", "thin"
+        return "?", f"it is in {stated}: write {kind} as unit, and how much of it one {stated} is as factor", True
     unit = next(unit for most, unit in BY_SIZE[kind] if abs(size) <= most)
     what = "it is about" if kind == "°C" else "it changes by"
     advice = ": write unit, factor and zero, or remove the line" if unit == "?" else ""
-    return unit, f"no unit is stated, and {what} {size:.4g}{advice}", "thin"
+    return unit, f"no unit is stated, and {what} {size:.4g}{advice}", True

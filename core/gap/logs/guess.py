@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guesses about logs, as one list: each says what, the value, the reason, the evidence and how it is corrected.
+"""Guesses about logs, as one list: each says what, the value, the reason, whether it is to be checked, and how it is corrected.
 
 The template, the questions at the terminal and in Blender, and the answers from which a rig is written all come from this list.
 """
@@ -8,15 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 from ..dataset.column_names import numbered
 
 FORMAT = "palpate-log-answers/1"
 UNKNOWN = "?"
 """Value that nobody can know from the logs."""
-Evidence = Literal["stated", "shown", "thin"]
-"""The file states it, its numbers show it, or it only seems so: then a person has to confirm it."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +30,8 @@ class Guess:
     value : object
         As TOML writes it; what is not known in it is :data:`UNKNOWN`.
     reason : str
-    evidence : str
+    is_thin : bool
+        True if it only seems so, and a person has to confirm it; else the file states it, or its numbers show it.
     number : int
         Of the ``[[logger]]`` or ``[[recording]]``, from zero on.
     of : str
@@ -43,7 +42,7 @@ class Guess:
     word: str
     value: Any
     reason: str = ""
-    evidence: Evidence = "shown"
+    is_thin: bool = False
     number: int = 0
     of: str = ""
 
@@ -55,7 +54,7 @@ class Guess:
     @property
     def is_open(self) -> bool:
         """True if a person has to fill it in, or to confirm it."""
-        return self.is_unknown or self.evidence == "thin"
+        return self.is_unknown or self.is_thin
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -73,7 +72,7 @@ class Guess:
     @property
     def line(self) -> str:
         """The line of the template, which is corrected there: ``?`` is to be filled in, CHECK to be confirmed."""
-        mark = "CHECK: " if self.evidence == "thin" else ""
+        mark = "CHECK: " if self.is_thin else ""
         return f"{self.word} = {toml_value(self.value)}" + (f"  # {mark}{self.reason}" if self.reason else "")
 
     @property
@@ -83,11 +82,11 @@ class Guess:
             return f"{self.what} is not known: {self.reason}."
         return f"{self.what} is {toml_value(self.value)}, because {self.reason}."
 
-    def but(self, reason: str = "", evidence: Evidence | None = None, **words: Any) -> Guess:
-        """Return the guess of a column with one more reason, other evidence, and other words in its value."""
+    def but(self, reason: str = "", is_thin: bool = False, **words: Any) -> Guess:
+        """Return the guess of a column with one more reason, perhaps a thin one, and other words in its value."""
         reasons = "; ".join(one for one in (self.reason, reason) if one)
         value = {**self.value, **words} if words else self.value
-        return replace(self, value=value, reason=reasons, evidence=evidence or self.evidence)
+        return replace(self, value=value, reason=reasons, is_thin=is_thin or self.is_thin)
 
 
 @dataclass(frozen=True)
@@ -134,7 +133,7 @@ class Proposal:
 
     def confirmed(self) -> Proposal:
         """Return a proposal of which everything is taken for right but what is not known."""
-        return replace(self, guesses=tuple(replace(one, evidence="stated") for one in self.guesses))
+        return replace(self, guesses=tuple(replace(one, is_thin=False) for one in self.guesses))
 
 
 def has_unknown(value: Any) -> bool:

@@ -105,9 +105,7 @@ def with_distinct_names(logs: Sequence[LogFile], named: Sequence[str] = ()) -> l
     """
     if not {log.path.name for log in logs} & set(named):
         logs = joined_frames(logs)
-    paths = [log.path for log in logs]
-    names = [path.name for path in paths]
-    if len(set(names)) < len(names):
+    if len({log.path.name for log in logs}) < len(logs):
         logs = [replace(log, label=f"{log.path.absolute().parent.name}/{log.path.name}") for log in logs]
     names = [log.name for log in logs]
     for one in names:

@@ -16,9 +16,9 @@ from ...io.csv_table import LARGEST_NUMBER
 from ...io.file_writing import atomic_write, writable_folder
 from ...io.hidden_folder import FileList
 from ...jobs import Job, Progress
-from ..dataset.column_names import Column
-from ..dataset.rig import FORMAT, read_rig
-from ..dataset.second_logger import interpolated, with_steady_signs
+from ..dataset.column_names import FORCE, POSE, SLIDE, Column
+from ..dataset.rig import FORMAT, Rig, read_rig
+from ..dataset.second_logger import at_times
 from .answers import Answers, LoggerAnswer, RecordingAnswer
 from .clock_alignment import ClockShift, clock_shift
 from .column_behaviour import LEAST_CONTACT, contact_of, correlation, is_unordered, missing_code
@@ -45,13 +45,14 @@ class NewRig:
     ----------
     path : Path
         Of the rig.
-    files : tuple of Path
+    rig : Rig
+        What was read from it.
     notes : tuple of str
         What a user should know, a sentence each; they stand in the rig as comments, too.
     """
 
     path: Path
-    files: tuple[Path, ...]
+    rig: Rig
     notes: tuple[str, ...]
 
 
@@ -85,19 +86,18 @@ def write_rig(logs: Sequence[LogFile], answers: Answers, folder: str | os.PathLi
     by_name = {log.name: log for log in logs}
     files = FileList(folder)
     with files.new_files("rig") as new:
-        written: list[Path] = []
         notes: list[str] = []
         trials = []
         for number, recording in enumerate(recordings, start=1):
             yield Progress(recording.name, number, len(recordings) + 1)
             tables = [_columns_of(by_name, file, answers, notes) for file in recording.files]
-            trials.append(_trial(recording, tables, names[recording.name], new, written, notes))
+            trials.append(_trial(recording, tables, names[recording.name], new, notes))
         text = _rig_text(answers, trials, notes)
         with atomic_write(new / RIG_NAME) as temporary:
             temporary.write_text(text, encoding="utf-8", newline="\n")
-        read_rig(new / RIG_NAME)
-        places = files.replace(new, {"rig": [*written, new / RIG_NAME]})
-    return NewRig(folder / RIG_NAME, tuple(places), tuple(dict.fromkeys(notes)))
+        rig = read_rig(new / RIG_NAME)
+        files.replace(new, {"rig": [*sorted(new.glob("*.csv")), new / RIG_NAME]})
+    return NewRig(folder / RIG_NAME, rig, tuple(dict.fromkeys(notes)))
 
 
 def _file_names(recordings: Sequence[RecordingAnswer], folder: Path, logs: Sequence[LogFile]) -> dict[str, str]:
@@ -129,22 +129,22 @@ def _columns_of(logs: Mapping[str, LogFile], file: str, answers: Answers, notes:
     if logger is None:
         raise FileError(f"No [[logger]] of the answers has the file '{file}': add its name to files of one.")
     tables: dict[str, tuple[LogTable, dict[str, np.ndarray]]] = {}
-    constants = {quantity: one.constant for quantity, one in logger.columns.items() if one.constant is not None}
     for quantity, answer in logger.columns.items():
-        if quantity != "time" and quantity not in constants:
-            for i, name in enumerate(answer.names):
-                found = _table_of(log.tables, name)
-                if found is None:
-                    raise FileError(f"'{file}' has no column '{name}', which the answers name for {quantity}: check its name.")
-                table, own = found
-                column = f"texel_{i}" if quantity == "texel" else quantity
-                values = _in_si(quantity, answer, table.columns[own], f"'{own}' of '{file}'")
-                tables.setdefault(table.name, (table, {}))[1][column] = values
+        for i, name in enumerate(answer.names if quantity != "time" else ()):
+            found = _table_of(log.tables, name)
+            if found is None:
+                raise FileError(f"'{file}' has no column '{name}', which the answers name for {quantity}: check its name.")
+            table, own = found
+            column = f"texel_{i}" if quantity == "texel" else quantity
+            values = _in_si(quantity, answer, table.columns[own], f"'{own}' of '{file}'")
+            tables.setdefault(table.name, (table, {}))[1][column] = values
     if not tables:
         raise FileError(f"The answers use no column of '{file}': name its columns, or leave the file out.")
     parts = [_on_clock(columns, _clock_of(log, table, logger, columns), log, notes) for table, columns in tables.values()]
     made = _on_one_clock(parts, log, notes)
-    made |= {quantity: np.full(len(made["time"]), value) for quantity, value in constants.items() if value is not None}
+    for quantity, answer in logger.columns.items():
+        if answer.constant is not None:
+            made[quantity] = np.full(len(made["time"]), answer.constant)
     time = logger.columns.get("time")
     load = next((made[one] for one in ("force", "depth", "z", "force_z") if one in made), None)
     if time is not None and time.rate and load is not None and is_unordered(load):
@@ -252,8 +252,7 @@ def _on_one_clock(parts: list[dict[str, np.ndarray]], log: LogFile, notes: list[
     found = {"time": time, **{name: column[inside] for name, column in base.items() if name != "time"}}
     for part in parts:
         if part is not base:
-            steady = with_steady_signs(part)
-            found |= {name: interpolated(part["time"], column, time) for name, column in steady.items() if name != "time"}
+            found |= at_times(part, time)
             notes.append(
                 f"'{log.name}': {', '.join(sorted(set(part) - {'time'}))} (every {_step(part):.3g} s) were interpolated "
                 f"at the times of {_first_names(base)} (every {_step(base):.3g} s)."
@@ -274,12 +273,7 @@ def _first_names(part: Mapping[str, np.ndarray]) -> str:
 
 
 def _trial(
-    recording: RecordingAnswer,
-    tables: list[dict[str, np.ndarray]],
-    name: str,
-    folder: Path,
-    written: list[Path],
-    notes: list[str],
+    recording: RecordingAnswer, tables: list[dict[str, np.ndarray]], name: str, folder: Path, notes: list[str]
 ) -> list[str]:
     """Check a recording, write its files, and return the lines of its [[trial]]."""
     tables.sort(key=lambda table: any(one in table for one in ("x", "depth", "force")), reverse=True)
@@ -287,22 +281,17 @@ def _trial(
     for table in tables:
         _check_sizes(table, recording.name)
     lines = ["[[trial]]", f'file = "{name}.csv"', f'use = "{recording.use}"']
-    if len(tables) == 1:
-        start = float(tables[0]["time"][0])
-        _check_contact(tables[0], recording.name)
-        written.append(_write_csv(folder / f"{name}.csv", tables[0], start))
-    else:
-        driven, answered = tables
-        start = float(driven["time"][0])
-        is_one_clock = abs(float(answered["time"][0]) - start) < 86400.0
-        second = start if is_one_clock else float(answered["time"][0])
+    driven, answered = tables[0], tables[-1]
+    start, second = float(driven["time"][0]), float(answered["time"][0])
+    if answered is not driven:
+        second = start if abs(second - start) < 86400.0 else second
         late, why = _lateness(recording, driven, answered, start - second)
         notes.append(f"'{recording.name}': {why}.")
-        _check_contact(answered, recording.name)
-        written.append(_write_csv(folder / f"{name}.csv", driven, start))
-        written.append(_write_csv(folder / f"{name}_readings.csv", answered, second))
-        lines += [f"# {why}"]
-        lines += [f"readings = {toml_value({'file': f'{name}_readings.csv', 'late': late})}"]
+        lines += [f"# {why}", f"readings = {toml_value({'file': f'{name}_readings.csv', 'late': late})}"]
+    _check_contact(answered, recording.name)
+    _write_csv(folder / f"{name}.csv", driven, start)
+    if answered is not driven:
+        _write_csv(folder / f"{name}_readings.csv", answered, second)
     stamp = f"times count from {start:.3f} s of the log's clock; " if abs(start) > 1e-9 else ""
     return [*lines, f"# {stamp}read from {', '.join(recording.files)}", ""]
 
@@ -329,7 +318,7 @@ def _lateness(
     """Return how late the second clock is, by the zeros of both files, and why."""
     if recording.late is not None:
         return recording.late + apart, f"the answers say that the second clock is {recording.late:.6g} s late"
-    found = _shift(driven, answered)
+    found = _shift(recording.name, driven, answered)
     if min(driven["time"][0], answered["time"][0]) > SINCE_1970:
         seen = f" (changes agree best with {found.late:.2g} s)" if found and found.is_sure else ""
         return apart, f"the two clocks show the time of day and count as one{seen}: late = … in its [[recording]] shifts one"
@@ -344,17 +333,22 @@ def _lateness(
     ), f"the second clock is {found.late:.6g} s late, by the correlation of changes ({found.quality})"
 
 
-def _shift(driven: dict[str, np.ndarray], answered: dict[str, np.ndarray]) -> ClockShift | None:
+def _shift(name: str, driven: dict[str, np.ndarray], answered: dict[str, np.ndarray]) -> ClockShift | None:
     """Compare what both loggers saw: a force where the first one has it, else the motion."""
-    cause = next(driven[name] for name in ("force_z", "force", "depth", "z") if name in driven)
-    return clock_shift((driven["time"], cause), (answered["time"], _response(answered)))
+    cause = next((driven[one] for one in ("force_z", "force", "depth", "z") if one in driven), None)
+    answer = _response(answered)
+    if cause is None or answer is None:
+        raise FileError(
+            f"The two files of '{name}' need z, depth or force in one and texel or force_z in the other: name these columns."
+        )
+    return clock_shift((driven["time"], cause), (answered["time"], answer))
 
 
-def _response(table: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return one curve of all readings, counted from their medians and turned alike; without readings the force."""
+def _response(table: Mapping[str, np.ndarray]) -> np.ndarray | None:
+    """Return one curve of all readings, counted from their medians and turned alike; without readings the force, if any."""
     names = [name for name in table if name.startswith("texel_")]
     if not names:
-        return table["force_z"]
+        return table.get("force_z")
     values = np.stack([table[name] for name in names], axis=1)
     values = values - np.nanmedian(values, axis=0)
     low, high = np.nanmin(values, axis=0), np.nanmax(values, axis=0)
@@ -369,15 +363,15 @@ def _check_sizes(table: Mapping[str, np.ndarray], name: str) -> None:
         if not len(known):
             continue
         span, size = float(np.ptp(known)), float(np.abs(known).max())
-        if quantity in ("x", "y", "z", "depth", "slide_x", "slide_y") and span > LARGEST_MOTION:
+        if quantity in (*POSE, "depth", *SLIDE) and span > LARGEST_MOTION:
             raise FileError(
                 f"{quantity} of '{name}' moves by {span:.4g} m: its unit in the answers must be wrong, write mm or um."
             )
-        if quantity in ("force", *(f"force_{axis}" for axis in "xyz")) and size > LARGEST_FORCE:
+        if quantity in ("force", *FORCE) and size > LARGEST_FORCE:
             raise FileError(
                 f"{quantity} of '{name}' reaches {size:.4g} N: its unit in the answers must be wrong, write mN or g."
             )
-    motions = [np.ptp(c[np.isfinite(c)]) for n, c in table.items() if n in ("x", "y", "z", "depth") and np.isfinite(c).any()]
+    motions = [np.ptp(c[np.isfinite(c)]) for n, c in table.items() if n in (*POSE, "depth") and np.isfinite(c).any()]
     if motions and 0.0 < max(motions) < SMALLEST_MOTION:
         raise FileError(
             f"The motion of '{name}' spans {max(motions):.3g} m: its unit in the answers must be wrong, write mm or m."
@@ -389,7 +383,7 @@ def _check_sizes(table: Mapping[str, np.ndarray], name: str) -> None:
 
 def _check_contact(table: Mapping[str, np.ndarray], name: str) -> None:
     """Refuse a recording in which nothing answers, or nothing drives."""
-    for group in (("depth", "force"), ("x", "y", "z")):
+    for group in (("depth", "force"), POSE):
         own = [table[one] for one in group if one in table]
         if own and not any(np.ptp(column[np.isfinite(column)]) > 0.0 for column in own if np.isfinite(column).any()):
             raise FileError(f"What drove the sensor does not change in '{name}': leave it out, or check which column it is.")
@@ -405,7 +399,7 @@ def _check_contact(table: Mapping[str, np.ndarray], name: str) -> None:
         )
 
 
-def _write_csv(path: Path, table: Mapping[str, np.ndarray], start: float) -> Path:
+def _write_csv(path: Path, table: Mapping[str, np.ndarray], start: float) -> None:
     """Write a table; the times count from `start`."""
     columns = {name: values - start if name == "time" else values for name, values in table.items()}
     large = [name for name, values in columns.items() if np.nanmax(np.abs(values), initial=0.0) > LARGEST_NUMBER]
@@ -415,7 +409,6 @@ def _write_csv(path: Path, table: Mapping[str, np.ndarray], start: float) -> Pat
         file.write(",".join(columns) + "\n")
         for row in zip(*columns.values(), strict=True):
             file.write(",".join("" if value != value else f"{value:.{DIGITS}g}" for value in row) + "\n")
-    return path
 
 
 # --- the rig

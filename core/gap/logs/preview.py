@@ -64,13 +64,18 @@ def plot_rig(rig: Rig, path: str | Path) -> None:
     figure = Figure(figsize=(10.0, 2.4 * len(trials)), layout="constrained")
     axes = np.atleast_2d(figure.subplots(len(trials), 2, squeeze=False))
     for row, trial in zip(axes, trials, strict=True):
-        _curves(row[0], trial.time, _driven(trial.stimulus, trial.level, trial.position))
+        driven: dict[str, np.ndarray] = {}
         answered: dict[str, np.ndarray] = {}
+        if trial.level is not None:
+            driven["depth (m)" if trial.stimulus == "depth" else "force (N)"] = trial.level
+        elif trial.position is not None:
+            driven |= {f"{axis} (m)": values for axis, values in zip("xyz", trial.position.T)}
         if trial.reading is not None:
             loudest = np.argsort(-np.nan_to_num(np.nanmax(trial.reading, axis=0) - np.nanmin(trial.reading, axis=0)))
             answered |= {f"texel_{i} ({rig.parameters.unit})": trial.reading[:, i] for i in loudest[:MOST_CURVES]}
         elif trial.force is not None:
             answered |= {f"force_{axis} (N)": values for axis, values in zip("xyz", trial.force.T)}
+        _curves(row[0], trial.time, driven)
         _curves(row[1], trial.time, answered)
         row[0].set_ylabel(f"{trial.name} ({trial.use})")
     for axis in axes[-1]:
@@ -78,12 +83,6 @@ def plot_rig(rig: Rig, path: str | Path) -> None:
     FigureCanvasAgg(figure)
     with atomic_write(path) as temporary:
         figure.savefig(temporary, format="png", dpi=100, metadata={"Software": "Palpate"})
-
-
-def _driven(kind: str, level: np.ndarray | None, position: np.ndarray | None) -> dict[str, np.ndarray]:
-    if level is not None:
-        return {"depth (m)" if kind == "depth" else "force (N)": level}
-    return {} if position is None else {f"{axis} (m)": values for axis, values in zip("xyz", position.T)}
 
 
 def _curves(axis: object, time: np.ndarray, curves: Mapping[str, np.ndarray]) -> None:

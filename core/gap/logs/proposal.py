@@ -25,7 +25,7 @@ from .column_meaning import (
     time_unit,
     unit_of,
 )
-from .guess import UNKNOWN, Evidence, Guess, Proposal
+from .guess import UNKNOWN, Guess, Proposal
 from .log_table import FEWEST_ROWS, FRAMES, LogFile, LogTable, with_distinct_names
 
 BEGINNING = 0.05
@@ -165,9 +165,9 @@ class _Logger:
             found = longer if longer.weight > found.weight else found
         return replace(found, unit=self.units.get(full, found.unit) or found.unit)
 
-    def guess(self, quantity: str, value: Any, reason: str, evidence: Evidence = "shown") -> Guess:
+    def guess(self, quantity: str, value: Any, reason: str, is_thin: bool = False) -> Guess:
         """Return a guess about a quantity of this logger."""
-        return Guess("logger.columns", quantity, value, reason, evidence, self.number, self.logs[0].name)
+        return Guess("logger.columns", quantity, value, reason, is_thin, self.number, self.logs[0].name)
 
     def values(self, full: str, log: LogFile | None = None) -> np.ndarray:
         """Return the values of a column in one file, or in all of them."""
@@ -258,7 +258,7 @@ class _Logger:
         if not rising and named:
             unit = time_unit(self.values(named[0], self.logs[0]), self.meanings[named[0]].unit)[0]
             reason = "of its name, but it falls: cut the file where the clock was reset, or name another column"
-            return self.guess("time", {"name": named[0], "unit": unit}, reason, "thin")
+            return self.guess("time", {"name": named[0], "unit": unit}, reason, is_thin=True)
         driver = self.driver()
         reason = ""
         if self.logs[0].kind == FRAMES:
@@ -268,21 +268,21 @@ class _Logger:
         elif driver is not None and all(map(self._counts_rows, rising)) and self._is_unordered(driver):
             reason = "the load jumps from row to row and no column is a clock: these are points, which are sorted by the load"
         if reason:
-            return self.guess("time", {"rate": 1.0}, reason, "thin")
+            return self.guess("time", {"rate": 1.0}, reason, is_thin=True)
         if not rising:
             return self.guess("time", {"name": UNKNOWN}, "no column rises like a clock; write its name, or { rate = … } in Hz")
         best = max(rising, key=lambda name: (self.meanings[name].weight, name.rpartition("/")[2] == "time"))
-        unit, reason, evidence = time_unit(self.values(best, self.logs[0]), self.meanings[best].unit)
+        unit, reason, is_thin = time_unit(self.values(best, self.logs[0]), self.meanings[best].unit)
         short = best.rpartition("/")[2]
         is_of_each = len(self.tables) > 1 and all(short in table.columns for table in self.tables)
         is_only_named = {name.rpartition("/")[2] for name in rising} == {short} and self.meanings[best].quantity == "time"
         if is_of_each:
-            evidence = "stated"
+            is_thin = False
         elif not is_only_named:
             reason = f"{reason}; it is the column that rises like a clock"
             is_only_date = len(rising) == 1 and is_since_1970(self.values(best, self.logs[0]), unit)
-            evidence = evidence if is_only_date else "thin"
-        return self.guess("time", {"name": short if is_of_each else best, "unit": unit}, reason, evidence)
+            is_thin = is_thin or not is_only_date
+        return self.guess("time", {"name": short if is_of_each else best, "unit": unit}, reason, is_thin)
 
     def _is_unordered(self, name: str) -> bool:
         return all(is_unordered(self.values(name, log)) for log in self.logs)
@@ -312,7 +312,7 @@ class _Logger:
         for other in moving:
             if other is not best and len(other) == len(best):
                 why = f"'{next(iter(other.values()))}' could be meant as well"
-                return {quantity: one.but(why, "thin") for quantity, one in found.items()}
+                return {quantity: one.but(why, is_thin=True) for quantity, one in found.items()}
         return found
 
     def _one(self, quantity: str, names: Sequence[str]) -> Guess:
@@ -320,25 +320,23 @@ class _Logger:
         name = max(names, key=lambda one: self.meanings[one].weight)
         stated = self.meanings[name].unit
         is_length = quantity in ("x", "y", "z", "depth", "slide_x", "slide_y")
-        evidence: Evidence
         is_ros = name.startswith("/") and self.logs[0].kind != "table of text" and not stated
         if is_ros and is_length or is_ros and quantity in FORCE:
-            unit, reason, evidence = "m" if is_length else "N", "ROS says so", "stated"
+            unit, reason, is_thin = "m" if is_length else "N", "ROS says so", False
         elif is_length:
             group = [one for one in POSE if quantity in POSE for one in self.candidates.get(one, [])] or [name]
-            unit, reason, evidence = unit_of("m", stated, max(self.span(one) for one in group))
+            unit, reason, is_thin = unit_of("m", stated, max(self.span(one) for one in group))
         elif quantity.startswith("q"):
-            unit, reason, evidence = "", "of its name", "stated"
+            unit, reason, is_thin = "", "of its name", False
         elif quantity == "temperature":
-            unit, reason, evidence = unit_of("°C", stated, float(np.nanmedian(self.values(name, self.logs[0]))))
+            unit, reason, is_thin = unit_of("°C", stated, float(np.nanmedian(self.values(name, self.logs[0]))))
         else:
-            unit, reason, evidence = unit_of("N", stated, self.span(name))
-        if self.meanings[name].weight == 1 and not set(POSE) <= set(self.candidates):
-            evidence = "thin"
+            unit, reason, is_thin = unit_of("N", stated, self.span(name))
+        is_thin = is_thin or self.meanings[name].weight == 1 and not set(POSE) <= set(self.candidates)
         value = {"name": name, **({"unit": unit} if unit else {})}
-        found = self.guess(quantity, value, reason, evidence)
+        found = self.guess(quantity, value, reason, is_thin)
         others = [one for one in names if one != name]
-        return found.but(f"'{others[0]}' could be meant as well", "thin") if others else found
+        return found.but(f"'{others[0]}' could be meant as well", is_thin=True) if others else found
 
     def _texel(self) -> Guess:
         best, *others = self.families
@@ -351,7 +349,7 @@ class _Logger:
             what = f"{what}; they follow the load by {best.follows:.2f}, others that could be meant: {listed_ones}"
         is_clear = best.is_named and not any(one.is_named for one in rivals)
         value = _texel_words(best.columns) | ({"unit": unit} if unit else {})
-        return self.guess("texel", value, what, "shown" if is_clear else "thin")
+        return self.guess("texel", value, what, not is_clear)
 
     def answers_of(self, name: str) -> float:
         """Return how far a column leaves its noise from sample to sample, in units of that."""
@@ -448,14 +446,14 @@ def _motion(loggers: Sequence[_Logger], found: Sequence[Columns], owner: Mapping
     if quantity == "z" and silent:
         for axis in "xy":
             why = "of the indenter in the sensor's frame, m; a number where it does not move"
-            found[i][axis] = loggers[i].guess(axis, 0.0, why, "thin")
+            found[i][axis] = loggers[i].guess(axis, 0.0, why, is_thin=True)
         why = f"it is one axis, and {silent} never answer: something smaller than the sensor presses"
-        found[i]["z"] = _turned(own.but(why, "thin"), way > 0.0)
+        found[i]["z"] = _turned(own.but(why, is_thin=True), way > 0.0)
         return
     if quantity == "z":
-        own = own.but(f"it is one axis, taken from where it begins; {FLAT}", "thin", **({"zero": zero} if zero else {}))
+        own = own.but(f"it is one axis, taken from where it begins; {FLAT}", is_thin=True, **({"zero": zero} if zero else {}))
     elif silent:
-        own = own.but(f"{silent} never answer, and a depth is that of all texels; {FLAT}", "thin")
+        own = own.but(f"{silent} never answer, and a depth is that of all texels; {FLAT}", is_thin=True)
     found[i]["depth"] = replace(_turned(own, way < 0.0), word="depth")
 
 
@@ -472,7 +470,7 @@ def _load(logger: _Logger, own: Guess) -> Guess:
     if not rests:
         return _turned(own.but("nothing shows it without load, so no zero is subtracted"), bool(np.nanmedian(values) < 0.0))
     if abs(zero) > ZERO_SHARE * abs(way):
-        own = own.but(f"it is {zero:.4g} without load, which is subtracted", "thin", zero=zero)
+        own = own.but(f"it is {zero:.4g} without load, which is subtracted", is_thin=True, zero=zero)
     return _turned(own, way < 0.0)
 
 
@@ -518,10 +516,10 @@ def _say_what_lacks(loggers: Sequence[_Logger], found: Sequence[Columns]) -> Non
     if not owner & {"depth", "force"} and not set(POSE) <= owner:
         i = next((i for i, own in enumerate(found) if "texel" not in own), 0)
         why = f"nothing looks like what drove the sensor; depth, force or x y z ({loggers[i].described()})"
-        found[i]["depth"] = loggers[i].guess("depth", {"name": UNKNOWN, "unit": "m"}, why, "thin")
+        found[i]["depth"] = loggers[i].guess("depth", {"name": UNKNOWN, "unit": "m"}, why, is_thin=True)
     if not owner & {"texel", "force_z"}:
         why = f"nothing looks like readings; name the column of each texel ({loggers[-1].described()})"
-        found[-1]["texel"] = loggers[-1].guess("texel", {"names": [UNKNOWN]}, why, "thin")
+        found[-1]["texel"] = loggers[-1].guess("texel", {"names": [UNKNOWN]}, why, is_thin=True)
 
 
 def _sensor(loggers: Sequence[_Logger], found: Sequence[Columns]) -> list[Guess]:
@@ -529,11 +527,11 @@ def _sensor(loggers: Sequence[_Logger], found: Sequence[Columns]) -> list[Guess]
     texels = next((own["texel"] for own in found if "texel" in own), None)
     is_pose = any(set(POSE) <= set(own) for own in found)
     count = len(texels.columns) if texels else 1
-    grid, reason, evidence = _grid_of(count, loggers)
+    grid, reason = _grid_of(count, loggers)
     is_free = not is_pose and count == 1
     grid["pitch"] = [ONE_TEXEL_PITCH if is_free else UNKNOWN] * 2
     reason += "; its size has no influence here" if is_free else ", and the pitch along x and y in metres"
-    guesses = [Guess("sensor", "grid", grid, reason, evidence)]
+    guesses = [Guess("sensor", "grid", grid, reason)]
     if texels is not None:
         unit = texels.value.get("unit", "")
         why = "of the readings" if unit else "no unit is stated; any name will do"
@@ -547,16 +545,15 @@ def _sensor(loggers: Sequence[_Logger], found: Sequence[Columns]) -> list[Guess]
     return guesses
 
 
-def _grid_of(count: int, loggers: Sequence[_Logger]) -> tuple[dict[str, Any], str, Evidence]:
+def _grid_of(count: int, loggers: Sequence[_Logger]) -> tuple[dict[str, Any], str]:
     for one in loggers:
         for table in one.tables:
             for rows, across in table.grids.values():
                 if rows * across == count:
-                    why = f"the array has {rows} rows and {across} columns"
-                    return {"rows": rows, "columns": across}, why, "stated"
+                    return {"rows": rows, "columns": across}, f"the array has {rows} rows and {across} columns"
     if count == 1:
-        return {"rows": 1, "columns": 1}, "one texel", "shown"
-    return {"rows": UNKNOWN, "columns": UNKNOWN}, f"{count} texels; their rows and columns", "shown"
+        return {"rows": 1, "columns": 1}, "one texel"
+    return {"rows": UNKNOWN, "columns": UNKNOWN}, f"{count} texels; their rows and columns"
 
 
 def listed(names: Sequence[str]) -> str:

@@ -52,7 +52,7 @@ def _asked(guess: Guess, ask: Callable[[str], str]) -> Guess | None:
         if is_column and is_other and word in QUANTITIES:
             guess, typed = replace(guess, word=word, value={}), rest
         value = _typed(typed, guess) if typed else guess.value
-        guess = replace(guess, value=value, evidence="stated") if value is not None else guess
+        guess = replace(guess, value=value, is_thin=False) if value is not None else guess
     return guess
 
 

@@ -69,7 +69,7 @@ def test_what_a_log_calls_a_temperature():
     assert meaning_of("temperature_degC").quantity == meaning_of("Temp [K]").quantity == "temperature"
     assert meaning_of("Temp [K]").unit == "K"
     assert unit_of("°C", "", 295.0)[0] == "K" and unit_of("°C", "", 21.0)[0] == "°C"
-    assert unit_of("°C", "°F", 70.0) == ("°F", "the file says so", "stated")
+    assert unit_of("°C", "°F", 70.0) == ("°F", "the file says so", False)
 
 
 @pytest.mark.long("a whole diagnosis of six recordings")

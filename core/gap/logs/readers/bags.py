@@ -77,7 +77,7 @@ def _messages(
 
     schemas: dict[int, Any] = {}
     channels: dict[int, Any] = {}
-    decoders = _Decoders(path)
+    decoders: dict[int, Decoder | None] = {}
     for record in read_by(_records(file, path), path, "MCAP", *known):
         if isinstance(record, Schema):
             schemas[record.id] = record
@@ -88,8 +88,10 @@ def _messages(
             if channel is None:
                 raise FileError(f"'{path.name}' is damaged (a message of channel {record.channel_id}, unknown): copy it again.")
             schema = schemas.get(channel.schema_id)
-            decode = decoders.of(channel, schema)
-            yield channel.topic, schema.name if schema else channel.message_encoding, record.log_time, record.data, decode
+            if channel.id not in decoders:
+                decoders[channel.id] = _decoder_of(channel, schema, path)
+            kind = schema.name if schema else channel.message_encoding
+            yield channel.topic, kind, record.log_time, record.data, decoders[channel.id]
 
 
 def _records(file: Any, path: Path) -> Iterator[Any]:
@@ -107,38 +109,22 @@ def _records(file: Any, path: Path) -> Iterator[Any]:
             yield outer
 
 
-class _Decoders:
-    """Decoders of messages, by channel."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._known: dict[int, Decoder | None] = {}
-        self._store: Any = None
-
-    def of(self, channel: Any, schema: Any) -> Decoder | None:
-        """Return the decoder of a channel; None if its encoding is not known."""
-        if channel.id not in self._known:
-            self._known[channel.id] = self._new(channel, schema)
-        return self._known[channel.id]
-
-    def _new(self, channel: Any, schema: Any) -> Decoder | None:
-        if channel.message_encoding == "json":
-            return json.loads
-        if schema is None or schema.encoding not in ("ros2msg", "ros1msg") or is_picture(schema.name):
-            return None
-        typesys = imported("rosbags.typesys", f"'{self._path.name}'", INSTALL)
-        if self._store is None:
-            self._store = typesys.get_typestore(typesys.Stores.EMPTY)
-        store, name = self._store, schema.name
-        if name.count("/") == 1:  # as ROS 1 writes it
-            name = name.replace("/", "/msg/")
-        with damage_said(self._path, "MCAP"):
-            types = typesys.get_types_from_msg(schema.data.decode(), name)
-        with damage_said(self._path, "MCAP"), suppress(KeyError):
-            store.register({one: kind for one, kind in types.items() if one not in store.fielddefs})
-        if schema.encoding == "ros1msg":
-            return lambda content: store.deserialize_ros1(content, name)
-        return lambda content: store.deserialize_cdr(content, name)
+def _decoder_of(channel: Any, schema: Any, path: Path) -> Decoder | None:
+    """Return the decoder of a channel's messages; None if they are not read."""
+    if channel.message_encoding == "json":
+        return json.loads
+    if schema is None or schema.encoding not in ("ros2msg", "ros1msg") or is_picture(schema.name):
+        return None
+    typesys = imported("rosbags.typesys", f"'{path.name}'", INSTALL)
+    store, name = typesys.get_typestore(typesys.Stores.EMPTY), schema.name
+    if name.count("/") == 1:  # as ROS 1 writes it
+        name = name.replace("/", "/msg/")
+    with damage_said(path, "MCAP"):
+        types = typesys.get_types_from_msg(schema.data.decode(), name)
+        with suppress(KeyError):
+            store.register(types)
+    decode = store.deserialize_ros1 if schema.encoding == "ros1msg" else store.deserialize_cdr
+    return lambda content: decode(content, name)
 
 
 def read_bag(path: Path) -> LogFile:

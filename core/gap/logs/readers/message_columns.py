@@ -51,8 +51,7 @@ class TopicColumns:
 
     def __init__(self, topic: str, path: Path):
         self._topic, self._path = topic, path
-        self._names: list[str] = []
-        self._index: dict[str, int] = {}
+        self._places_of: dict[str, int] = {}
         self._values = array("d")
         self._starts = array("Q", [0])
         self._places = array("Q")
@@ -64,29 +63,25 @@ class TopicColumns:
         stamp = _stamp(message)
         self._stamps.append(np.nan if stamp is None else stamp)
         for name, number in _numbers(message, "", 0):
-            place = self._index.get(name)
-            if place is None:
-                place = self._index[name] = len(self._names)
-                self._names.append(name)
-                if len(self._names) > MOST_COLUMNS:
-                    require_size(0, len(self._names), self._path)
-            self._places.append(place)
+            self._places.append(self._places_of.setdefault(name, len(self._places_of)))
             self._values.append(number)
+            if len(self._places_of) > MOST_COLUMNS:
+                break
         self._starts.append(len(self._values))
-        if len(self._values) % 65536 < 64:
-            require_size(len(self._values), len(self._names), self._path)
+        require_size(len(self._values), len(self._places_of), self._path)
 
     def table(self) -> tuple[LogTable | None, str]:
         """Return the table, None if there are too few messages, and what is said about its times."""
         count = len(self._recorded)
-        if count < FEWEST_ROWS or not self._names:
+        names = list(self._places_of)
+        if count < FEWEST_ROWS or not names:
             return None, ""
-        require_size(count * len(self._names), len(self._names), self._path)
-        values = np.full((count, len(self._names)), np.nan)
+        require_size(count * len(names), len(names), self._path)
+        values = np.full((count, len(names)), np.nan)
         rows = np.repeat(np.arange(count), np.diff(np.frombuffer(self._starts, np.uint64)).astype(np.int64))
         values[rows, np.frombuffer(self._places, np.uint64)] = np.frombuffer(self._values, float)
         time, said = self._times()
-        columns = {TIME: time, **{name: column for name, column in zip(self._names, cleaned(values).T) if name != TIME}}
+        columns = {TIME: time, **{name: column for name, column in zip(names, cleaned(values).T) if name != TIME}}
         return LogTable(self._topic, columns, {TIME: "s"}), said
 
     def _times(self) -> tuple[np.ndarray, str]:

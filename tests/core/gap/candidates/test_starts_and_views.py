@@ -98,7 +98,8 @@ def test_a_fault_counts_if_displaced_texels_have_it_too(swapped):
     for trial in trials if swapped else ():
         trial.reading[:, pair] = trial.reading[:, pair[::-1]]
     rig = replace(plain, trials=tuple(trials))
-    fault = DataFault("swapped-channels", tuple(trial.name for trial in trials), "two channels follow each other's load")
+    names = tuple(trial.name for trial in trials)
+    fault = DataFault("swapped-channels", names, "two channels follow each other's load", lambda trial: trial)
     result = SimpleNamespace(rig=rig, faults=[fault])
     assert bool(faults_of(result, moved)) is swapped
     assert faults_of(result, Model(moved.parameters)) == [fault]  # nothing displaced: faults were judged with these texels

@@ -33,7 +33,7 @@ def trial(position, quaternion=None, time=None, **changes):
 
 
 def rig(indenter, one):
-    return Rig("rig", grid_texels(14, 6, 0.0034, 0.0034), SensorParameters(), frozenset(), None, None, indenter, (one,))
+    return Rig("rig", grid_texels(14, 6, 0.0034, 0.0034), SensorParameters(), frozenset(), None, indenter, (one,))
 
 
 @pytest.mark.parametrize("turned", [False, True])
@@ -48,7 +48,7 @@ def test_a_box_is_its_mesh(turned):
         turns = np.column_stack([np.ones(40), 0.08 * rng.normal(size=(40, 3))])
         turns /= np.linalg.norm(turns, axis=1)[:, None]
         one = trial(where, turns if turned else None)
-        own = rig(Indenter(box(*edges), None, "box", edges), one)
+        own = rig(Indenter(box(*edges), None, edges), one)
         if turned:
             normal = own.texels.normal + 0.5 * rng.normal(size=own.texels.normal.shape)
             own = replace(own, texels=replace(own.texels, normal=normal / np.linalg.norm(normal, axis=1)[:, None]))

@@ -41,7 +41,7 @@ def test_of_the_axes_of_taxels_the_one_that_follows_the_load_is_proposed_and_ask
         pattern.format(i=i, axis=axis): values + noise(400, level=4.0) for i in range(4) for axis, values in axes.items()
     }
     answer = columns_of(write_csv(tmp_path / "skin.csv", columns))["texel"]
-    assert answer.value == {"name": pattern.format(i="{}", axis="z"), "first": 0, "count": 4} and answer.evidence == "thin"
+    assert answer.value == {"name": pattern.format(i="{}", axis="z"), "first": 0, "count": 4} and answer.is_thin
     assert "follow the load by 1.00, others that could be meant: " in answer.reason and "0.0" in answer.reason
 
 
@@ -65,7 +65,7 @@ def test_calibration_points_in_no_order_are_sorted_by_the_load(tmp_path):
     }
     log = write_csv(tmp_path / "points.csv", columns)
     answer = columns_of(log)["time"]
-    assert answer.value == {"rate": 1.0} and answer.evidence == "thin" and "these are points" in answer.reason
+    assert answer.value == {"rate": 1.0} and answer.is_thin and "these are points" in answer.reason
     (trial,) = read_rig(new_rig(tmp_path / "rig", [log], template(tmp_path, [log])).path).trials
     np.testing.assert_allclose(trial.level, np.sort(load), atol=1e-9)
     np.testing.assert_allclose(trial.reading[:, 1], 10.0 + 2.0 * np.sort(load), atol=0.1)
@@ -79,7 +79,7 @@ def test_matrices_in_files_are_frames_with_the_load_of_their_names(tmp_path):
         paths[-1].write_text("\n".join(",".join(f"{value:03.0f}" for value in row) for row in frame) + "\n")
     answers = proposal(*reversed(paths))
     own = answers.columns()
-    assert own["time"].evidence == "thin" and "each file is a frame" in own["time"].reason
+    assert own["time"].is_thin and "each file is a frame" in own["time"].reason
     assert own["force"].value["area"] == "?" and "the area on which the pressure acts" in own["force"].question
     assert answers.of("sensor", "grid").value == {"rows": 8, "columns": 6, "pitch": ["?", "?"]}
     path = template(tmp_path, paths, **{'area = "?"': "area = 2e-3"})
@@ -139,7 +139,7 @@ def test_one_axis_that_most_texels_do_not_feel_is_an_indenter_at_a_place(tmp_pat
 
 def test_one_axis_that_all_texels_feel_is_a_depth_and_says_what_that_means(tmp_path):
     own = columns_of(write_csv(tmp_path / "run.csv", press(silent=0)))
-    assert own["depth"].value["factor"] == -1.0 and own["depth"].evidence == "thin"
+    assert own["depth"].value["factor"] == -1.0 and own["depth"].is_thin
     assert "as a plate does: for a ball write x, y and z" in own["depth"].reason
 
 
@@ -156,7 +156,7 @@ def test_a_load_that_rests_at_its_beginning_has_its_zero_there(tmp_path):
     columns = {"time": TIME, "fz": 0.4 + 3.0 * np.where(TIME < 2.0, 0.0, LOAD)}
     columns |= {f"taxel{i}": 400.0 * columns["fz"] for i in range(4)}
     force = columns_of(write_csv(tmp_path / "press.csv", columns))["force"]
-    assert force.value["zero"] == pytest.approx(0.4) and "is subtracted" in force.reason and force.evidence == "thin"
+    assert force.value["zero"] == pytest.approx(0.4) and "is subtracted" in force.reason and force.is_thin
 
 
 def test_steps_of_a_friction_rig_with_headers_of_their_own_are_said_and_speeds_are_no_texels(tmp_path):
@@ -207,10 +207,10 @@ def test_every_guess_is_a_line_with_its_reason_that_is_corrected_there(tmp_path,
     found = proposal(write_csv(tmp_path / "a.csv", columns[case]))
     lines = found.text.splitlines()
     for guess in found.guesses:
-        mark = "  # CHECK: " if guess.evidence == "thin" else "  # "
+        mark = "  # CHECK: " if guess.is_thin else "  # "
         assert guess.line in lines and (not guess.reason or guess.line.endswith(mark + guess.reason))
         assert guess.reason or not guess.is_open
-        assert (guess.question in found.questions) == (guess.is_unknown or guess.evidence == "thin")
+        assert (guess.question in found.questions) == (guess.is_unknown or guess.is_thin)
     put = []
     questions.asked(found.confirmed(), lambda question: put.append(question) or "1")
     assert len(put) == sum(guess.is_unknown for guess in found.guesses)

@@ -81,9 +81,7 @@ def test_a_unit_that_only_the_size_tells_is_asked(tmp_path):
     logs = [write_csv(tmp_path / "a.csv", {"time": time, "indentation": depth * 1e3, "reading": force[:, 0]})]
     found = propose([read_log(logs[0])])
     column = found.columns()["depth"]
-    assert (
-        column.value["unit"] == "mm" and column.evidence == "thin" and "no unit is stated, and it changes by 2" in column.reason
-    )
+    assert column.value["unit"] == "mm" and column.is_thin and "no unit is stated, and it changes by 2" in column.reason
     with pytest.raises(
         FileError, match='depth of .a.csv. is .*"mm" }, because no unit is stated, and it changes by 2: answer it'
     ):
@@ -144,6 +142,17 @@ def test_a_shift_that_the_recordings_do_not_tell_is_asked(tmp_path):
     answers.write_text(answers.read_text().replace('use = "fit"', 'use = "fit"\nlate = 0.25'))
     (trial,) = read_rig(new_rig(tmp_path / "rig", [stage, pad], answers).path).trials
     assert trial.time[0] == pytest.approx(0.0) and trial.time[-1] == pytest.approx(5.74)
+
+
+@pytest.mark.parametrize(
+    "words", ['texel = { name = "s{}", first = 0, count = 4 }', 'depth = { name = "depth (mm)", unit = "mm" }']
+)
+def test_a_logger_without_what_drove_or_what_answered_is_one_sentence(tmp_path, words):
+    logs = two_loggers(tmp_path)
+    column = re.search(r'name = "([^"]*)"', words)[1].replace("{}", "0")
+    answers = template(tmp_path, logs, **{words: f'temperature = {{ name = "{column}", unit = "°C" }}'})
+    with pytest.raises(FileError, match="need z, depth or force in one and texel or force_z in the other: name these columns"):
+        new_rig(tmp_path / "rig", logs, answers)
 
 
 def test_clocks_of_the_time_of_day_count_as_one_and_a_shift_between_them_is_said(tmp_path):
@@ -289,7 +298,7 @@ def test_questions_at_the_terminal_are_answered_as_in_the_file(tmp_path):
     time, depth, force = press()
     log = write_csv(tmp_path / "a.csv", {"time": time, "way": depth * 1e3, "indentation": depth * 1e3, "reading": force[:, 0]})
     found = propose([read_log(log)])
-    assert found.columns()["depth"].evidence == "thin"
+    assert found.columns()["depth"].is_thin
     for typed, value in {
         "way mm": {"name": "way", "unit": "mm"},
         "way": {"name": "way", "unit": "mm"},

@@ -30,8 +30,8 @@ def _rigs():
     mesh = box(*edges)
     return {
         "ball": ball,
-        "box": replace(ball, indenter=Indenter(mesh, None, "box", edges)),
-        "any mesh": replace(ball, indenter=Indenter(mesh, None, "box")),
+        "box": replace(ball, indenter=Indenter(mesh, None, edges)),
+        "any mesh": replace(ball, indenter=Indenter(mesh)),
         "curved": replace(ball, texels=domed),
     }
 
