@@ -178,16 +178,17 @@ class _Search:
         noise: tuple[ChannelNoise, ChannelNoise],
     ):
         self._ground, self._fitted, self._model, self._free, self._noise = ground, list(fitted), model, free, noise
-        trials = [p.trial for p in self._fitted]
-        like = replace(
-            ground.like,
-            reading=next((one.reading for one in trials if one.reading is not None), None),
-            force=next((one.force for one in trials if one.force is not None), None),
+        has_readings, has_forces = (
+            any(getattr(p.trial, part) is not None for p in self._fitted) for part in ("reading", "force")
         )
         self._further: dict[str, tuple[Trajectory, Predictor]] = {}
         for name, programme in ground.programmes().items():
             trajectory = ground.trajectory(programme)
-            self._further[name] = trajectory, Predictor(trajectory.as_trial(like), ground.rig)
+            samples = len(trajectory.trial.time)
+            reading = np.zeros((samples, len(ground.rig.texels))) if has_readings else None
+            force = np.zeros((samples, 3)) if has_forces else None
+            trial = replace(trajectory.trial, reading=reading, force=force)
+            self._further[name] = trajectory, Predictor(trial, ground.rig)
         found = _fitted_kinds(self._fitted, model)
         names = {one.name for one in found}
         more = _fitted_kinds([*self._fitted, *(further for _, further in self._further.values())], model)
