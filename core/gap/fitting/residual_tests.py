@@ -162,26 +162,6 @@ STEADY = (0.3, 3.0)
 """Bounds of each trial's coefficient, as multiples of that of all trials."""
 
 
-@dataclass(frozen=True)
-class _LoadedSamples:
-    """Loaded samples of one trial.
-
-    Attributes
-    ----------
-    size : (m,) float
-        Magnitude of the predicted readings, in units of the noise.
-    square : (m,) float
-        Squares of the residual, in the same unit.
-    serial_correlation, texel_correlation : float
-        Of the residual: with the sample before, and between texels.
-    """
-
-    size: np.ndarray
-    square: np.ndarray
-    serial_correlation: float
-    texel_correlation: float
-
-
 def proportional_noise(views: Sequence[TrialView], model: Model) -> Effect | None:
     """Return noise in proportion to the reading if a model's residual is like that, else None.
 
@@ -192,7 +172,7 @@ def proportional_noise(views: Sequence[TrialView], model: Model) -> Effect | Non
     model : Model
         A fitted model without noise.
     """
-    found, rest = [], []
+    sizes, squares, correlations, rest = [], [], [], [np.zeros(0)]
     for view in views:
         reading = view.predictor.trial.reading
         if reading is None:
@@ -201,47 +181,52 @@ def proportional_noise(views: Sequence[TrialView], model: Model) -> Effect | Non
         size = np.abs(view.predictor.predict(model).reading - model.parameters.zero) / view.noise[0]
         known = np.isfinite(reading)
         rest.append(residual[known & (size < RESTING)])
-        found.append(_loaded_samples(size, residual, known & (size > LOADED)))
-    still = np.concatenate(rest) if rest else np.zeros(0)
-    if len(still) < LEAST_RESTING or sum(len(one.size) for one in found) < LEAST_LOADED:
+        loaded = known & (size > LOADED)
+        sizes.append(size[loaded])
+        squares.append(residual[loaded] ** 2)
+        correlations.append(_correlations(size, residual, loaded))
+    still = np.concatenate(rest)
+    if len(still) < LEAST_RESTING or sum(map(len, sizes)) < LEAST_LOADED:
         return None
     floor = max(float(np.mean(still * still)), 1e-6)
-    size, square = (np.concatenate([getattr(one, name) for one in found]) for name in ("size", "square"))
-    each, pooled = (
-        [_variance_coefficient(one.size, one.square, floor) for one in found if len(one.size) > LEAST_IN_TRIAL],
-        _variance_coefficient(size, square, floor),
-    )
+    size, square = np.concatenate(sizes), np.concatenate(squares)
+    each = [_variance_coefficient(a, b, floor) for a, b in zip(sizes, squares, strict=True) if len(a) > LEAST_IN_TRIAL]
+    pooled = _variance_coefficient(size, square, floor)
     large = square[size > np.quantile(size, LARGE_QUANTILE)]
     small = square[size < np.quantile(size, SMALL_QUANTILE)]
     if not (len(large) and len(small)):  # all readings are equal, as at the rail of a converter
         return None
     grows = large.mean() > LEAST_VARIANCE_RATIO * floor and large.mean() > LEAST_GROWTH * small.mean()
     steady = pooled > 0.0 and min(each, default=0.0) > STEADY[0] * pooled and max(each, default=0.0) < STEADY[1] * pooled
-    weight = np.array([len(one.size) for one in found], float)
-    serial_correlation = float(np.average([one.serial_correlation for one in found], weights=weight))
-    texel_correlation = float(np.average([one.texel_correlation for one in found], weights=weight))
-    if not (grows and steady and serial_correlation < MOST_CORRELATION and texel_correlation < MOST_CORRELATION):
+    correlation = np.average(correlations, axis=0, weights=np.array([len(one) for one in sizes], float))
+    if not (grows and steady and (correlation < MOST_CORRELATION).all()):
         return None
     return Effect(NOISE, "proportional", {"share": float(np.sqrt(pooled))})
 
 
-def _loaded_samples(size: np.ndarray, residual: np.ndarray, loaded: np.ndarray) -> _LoadedSamples:
-    """Loaded samples of a trial, with correlations of the large ones.
+def _correlations(size: np.ndarray, residual: np.ndarray, loaded: np.ndarray) -> tuple[float, float]:
+    """Correlations of the residual (T, n) at large readings with the sample before, and between texels.
 
-    Correlations are of residuals in units of the local reading, so that a few large ones do not decide. At small readings the
-    noise at rest would hide what a model lacks.
+    They are of residuals in units of the local reading, so that a few large ones do not decide. At small readings the noise at
+    rest would hide what a model lacks.
+
+    Parameters
+    ----------
+    size : (T, n) float
+        Magnitude of the predicted readings, in units of the noise.
+    residual : (T, n) float
+    loaded : (T, n) bool
     """
     large = loaded & (size > np.quantile(size[loaded], LARGE_QUANTILE)) if loaded.any() else loaded
     unit = np.where(large, residual / np.maximum(size, 1.0), 0.0)
     both = large[1:] & large[:-1]
     square = float((unit * unit).sum())
-    serial_correlation = float((unit[1:] * unit[:-1])[both].sum()) / max(square, 1e-300)
+    serial = float((unit[1:] * unit[:-1])[both].sum()) / max(square, 1e-300)
     together = unit.sum(axis=1)
     pairs = float((together * together).sum()) - square
     count = large.sum(axis=1)
     possible = float((count * (count - 1)).sum()) / max(float(count.sum()), 1.0)
-    texel_correlation = pairs / max(square * possible, 1e-300) if possible > 0 else 0.0
-    return _LoadedSamples(size[loaded], residual[loaded] ** 2, serial_correlation, texel_correlation)
+    return serial, pairs / max(square * possible, 1e-300) if possible > 0 else 0.0
 
 
 def _variance_coefficient(size: np.ndarray, square: np.ndarray, floor: float) -> float:
