@@ -158,7 +158,7 @@ def _contact_samples(
 ) -> ContactSamples:
     """The samples in contact of some columns of a stimulus, each of a weight `count`."""
     pressed = stimulus.load[:, column] > 0
-    texel, sample = np.nonzero(pressed.T)
+    texel, sample = map(np.ascontiguousarray, np.nonzero(pressed.T))
     own, before = column[texel], np.maximum(sample - 1, 0)
     slip, mean = np.zeros((len(sample), 3)), np.zeros((len(sample), 3))
     if stimulus.slip is not None:
