@@ -55,13 +55,8 @@ class Plan:
     @property
     def path_of_motion(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Times (m,), s, and positions (m, 3), m, of the probe in the sensor's frame; None where no poses are planned."""
-        positions = None if self.outlook.experiment is None else self.outlook.experiment.trajectory.positions()
-        return None if self.outlook.experiment is None or positions is None else (self._times, positions)
-
-    @property
-    def _times(self) -> np.ndarray:
-        assert self.outlook.experiment is not None
-        return self.outlook.experiment.trajectory.time
+        trial = None if self.outlook.experiment is None else self.outlook.experiment.trajectory.trial
+        return None if trial is None or trial.position is None else (trial.time, trial.position)
 
     def report(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write plan.json, and the trajectory as plan.csv where there is one; return the files."""

@@ -133,7 +133,7 @@ def keys(obj, trajectory: Trajectory, first: int, rate: float, metres: float) ->
 
     location, quaternion, _ = transforms.decompose(transforms.as_array(obj.matrix_world))
     places = location + trajectory.position @ transforms.rotation(quaternion).T / metres
-    turn = quaternion_product(quaternion[None], trajectory.quaternion[None])[0]
+    turn = quaternion_product(quaternion[None], trajectory.trial.quaternion[:1])[0]
     return first + trajectory.knots * rate, places, turn
 
 

@@ -10,14 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from ...effects.engine.registry import only_name_where
 from ...effects.engine.specification import SCATTER
 from ...model.sensor import Effect
-from ..forward.contact_phases import features, missing_readings, relative_load
+from ..forward.contact_phases import features, known_readings, relative_load
 from ..forward.predictor import Model, Predictor
 from .least_squares import TrialView
 
@@ -68,9 +67,7 @@ def residual_structure(predictors: Sequence[Predictor], residuals: Sequence[np.n
     parts, sums = [], []
     for number, (predictor, groups, residual) in enumerate(zip(predictors, found, residuals, strict=True)):
         table = _table(groups, sizes, residual.shape)
-        missing = missing_readings(predictor)
-        if missing is not None:
-            table[:, missing] = 0.0
+        table[:, ~known_readings(predictor)] = 0.0
         part = slice(None)
         if halves:
             middle = len(residual) // 2
@@ -120,9 +117,8 @@ def _share_predicted_by_texel(predictors: Sequence[Predictor], residuals: Sequen
     """The same for a constant and a gain of each texel."""
     parts = []
     for predictor, r in zip(predictors, residuals, strict=True):
-        d, missing = relative_load(predictor.stimulus), missing_readings(predictor)
-        known = np.ones(d.shape) if missing is None else (~missing).astype(float)
-        d = d * known
+        known = known_readings(predictor).astype(float)
+        d = relative_load(predictor.stimulus) * known
         parts.append(np.stack([known.sum(axis=0), d.sum(axis=0), (d * d).sum(axis=0), r.sum(axis=0), (d * r).sum(axis=0)]))
     left = 0.0
     for i, (predictor, r) in enumerate(zip(predictors, residuals, strict=True)):
@@ -132,9 +128,7 @@ def _share_predicted_by_texel(predictors: Sequence[Predictor], residuals: Sequen
         det = one * d2 - d1 * d1
         offset, gain = (d2 * r1 - d1 * rd) / det, (one * rd - d1 * r1) / det
         miss = r - offset - gain * relative_load(predictor.stimulus)
-        missing = missing_readings(predictor)
-        if missing is not None:
-            miss[missing] = 0.0
+        miss[~known_readings(predictor)] = 0.0
         left += float(np.vdot(miss, miss))
     return 1.0 - left / total
 
@@ -162,26 +156,6 @@ STEADY = (0.3, 3.0)
 """Bounds of each trial's coefficient, as multiples of that of all trials."""
 
 
-@dataclass(frozen=True)
-class _LoadedSamples:
-    """Loaded samples of one trial.
-
-    Attributes
-    ----------
-    size : (m,) float
-        Magnitude of the predicted readings, in units of the noise.
-    square : (m,) float
-        Squares of the residual, in the same unit.
-    serial_correlation, texel_correlation : float
-        Of the residual: with the sample before, and between texels.
-    """
-
-    size: np.ndarray
-    square: np.ndarray
-    serial_correlation: float
-    texel_correlation: float
-
-
 def proportional_noise(views: Sequence[TrialView], model: Model) -> Effect | None:
     """Return noise in proportion to the reading if a model's residual is like that, else None.
 
@@ -192,7 +166,7 @@ def proportional_noise(views: Sequence[TrialView], model: Model) -> Effect | Non
     model : Model
         A fitted model without noise.
     """
-    found, rest = [], []
+    sizes, squares, correlations, rest = [], [], [], [np.zeros(0)]
     for view in views:
         reading = view.predictor.trial.reading
         if reading is None:
@@ -201,47 +175,52 @@ def proportional_noise(views: Sequence[TrialView], model: Model) -> Effect | Non
         size = np.abs(view.predictor.predict(model).reading - model.parameters.zero) / view.noise[0]
         known = np.isfinite(reading)
         rest.append(residual[known & (size < RESTING)])
-        found.append(_loaded_samples(size, residual, known & (size > LOADED)))
-    still = np.concatenate(rest) if rest else np.zeros(0)
-    if len(still) < LEAST_RESTING or sum(len(one.size) for one in found) < LEAST_LOADED:
+        loaded = known & (size > LOADED)
+        sizes.append(size[loaded])
+        squares.append(residual[loaded] ** 2)
+        correlations.append(_correlations(size, residual, loaded))
+    still = np.concatenate(rest)
+    if len(still) < LEAST_RESTING or sum(map(len, sizes)) < LEAST_LOADED:
         return None
     floor = max(float(np.mean(still * still)), 1e-6)
-    size, square = (np.concatenate([getattr(one, name) for one in found]) for name in ("size", "square"))
-    each, pooled = (
-        [_variance_coefficient(one.size, one.square, floor) for one in found if len(one.size) > LEAST_IN_TRIAL],
-        _variance_coefficient(size, square, floor),
-    )
+    size, square = np.concatenate(sizes), np.concatenate(squares)
+    each = [_variance_coefficient(a, b, floor) for a, b in zip(sizes, squares, strict=True) if len(a) > LEAST_IN_TRIAL]
+    pooled = _variance_coefficient(size, square, floor)
     large = square[size > np.quantile(size, LARGE_QUANTILE)]
     small = square[size < np.quantile(size, SMALL_QUANTILE)]
     if not (len(large) and len(small)):  # all readings are equal, as at the rail of a converter
         return None
     grows = large.mean() > LEAST_VARIANCE_RATIO * floor and large.mean() > LEAST_GROWTH * small.mean()
     steady = pooled > 0.0 and min(each, default=0.0) > STEADY[0] * pooled and max(each, default=0.0) < STEADY[1] * pooled
-    weight = np.array([len(one.size) for one in found], float)
-    serial_correlation = float(np.average([one.serial_correlation for one in found], weights=weight))
-    texel_correlation = float(np.average([one.texel_correlation for one in found], weights=weight))
-    if not (grows and steady and serial_correlation < MOST_CORRELATION and texel_correlation < MOST_CORRELATION):
+    correlation = np.average(correlations, axis=0, weights=np.array([len(one) for one in sizes], float))
+    if not (grows and steady and (correlation < MOST_CORRELATION).all()):
         return None
     return Effect(NOISE, "proportional", {"share": float(np.sqrt(pooled))})
 
 
-def _loaded_samples(size: np.ndarray, residual: np.ndarray, loaded: np.ndarray) -> _LoadedSamples:
-    """Loaded samples of a trial, with correlations of the large ones.
+def _correlations(size: np.ndarray, residual: np.ndarray, loaded: np.ndarray) -> tuple[float, float]:
+    """Correlations of the residual (T, n) at large readings with the sample before, and between texels.
 
-    Correlations are of residuals in units of the local reading, so that a few large ones do not decide. At small readings the
-    noise at rest would hide what a model lacks.
+    They are of residuals in units of the local reading, so that a few large ones do not decide. At small readings the noise at
+    rest would hide what a model lacks.
+
+    Parameters
+    ----------
+    size : (T, n) float
+        Magnitude of the predicted readings, in units of the noise.
+    residual : (T, n) float
+    loaded : (T, n) bool
     """
     large = loaded & (size > np.quantile(size[loaded], LARGE_QUANTILE)) if loaded.any() else loaded
     unit = np.where(large, residual / np.maximum(size, 1.0), 0.0)
     both = large[1:] & large[:-1]
     square = float((unit * unit).sum())
-    serial_correlation = float((unit[1:] * unit[:-1])[both].sum()) / max(square, 1e-300)
+    serial = float((unit[1:] * unit[:-1])[both].sum()) / max(square, 1e-300)
     together = unit.sum(axis=1)
     pairs = float((together * together).sum()) - square
     count = large.sum(axis=1)
     possible = float((count * (count - 1)).sum()) / max(float(count.sum()), 1.0)
-    texel_correlation = pairs / max(square * possible, 1e-300) if possible > 0 else 0.0
-    return _LoadedSamples(size[loaded], residual[loaded] ** 2, serial_correlation, texel_correlation)
+    return serial, pairs / max(square * possible, 1e-300) if possible > 0 else 0.0
 
 
 def _variance_coefficient(size: np.ndarray, square: np.ndarray, floor: float) -> float:
@@ -292,24 +271,9 @@ class SpectralLine:
     share: float
 
 
-class UnloadedResidual(NamedTuple):
-    """The residual of one trial while its texels carry no load.
-
-    Attributes
-    ----------
-    step : float, seconds
-        Median time between two samples.
-    time : (t,) float, seconds
-    values : (t, n) float
-        Residual about its mean, in units of the noise; zero where it is not known.
-    known : (t, n) bool
-        Where a texel is unloaded and was measured.
-    """
-
-    step: float
-    time: np.ndarray
-    values: np.ndarray
-    known: np.ndarray
+UnloadedResidual = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Of one trial: times (t,) in seconds, the residual about its mean without load (t, n) in units of the noise, zero where it is
+not known, and where it is known, because a texel is unloaded and was measured, (t, n) bool."""
 
 
 def strongest_line(views: Sequence[TrialView], model: Model) -> SpectralLine | None:
@@ -324,16 +288,17 @@ def strongest_line(views: Sequence[TrialView], model: Model) -> SpectralLine | N
     resting = [one for one in (_unloaded_residual(view, model) for view in views) if one is not None]
     if not resting:
         return None
-    step = min(one.step for one in resting)
-    if max(float(np.ptp(one.time)) for one in resting) / step > LONGEST_GRID * max(len(one.time) for one in resting):
+    times = [time for time, _, _ in resting]
+    step = min(float(np.median(np.diff(time))) for time in times)
+    if max(float(np.ptp(time)) for time in times) / step > LONGEST_GRID * max(map(len, times)):
         return None
-    sample_indices = [np.round((one.time - one.time[0]) / step).astype(int) for one in resting]
+    sample_indices = [np.round((time - time[0]) / step).astype(int) for time in times]
     length = max(int(indices[-1]) for indices in sample_indices) + 1
     powers = []
-    for indices, one in zip(sample_indices, resting, strict=True):
-        resampled = np.zeros((length, one.values.shape[1]))
-        resampled[indices] = one.values
-        powers.append((np.abs(np.fft.rfft(resampled, axis=0)) ** 2).sum(axis=1) / max(float(one.known.sum()), 1.0))
+    for indices, (_, values, known) in zip(sample_indices, resting, strict=True):
+        resampled = np.zeros((length, values.shape[1]))
+        resampled[indices] = values
+        powers.append((np.abs(np.fft.rfft(resampled, axis=0)) ** 2).sum(axis=1) / max(float(known.sum()), 1.0))
     usable = slice(LINE_HALF_WIDTH + 1, len(powers[0]) - 2)
     levels = [_noise_level(power) for power in powers]
     ratio = np.sum([power / level for power, level in zip(powers, levels, strict=True)], axis=0)[usable]
@@ -363,7 +328,7 @@ def _unloaded_residual(view: TrialView, model: Model) -> UnloadedResidual | None
         return None
     residual = np.where(known, view.residual(model)[:, : reading.shape[1]], 0.0)
     residual = np.where(known, residual - residual.sum(axis=0) / np.maximum(known.sum(axis=0), 1), 0.0)
-    return UnloadedResidual(view.predictor.trial.step, time, residual, known)
+    return time, residual, known
 
 
 def _noise_level(power: np.ndarray) -> np.ndarray:
@@ -385,7 +350,7 @@ def _false_alarm_probability(total: float, trials: int) -> float:
 def _line_at(resting: list[UnloadedResidual], frequency: float, noise: float) -> SpectralLine:
     """Amplitude and share of a line at a frequency, by least squares for each texel."""
     line = total = samples = 0.0
-    for _, time, values, known in resting:
+    for time, values, known in resting:
         wave = np.exp(-2j * np.pi * frequency * (time - time[0]))
         count = known.sum(axis=0)
         amplitude = 2.0 * np.abs(wave @ values) / np.maximum(count, 1)

@@ -37,11 +37,8 @@ def sphere_contact(center: np.ndarray, radius: float, position: np.ndarray, outw
     overpressed : int
         Most texels at once whose segment begins inside the indenter.
     """
-    depth, normal, point = _untouched(len(center), position, outward)
-    most = meet_sphere(
-        np.ascontiguousarray(center), float(radius), *_plain(position, outward), float(reach), depth, normal, point
-    )
-    return depth, normal, point, int(most)
+    straight = np.tile(np.eye(3), (len(center), 1, 1))
+    return _contact(center, straight, np.array([radius], float), position, outward, reach)
 
 
 def box_contact(
@@ -59,64 +56,38 @@ def box_contact(
     position, outward, reach
         As in :func:`sphere_contact`, like the returns.
     """
-    depth, normal, point = _untouched(len(center), position, outward)
-    frame = np.ascontiguousarray(rotation_matrices(quaternion))  # box → sensor
-    texels, center, half = _plain(position, outward), np.ascontiguousarray(center, dtype=float), 0.5 * np.asarray(edges, float)
-    return depth, normal, point, int(meet_box(center, frame, half, *texels, float(reach), depth, normal, point))
+    return _contact(center, rotation_matrices(quaternion), 0.5 * np.asarray(edges, float), position, outward, reach)
 
 
-def _untouched(samples: int, position: np.ndarray, outward: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Depth, normal and point without contact."""
-    shape = (samples, *position.shape)
-    return np.zeros(shape[:2]), np.broadcast_to(-outward, shape).copy(), np.broadcast_to(position, shape).copy()
-
-
-def _plain(position: np.ndarray, outward: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Contiguous arrays, so that the kernels are compiled only once."""
-    return np.ascontiguousarray(position, dtype=float), np.ascontiguousarray(outward, dtype=float)
+def _contact(
+    center: np.ndarray, frame: np.ndarray, size: np.ndarray, position: np.ndarray, outward: np.ndarray, reach: float
+) -> Contact:
+    """Contact of texels with a shape (see :func:`meet`)."""
+    shape = (len(center), *position.shape)
+    contact = np.zeros(shape[:2]), np.broadcast_to(-outward, shape).copy(), np.broadcast_to(position, shape).copy()
+    # Contiguous arrays, so that the kernel is compiled only once.
+    arrays = (np.ascontiguousarray(values, dtype=float) for values in (center, frame, size, position, outward))
+    return *contact, int(meet(*arrays, float(reach), contact))
 
 
 @kernel
-def write_contact(i, j, left, entered, position, outward, contact):  # type: ignore[no-untyped-def]
-    """Write where the segment of texel `j` enters the indenter in sample `i`, with so much of its length left.
+def meet(center, frame, size, position, outward, reach, contact):  # type: ignore[no-untyped-def]
+    """Write where the segments of texels enter a shape; return the most texels whose segment begins inside it at once.
 
-    `entered` is the indenter's outward normal there, `contact` are depth, normal and point.
+    Parameters
+    ----------
+    center : (T, 3) float, metres
+    frame : (T, 3, 3) float
+        Axes of the shape as columns.
+    size : (1,) or (3,) float, metres
+        Radius of a sphere, or half of the edges of a box.
+    position, outward, reach
+        As in :func:`sphere_contact`.
+    contact : tuple of (T, n), (T, n, 3) and (T, n, 3) float
+        Depth, normal and point; written to.
     """
     depth, normal, point = contact
-    along = 0.0
-    for axis in range(3):
-        along += entered[axis] * outward[j, axis]
-        normal[i, j, axis] = entered[axis]
-        point[i, j, axis] = position[j, axis] - left * outward[j, axis]
-    depth[i, j] = left * abs(along)
-
-
-@kernel
-def meet_sphere(center, radius, position, outward, reach, depth, normal, point):  # type: ignore[no-untyped-def]
-    """Write the contacts with a sphere into `depth`, `normal` and `point`; return the most texels overpressed at once."""
-    most = 0
-    for i in range(center.shape[0]):
-        deep = 0
-        for j in range(position.shape[0]):
-            nx, ny, nz = outward[j, 0], outward[j, 1], outward[j, 2]
-            ox = position[j, 0] - reach * nx - center[i, 0]
-            oy = position[j, 1] - reach * ny - center[i, 1]
-            oz = position[j, 2] - reach * nz - center[i, 2]
-            if is_in_sphere((ox, oy, oz), radius):
-                deep += 1
-            s = sphere_entry((ox, oy, oz), (nx, ny, nz), radius)
-            if s < 0.0 or s >= reach:
-                continue
-            ax, ay, az = (ox + s * nx) / radius, (oy + s * ny) / radius, (oz + s * nz) / radius
-            write_contact(i, j, reach - s, (ax, ay, az), position, outward, (depth, normal, point))
-        most = max(most, deep)
-    return most
-
-
-@kernel
-def meet_box(center, frame, half, position, outward, reach, depth, normal, point):  # type: ignore[no-untyped-def]
-    """Write the contacts with a box of these half edges into `depth`, `normal` and `point`; return as :func:`meet_sphere`."""
-    most, farthest = 0, np.sqrt(half[0] ** 2 + half[1] ** 2 + half[2] ** 2) + reach
+    is_ball, most, farthest = len(size) == 1, 0, np.sqrt((size * size).sum()) + reach
     for i in range(center.shape[0]):
         deep = 0
         for j in range(position.shape[0]):
@@ -126,24 +97,34 @@ def meet_box(center, frame, half, position, outward, reach, depth, normal, point
             oz = position[j, 2] - reach * nz - center[i, 2]
             if ox * ox + oy * oy + oz * oz > farthest * farthest:
                 continue
-            # Into the box's frame, whose axes are columns.
-            base = (
-                ox * frame[i, 0, 0] + oy * frame[i, 1, 0] + oz * frame[i, 2, 0],
-                ox * frame[i, 0, 1] + oy * frame[i, 1, 1] + oz * frame[i, 2, 1],
-                ox * frame[i, 0, 2] + oy * frame[i, 1, 2] + oz * frame[i, 2, 2],
-            )
-            way = (
-                nx * frame[i, 0, 0] + ny * frame[i, 1, 0] + nz * frame[i, 2, 0],
-                nx * frame[i, 0, 1] + ny * frame[i, 1, 1] + nz * frame[i, 2, 1],
-                nx * frame[i, 0, 2] + ny * frame[i, 1, 2] + nz * frame[i, 2, 2],
-            )
-            if is_in_box(base, (half[0], half[1], half[2])):
-                deep += 1
-            enters, face = box_entry(base, way, (half[0], half[1], half[2]))
+            base, way, face = (ox, oy, oz), (nx, ny, nz), 0
+            if is_ball:
+                deep += is_in_sphere(base, size[0])
+                enters = sphere_entry(base, way, size[0])
+            else:  # into the box's frame, whose axes are columns
+                base = (
+                    ox * frame[i, 0, 0] + oy * frame[i, 1, 0] + oz * frame[i, 2, 0],
+                    ox * frame[i, 0, 1] + oy * frame[i, 1, 1] + oz * frame[i, 2, 1],
+                    ox * frame[i, 0, 2] + oy * frame[i, 1, 2] + oz * frame[i, 2, 2],
+                )
+                way = (
+                    nx * frame[i, 0, 0] + ny * frame[i, 1, 0] + nz * frame[i, 2, 0],
+                    nx * frame[i, 0, 1] + ny * frame[i, 1, 1] + nz * frame[i, 2, 1],
+                    nx * frame[i, 0, 2] + ny * frame[i, 1, 2] + nz * frame[i, 2, 2],
+                )
+                deep += is_in_box(base, (size[0], size[1], size[2]))
+                enters, face = box_entry(base, way, (size[0], size[1], size[2]))
             if not 0.0 <= enters < reach:
                 continue
-            sign = -1.0 if way[face] > 0.0 else 1.0
-            ax, ay, az = sign * frame[i, 0, face], sign * frame[i, 1, face], sign * frame[i, 2, face]
-            write_contact(i, j, reach - enters, (ax, ay, az), position, outward, (depth, normal, point))
+            if is_ball:
+                ax, ay, az = (ox + enters * nx) / size[0], (oy + enters * ny) / size[0], (oz + enters * nz) / size[0]
+            else:
+                sign = -1.0 if way[face] > 0.0 else 1.0
+                ax, ay, az = sign * frame[i, 0, face], sign * frame[i, 1, face], sign * frame[i, 2, face]
+            left = reach - enters
+            depth[i, j] = left * abs(ax * nx + ay * ny + az * nz)
+            normal[i, j, 0], normal[i, j, 1], normal[i, j, 2] = ax, ay, az
+            for axis in range(3):
+                point[i, j, axis] = position[j, axis] - left * outward[j, axis]
         most = max(most, deep)
     return most

@@ -87,13 +87,11 @@ FEATURES: dict[str, str] = {
 }
 
 
-def missing_readings(predictor: Predictor) -> np.ndarray | None:
-    """Return where readings are missing, (T, n) bool; None if none is, or if there are no readings at all."""
-    reading = predictor.trial.reading
-    if reading is None:
-        return None
-    missing = ~np.isfinite(reading)
-    return missing if missing.any() and not missing.all() else None
+def known_readings(predictor: Predictor) -> np.ndarray:
+    """Return where readings are known, (T, n) bool; everywhere if there are no readings at all."""
+    reading, everywhere = predictor.trial.reading, np.ones(predictor.stimulus.load.shape, bool)
+    known = everywhere if reading is None else np.isfinite(reading)
+    return known if known.any() else everywhere
 
 
 def features(predictor: Predictor, residual: np.ndarray) -> dict[str, np.ndarray]:
@@ -137,8 +135,7 @@ def features(predictor: Predictor, residual: np.ndarray) -> dict[str, np.ndarray
         around = _neighbour_load(predictor, d)
         groups["neighbours"] = [around - d, around * (d > 0), np.broadcast_to(d.mean(axis=1, keepdims=True), d.shape)]
         # A missing reading is no residual of zero: it is no other texel either.
-        missing = missing_readings(predictor)
-        known = np.ones(d.shape) if missing is None else (~missing).astype(float)
+        known = known_readings(predictor).astype(float)
         others = (residual.sum(axis=1, keepdims=True) - residual) / np.maximum(known.sum(axis=1, keepdims=True) - known, 1.0)
         groups["common mode"] = [others]
         shared = [_pattern_of_others(residual, shape, known) for shape in (d, rate)]

@@ -27,10 +27,10 @@ from ...laws.friction import (
 )
 from ...model.sensor import Effect
 from ...model.sensor_parameters import SensorParameters
+from .stimulus import Stimulus, dot
 
 if TYPE_CHECKING:
     from ..dataset.rig import Rig
-    from .stimulus import Stimulus
 
 EQUAL_WITHIN = 1e-9
 """Difference of the means of two texels, as a share of the largest value, up to which they have equal histories."""
@@ -70,14 +70,6 @@ class ContactSamples(NamedTuple):
     slip_squared: np.ndarray
     mean_slip_squared: np.ndarray
     time_step: np.ndarray
-
-    @classmethod
-    def of_size(cls, m: int) -> ContactSamples:
-        """Return room for m samples."""
-        vectors = (np.empty((m, 3)) for _ in range(3))
-        return cls(
-            np.empty(m, int), np.empty(m, int), np.empty(m, bool), np.empty(m), *vectors, *(np.empty(m) for _ in range(3))
-        )
 
 
 @dataclass(frozen=True)
@@ -167,13 +159,17 @@ class ContactHistory:
 def _contact_samples(
     stimulus: Stimulus, normal: np.ndarray, column: np.ndarray, count: np.ndarray, step: np.ndarray
 ) -> ContactSamples:
-    """The samples in contact of some columns (see :func:`write_samples`)."""
-    normal = np.ascontiguousarray(normal, dtype=float)
-    slip = np.zeros_like(normal) if stimulus.slip is None else np.ascontiguousarray(stimulus.slip)
-    pressed = np.ascontiguousarray(stimulus.load[:, column] > 0)
-    samples = ContactSamples.of_size(int(pressed.sum()))
-    write_samples(pressed, column, count, normal, slip, step, samples)
-    return samples
+    """The samples in contact of some columns of a stimulus, each of a weight `count`."""
+    pressed = stimulus.load[:, column] > 0
+    texel, sample = map(np.ascontiguousarray, np.nonzero(pressed.T))
+    own, before = column[texel], np.maximum(sample - 1, 0)
+    slip, mean = np.zeros((len(sample), 3)), np.zeros((len(sample), 3))
+    if stimulus.slip is not None:
+        slip = stimulus.slip[sample, own]
+        mean = 0.5 * (slip + stimulus.slip[before, own])
+    continues = (sample > 0) & pressed[before, texel]
+    squares = dot(slip, slip), dot(mean, mean)
+    return ContactSamples(sample, texel, continues, count[texel], normal[sample, own], slip, mean, *squares, step[sample])
 
 
 def _equal_texels(arrays: list[np.ndarray], texels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -193,44 +189,6 @@ def _equal_texels(arrays: list[np.ndarray], texels: np.ndarray) -> tuple[np.ndar
     groups: dict[bytes, int] = {}
     group = np.array([groups.setdefault(row.tobytes(), len(groups)) for row in np.concatenate(keys).T], dtype=int)
     return np.unique(group, return_index=True)[1], group
-
-
-@kernel
-def write_samples(pressed, column, count, normal, slip, step, samples):  # type: ignore[no-untyped-def]
-    """Write the samples in contact, column after column.
-
-    Parameters
-    ----------
-    pressed : (T, g) bool
-    column : (g,) int
-        Index in `normal` and `slip` of each column.
-    count : (g,) float
-        Weight of each column.
-    normal, slip : (T, n, 3) float
-    step : (T,) float, s
-        Since the sample before.
-    samples : ContactSamples
-        Written to.
-    """
-    i = 0
-    for texel in range(pressed.shape[1]):
-        own = column[texel]
-        for sample in range(pressed.shape[0]):
-            if not pressed[sample, texel]:
-                continue
-            before = max(sample - 1, 0)
-            samples.sample[i], samples.texel[i], samples.weight[i] = sample, texel, count[texel]
-            samples.continues[i] = sample > 0 and pressed[before, texel]
-            samples.time_step[i] = step[sample]
-            now_squared, mean_squared = 0.0, 0.0
-            for axis in range(3):
-                now = slip[sample, own, axis]
-                mean = 0.5 * (now + slip[before, own, axis])
-                samples.normal[i, axis], samples.slip[i, axis] = normal[sample, own, axis], now
-                samples.mean_slip[i, axis] = mean
-                now_squared, mean_squared = now_squared + now * now, mean_squared + mean * mean
-            samples.slip_squared[i], samples.mean_slip_squared[i] = now_squared, mean_squared
-            i += 1
 
 
 @kernel

@@ -16,7 +16,6 @@ from ...effects.engine import readout_chain
 from ...effects.engine.registry import actual_placement as placed_texels
 from ...effects.engine.registry import form_of, kind_of, site_of_action
 from ...effects.engine.specification import SCATTER, STEPS, TransducerArray
-from ...geometry.texels import Texels
 from ...model.sensor import Effect, Sensor
 from ...model.sensor_parameters import FRICTION_LAW_PARAMETERS, NORMAL_LAW_PARAMETERS, SensorParameters
 from ..dataset.rig import FORCE, Rig
@@ -52,11 +51,6 @@ class Model:
     recordings: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
-    def fitted_effects(self) -> tuple[Effect, ...]:
-        """Effects without noise, which is found in the residual."""
-        return tuple(e for e in self.effects if kind_of(e.name).found_by != SCATTER)
-
-    @cached_property
     def is_stepped(self) -> bool:
         """True if readings come in steps."""
         return any(kind_of(e.name).found_by == STEPS for e in self.effects)
@@ -64,7 +58,7 @@ class Model:
     @cached_property
     def readout_effects(self) -> tuple[Effect, ...]:
         """Effects on readings, without noise: a prediction is the expected value."""
-        return tuple(e for e in self.fitted_effects if site_of_action(e) == "readout")
+        return tuple(e for e in self.effects if site_of_action(e) == "readout" and kind_of(e.name).found_by != SCATTER)
 
     @cached_property
     def normal_force_effects(self) -> tuple[Effect, ...]:
@@ -152,7 +146,7 @@ class Session:
         self._texel_forces: _Recent[np.ndarray] = _Recent(CACHE_SIZE)
         self._totals: _Recent[np.ndarray] = _Recent(most)
         self._readings: _Recent[np.ndarray] = _Recent(most)
-        self._sites: dict[bytes | None, TransducerArray] = {}
+        self._first_heights = self._heights({})
 
     def part(self, trial: Trial) -> tuple[Stimulus, slice]:
         """Return the stimulus of the texels in one of the trials, and its samples among those of all."""
@@ -167,37 +161,22 @@ class Session:
 
     def _computed_reading(self, model: Model, subset: np.ndarray | None) -> np.ndarray:
         """Return the readings under effects on the readout."""
-        effects = model.readout_effects
-        which, p = None if subset is None else subset.tobytes(), model.parameters
-        site = self._sites.get(which) or self._site(model, subset)
-        if (site.gain, site.zero) != (p.gain, p.zero):
-            site = replace(site, gain=p.gain, zero=p.zero)
-        self._sites[which] = site
+        effects, site = model.readout_effects, replace(self._site, gain=model.parameters.gain, zero=model.parameters.zero)
         if subset is not None:
             effects = tuple(_effect_on_texels(effect, subset) for effect in effects)
+            row, column = (None if index is None else index[subset] for index in (site.row, site.column))
+            site = replace(site, position=site.position[subset], area=site.area[subset], row=row, column=column)
         return readout_chain.readings(effects, site, self.stimulus.time, self.normal_force(model, subset))
 
-    def _site(self, model: Model, subset: np.ndarray | None) -> TransducerArray:
-        """The texels, or some, as effects on readings see them."""
-        site = readout_chain.transducers_of(Sensor("sensor", 0, self.rig.texels, model.parameters))
-        site = replace(site, temperature=self._temperature())
-        if subset is None:
-            return site
-        return replace(
-            site,
-            position=site.position[subset],
-            area=site.area[subset],
-            row=None if site.row is None else site.row[subset],
-            column=None if site.column is None else site.column[subset],
-        )
-
-    def _temperature(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Times and temperatures that were recorded."""
+    @cached_property
+    def _site(self) -> TransducerArray:
+        """The texels as effects on readings see them, with the temperatures that were recorded."""
+        site = readout_chain.transducers_of(Sensor("sensor", 0, self.rig.texels, self.rig.parameters))
         recorded = [trial.temperature for trial in self.trials if trial.temperature is not None]
         if not recorded:
-            return None
+            return site
         times, values = zip(*recorded, strict=True)
-        return np.concatenate(times), np.concatenate(values)
+        return replace(site, temperature=(np.concatenate(times), np.concatenate(values)))
 
     def total_force(self, model: Model) -> np.ndarray:
         """Return the sum of normal and friction forces on the sensor, (T, 3) N."""
@@ -211,33 +190,28 @@ class Session:
     def placed(self, model: Model) -> Stimulus:
         """Return the stimulus of the points of the surface at the places where effects move them."""
         moving = model.placing_effects if self.stimulus.trial.stimulus == "pose" else ()
-        heights = self._heights(model)
+        heights = self._heights(model.recordings)
         if not moving and heights == self._first_heights:
             return self.stimulus
-        key = _effects_key(moving), heights
 
         def place() -> Stimulus:
             t = self.rig.surface
             if moving:
                 position, normal, tangent = placed_texels(moving, t.position, t.normal, t.tangent)
                 t = replace(t, position=position, normal=normal, tangent=tangent)
-            return self._stimulus_of(t, heights)
+            stimuli = [surface_stimulus_of(trial, self.rig, t, at) for trial, at in zip(self.trials, heights, strict=True)]
+            return joined_stimuli(stimuli, t)[0]
 
-        return self._placed.get_or(key, place)
+        return self._placed.get_or((_effects_key(moving), heights), place)
 
-    @cached_property
-    def _first_heights(self) -> tuple[float, ...]:
-        """Contact heights where fits start."""
-        return self._heights(None)
-
-    def _heights(self, model: Model | None) -> tuple[float, ...]:
-        """Contact height of each of its trials; None: where fits start."""
-        return tuple(_height_of(trial, model) for trial in self.trials)
-
-    def _stimulus_of(self, texels: Texels, heights: tuple[float, ...]) -> Stimulus:
-        """The stimulus of texels at other places."""
-        stimuli = [surface_stimulus_of(trial, self.rig, texels, at) for trial, at in zip(self.trials, heights, strict=True)]
-        return joined_stimuli(stimuli, texels)[0]
+    def _heights(self, recordings: Mapping[str, float]) -> tuple[float, ...]:
+        """Contact height of each of its trials; of a free one that is not among the numbers that from which its fit starts."""
+        return tuple(
+            recordings.get(number_name(CONTACT_HEIGHT, one.contact_height), one.height_start)
+            if isinstance(one.contact_height, str)
+            else one.contact_height
+            for one in self.trials
+        )
 
     def normal_force(self, model: Model, subset: np.ndarray | None = None) -> np.ndarray:
         """Return the normal force of each texel, or of some, (T, n) N."""
@@ -255,20 +229,17 @@ class Session:
         stimulus = self.placed(model)
         if stimulus.force_share is not None:
             return stimulus.force_share if subset is None else stimulus.force_share[:, subset]
-        whole = None if subset is None else self._forces.get(self._force_key(model, None))
-        if whole is not None:
-            return whole[:, subset]
         return self._forces.get_or(
             self._force_key(model, subset),
             lambda: self._contact_history(model, subset).force(model.parameters, model.normal_force_effects),
         )
 
     def _force_key(self, model: Model, subset: np.ndarray | None) -> object:
-        return None if subset is None else subset.tobytes(), self._heights(model), model.normal_force_key
+        return None if subset is None else subset.tobytes(), self._heights(model.recordings), model.normal_force_key
 
     def _contact_history(self, model: Model, subset: np.ndarray | None) -> ContactHistory:
         which = None if subset is None else subset.tobytes()
-        key = which, _effects_key(model.placing_effects), self._heights(model)
+        key = which, _effects_key(model.placing_effects), self._heights(model.recordings)
         sums = subset is None and any(trial.force is not None for trial in self.trials)
         return self._histories.get_or(key, lambda: ContactHistory.of(self.placed(model), subset, self.rig, sums))
 
@@ -309,17 +280,12 @@ class Predictor:
         with_forces : bool
             True if the net force is wanted, if it was measured.
         """
-        wanted = with_forces and self.trial.force is not None
+        trial = self.trial
         reading = self.responses.reading(model, subset)[self.samples]
-        force = self.responses.total_force(model)[self.samples] if wanted else None
-        if self.trial.tared:
+        force = self.responses.total_force(model)[self.samples] if with_forces and trial.force is not None else None
+        if trial.tared:
             reading, force = reading - reading[:1], None if force is None else force - force[:1]
-        return self._of_recording(model, Prediction(reading, force), subset)
-
-    def _of_recording(self, model: Model, of_sensor: Prediction, subset: np.ndarray | None) -> Prediction:
-        """The prediction with the recording's own factor and zero."""
-        trial, reading, force = self.trial, of_sensor.reading, of_sensor.force
-        if trial.factor != 1.0 or trial.zero != 0.0:
+        if trial.factor != 1.0 or trial.zero != 0.0:  # the recording's own
             if trial.reading is not None:
                 rest = 0.0 if trial.tared else model.parameters.zero
                 measured = trial.reading if subset is None else trial.reading[:, subset]
@@ -327,9 +293,7 @@ class Predictor:
                 reading = rest + zero + factor * (reading - rest)
             elif force is not None and trial.force is not None:
                 force = self.numbers(model, force, trial.force)[0] * force
-        if force is not None:
-            force = self._with_force_zero(model, force)
-        return Prediction(reading, force)
+        return Prediction(reading, None if force is None else self._with_force_zero(model, force))
 
     def _with_force_zero(self, model: Model, force: np.ndarray) -> np.ndarray:
         """The net force as its sensor shows it, (T, 3) N."""
@@ -396,14 +360,6 @@ def placed_stimulus(trial: Trial, rig: Rig, model: Model) -> Stimulus:
     return of_texels(Session([trial], rig).placed(model), rig)
 
 
-def _height_of(trial: Trial, model: Model | None) -> float:
-    """Contact height of a trial; that from which its fit starts if it is free and the model does not have it."""
-    if not isinstance(trial.contact_height, str):
-        return trial.contact_height
-    numbers = {} if model is None else model.recordings
-    return numbers.get(number_name(CONTACT_HEIGHT, trial.contact_height), trial.height_start)
-
-
 def _acts_through(effect: Effect, mechanism: str) -> bool:
     return form_of(effect.name, effect.form).mechanism == mechanism
 
@@ -424,10 +380,6 @@ class _Recent(Generic[Value]):
                 self._values.popitem(last=False)
         self._values[key] = kept
         return kept
-
-    def get(self, key: object) -> Value | None:
-        """Return the result of a key, None if it is not kept."""
-        return self._values.get(key)
 
 
 def _effects_key(effects: tuple[Effect, ...]) -> object:

@@ -170,7 +170,7 @@ def _stimulus(trial: Trial, rig: Rig, texels: Texels) -> Stimulus:
     level = np.repeat(np.maximum(trial.level, 0.0)[:, None], n, axis=1)
     slip = None if along is None else along * (level > 0)[:, :, None]
     nothing = np.zeros_like(level)
-    slide = nothing if slip is None else np.sqrt(_dot(slip, slip))
+    slide = nothing if slip is None else np.sqrt(dot(slip, slip))
     if trial.stimulus == "force":
         return Stimulus(trial, nothing, nothing, level / _texel_count(rig), None, slide, slip)
     rate = np.where(level > 0, np.gradient(trial.level, trial.time)[:, None], 0.0)
@@ -354,11 +354,11 @@ def _weighted(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) 
     load, normal = load[back], normal[back]
     slip = None if along is None else along * (load > 0)[:, :, None]
     nothing = np.zeros_like(load)
-    return Stimulus(trial, nothing, nothing, load, normal, nothing if slip is None else np.sqrt(_dot(slip, slip)), slip)
+    return Stimulus(trial, nothing, nothing, load, normal, nothing if slip is None else np.sqrt(dot(slip, slip)), slip)
 
 
-def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Scalar product along the last axis; three products are several times as fast as einsum over so short an axis."""
+def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return the scalar product along the last axis; three products are several times as fast as einsum over so few."""
     return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
 
 

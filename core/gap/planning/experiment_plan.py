@@ -12,16 +12,18 @@ from ...effects.engine.registry import library
 from ...effects.engine.specification import FIT
 from ...errors import ParameterError
 from ...jobs import Job, Progress
-from ..base.base_model import base_parameters_to_search, recording_numbers
-from ..candidates.candidates import Candidate, candidates, scales_of
+from ..base.base_model import base_parameters_to_search, prepared, recording_numbers, start_model, with_recording_numbers
+from ..base.contact_heights import with_starting_heights
+from ..base.quantities import friction_kinds
+from ..candidates.candidates import DIRECTLY_ESTIMATED, NOT_FITTED, Candidate, candidates, scales_of
 from ..dataset.rig import Rig
+from ..fitting.identifiability import unidentifiable
 from ..fitting.least_squares import FreeParameter, free_base_parameters
-from ..fitting.noise_floor import ChannelNoise
-from ..forward.predictor import Model, Predictor
+from ..fitting.noise_floor import ChannelNoise, coverage
+from ..forward.predictor import Model, Predictor, predictors_of
 from ..selection.findings import Diagnosis
 from .paths import Ground, Limits, Trajectory, Wishes
 from .separation import Separation, Signals
-from .unfitted import unfitted
 
 Pair = tuple[str, str]
 """A kind that acts, and a rival."""
@@ -109,21 +111,30 @@ def plan_experiment(rig: Rig, wishes: Wishes | None = None) -> Job[ExperimentPla
 
     Raises
     ------
+    FileError
+        The recordings do not fit their stimulus, see :func:`.base_model.prepared`.
     ParameterError
         A limit or a kind that is wanted has no meaning here.
     """
     wishes = wishes or Wishes()
     yield Progress("contacts of every trial", 0, 100)
-    known = unfitted(rig)
-    ground = Ground(known.predictors, wishes.limits(known.predictors))
-    full = scales_of(known.fitted, known.start).reading
-    names = base_parameters_to_search(rig, known.fitted)
-    free = [*free_base_parameters(known.start.parameters, names, full), *recording_numbers(rig, known.fitted, full)]
-    search = _Search(ground, known.fitted, known.start, free, known.channels)
-    shown = [kind for kind in search.kinds if kind not in known.cannot_show]
+    rig = with_starting_heights(rig)
+    predictors = predictors_of(rig.trials, rig)
+    noise, _ = prepared(rig, predictors)
+    fitted = [predictor for predictor in predictors if predictor.trial.use == "fit"]
+    start = with_recording_numbers(start_model(rig, fitted), fitted)
+    can_show = {*(one.name for one in candidates(fitted, start)), *DIRECTLY_ESTIMATED, *NOT_FITTED, *friction_kinds()}
+    reasons = unidentifiable(coverage(fitted))
+    cannot_show = {name: reasons.get(name, "these recordings cannot show it") for name in library() if name not in can_show}
+    ground = Ground(predictors, wishes.limits(predictors))
+    full = scales_of(fitted, start).reading
+    names = base_parameters_to_search(rig, fitted)
+    free = [*free_base_parameters(start.parameters, names, full), *recording_numbers(rig, fitted, full)]
+    search = _Search(ground, fitted, start, free, noise)
+    shown = [kind for kind in search.kinds if kind not in cannot_show]
     _check_kinds(wishes.between, search.kinds)
     experiment, separations = yield from search.run(wishes.between or tuple(shown), choose_pair=not wishes.between)
-    return ExperimentPlan(tuple(one for one in separations if one.kind in shown), known.cannot_show, experiment)
+    return ExperimentPlan(tuple(one for one in separations if one.kind in shown), cannot_show, experiment)
 
 
 def plan_after(result: Diagnosis, wishes: Wishes | None = None) -> Job[PlannedExperiment | None]:
@@ -167,16 +178,17 @@ class _Search:
         noise: tuple[ChannelNoise, ChannelNoise],
     ):
         self._ground, self._fitted, self._model, self._free, self._noise = ground, list(fitted), model, free, noise
-        trials = [p.trial for p in self._fitted]
-        like = replace(
-            ground.like,
-            reading=next((one.reading for one in trials if one.reading is not None), None),
-            force=next((one.force for one in trials if one.force is not None), None),
+        has_readings, has_forces = (
+            any(getattr(p.trial, part) is not None for p in self._fitted) for part in ("reading", "force")
         )
         self._further: dict[str, tuple[Trajectory, Predictor]] = {}
         for name, programme in ground.programmes().items():
             trajectory = ground.trajectory(programme)
-            self._further[name] = trajectory, Predictor(trajectory.as_trial(like), ground.rig)
+            samples = len(trajectory.trial.time)
+            reading = np.zeros((samples, len(ground.rig.texels))) if has_readings else None
+            force = np.zeros((samples, 3)) if has_forces else None
+            trial = replace(trajectory.trial, reading=reading, force=force)
+            self._further[name] = trajectory, Predictor(trial, ground.rig)
         found = _fitted_kinds(self._fitted, model)
         names = {one.name for one in found}
         more = _fitted_kinds([*self._fitted, *(further for _, further in self._further.values())], model)

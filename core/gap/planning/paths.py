@@ -231,57 +231,13 @@ class Trajectory:
         Increasing.
     position : (k, 3) float, m, or None
         Of the probe in the sensor's frame at the knots.
-    quaternion : (4,) float or None
-        Its orientation, (w, x, y, z).
-    level : (k,) float or None
-        Depth (m) or force (N) at the knots, where the rig knows these.
-    step : float, s
-        Between the samples.
-    level_name : str
-        What the levels are: depth or force.
+    trial : Trial
+        A recording along it, without responses.
     """
 
     knots: np.ndarray
     position: np.ndarray | None
-    quaternion: np.ndarray | None
-    level: np.ndarray | None
-    step: float
-    level_name: str = "depth"
-
-    @property
-    def time(self) -> np.ndarray:
-        """Times of the samples, (T,) s."""
-        return np.arange(round(float(self.knots[-1]) / self.step) + 1) * self.step
-
-    def positions(self) -> np.ndarray | None:
-        """Return the positions at the samples, (T, 3) m; None if the rig knows none."""
-        if self.position is None:
-            return None
-        return np.stack([np.interp(self.time, self.knots, axis) for axis in self.position.T], axis=1)
-
-    def levels(self) -> np.ndarray | None:
-        """Return the depths (m) or forces (N) at the samples, (T,); None if the rig knows poses."""
-        return None if self.level is None else np.interp(self.time, self.knots, self.level)
-
-    def as_trial(self, like: Trial) -> Trial:
-        """Return a recording with this stimulus, otherwise like another one. Its responses are zero if that one has any."""
-        time, positions = self.time, self.positions()
-        turns = None if self.quaternion is None else np.tile(self.quaternion, (len(time), 1))
-        return replace(
-            like,
-            name="planned",
-            use="fit",
-            time=time,
-            position=positions,
-            quaternion=turns,
-            level=self.levels(),
-            travel=np.zeros((len(time), 2)),
-            reading=None if like.reading is None else np.zeros((len(time), like.reading.shape[1])),
-            force=None if like.force is None else np.zeros((len(time), 3)),
-            session="",
-            repeats="",
-            temperature=None,
-        )
+    trial: Trial
 
 
 class Ground:
@@ -385,21 +341,35 @@ class Ground:
         time, place, depth = (np.array(column) for column in zip(*knots, strict=True))
         planned = self._through(time, place, depth)
         if self.track:
-            excess = float(stimulus_of(planned.as_trial(self.like), self.rig).load.max()) - self.limits.depth
+            excess = float(stimulus_of(planned.trial, self.rig).load.max()) - self.limits.depth
             if excess > 0.0:
                 planned = self._through(time, place, np.where(depth > 0.0, depth - 1.01 * excess, depth))
         return planned
 
     def _through(self, time: np.ndarray, place: np.ndarray, depth: np.ndarray) -> Trajectory:
         """The trajectory through knots at times, places and depths."""
-        step = self.like.step
-        if self.quaternion is None:
-            return Trajectory(time, None, None, depth, step, self.like.stimulus)
-        if self.track:
-            position = self.places[place] + (self.touch[place] - depth)[:, None] * self.up
-            return Trajectory(time, position, self.quaternion, None, step)
-        position = self.places[place] + self.touch[place][:, None] * self.up
-        return Trajectory(time, position, self.quaternion, depth, step, self.like.stimulus)
+        step, position, turns = self.like.step, None, None
+        samples = np.arange(round(float(time[-1]) / step) + 1) * step
+        if self.quaternion is not None:
+            height = self.touch[place] - depth if self.track else self.touch[place]
+            position = self.places[place] + height[:, None] * self.up
+            turns = np.tile(self.quaternion, (len(samples), 1))
+        planned = replace(
+            self.like,
+            name="planned",
+            use="fit",
+            time=samples,
+            position=None if position is None else np.stack([np.interp(samples, time, axis) for axis in position.T], axis=1),
+            quaternion=turns,
+            level=None if self.track else np.interp(samples, time, depth),
+            travel=np.zeros((len(samples), 2)),
+            reading=None,
+            force=None,
+            session="",
+            repeats="",
+            temperature=None,
+        )
+        return Trajectory(time, position, planned)
 
     def _touching_heights(self) -> np.ndarray:
         """Height over each place at which the probe touches: from above in steps, then by halving."""

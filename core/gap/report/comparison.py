@@ -207,40 +207,16 @@ LOADINGS = {
     "seconds": "lasts {:.3g} times as long",
     "loads": "is loaded {:.3g} times as often",
 }
-"""Words for a quantity of :class:`RecordingSummary` that is so many times the largest of the fitted recordings."""
+"""Words for a quantity of :func:`_loading` that is so many times the largest of the fitted recordings."""
 FAST = 0.95
 """Quantile of the rates of loading that counts as a recording's speed."""
 
 
-@dataclass(frozen=True)
-class RecordingSummary:
-    """Stimulus of a recording, and its measured and predicted readings.
+def _level_and_gain(predictor: Predictor, model: Model, full: tuple[float, float]) -> tuple[float, float]:
+    """Mean of measured minus predicted readings without load, as a share of the range, and their ratio under load.
 
-    Attributes
-    ----------
-    level : float
-        Mean of measured minus predicted without load, as a share of the range; NaN if nothing is unloaded.
-    gain : float
-        Factor of the predicted readings, less their zero, that fits the measured ones best.
-    depth, speed, seconds, loads : float
-        Largest load, fast rate of loading, length, and number of times that it is loaded.
-    load : (n,) float
-        Sum of each texel's load.
-    slides : bool
+    Without readings the net force along its largest component is compared. Both are NaN where they are unknown.
     """
-
-    level: float
-    gain: float
-    depth: float
-    speed: float
-    seconds: float
-    loads: int
-    load: np.ndarray
-    slides: bool
-
-
-def recording_summary(predictor: Predictor, model: Model, full: tuple[float, float]) -> RecordingSummary:
-    """Return the summary of one recording; without readings the net force along its largest component is compared."""
     trial, predicted = predictor.trial, predictor.predict(model)
     if trial.reading is not None:
         measured, expected, size, zero = trial.reading, predicted.reading, full[0], model.parameters.zero
@@ -256,21 +232,21 @@ def recording_summary(predictor: Predictor, model: Model, full: tuple[float, flo
     shift = level * size if np.isfinite(level) else 0.0
     x, y = (expected - zero)[known & ~idle], (measured - zero - shift)[known & ~idle]
     gain = float(x @ y) / float(x @ x) if float(x @ x) > 0 else float("nan")
-    load = predictor.stimulus.load
-    total = load.max(axis=1)
-    rate = np.gradient(total, trial.time)
+    return level, gain
+
+
+def _loading(predictor: Predictor) -> dict[str, float]:
+    """Largest load, fast rate of loading, length of a recording, and number of times that it is loaded."""
+    time, load = predictor.trial.time, predictor.stimulus.load.max(axis=1)
+    rate = np.gradient(load, time)
     quick = rate[rate > 0]
-    half = total > 0.5 * max(float(total.max(initial=0.0)), 1e-300)
-    return RecordingSummary(
-        level,
-        gain,
-        float(total.max(initial=0.0)),
-        float(np.quantile(quick, FAST)) if len(quick) else 0.0,
-        float(trial.time[-1] - trial.time[0]),
-        int(np.count_nonzero(half[1:] & ~half[:-1])),
-        load.sum(axis=0),
-        bool(predictor.stimulus.slide_speed.any()),
-    )
+    half = load > 0.5 * max(float(load.max(initial=0.0)), 1e-300)
+    return {
+        "depth": float(load.max(initial=0.0)),
+        "speed": float(np.quantile(quick, FAST)) if len(quick) else 0.0,
+        "seconds": float(time[-1] - time[0]),
+        "loads": float(np.count_nonzero(half[1:] & ~half[:-1])),
+    }
 
 
 def recording_differences(result: Diagnosis, name: str) -> list[str]:
@@ -282,27 +258,26 @@ def recording_differences(result: Diagnosis, name: str) -> list[str]:
     name : str
         Of the check recording.
     """
-    model = result.best.model
-    fitted = [recording_summary(p, model, result.full) for p in result.of("fit")]
-    other = next(recording_summary(p, model, result.full) for p in result.of("check") if p.trial.name == name)
+    other, fitted = next(p for p in result.of("check") if p.trial.name == name), result.of("fit")
+    own, *others = (_level_and_gain(p, result.best.model, result.full) for p in (other, *fitted))
+    level, gain = (_outside(values, value) for value, values in zip(own, zip(*others, strict=True), strict=True))
     said = []
-    level = _outside([one.level for one in fitted], other.level)
     if abs(level) > LEAST_LEVEL:
         said.append(
             f"without load it reads {abs(level):.1%} of the range {'more' if level > 0 else 'less'} than any fitted one"
         )
-    gain = _outside([one.gain for one in fitted], other.gain)
     if abs(gain) > LEAST_GAIN:
         said.append(f"under the same load it reads {abs(gain):.0%} {'more' if gain > 0 else 'less'} than any fitted one")
-    for attribute, words in LOADINGS.items():
-        most, own = max(float(getattr(one, attribute)) for one in fitted), float(getattr(other, attribute))
-        if own > OUTSIDE * most > 0.0:
-            said.append(f"it {words.format(own / most)} as any fitted one")
-    known = np.sum([one.load for one in fitted], axis=0) > 0
-    share = float(other.load[~known].sum()) / max(float(other.load.sum()), 1e-300)
+    loading, loadings = _loading(other), [_loading(p) for p in fitted]
+    for quantity, words in LOADINGS.items():
+        most = max(one[quantity] for one in loadings)
+        if loading[quantity] > OUTSIDE * most > 0.0:
+            said.append(f"it {words.format(loading[quantity] / most)} as any fitted one")
+    load, known = other.stimulus.load.sum(axis=0), np.any([(p.stimulus.load > 0).any(axis=0) for p in fitted], axis=0)
+    share = float(load[~known].sum()) / max(float(load.sum()), 1e-300)
     if share > LEAST_NEW_LOAD:
         said.append(f"{share:.0%} of its load is on texels that no fitted one touches")
-    if other.slides and not any(one.slides for one in fitted):
+    if other.stimulus.slide_speed.any() and not any(p.stimulus.slide_speed.any() for p in fitted):
         said.append("a surface slides in it, and in no fitted one")
     return said or ["it does not differ from the fitted ones in level, gain, depth, speed, length or place"]
 

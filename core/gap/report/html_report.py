@@ -54,12 +54,13 @@ def html_report(result: Diagnosis, found: dict[str, Any], headline: str, picture
         Names of the pictures that were drawn into `folder`.
     folder : Path
     """
+    encoded = {name: base64.b64encode((folder / f"{name}.png").read_bytes()).decode() for name in pictures}
     return render_html(
         TEMPLATE,
         name=result.rig.name,
         extent=_extent(result),
         headline=headline,
-        pictures={name: {"caption": CAPTIONS[name], "data": _encoded(folder / f"{name}.png")} for name in pictures},
+        pictures={name: {"caption": CAPTIONS[name], "data": data} for name, data in encoded.items()},
         gap=_gap_table(found),
         effects=[_effect(one) for one in found["found"]],
         evidence=_evidence_table(found),
@@ -78,11 +79,6 @@ def _extent(result: Diagnosis) -> str:
     seconds = sum(float(t.time[-1] - t.time[0]) for t in trials)
     uses = f"{counted(len(result.of('fit')), 'trial')} fitted, {len(result.of('check'))} for checking only"
     return f"{counted(len(result.rig.texels), 'texel')}, {uses}, {seconds:.0f} s in all."
-
-
-def _encoded(path: Path) -> str:
-    """A file's bytes in base64."""
-    return base64.b64encode(path.read_bytes()).decode()
 
 
 def _gap_table(found: dict[str, Any]) -> Table:

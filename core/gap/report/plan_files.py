@@ -119,16 +119,14 @@ def write_plan(plan: ExperimentPlan, folder: Path) -> list[Path]:
 
 def write_trajectory(trajectory: Trajectory, path: Path) -> None:
     """Write the samples of a trajectory as the columns that a recording of a rig has: SI units, one header line."""
-    columns = {"time": trajectory.time}
-    positions, levels = trajectory.positions(), trajectory.levels()
-    if positions is not None:
-        axes = ("x", "y", "z") if levels is None else ("x", "y")
-        columns |= dict(zip(axes, positions.T, strict=False))
-    if trajectory.quaternion is not None:
-        turns = zip(("qw", "qx", "qy", "qz"), trajectory.quaternion, strict=True)
-        columns |= {name: value + 0.0 * trajectory.time for name, value in turns}
-    if levels is not None:
-        columns[trajectory.level_name] = levels
+    trial = trajectory.trial
+    columns = {"time": trial.time}
+    if trial.position is not None:
+        columns |= dict(zip("xyz" if trial.level is None else "xy", trial.position.T, strict=False))
+    if trial.quaternion is not None:
+        columns |= dict(zip(("qw", "qx", "qy", "qz"), trial.quaternion.T, strict=True))
+    if trial.level is not None:
+        columns[trial.stimulus] = trial.level
     rows = zip(*columns.values(), strict=True)
     with atomic_write(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
         file.write(",".join(columns) + "\n")

@@ -295,15 +295,10 @@ FILE_TYPES = ("png", "pdf")
 
 def picture(name: str, result: Diagnosis, errors: GapErrors) -> Figure:
     """Draw the picture of this name (see :data:`CAPTIONS`)."""
-    drawings: dict[str, Callable[[], Figure]] = {
-        "overview": lambda: overview(result, errors),
-        "gap": lambda: gap_bars(result, errors),
-        "curves": lambda: curves(result),
-        "loops": lambda: loops(result),
-        "map": lambda: error_map(result),
-        "phases": lambda: phase_bars(result, errors),
-    }
-    return drawings[name]()
+    without_errors = {"curves": curves, "loops": loops, "map": error_map}
+    if name in without_errors:
+        return without_errors[name](result)
+    return {"overview": overview, "gap": gap_bars, "phases": phase_bars}[name](result, errors)
 
 
 def draw(result: Diagnosis, errors: GapErrors, folder: Path) -> Job[list[str]]:

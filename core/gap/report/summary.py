@@ -20,7 +20,7 @@ from ..planning.experiment_plan import PlannedExperiment, plan_after
 from ..selection.check_recordings import CheckedRecording
 from ..selection.findings import Diagnosis, Finding
 from .amended_sensor import amended_sensor, with_mean_gain_moved
-from .comparison import USES, GapErrors, closed_share, error_location, gap_errors, recording_differences, recording_errors
+from .comparison import USES, GapErrors, closed_share, error_location, recording_differences, recording_errors
 from .html_report import html_report
 from .plan_files import NEXT_TRAJECTORY, experiment_words, write_trajectory
 from .plots import FILE_TYPES, draw
@@ -146,15 +146,15 @@ def _found(one: Finding, model: Model, result: Diagnosis, errors: GapErrors) -> 
     }
 
 
-def write_report(result: Diagnosis, folder: Path, errors: GapErrors | None = None) -> Job[None]:
+def write_report(result: Diagnosis, folder: Path, errors: GapErrors) -> Job[None]:
     """Write everything into a folder. All files of an earlier report there are replaced together (:class:`.FileList`).
 
     Parameters
     ----------
     result : Diagnosis
     folder : Path
-    errors : GapErrors, optional
-        Of the result, if they were computed before.
+    errors : GapErrors
+        Of the result.
 
     Yields
     ------
@@ -169,7 +169,6 @@ def write_report(result: Diagnosis, folder: Path, errors: GapErrors | None = Non
     with files.new_files("report") as new:
         yield Progress("writing the amended sensor", 0, 1000)
         write_sensor(new / "sensor.toml", amended_sensor(result))
-        errors = errors or gap_errors(result)
         pictures = yield from part_of_job(
             draw(result, errors, new), lambda step: Progress(step.stage, 100 + 500 * step.done // step.total, 1000)
         )

@@ -102,7 +102,7 @@ def test_the_report_says_what_friction_does_and_what_is_left(tmp_path):
         and "not missing" not in said
     )
     assert summary.summary(result, errors)["base"]["gap_without_friction"] == errors.frictionless
-    *_, _ = summary.write_report(result, tmp_path)
+    *_, _ = summary.write_report(result, tmp_path, errors)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "1 texel, 1 trial fitted" in page and "base without its friction" in page and "base model, refitted" in page
     assert "not identifiable from these recordings" in page  # friction and stiffness are known as a product alone

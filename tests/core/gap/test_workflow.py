@@ -21,7 +21,7 @@ from palpate.core.gap.fitting.least_squares import FreeParameter, TrialView, cro
 from palpate.core.gap.fitting.residual_tests import residual_structure
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.report import summary
-from palpate.core.gap.report.comparison import nrmse
+from palpate.core.gap.report.comparison import gap_errors, nrmse
 from palpate.core.gap.report.sentences import next_experiment, noise_sentence
 from palpate.core.io.sensor_toml import read_sensor
 
@@ -161,7 +161,7 @@ def test_creep_is_named_and_the_gap_closes(tmp_path, monkeypatch):
     result = cases.diagnosed(cases.rig(contact=cases.relaxing(), seed=7))
     assert [named.name for named in result.findings] == ["creep"]
     assert result.verdict == "explained" and result.findings[0].confidence > 0.6
-    for _ in summary.write_report(result, tmp_path):
+    for _ in summary.write_report(result, tmp_path, gap_errors(result)):
         pass
     found = json.loads((tmp_path / "gap.json").read_text())
     assert not (tmp_path / "next_experiment.csv").exists()

@@ -86,14 +86,14 @@ def test_a_plan_names_a_programme_and_writes_a_recording_that_a_rig_can_have(rig
     assert words["experiment"]["programme"] == one.programme and len(words["pairs"]) == len(plan.separations)
     table = np.genfromtxt(written[1], delimiter=",", names=True)
     assert table.dtype.names == ("time", "x", "y", "z", "qw", "qx", "qy", "qz")
-    assert np.allclose(np.stack([table[axis] for axis in "xyz"], 1), one.trajectory.positions(), rtol=0, atol=1e-10)
+    assert np.allclose(np.stack([table[axis] for axis in "xyz"], 1), one.trajectory.trial.position, rtol=0, atol=1e-10)
     assert main(["gap", str(path), "--plan", "--between", "creep", "drift", "--out", str(out)]) == 0
     assert json.loads(written[0].read_text())["experiment"]["between"] == ["creep", "drift"]  # the earlier plan is replaced
 
 
 def test_what_is_known_by_unloading_is_planned_with_unloading(rig):
     plan = run_job(plan_experiment(rig, Wishes(between=("hysteresis", "stiffening"))))
-    depth = cases.RADIUS - plan.experiment.trajectory.positions()[:, 2]
+    depth = cases.RADIUS - plan.experiment.trajectory.trial.position[:, 2]
     assert "hysteresis" in plan.cannot_show and (np.diff(depth) < 0.0).any()
     assert plan.experiment.separation_after > 2.0 * plan.experiment.separation_before
 

@@ -52,13 +52,13 @@ def test_every_trajectory_keeps_its_limits(name):
     chosen = list(ground.programmes().values())[:: 7 if name == "any mesh" else 1]
     for programme in chosen:
         trajectory = ground.trajectory(programme)
-        time, position = trajectory.time, trajectory.positions()
-        assert time[0] == 0.0 and time[-1] == pytest.approx(LIMITS.duration, abs=trajectory.step)
+        time, position = trajectory.trial.time, trajectory.trial.position
+        assert time[0] == 0.0 and time[-1] == pytest.approx(LIMITS.duration, abs=trajectory.trial.step)
         assert (np.diff(trajectory.knots) > 0.0).all()
         for moments, places in ((trajectory.knots, trajectory.position), (time, position)):
             speeds = np.linalg.norm(np.diff(places, axis=0), axis=1) / np.diff(moments)
             assert speeds.max() <= LIMITS.speed * (1.0 + ROUNDING)
-        stimulus = stimulus_of(trajectory.as_trial(rig.trials[0]), rig)
+        stimulus = stimulus_of(trajectory.trial, rig)
         deep = stimulus.load.max(axis=1)
         assert 0.0 < deep.max() <= LIMITS.depth + 1e-11
         assert deep[time < 0.5].max() == 0.0 and deep[-3:].max() == 0.0  # it begins and ends clear of the sensor
@@ -109,6 +109,6 @@ def test_where_depths_are_known_depths_are_planned():
     assert limits.depth == pytest.approx(0.001) and limits.speed == pytest.approx(0.001, rel=0.05)
     assert not any("slide" in called or "place" in called for called in ground.programmes())
     for programme in ground.programmes().values():
-        planned = ground.trajectory(programme).as_trial(trial)
+        planned = ground.trajectory(programme).trial
         assert planned.position is None and planned.level.min() == 0.0 and 0.0 < planned.level.max() <= limits.depth
         assert np.abs(np.diff(planned.level)).max() * 40.0 <= limits.speed * (1.0 + ROUNDING)
