@@ -6,4 +6,4 @@ the recordings in ``view_set``; dead texels and converters are estimated directl
 fitted effect whose signature the recordings lack.
 """
 
-__all__ = ["candidates", "plausibility", "rao_score", "silenced_texels", "starting_points", "view_set"]
+__all__ = ["candidates", "direct_estimates", "plausibility", "rao_score", "silenced_texels", "starting_points", "view_set"]

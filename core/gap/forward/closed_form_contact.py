@@ -87,7 +87,9 @@ def meet(center, frame, size, position, outward, reach, contact):  # type: ignor
         Depth, normal and point; written to.
     """
     depth, normal, point = contact
-    is_ball, most, farthest = len(size) == 1, 0, np.sqrt((size * size).sum()) + reach
+    is_ball, most, farthest = len(size) == 1, 0, size[0] + reach
+    if not is_ball:
+        farthest = np.sqrt(size[0] * size[0] + size[1] * size[1] + size[2] * size[2]) + reach
     for i in range(center.shape[0]):
         deep = 0
         for j in range(position.shape[0]):

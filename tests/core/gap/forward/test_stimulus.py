@@ -211,7 +211,7 @@ def test_texels_that_are_touched_at_different_times_are_not_equal(samples):
 
 def test_texels_that_are_never_touched_read_nothing():
     one = trial(np.tile([0.0, 0.0, 0.05], (20, 1)), force=np.zeros((20, 3)))
-    predicted = Predictor(one, rig(Indenter(box(0.01, 0.01, 0.01), None, "box", (0.01, 0.01, 0.01)), one)).predict(
+    predicted = Predictor(one, rig(Indenter(box(0.01, 0.01, 0.01), None, (0.01, 0.01, 0.01)), one)).predict(
         Model(SensorParameters())
     )
     assert not predicted.reading.any() and predicted.force is not None and not predicted.force.any()
