@@ -37,7 +37,15 @@ def held(signal: np.ndarray, time: np.ndarray, values: Values, transducers: Tran
     return (1.0 - gone) * signal + gone * np.asarray(values["level"])
 
 
-_DEAD = Parameter("dead", "1", 0.0, 0.0, 1.0, "1 for each dead texel, 0 for the others, and less than 1 where a texel still answers.", per_texel=True)
+_DEAD = Parameter(
+    "dead",
+    "1",
+    0.0,
+    0.0,
+    1.0,
+    "1 for each dead texel, 0 for the others, less than 1 where a texel still answers.",
+    per_texel=True,
+)
 _SHARE = Parameter("share", "1", 0.1, 0.0, 1.0, "Share of the texels that are dead.")
 
 KIND = Kind(
