@@ -273,6 +273,7 @@ def test_a_dead_texel_may_follow_a_share_of_its_load(change, follows):
     candidate = Candidate(kind_of("dead-texels"), form_of("dead-texels", "held"))
     effect = unresponsive_texels(views, model, candidate, len(rig.texels))
     free = free_with((), model, candidate, effect, scales_of(predictors, model))
+    assert [item.number_count(len(rig.texels)) for item in free] == [len(GONE)] * 2
     found = fit(views, model.with_effect(effect), free).model.effects[0].values
     others = np.delete(np.arange(len(rig.texels)), GONE)
     assert all((np.asarray(found[name])[others] == 0.0).all() for name in ("dead", "level"))

@@ -13,7 +13,7 @@ import pytest
 from palpate.core.effects.engine.registry import effect, library
 from palpate.core.gap.base.base_model import with_recording_numbers
 from palpate.core.gap.base.recording_differences import with_own_numbers
-from palpate.core.gap.fitting.least_squares import Fit, fit
+from palpate.core.gap.fitting.least_squares import Fit, FreeParameter, fit
 from palpate.core.gap.forward.predictor import Model, number_name, predictors_of
 from palpate.core.gap.selection import blocks, diagnosis, noise_level, rule_numbers, score, search, verdict
 from palpate.core.gap.selection.block_sums import Sums
@@ -42,7 +42,7 @@ def sums(left, changes=()):
 def model(left, *labels, changes=None, assumed="", numbers=1):
     """A model of some forms that leaves this much; its effects change the prediction by `changes`."""
     names = tuple(label.split("/")[0] for label in labels)
-    free = tuple(SimpleNamespace(effect=0, name=f"number {i}", per_texel=False) for i in range(numbers)) if labels else ()
+    free = tuple(FreeParameter(0, f"number {i}", 0.0, 1.0) for i in range(numbers)) if labels else ()
     fit = SimpleNamespace(free=free, model=SimpleNamespace(effects=()))
     one = Hypothesis(fit, names, labels, sums(left, (0.0,) * len(labels) if changes is None else changes), assumed)
     one.__dict__["is_bent"] = False
@@ -66,7 +66,7 @@ def test_the_score_is_the_logarithm_of_what_is_left_and_allowed():
 
 
 def test_displacements_that_a_scan_has_found_are_numbers():
-    free = (SimpleNamespace(effect=0, name="z", per_texel=False),)
+    free = (FreeParameter(0, "z", 0.0, 1.0),)
     moved = effect("misalignment", "rigid", x=0.001, y=0.0, z=0.0, about_x=0.0, about_y=0.0, about_z=0.02)
     one = Hypothesis(
         SimpleNamespace(free=free, model=SimpleNamespace(effects=(moved,))), ("misalignment",), ("misalignment/rigid",), None
