@@ -163,8 +163,9 @@ def _estimate(place: Path, folder: Path, arguments: argparse.Namespace) -> int:
     from ..sweep import studies
 
     workers = arguments.workers or count_of_cores()
-    with console.Interrupt.raised_at_once():
+    with console.Interrupt.raised_at_once(limits=True):
         opened, found = studies.try_study(place, arguments.scripts)
+    console.Interrupt.check()  # a limit that a run has taken for its own error
     print(_kind_of_runs(opened))
     if arguments.slurm:
         from ..sweep import slurm

@@ -57,7 +57,7 @@ class LeRobotWriter:
     task : str
         What LeRobot calls the task, the same for all runs.
     varied : sequence of Feature
-        What was varied, the same in all frames of a run.
+        Columns of the varied properties, which are constant within a run.
     file_bytes : int
         Size from which on a file of frames is followed by the next, where it is above :data:`FILE_MEGABYTES`.
     """
@@ -81,7 +81,7 @@ class LeRobotWriter:
         _write_texels(root / "meta" / "texels.parquet", layout.texels)
 
     def add(self, index: int, digest: str, columns: dict[str, np.ndarray], values: Sequence[Any] = ()) -> None:
-        """Append the frames of a run: its index and digest, the numbers of the layout's features, and what was varied."""
+        """Append the frames of a run: its index, its digest, numbers of the layout's features, values of the varied properties."""
         count = len(columns[TIMESTAMP.name])
         places = {
             "frame_index": np.arange(count),

@@ -24,7 +24,7 @@ from ..forward.predictor import Model, Predictor
 NOT_FITTED = names_found_by(SCATTER)
 """Kinds that are not fitted but found in the final residual (see :func:`.residual_tests.proportional_noise`)."""
 DIRECTLY_ESTIMATED = (*names_found_by(SILENT_TEXELS), *names_found_by(STEPS))
-"""Kinds whose parameters are estimated directly from the readings (see :mod:`.direct_estimates`)."""
+"""Kinds whose fit, if there is one, begins with a direct estimate from the readings (see :mod:`.direct_estimates`)."""
 SHORTEST_STEP, LONGEST_STEP = 0.01, 20.0
 """A starting point is moved along a candidate's strength by factors between these."""
 SMALL, LARGE = 0.02, 4.0

@@ -46,9 +46,9 @@ class NewRig:
     path : Path
         Of the rig.
     rig : Rig
-        What was read from it.
+        As read from that file.
     notes : tuple of str
-        What a user should know, a sentence each; they stand in the rig as comments, too.
+        Remarks for the user, a sentence each; they stand in the rig as comments, too.
     """
 
     path: Path

@@ -239,8 +239,9 @@ def clipped(reading, _time):
     np.minimum(reading, 0.03, out=reading)
 
 
-@pytest.mark.parametrize(("change", "level"), [(silent, 0.0), (stuck, 0.3), (railed, 2.0), (clipped, None)])
-def test_texels_that_do_not_answer(change, level):
+def estimated(change):
+    """Candidate with a rig whose readings are changed, its predictors, views, and the effect that is estimated."""
+
     def changed(reading, time):
         reading = reading.copy()
         change(reading, time)
@@ -249,9 +250,15 @@ def test_texels_that_do_not_answer(change, level):
     rig = cases.rig(change=changed, seed=3, stated=80.0, noise=1e-4)
     predictors = predictors_of(rig.trials, rig)
     noise, _ = prepared(rig, predictors)
-    view_set = view_set_of(predictors, (noise[0].deviation, 1.0))
+    views = view_set_of(predictors, (noise[0].deviation, 1.0)).whole
     candidate = Candidate(kind_of("dead-texels"), form_of("dead-texels", "held"))
-    found = unresponsive_texels(view_set.whole, Model(rig.parameters), candidate, len(rig.texels))
+    found = unresponsive_texels(views, Model(rig.parameters), candidate, len(rig.texels))
+    return candidate, rig, predictors, views, found
+
+
+@pytest.mark.parametrize(("change", "level"), [(silent, 0.0), (stuck, 0.3), (railed, 2.0), (clipped, None)])
+def test_texels_that_do_not_answer(change, level):
+    _, rig, _, _, found = estimated(change)
     if level is None:
         assert found is None
         return
@@ -261,17 +268,8 @@ def test_texels_that_do_not_answer(change, level):
 
 @pytest.mark.parametrize(("change", "follows"), [(silent, 0.0), (stuck, 0.0), (deaf, 0.05)])
 def test_a_dead_texel_may_follow_a_share_of_its_load(change, follows):
-    def changed(reading, time):
-        reading = reading.copy()
-        change(reading, time)
-        return reading
-
-    rig = cases.rig(change=changed, seed=3, stated=80.0, noise=1e-4)
-    predictors, model = predictors_of(rig.trials, rig), Model(rig.parameters)
-    noise, _ = prepared(rig, predictors)
-    views = view_set_of(predictors, (noise[0].deviation, 1.0)).whole
-    candidate = Candidate(kind_of("dead-texels"), form_of("dead-texels", "held"))
-    effect = unresponsive_texels(views, model, candidate, len(rig.texels))
+    candidate, rig, predictors, views, effect = estimated(change)
+    model = Model(rig.parameters)
     free = free_with((), model, candidate, effect, scales_of(predictors, model))
     assert [item.number_count(len(rig.texels)) for item in free] == [len(GONE)] * 2
     found = fit(views, model.with_effect(effect), free).model.effects[0].values
