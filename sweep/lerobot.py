@@ -81,7 +81,7 @@ class LeRobotWriter:
         _write_texels(root / "meta" / "texels.parquet", layout.texels)
 
     def add(self, index: int, digest: str, columns: dict[str, np.ndarray], values: Sequence[Any] = ()) -> None:
-        """Append the frames of a run: its index, its digest, numbers of the layout's features, values of the varied properties."""
+        """Append the frames of a run: its index and digest, numbers of the features, and values of the varied properties."""
         count = len(columns[TIMESTAMP.name])
         places = {
             "frame_index": np.arange(count),
