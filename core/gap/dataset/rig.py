@@ -225,7 +225,6 @@ def _read_trials(words: RigWords, reader: _TrialReader) -> tuple[list[Trial], li
         warnings += notes
     check_free_heights(trials, path)
     trials, notes = on_common_clocks(trials, histories, words.clock, path)
-    trials = [_on_own_clock(trial) for trial in trials]
     names = [trial.name for trial in trials]
     for name in names:
         if names.count(name) > 1:
@@ -504,15 +503,7 @@ def _temperatures(columns: Mapping[str, np.ndarray], time: np.ndarray, file: Pat
             f"`temperature` in '{file.name}' reaches {worst:g} °C: check its unit, [columns] takes "
             'temperature = { name = "…", unit = "K" }.'
         )
-    return time[known] - time[0], values[known]
-
-
-def _on_own_clock(trial: Trial) -> Trial:
-    """The trial with the times of its temperatures on the clock of its samples, rather than since its first sample."""
-    if trial.temperature is None:
-        return trial
-    since, values = trial.temperature
-    return replace(trial, temperature=(trial.time[0] + since, values))
+    return time[known], values[known]
 
 
 def _clock(columns: Mapping[str, np.ndarray], file: Path) -> np.ndarray:

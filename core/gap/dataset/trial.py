@@ -110,6 +110,11 @@ class Trial:
         """True if any channel of the responses has two different values."""
         return any((np.fmax.reduce(part, axis=0) > np.fmin.reduce(part, axis=0)).any() for part in self.responses)
 
+    def later(self, seconds: float) -> Trial:
+        """Return the recording with its samples and temperatures later by a time, seconds."""
+        temperature = self.temperature and (self.temperature[0] + seconds, self.temperature[1])
+        return replace(self, time=self.time + seconds, temperature=temperature)
+
     def without(self, rows: np.ndarray) -> Trial:
         """Return the recording without its responses in some samples, (T,) bool."""
         reading, force = (
@@ -286,11 +291,11 @@ def on_common_clocks(
                     "The time stamps go on from recording to recording, so they are one session: what the sensor remembers "
                     'goes on, too (clock = "own" in the rig if each was recorded with a fresh sensor).'
                 )
-            return [replace(trial, time=trial.time - began, session=ONE_CLOCK) for trial in trials], notes
+            return [replace(trial.later(-began), session=ONE_CLOCK) for trial in trials], notes
     alone = [float(trial.time[0]) for trial, history in zip(trials, histories, strict=True) if not history.session]
     for i, history in enumerate(histories):
         if not history.session:
-            trials[i] = replace(trials[i], time=trials[i].time - min(alone))
+            trials[i] = trials[i].later(-min(alone))
     for name in names:
         members = [i for i, history in enumerate(histories) if history.session == name]
         if _is_mixed([trials[i] for i in members]):
@@ -300,8 +305,7 @@ def on_common_clocks(
             )
         starts, unknown = _starts([trials[i] for i in members], [histories[i] for i in members], clock, path)
         for i, start in zip(members, starts, strict=True):
-            time = trials[i].time
-            trials[i] = replace(trials[i], time=time - time[0] + start, session=name)
+            trials[i] = replace(trials[i].later(-trials[i].time[0]).later(start), session=name)
         if unknown and len(members) > 1:
             notes.append(
                 f"Nothing says how long the pauses of session '{name}' were: {UNKNOWN_PAUSE:g} s each were assumed; "

@@ -62,10 +62,12 @@ def test_what_a_rig_says_is_not_asked_again():
     assert not may_differ(replace(rig, trials=(*rig.trials[:2], rig.trials[4])))
 
 
-def test_one_session_keeps_the_order_of_the_rig():
+def test_one_session_keeps_the_order_of_the_rig_and_temperatures_at_their_samples():
     rig = changing(lambda force, i: force)
+    rig = replace(rig, trials=tuple(replace(one, temperature=(one.time, one.time + 20.0)) for one in rig.trials))
     session = as_one_session(rig)
     assert session is not None and len({trial.session for trial in session.trials}) == 1
     ends = [float(trial.time[-1]) for trial in session.trials]
     assert all(trial.time[0] > end for trial, end in zip(session.trials[1:], ends[:-1], strict=True))
     assert [trial.name for trial in session.trials] == [trial.name for trial in rig.trials]
+    assert all(np.array_equal(trial.temperature[0], trial.time) for trial in session.trials)
