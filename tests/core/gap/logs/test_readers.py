@@ -165,6 +165,30 @@ def test_mcap_with_json(tmp_path):
     assert "/camera (foxglove.CompressedImage) is not read" in read_log(path).notes[0]
 
 
+def test_mcap_with_topics_of_both_versions_of_ros(tmp_path):
+    """Their headers have one name and different fields: each channel has types of its own."""
+    writer_of = pytest.importorskip("mcap.writer")
+    rule, path = "=" * 80, tmp_path / "both.mcap"
+    forms = {
+        "ros1": f"Header header\nfloat64 value\n{rule}\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id",
+        "ros2": f"std_msgs/Header header\nfloat64 value\n{rule}\nMSG: std_msgs/Header\n"
+        f"builtin_interfaces/Time stamp\nstring frame_id\n{rule}\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec",
+    }
+    with path.open("wb") as file:
+        writer = writer_of.Writer(file)
+        writer.start()
+        for number, (name, text) in enumerate(forms.items()):
+            schema = writer.register_schema(("skin/Force", "skin/msg/Force")[number], f"{name}msg", text.encode())
+            channel = writer.register_channel(f"/{name}", ("ros1", "cdr")[number], schema)
+            for i, force in enumerate(FORCE):
+                stamp = struct.pack("<IIII", i, i, 5, 0) if name == "ros1" else b"\0\1\0\0" + struct.pack("<iII4x", i, 5, 1)
+                writer.add_message(channel, i * 10**9, stamp + struct.pack("<d", force), i * 10**9)
+        writer.finish()
+    for name in forms:
+        columns = table_of(path, f"/{name}").columns
+        assert np.array_equal(columns["value"], FORCE) and columns["time"][2] == 2.000000005
+
+
 # --- what cannot be read is one sentence
 
 
