@@ -63,6 +63,10 @@ def find_meshes(vary: Mapping[str, Any], base: Path) -> dict[str, Path]:
     words: list[str] = []
     for name, entry in vary.items():
         if name.endswith(f".{MESH}") and not is_scene_property(name):
+            if isinstance(entry, str) and glob.has_magic(entry):
+                raise ParameterError(
+                    f"'{name}' is the pattern '{entry}': write {{ choice = [\"{entry}\"] }} to vary its files."
+                )
             given = entry.get(CHOICE) if isinstance(entry, Mapping) else [entry]
             words += [word for word in given if isinstance(word, str)] if isinstance(given, list) else []
     files: dict[str, Path] = {}

@@ -6,7 +6,7 @@ import pytest
 import trimesh
 from study_scenes import BALL_RADIUS, HEAD, tiny_scene
 
-from palpate.core.errors import PalpateError
+from palpate.core.errors import PalpateError, ParameterError
 from palpate.core.geometry.mesh import mass_properties
 from palpate.core.io.input_files import load_mesh
 from palpate.core.study.design import columns_of, find_meshes, freeze_meshes
@@ -88,3 +88,11 @@ def test_what_is_no_mesh_is_one_sentence(folder, words, sentence):
     with pytest.raises(PalpateError, match=sentence) as raised:
         plan_in(folder)
     assert "\n" not in str(raised.value)
+
+
+def test_a_pattern_that_is_one_value_is_one_sentence(folder):
+    text = STUDY.replace('{ choice = ["shapes/*.stl", "cone.ply"] }', '"shapes/*.stl"')
+    assert text != STUDY
+    (folder / "study.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(ParameterError, match=r"'Ball.mesh' is the pattern 'shapes/\*.stl': write { choice = "):
+        plan_in(folder)
