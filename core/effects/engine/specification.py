@@ -257,6 +257,8 @@ class Form:
     error : float or None
         φ of a form that is free to follow any law of its kind: the share of the mean square of the kind's change that it leaves
         of other laws, measured on laws that the library does not have. None for formulas of textbooks.
+    jumps : bool
+        Whether the reading jumps where a load reaches its only parameter: no derivative leads to the value, so it is scanned.
     is_apart : bool
         Whether the free forms of its kind explain a part of it and do not follow it, so that pairs are looked for in it, too.
     """
@@ -284,7 +286,13 @@ class Form:
     same_as: str = ""
     needs: str = ""
     error: float | None = None
+    jumps: bool = False
     is_apart: bool = False
+
+    @property
+    def is_wide(self) -> bool:
+        """True if the form is free to follow any law of its kind, or is one that those forms do not follow."""
+        return self.error is not None or self.is_apart
 
     @cached_property
     def mechanism(self) -> str:

@@ -89,6 +89,7 @@ KIND = Kind(
             (_THRESHOLD,),
             neutral={"threshold": 0.0},
             memoryless=step,
+            jumps=True,
             is_apart=True,
         ),
     ),

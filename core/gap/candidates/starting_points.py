@@ -8,7 +8,7 @@ import numpy as np
 from ...effects.engine.registry import form_of
 from ...effects.engine.specification import SILENT_TEXELS, STEPS, scalar
 from ...model.sensor import Effect
-from .candidates import IN_PLANE, SMALL_SHIFT, SMALL_TURN, START_COUNT, Candidate, Scales
+from .candidates import IN_PLANE, SMALL_SHIFT, SMALL_TURN, START_COUNT, Candidate, Scales, search_range
 from .direct_estimates import few_levels, quantization_starts, unresponsive_texels
 from .rao_score import ScoreTest
 from .view_set import ViewSet
@@ -17,10 +17,13 @@ VISIBLE_STEPS_PROMISE = 0.5
 """Promise of quantization whose steps are seen in the readings, as a share of the squares: it is always fitted."""
 LARGEST_SHIFT, LARGEST_TURN = 0.5, 0.1
 """Bounds of the starting points of displaced texels: a share of the pitch, and an angle in rad."""
-DISPLACEMENT_SCANS = ((0.15, 8), (0.05, 3))
+DISPLACEMENT_SCANS = ((0.15, 8), (0.02, 8))
 """Step and number of steps to each side of the scans for a large displacement, first ones and second ones, which reach from one
-first step to the next; steps are shares of the pitch and of `LARGEST_TURN`. Shifts of 14 rigs with flat punches are 0.95
-pitches at most, and in each the squares fall as far as on a grid of 0.05 pitches (to four digits). DIRECT misses it in two."""
+first step to the next; steps are shares of the pitch and of `LARGEST_TURN`. Shifts of 25 rigs with flat punches are 0.95
+pitches at most, and in 24 the fit ends at the noise, with second steps of 0.05 in 23: there the place is 0.04 pitches wide."""
+THRESHOLD_SCANS = (24, 16)
+"""Values of a threshold over its search range, and then between the neighbours of the best, in scans for one where readings
+jump. Each of eight jumps is then found to a hundredth."""
 TEXEL_STEP = 0.01
 """Test step of parameters of single texels, as a share of their scale."""
 
@@ -62,12 +65,27 @@ def _scaled_starts(candidate: Candidate, score_test: ScoreTest, scales: Scales, 
     The score test is linear and an effect is not: how far loads spread does nothing near a width of zero.
     """
     gain, tried = abs(score_test.model.parameters.gain), []
+    if candidate.form.jumps:
+        return [_threshold(candidate, score_test, scales, gain)]
     for values in candidate.starting_values(scales, gain, count):
         effect = candidate.effect(values, scales.texels, gain)
         promise, length = score_test.score(effect)
         if length > 0.0 or candidate.is_signed:
             tried += [(promise, effect), (promise, candidate.scaled(effect, length, gain))]
     return sorted(tried, key=lambda entry: -entry[0])
+
+
+def _threshold(candidate: Candidate, score_test: ScoreTest, scales: Scales, gain: float) -> tuple[float, Effect]:
+    """The threshold that lowers the squares most in two scans: where readings jump, no derivative points to it."""
+    (parameter,) = candidate.form.parameters
+    low, high = search_range(parameter.scaled(gain), scales, candidate.form)
+    for count in THRESHOLD_SCANS:
+        values = np.geomspace(low, high, count)
+        effects = [candidate.effect({parameter.name: float(value)}, scales.texels, gain) for value in values]
+        decreases = [score_test.decrease_with(effect) for effect in effects]
+        best = int(np.argmax(decreases))
+        low, high = values[max(best - 1, 0)], values[min(best + 1, count - 1)]
+    return decreases[best], effects[best]
 
 
 def _quantization_starts(candidate: Candidate, score_test: ScoreTest, view_set: ViewSet) -> list[tuple[float, Effect]]:

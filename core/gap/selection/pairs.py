@@ -67,7 +67,7 @@ def _dictionary(screening: Screening, base: Hypothesis) -> Iterator[_Entry]:
             by_kind.setdefault(one.name, []).append(one)
     gain = abs(base.fit.model.parameters.gain)
     for forms in by_kind.values():
-        wide = [one for one in forms if one.form.error is not None or one.form.is_apart]
+        wide = [one for one in forms if one.form.is_wide]
         yield from [*_entries(screening, wide, gain)] or _entries(screening, forms, gain)
 
 

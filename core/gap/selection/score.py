@@ -183,9 +183,9 @@ class Score:
         return bool((excess[0] > np.maximum(SIGNIFICANT_ERRORS * self.noise.error, allowed[0]))[self.measured].any())
 
     def is_refuted(self, forms: Sequence[Hypothesis]) -> bool:
-        """Return whether a kind leaves a gap in all its forms that are free to follow any law, or in all if it has none."""
-        free = [one for one in forms if form_of(*one.forms[-1].split("/")).error is not None]
-        return all(map(self.leaves_gap, free or forms))
+        """Return whether a kind leaves a gap in all its wide forms (see :attr:`.specification.Form.is_wide`), or in all."""
+        wide = [one for one in forms if form_of(*one.forms[-1].split("/")).is_wide]
+        return all(map(self.leaves_gap, wide or forms))
 
     def value(self, one: Hypothesis) -> float:
         """Return S."""

@@ -132,9 +132,9 @@ class Screening:
     ) -> Making:
         """Return the parent with one effect more, for the kinds that promise most, in one form of each.
 
-        It is the form that is free to follow any law, if the kind has one that promises anything, so that kinds compete at
-        equal freedom. Alone, the two forms that promise most are compared, of its free forms or of all if it has none, and the
-        best kinds come in all their forms.
+        It is a form that is free to follow any law, or that those do not follow, if the kind has one that promises anything, so
+        that kinds compete at equal freedom. Alone, the two forms that promise most are compared, of these or of all if there is
+        none, and the best kinds come in all their forms.
 
         Parameters
         ----------
@@ -155,9 +155,8 @@ class Screening:
         for name, forms in by_kind.items():
             if kinds is None or name in kinds:
                 yield "screening every effect"
-                free = [one for one in forms if one.form.error is not None]
-                others = [one for one in forms if one.form.error is None]
-                screened.append(self._promises(parent, tests, free) or self._promises(parent, tests, others))
+                wide = [one for one in forms if one.form.is_wide]
+                screened.append(self._promises(parent, tests, wide) or self._promises(parent, tests, forms))
         screened = sorted((own for own in screened if own), key=lambda own: -own[0].share)
         first_fits = []
         for own in screened[: None if is_first else TRIED_KINDS]:
