@@ -135,6 +135,20 @@ def test_a_large_shift_under_a_flat_punch_is_found():
     assert left < 0.05 * whole
 
 
+@pytest.mark.parametrize("threshold", [0.01, 0.02, 0.03])
+def test_a_threshold_at_which_readings_jump_is_found(threshold):
+    """No derivative points to it, and forms without a jump do not follow it: it is scanned, and screened beside them."""
+    rig = cases.rig(lambda force, time: np.where(force > threshold, force, 0.0), trials=3, noise=1e-3)
+    seen = predictors_of(rig.trials, rig)
+    views = [TrialView(one, noise=(1e-3, 1.0)) for one in seen]
+    base = fit(views, Model(rig.parameters), free_base_parameters(rig.parameters, ("k", "cn"), 1.0))
+    step = Candidate(kind_of("dead-zone"), form_of("dead-zone", "step"))
+    decrease, found = starting_points(step, test := ScoreTest(views, base), None, scales_of(seen, base.model), count=1)[0]
+    assert found.values["threshold"] == pytest.approx(threshold, rel=0.02)
+    assert decrease > 0.8 * test.total
+    assert step.form.is_wide and form_of("dead-zone", "knee").is_wide and not form_of("dead-zone", "hard").is_wide
+
+
 def test_a_shift_starts_from_the_displacement_that_was_fitted_alone():
     rigid = effect("misalignment", "rigid", x=1e-3, y=-2e-3, z=1e-4, about_x=0.01, about_y=0.0, about_z=0.02)
     alone = {"misalignment/rigid": rigid, "lag/first-order": effect("lag", "first-order", time=0.1)}
