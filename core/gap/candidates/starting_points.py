@@ -66,7 +66,7 @@ def _scaled_starts(candidate: Candidate, score_test: ScoreTest, scales: Scales, 
     """
     gain, tried = abs(score_test.model.parameters.gain), []
     if candidate.form.jumps:
-        return [_threshold(candidate, score_test, scales, gain)]
+        return _scanned_threshold(candidate, score_test, scales, gain)
     for values in candidate.starting_values(scales, gain, count):
         effect = candidate.effect(values, scales.texels, gain)
         promise, length = score_test.score(effect)
@@ -75,17 +75,19 @@ def _scaled_starts(candidate: Candidate, score_test: ScoreTest, scales: Scales, 
     return sorted(tried, key=lambda entry: -entry[0])
 
 
-def _threshold(candidate: Candidate, score_test: ScoreTest, scales: Scales, gain: float) -> tuple[float, Effect]:
+def _scanned_threshold(candidate: Candidate, score_test: ScoreTest, scales: Scales, gain: float) -> list[tuple[float, Effect]]:
     """The threshold that lowers the squares most in two scans: where readings jump, no derivative points to it."""
     (parameter,) = candidate.form.parameters
     low, high = search_range(parameter.scaled(gain), scales, candidate.form)
-    for count in THRESHOLD_SCANS:
+    best: list[tuple[float, Effect]] = []
+    for count in THRESHOLD_SCANS if low > 0.0 else ():
         values = np.geomspace(low, high, count)
         effects = [candidate.effect({parameter.name: float(value)}, scales.texels, gain) for value in values]
         decreases = [score_test.decrease_with(effect) for effect in effects]
-        best = int(np.argmax(decreases))
-        low, high = values[max(best - 1, 0)], values[min(best + 1, count - 1)]
-    return decreases[best], effects[best]
+        top = int(np.argmax(decreases))
+        low, high = values[max(top - 1, 0)], values[min(top + 1, count - 1)]
+        best = [(decreases[top], effects[top])]
+    return best
 
 
 def _quantization_starts(candidate: Candidate, score_test: ScoreTest, view_set: ViewSet) -> list[tuple[float, Effect]]:
