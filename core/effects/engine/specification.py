@@ -256,11 +256,11 @@ class Form:
         What recordings must hold for this form, one of :data:`NEEDS`, if it differs from the kind's.
     error : float or None
         φ of a form that is free to follow any law of its kind: the share of the mean square of the kind's change that it leaves
-        of other laws, measured on laws that the library does not have. None for formulas of textbooks.
-    jumps : bool
-        Whether the reading jumps where a load reaches its only parameter: no derivative leads to the value, so it is scanned.
+        of other laws at most, as measured, rounded up to 0.001 or 0.005. None for formulas of textbooks.
+    jumps_at : tuple of str
+        The parameter, if the reading jumps where a load reaches its value: no derivative leads there, so it is scanned.
     is_apart : bool
-        Whether the free forms of its kind explain a part of it and do not follow it, so that pairs are looked for in it, too.
+        Whether the free forms of its kind explain a part of it and do not follow it, so that it is looked for beside them.
     """
 
     name: str
@@ -286,7 +286,7 @@ class Form:
     same_as: str = ""
     needs: str = ""
     error: float | None = None
-    jumps: bool = False
+    jumps_at: tuple[str, ...] = ()
     is_apart: bool = False
 
     @property

@@ -120,7 +120,7 @@ KIND = Kind(
             "Paul, Introduction to Electromagnetic Compatibility (2006), chapter 9: crosstalk between parallel wires",
             (
                 Parameter("share", "1", 0.05, 0.0, 0.5, "Share c that the next wire adds."),
-                Parameter("fall", "1", 0.4, 0.0, 0.9, "Factor q of the share from each wire to the next but one."),
+                Parameter("fall", "1", 0.4, 0.0, 1.0, "Factor q of the share from each wire to the next but one."),
             ),
             neutral={"share": 0.0},
             memoryless=wires,

@@ -71,7 +71,7 @@ KIND = Kind(
             (_DEAD,),
             neutral={"dead": 0.0},
             memoryless=listed,
-            error=0.005,  # every texel that is silent is one of these
+            error=0.001,  # every texel that is silent is one of these
         ),
         Form(
             "held",
@@ -84,7 +84,7 @@ KIND = Kind(
             neutral={"dead": 0.0},
             memoryless=held,
             after_conversion=True,
-            error=0.005,  # every stuck-at fault has this form
+            error=0.001,  # every stuck-at fault has this form
         ),
         Form(
             "stuck",

@@ -80,7 +80,7 @@ KIND = Kind(
             ),
             neutral={"threshold": 0.0},
             memoryless=knee,
-            error=0.005,  # of hard and soft it leaves 0.0002 at most
+            error=0.001,  # of hard and soft it leaves 0.0002 at most
         ),
         Form(
             "step",
@@ -89,7 +89,7 @@ KIND = Kind(
             (_THRESHOLD,),
             neutral={"threshold": 0.0},
             memoryless=step,
-            jumps=True,
+            jumps_at=("threshold",),
             is_apart=True,
         ),
     ),

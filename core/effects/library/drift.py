@@ -107,7 +107,7 @@ KIND = Kind(
             neutral={"amount": 0.0},
             memoryless=shifted_power,
             after_conversion=True,
-            error=0.005,  # of linear and warm-up it leaves 0.0002 at most
+            error=0.001,  # of linear and warm-up it leaves 0.0002 at most
         ),
         Form(
             "sensitivity",

@@ -64,7 +64,7 @@ KIND = Kind(
             (Parameter("factor", "1", 1.0, 0.0, 100.0, "Factor g of each texel.", per_texel=True),),
             neutral={"factor": 1.0},
             memoryless=listed,
-            error=0.005,  # every factor of a texel is one of these
+            error=0.001,  # every factor of a texel is one of these
         ),
         Form(
             "gradient",

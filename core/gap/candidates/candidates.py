@@ -316,7 +316,7 @@ def parameters_at_bounds(model: Model, free: Sequence[FreeParameter], index: int
     form = form_of(effect.name, effect.form)
     neutral = form.neutral
     shares = [p for p in form.parameters if p.unit == "1" and p.low >= 0.0 and NEARLY_ALL <= p.high <= 1.0]
-    whole = {p.name: p.high for p in shares if p.low == neutral.get(p.name) == 0.0 or p.low > 0.0 and p.high == 1.0}
+    whole = {p.name: p.high for p in shares if p.high == 1.0 or p.low == neutral.get(p.name) == 0.0}
     whole |= {p.name: p.high for p in form.parameters if p.name == SHARPNESS}
     found = {}
     for item in free:
@@ -372,7 +372,7 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
                 continue
             fitted = _without(form, kind.known_parameters)
             moves = form.placement is not None
-            held = IN_PLANE if moves and in_steps else ()
+            held = form.jumps_at or (IN_PLANE if moves and in_steps else ())
             one = Candidate(kind, _without(fitted, ("z",)) if moves and heights_open else fitted, held)
             if several and not in_rows and _needs_rows(form):
                 continue

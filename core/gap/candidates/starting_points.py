@@ -21,9 +21,9 @@ DISPLACEMENT_SCANS = ((0.15, 8), (0.02, 8))
 """Step and number of steps to each side of the scans for a large displacement, first ones and second ones, which reach from one
 first step to the next; steps are shares of the pitch and of `LARGEST_TURN`. Shifts of 25 rigs with flat punches are 0.95
 pitches at most, and in 24 the fit ends at the noise, with second steps of 0.05 in 23: there the place is 0.04 pitches wide."""
-THRESHOLD_SCANS = (24, 16)
-"""Values of a threshold over its search range, and then between the neighbours of the best, in scans for one where readings
-jump. Each of eight jumps is then found to a hundredth."""
+THRESHOLD_SCANS = (24, 12, 12)
+"""Values of a threshold over its search range, and then twice between the neighbours of the best, in scans for one where
+readings jump: to a hundredth."""
 TEXEL_STEP = 0.01
 """Test step of parameters of single texels, as a share of their scale."""
 
@@ -65,7 +65,7 @@ def _scaled_starts(candidate: Candidate, score_test: ScoreTest, scales: Scales, 
     The score test is linear and an effect is not: how far loads spread does nothing near a width of zero.
     """
     gain, tried = abs(score_test.model.parameters.gain), []
-    if candidate.form.jumps:
+    if candidate.form.jumps_at:
         return _scanned_threshold(candidate, score_test, scales, gain)
     for values in candidate.starting_values(scales, gain, count):
         effect = candidate.effect(values, scales.texels, gain)
@@ -77,7 +77,7 @@ def _scaled_starts(candidate: Candidate, score_test: ScoreTest, scales: Scales, 
 
 def _scanned_threshold(candidate: Candidate, score_test: ScoreTest, scales: Scales, gain: float) -> list[tuple[float, Effect]]:
     """The threshold that lowers the squares most in two scans: where readings jump, no derivative points to it."""
-    (parameter,) = candidate.form.parameters
+    parameter = next(q for q in candidate.form.parameters if q.name in candidate.form.jumps_at)
     low, high = search_range(parameter.scaled(gain), scales, candidate.form)
     best: list[tuple[float, Effect]] = []
     for count in THRESHOLD_SCANS if low > 0.0 else ():

@@ -116,8 +116,9 @@ def _fitted(screening: Screening, base: Hypothesis, pair: tuple[_Entry, _Entry])
     """Two effects fitted together, first to a part of the data; empty if the signature of one of them is not there."""
     model, free = base.fit.model, tuple(base.fit.free)
     for one in pair:
-        moves = one.candidate.form.placement is not None  # its change is not proportional to it
-        effect = one.effect if moves else one.candidate.scaled(one.effect, one.length, abs(model.parameters.gain))
+        form = one.candidate.form
+        keeps = form.placement is not None or form.jumps_at  # its change is not proportional to it
+        effect = one.effect if keeps else one.candidate.scaled(one.effect, one.length, abs(model.parameters.gain))
         free = free_with(free, model, one.candidate, effect, screening.scales)
         model = model.with_effect(effect)
     views = screening.view_set.few_samples

@@ -79,12 +79,14 @@ class Hypothesis:
     def number_count(self) -> int:
         """Number of fitted values of effects and recordings; one for each texel where each has its own.
 
-        Displacements that a scan has found count, too.
+        Displacements and thresholds that a scan has found count, too.
         """
-        effects = enumerate(self.fit.model.effects)
-        moving = [(index, one) for index, one in effects if form_of(one.name, one.form).placement is not None]
-        moved = {(index, name) for index, one in moving for name in IN_PLANE if one.values.get(name, 0.0) != 0.0}
-        scanned = moved - {(item.effect, item.name) for item in self.fit.free}
+        scanned = set()
+        for index, one in enumerate(self.fit.model.effects):
+            form = form_of(one.name, one.form)
+            names = form.jumps_at or (IN_PLANE if form.placement is not None else ())
+            scanned |= {(index, name) for name in names if one.values.get(name, 0.0) != 0.0}
+        scanned -= {(item.effect, item.name) for item in self.fit.free}
         texels = max([len(v) for e in self.fit.model.effects for v in e.values.values() if isinstance(v, tuple)] + [1])
         return len(scanned) + sum(item.number_count(texels) for item in self.fit.free if item.effect != BASE)
 
@@ -183,9 +185,9 @@ class Score:
         return bool((excess[0] > np.maximum(SIGNIFICANT_ERRORS * self.noise.error, allowed[0]))[self.measured].any())
 
     def is_refuted(self, forms: Sequence[Hypothesis]) -> bool:
-        """Return whether a kind leaves a gap in all its wide forms (see :attr:`.specification.Form.is_wide`), or in all."""
-        wide = [one for one in forms if form_of(*one.forms[-1].split("/")).is_wide]
-        return all(map(self.leaves_gap, wide or forms))
+        """Return whether a kind leaves a gap in all its forms that are free to follow any law, or in all if it has none."""
+        free = [one for one in forms if form_of(*one.forms[-1].split("/")).error is not None]
+        return all(map(self.leaves_gap, free or forms))
 
     def value(self, one: Hypothesis) -> float:
         """Return S."""
