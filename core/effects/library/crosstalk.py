@@ -124,6 +124,7 @@ KIND = Kind(
             ),
             neutral={"share": 0.0},
             memoryless=wires,
+            fitted_up_to={"share": 0.25},  # as neighbours: half of a signal in the next wire is how loads spread
             error=0.005,  # of neighbours and lines it leaves 0.0022 at most
         ),
     ),
