@@ -184,6 +184,10 @@ class Score:
         excess, allowed = self.parts(one, self.weights[:1] if weights is None else weights)
         return bool((excess[0] > np.maximum(SIGNIFICANT_ERRORS * self.noise.error, allowed[0]))[self.measured].any())
 
+    def reaches_noise(self, one: Hypothesis) -> bool:
+        """Return whether a model leaves no more than noise accounts for."""
+        return bool((self.parts(one, self.weights[:1])[0][0] <= SIGNIFICANT_ERRORS * self.noise.error)[self.measured].all())
+
     def is_refuted(self, forms: Sequence[Hypothesis]) -> bool:
         """Return whether a kind leaves a gap in all its forms that are free to follow any law, or in all if it has none."""
         free = [one for one in forms if form_of(*one.forms[-1].split("/")).error is not None]

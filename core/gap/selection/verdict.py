@@ -23,10 +23,16 @@ NEARLY_WITHOUT = "the model without it does nearly as well, for one name less"
 
 
 def with_best_kinds(search: Search, best: Hypothesis) -> Hypothesis:
-    """Return the model, or one with another kind in a place where that explains more by all its forms, or is simpler."""
+    """Return the model, or one with another kind in a place where that explains more by all its forms, or is simpler.
+
+    A kind that leaves a gap gives way to one that leaves nothing beyond the noise, whatever its formulas might leave elsewhere.
+    """
     score = search.score
     for index, name in enumerate(best.names):
         _, others = search.in_place_of(best, index)
+        exact = [one for forms in others.values() for one in forms if score.reaches_noise(one)]
+        if exact and score.leaves_gap(best):
+            return max(exact, key=score.value)
         own = float(score.values_of_kind(others[name], search.library[name])[0])
         for other, forms in others.items():
             one = max(forms, key=score.value)

@@ -124,7 +124,7 @@ def test_a_large_shift_under_a_flat_punch_is_found():
     assert free == ["z", "about_x", "about_y"]  # an edge stays where it is
     rocked = replace(trials[0], quaternion=np.tile([np.cos(0.01), np.sin(0.01), 0.0, 0.0], (len(trials[0].time), 1)))
     not_all_flat = candidates([*flat, Predictor(rocked, rig)], base)
-    assert not any(one.held for one in not_all_flat if one.form.placement)  # a face that is not parallel meets texels one after another
+    assert not any(one.held for one in not_all_flat if one.form.placement)  # such a face meets texels one after another
     test = ScoreTest(views, fit(views, base, free_base_parameters(base.parameters, ("k",), 1.0)))
     candidate = Candidate(kind_of("misalignment"), form_of("misalignment", "shift"))
     _, best = starting_points(candidate, test, None, scales)[0]
