@@ -136,6 +136,17 @@ def test_a_kind_that_leaves_more_than_its_error_is_refuted_where_another_does_no
     assert weight == pytest.approx(found.score.weight(best, model(4.0))) and not rivals
 
 
+@pytest.mark.parametrize(("left", "gives_way"), [(1.015, True), (1.1, False)])
+def test_a_kind_that_leaves_a_gap_gives_way_to_one_that_reaches_the_noise(left, gives_way):
+    """The kind that fits may leave 3.8, so that its score is lower than that of one which leaves 0.3 and may leave nothing."""
+    best, other = model(1.3, "misalignment/tilt"), model(left, "adhesion/constant", changes=(75.0,))
+    found = search.Search({})
+    found.score, found.library = rule(), Counter(misalignment=1, adhesion=1)
+    found.in_place_of = lambda *_: (model(9.0), {"misalignment": [best], "adhesion": [other]})
+    assert found.score.value(best) > found.score.value(other)
+    assert verdict.with_best_kinds(found, best) is (other if gives_way else best)
+
+
 @pytest.mark.parametrize(("left", "helps"), [(2.9, False), (1.8, True)])
 def test_an_effect_may_help_to_predict_without_paying_for_its_name(left, helps):
     """A gap of two variances shrinks to 0.8, or hardly; the allowance of the first effect hides either."""
