@@ -304,8 +304,9 @@ class UI:
             return self.x, self.y
         unscrolled = True
         while True:
-            for share in (0.6, 0.3, 0.85, 0.9):  # twice in a row: a button wakes at the second event
-                for y in range(region.y + region.height - 8, region.y + 4, -11):  # a row is 20 pixels high
+            for share in (0.6, 0.3, 0.85, 0.9):
+                # A row is 20 pixels high, and a button wakes at the second event in it.
+                for y in range(region.y + region.height - 8, region.y + 4, -11):
                     yield from self.glide(region.x + region.width * share, y)
                     here = self.button_here(area, kind)
                     seen[here] = None

@@ -8,7 +8,7 @@ import numpy as np
 from ...model.parameter import Parameter
 from ...model.sensor import Values
 from ..engine.random_streams import uniform
-from ..engine.specification import SILENT_TEXELS, Drawing, Form, Kind, TransducerArray, scalar
+from ..engine.specification import EXACT_FORM_ERROR, SILENT_TEXELS, Drawing, Form, Kind, TransducerArray, scalar
 
 
 def _dead(values: Values, seed: int, texels: int) -> np.ndarray:
@@ -71,7 +71,7 @@ KIND = Kind(
             (_DEAD,),
             neutral={"dead": 0.0},
             memoryless=listed,
-            error=0.001,  # every texel that is silent is one of these
+            error=EXACT_FORM_ERROR,  # every texel that is silent is one of these
         ),
         Form(
             "held",
@@ -84,7 +84,7 @@ KIND = Kind(
             neutral={"dead": 0.0},
             memoryless=held,
             after_conversion=True,
-            error=0.001,  # every stuck-at fault has this form
+            error=EXACT_FORM_ERROR,  # every stuck-at fault has this form
         ),
         Form(
             "stuck",

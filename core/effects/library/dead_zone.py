@@ -7,7 +7,7 @@ import numpy as np
 
 from ...model.parameter import Parameter
 from ...model.sensor import Values
-from ..engine.specification import Drawing, Form, Kind, TransducerArray, scalar, where_loaded
+from ..engine.specification import EXACT_FORM_ERROR, Drawing, Form, Kind, TransducerArray, scalar, where_loaded
 
 
 def hard(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
@@ -80,7 +80,7 @@ KIND = Kind(
             ),
             neutral={"threshold": 0.0},
             memoryless=knee,
-            error=0.001,  # of hard and soft it leaves 0.0002 at most
+            error=EXACT_FORM_ERROR,  # of hard and soft it leaves 0.0002 at most
         ),
         Form(
             "step",

@@ -8,7 +8,7 @@ import numpy as np
 from ...model.parameter import Parameter
 from ...model.sensor import Values
 from ..engine.random_streams import random_walk
-from ..engine.specification import Drawing, Form, Kind, TransducerArray, scalar
+from ..engine.specification import EXACT_FORM_ERROR, Drawing, Form, Kind, TransducerArray, scalar
 
 MINUTE = 60.0
 """Seconds after which the amounts of the forms "shifted-power" and "listed" hold."""
@@ -107,7 +107,7 @@ KIND = Kind(
             neutral={"amount": 0.0},
             memoryless=shifted_power,
             after_conversion=True,
-            error=0.001,  # of linear and warm-up it leaves 0.0002 at most
+            error=EXACT_FORM_ERROR,  # of linear and warm-up it leaves 0.0002 at most
         ),
         Form(
             "sensitivity",

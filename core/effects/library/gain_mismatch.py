@@ -8,7 +8,7 @@ import numpy as np
 from ...model.parameter import Parameter
 from ...model.sensor import Values
 from ..engine.random_streams import normal
-from ..engine.specification import Drawing, Form, Kind, TransducerArray, scalar
+from ..engine.specification import EXACT_FORM_ERROR, Drawing, Form, Kind, TransducerArray, scalar
 
 
 def random(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
@@ -64,7 +64,7 @@ KIND = Kind(
             (Parameter("factor", "1", 1.0, 0.0, 100.0, "Factor g of each texel.", per_texel=True),),
             neutral={"factor": 1.0},
             memoryless=listed,
-            error=0.001,  # every factor of a texel is one of these
+            error=EXACT_FORM_ERROR,  # every factor of a texel is one of these
         ),
         Form(
             "gradient",

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...model.parameter import Parameter
 from ...model.sensor import Values
-from ..engine.specification import Drawing, Form, Kind, scalar
+from ..engine.specification import EXACT_FORM_ERROR, Drawing, Form, Kind, scalar
 
 
 def displaced(
@@ -89,7 +89,7 @@ KIND = Kind(
             (_X, _Y, _HEIGHT, _TILT_X, _TILT_Y, _TURN),
             neutral=dict.fromkeys(("x", "y", "z", "about_x", "about_y", "about_z"), 0.0),
             placement=displaced,
-            error=0.001,  # every motion of a rigid sensor is one of these
+            error=EXACT_FORM_ERROR,  # every motion of a rigid sensor is one of these
         ),
     ),
     experiment="press at many known places, also beyond the edges",

@@ -23,7 +23,8 @@ first step to the next; steps are shares of the pitch and of `LARGEST_TURN`. Shi
 pitches at most, and in 24 the fit ends at the noise, with second steps of 0.05 in 23: there the place is 0.04 pitches wide."""
 THRESHOLD_SCANS = (24, 12, 12)
 """Values of a threshold over its search range, and then twice between the neighbours of the best, in scans for one where
-readings jump: to a hundredth."""
+readings jump. The first steps are of a quarter, the last of a hundredth: the threshold is found in 12 of 12 rigs, in 4 of these
+beside another effect."""
 TEXEL_STEP = 0.01
 """Test step of parameters of single texels, as a share of their scale."""
 
@@ -76,7 +77,7 @@ def _scaled_starts(candidate: Candidate, score_test: ScoreTest, scales: Scales, 
 
 
 def _scanned_threshold(candidate: Candidate, score_test: ScoreTest, scales: Scales, gain: float) -> list[tuple[float, Effect]]:
-    """The threshold that lowers the squares most in two scans: where readings jump, no derivative points to it."""
+    """The threshold that lowers the squares most in scans that close in on it: where readings jump, no derivative does."""
     parameter = next(q for q in candidate.form.parameters if q.name in candidate.form.jumps_at)
     low, high = search_range(parameter.scaled(gain), scales, candidate.form)
     best: list[tuple[float, Effect]] = []

@@ -6,6 +6,8 @@ What is a matter of speed alone (how many models are tried) stands in :mod:`.sea
 
 from __future__ import annotations
 
+from ...effects.engine.specification import EXACT_FORM_ERROR
+
 STRETCHES = 8
 """M: independent stretches in the recordings. Programmes of presses repeat themselves, so there are far fewer of them than
 samples. With every block as a stretch of its own, load spreading in another formula was called crosstalk."""
@@ -16,9 +18,8 @@ MEMORIES = 5.0
 FORMULA_ERROR = 0.05
 """φ: share of the mean square of a kind's change that its formulas leave of a sensor that follows another formula, where the
 recordings show no larger one. The textbook forms of load spreading leave 0.04 to 0.09 of other kernels in the middle, and 0.25
-at most; a form that is free to follow any law states its own (:attr:`.specification.Form.error`), 0.001 where it leaves less
-than that. With 0.005 for those, too, 8 of 24 dead zones had rivals that leave more than ten times as much."""
-FREE_FORM_ERROR = 0.001
+at most; a form that is free to follow any law states its own (:attr:`.specification.Form.error`)."""
+FREE_FORM_ERROR = EXACT_FORM_ERROR
 """φ of a gain and a zero of each recording, as of a gain of each texel: every gain and zero is one of these."""
 LARGEST_FORMULA_ERROR = 0.25
 """Largest φ that recordings may show: two forms of which one leaves more describe two kinds of things."""
