@@ -9,7 +9,7 @@ import numpy as np
 
 from ...model.parameter import Parameter
 from ...model.sensor import Values
-from ..engine.specification import STEPS, Drawing, Form, Kind, TransducerArray, scalar
+from ..engine.specification import EXACT_FORM_ERROR, STEPS, Drawing, Form, Kind, TransducerArray, scalar
 
 
 def rounded(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
@@ -70,6 +70,7 @@ KIND = Kind(
             neutral={"step": 0.0},
             memoryless=rounded,
             after_conversion=True,
+            error=EXACT_FORM_ERROR,  # the values of a converter are these exactly
         ),
         Form(
             "floor",
@@ -79,6 +80,7 @@ KIND = Kind(
             neutral={"step": 0.0},
             memoryless=rounded_down,
             after_conversion=True,
+            error=EXACT_FORM_ERROR,  # the values of a converter are these exactly
         ),
         Form(
             "bits",
@@ -105,6 +107,7 @@ KIND = Kind(
             neutral={"growth": 0.0},
             memoryless=companded,
             after_conversion=True,
+            error=EXACT_FORM_ERROR,  # the values of a converter are these exactly
         ),
         Form(
             "power",
@@ -118,6 +121,7 @@ KIND = Kind(
             neutral={"first": 0.0},
             memoryless=power,
             after_conversion=True,
+            error=EXACT_FORM_ERROR,  # the values of a converter are these exactly
         ),
     ),
     experiment="raise the load very slowly through its whole range",

@@ -11,7 +11,7 @@ import numpy as np
 from ...effects.engine.registry import form_of
 from ...model.sensor import Effect
 from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
-from ..fitting.least_squares import Fit, FreeParameter, TrialView, derivatives, value_of
+from ..fitting.least_squares import Fit, FreeParameter, TrialView, derivatives, value_of, with_values
 
 RIDGE = 1e-10
 """Added to the diagonal of a Gram matrix, as a share of one plus its trace."""
@@ -127,6 +127,16 @@ class ScoreTest:
         """Return by how much the squares fall with an effect as it is, if the free parameters follow, to first order."""
         promise, length = self.score(effect)
         return promise * (2.0 * length - 1.0) / length**2 if length != 0.0 else 0.0
+
+    def decrease_after_step(self, effect: Effect) -> float:
+        """Return by how much an effect as it is lowers the squares after one step of the free parameters that texels share."""
+        model, common = self.model.with_effect(effect), [item for item in self.free if not item.per_texel]
+        along = sum(c @ view.residual(model).ravel() for c, view in zip(self.derivatives, self.views, strict=True))
+        steps = np.linalg.solve(self.gram, along)
+        at = [item.to_coordinate(value_of(model, item)) + step for item, step in zip(common, steps, strict=True)]
+        moved = with_values(model, common, [item.from_coordinate(x) for item, x in zip(common, at, strict=True)])
+        after = sum(float(np.vdot(r, r)) for r in (view.residual(moved) for view in self.views))
+        return self.total - after if np.isfinite(after) else -np.inf
 
     def score_of_texels(self, effect: Effect) -> float:
         """Return by how much the squares fall at best if each texel has a length of its own, less what noise alone gives.

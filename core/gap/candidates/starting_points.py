@@ -14,7 +14,7 @@ from .rao_score import ScoreTest
 from .view_set import ViewSet
 
 VISIBLE_STEPS_PROMISE = 0.5
-"""Promise of quantization whose steps are seen in the readings, as a share of the squares: it is always fitted."""
+"""Added to the promise of quantization whose steps are seen in the readings, as a share of the squares: it is always fitted."""
 LARGEST_SHIFT, LARGEST_TURN = 0.5, 0.1
 """Bounds of the starting points of displaced texels: a share of the pitch, and an angle in rad."""
 DISPLACEMENT_SCANS = ((0.15, 8), (0.02, 8))
@@ -92,14 +92,12 @@ def _scanned_threshold(candidate: Candidate, score_test: ScoreTest, scales: Scal
 
 
 def _quantization_starts(candidate: Candidate, score_test: ScoreTest, view_set: ViewSet) -> list[tuple[float, Effect]]:
-    """Steps that are estimated from the readings. If they are seen in the readings, they promise enough to be fitted."""
-    model = score_test.model
-    values = view_set.moving_readings(model)
-    visible = few_levels(values) is not None
-    least = VISIBLE_STEPS_PROMISE * score_test.total if visible else 0.0
+    """The best of the steps that are estimated from the readings; the other parameters follow it by half a step."""
+    values = view_set.moving_readings(score_test.model)
+    sure = VISIBLE_STEPS_PROMISE * score_test.total if few_levels(values) is not None else 0.0
     starts = quantization_starts(values, view_set.whole, candidate)
-    decreases = [(score_test.decrease(effect), effect) for effect in starts]
-    return [(max(decrease, least), effect) for decrease, effect in sorted(decreases, key=lambda entry: -entry[0])]
+    decreases = [(sure + score_test.decrease_after_step(effect), effect) for effect in starts]
+    return [max(decreases, key=lambda entry: entry[0])] if starts else []
 
 
 def _texel_parameter_starts(candidate: Candidate, score_test: ScoreTest, scales: Scales) -> list[tuple[float, Effect]]:

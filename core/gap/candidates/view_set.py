@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -51,13 +50,21 @@ class ViewSet:
     few_texels: list[TrialView]
     few_texels_with_forces: list[TrialView]
     _moving: np.ndarray | None = None
+    _few_samples: list[TrialView] | None = None
 
-    @cached_property
+    @property
     def few_samples(self) -> list[TrialView]:
         """All texels, few samples. For effects that couple texels or displace them."""
-        with_forces = self.few_texels[0].with_forces
-        predictors = _thinned([view.predictor for view in self.whole])
-        return [TrialView(one, noise=self.whole[0].noise, with_forces=with_forces) for one in predictors]
+        if self._few_samples is None:
+            like, predictors = self.few_texels[0], _thinned([view.predictor for view in self.whole])
+            self._few_samples = [replace(like, predictor=one, subset=None) for one in predictors]
+        return self._few_samples
+
+    def weighted(self, weight: float) -> ViewSet:
+        """Return the same views with another weight of forces."""
+        views = (self.whole, self.few_texels, self.few_texels_with_forces, self.few_samples)
+        whole, few_texels, with_forces, few_samples = ([replace(one, force_weight=weight) for one in own] for own in views)
+        return ViewSet(whole, few_texels, with_forces, self._moving, few_samples)
 
     def moving_readings(self, model: Model) -> np.ndarray:
         """Return readings that change, (n,) float, in which steps of a converter are looked for.

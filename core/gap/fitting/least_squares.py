@@ -156,6 +156,8 @@ class TrialView:
         Number of stretches of time into which the trial is cut if a part of it has to be left out of a fit.
     with_forces : bool
         True if measured net forces are part of the residual.
+    force_weight : float
+        Weight of the squares of forces, of those of readings. A value counts as so many.
     """
 
     predictor: Predictor
@@ -164,6 +166,7 @@ class TrialView:
     noise: tuple[float, float] = (1.0, 1.0)
     stretch_count: int = 1
     with_forces: bool = True
+    force_weight: float = 1.0
 
     def stretches(self, residual: np.ndarray) -> list[slice]:
         """Return the stretches of time that are left out one after the other, as rows of a residual."""
@@ -186,7 +189,7 @@ class TrialView:
     def residual(self, model: Model) -> np.ndarray:
         """Return measured minus predicted values in units of the noise, (T, c + 3); zero if a value is missing.
 
-        The first c columns are readings of the texels, the last three components of the net force.
+        The first c columns are readings of the texels, the last three components of the net force, by the root of their weight.
         """
         predicted = self.predictor.predict(model, self.subset, self.with_forces)
         reading, force = self._measured
@@ -195,17 +198,18 @@ class TrialView:
         if reading is not None:
             write_differences(reading, np.ascontiguousarray(predicted.reading[self.samples]), self.noise[0], out, 0)
         if predicted.force is not None and force is not None:
-            write_differences(force, np.ascontiguousarray(predicted.force[self.samples]), self.noise[1], out, width)
+            unit = self.noise[1] / np.sqrt(self.force_weight)
+            write_differences(force, np.ascontiguousarray(predicted.force[self.samples]), unit, out, width)
         return out
 
     @cached_property
     def counts(self) -> np.ndarray:
-        """Number of measured values of readings and of forces, (2,) int."""
-        trial, number = self.predictor.trial, np.zeros(2, int)
+        """Number of measured values of readings and of forces, (2,) float, those of forces by their weight."""
+        trial, number = self.predictor.trial, np.zeros(2)
         if trial.reading is not None:
             number[0] = np.isfinite(trial.reading[self.samples][:, self.texels]).sum()
         if trial.force is not None and self.with_forces:
-            number[1] = np.isfinite(trial.force[self.samples]).sum()
+            number[1] = self.force_weight * np.isfinite(trial.force[self.samples]).sum()
         return number
 
     def squares(self, residual: np.ndarray) -> np.ndarray:
@@ -269,8 +273,8 @@ class Fit:
     free : tuple of FreeParameter
     sse : (trials, 2) float
         Sum of squares of the residuals of each trial, of readings and of forces, in units of the noise.
-    count : (trials, 2) int
-        Number of measured values.
+    count : (trials, 2) float
+        Number of measured values, as they are weighted.
     equations : list of list of NormalEquations, or None
         At the end of the fit, by trial and stretch.
     """

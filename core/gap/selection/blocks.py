@@ -46,6 +46,10 @@ class Views:
         )
         return Views(fitted, check)
 
+    def weighted(self, weight: float) -> Views:
+        """Return the same views with another weight of forces."""
+        return Views(*([replace(view, force_weight=weight) for view in views] for views in (self.fitted, self.check)))
+
 
 def views_of(predictors: Sequence[Predictor], noise: tuple[float, float], memory: tuple[float, float]) -> Views:
     """Return the views of recordings.
@@ -109,19 +113,20 @@ class Blocks:
         ----------
         found : Fit
         views : Views
-            Of the recordings as they are assumed to differ.
+            Of the recordings as they are assumed to differ, with the weights of the fit.
         has_own_numbers : bool
             True if recordings have numbers of their own, the first component.
         """
         model = found.model
-        seen = [view.residual(model) for view in views.fitted]
-        outside = [view.residual(model) for view in views.check]
-        unseen = cross_fitted(found, views.fitted, seen)
-        squares = [r**2 * mask for r, mask in zip([*unseen, *outside], self._masks, strict=True)]
+        whole = [view.residual(model) for view in views.all]
+        seen, outside = whole[: len(views.fitted)], whole[len(views.fitted) :]
+        unseen = _unweighted(views, [*cross_fitted(found, views.fitted, seen), *outside])
+        squares = [r**2 * mask for r, mask in zip(unseen, self._masks, strict=True)]
         rest = [self._summed([s * rest[way] for s, rest in zip(squares, self._rests, strict=True)]) for way in (0, 1)]
         without = [model.without(index) for index in range(len(model.effects))]
         without = [_with_equal_recordings(model), *without] if has_own_numbers else without
-        changes = [self._change([*seen, *outside], [view.residual(other) for view in views.all]) for other in without]
+        whole = _unweighted(views, whole)
+        changes = [self._change(whole, _unweighted(views, [v.residual(other) for v in views.all])) for other in without]
         return Sums(
             self._summed(squares), self.count, np.stack(rest), self.rest_count, np.array(changes).reshape(-1, *self.count.shape)
         )
@@ -163,6 +168,14 @@ class Blocks:
         for view, table in zip(self.views.all, tables, strict=True):
             rows += [[table[part, :-3].sum(), table[part, -3:].sum()] for part in view.stretches(table)]
         return np.array(rows)
+
+
+def _unweighted(views: Views, residuals: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Residuals (T, n + 3) of views in units of the noise, without the weight of forces."""
+    return [
+        np.hstack([r[:, :-3], r[:, -3:] / np.sqrt(view.force_weight)]) if view.force_weight != 1.0 else r
+        for view, r in zip(views.all, residuals, strict=True)
+    ]
 
 
 def _with_equal_recordings(model: Model) -> Model:

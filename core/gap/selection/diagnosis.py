@@ -20,6 +20,7 @@ from ..base.contact_heights import with_starting_heights
 from ..base.quantities import FORCES, READINGS, friction_kinds
 from ..base.recording_differences import RecordingDifferences, as_one_session, may_differ, own_numbers, with_own_numbers
 from ..candidates.candidates import scales_of
+from ..candidates.direct_estimates import few_levels
 from ..candidates.view_set import ViewSet, view_set_of
 from ..data_faults.data_fault import DataFault
 from ..data_faults.search import find_faults, put_right
@@ -62,7 +63,8 @@ def diagnose(rig: Rig) -> Job[Diagnosis]:
     """
     begun = yield from _begin(rig)
     is_repeated = begun.result.noise[begun.main_quantity].source == MEASURED_REPEATS
-    search = Search(_starts(begun), MOST_SQUARE - 1.0 if is_repeated else None)
+    levels = few_levels(begun.view_set.moving_readings(begun.result.base.model))
+    search = Search(_starts(begun), MOST_SQUARE - 1.0 if is_repeated else None, levels is not None)
     chosen = yield from _progress_of(search.run(), SELECTION_BEGINS, VERDICT_BEGINS)
     named = with_best_kinds(search, chosen)
     best = yield from _progress_of(search.predicting(named), SELECTION_BEGINS, VERDICT_BEGINS)
@@ -158,12 +160,15 @@ def _with_own_numbers(result: Diagnosis) -> _Begun:
 def _concluded(begun: _Begun, search: Search, named: Hypothesis, best: Hypothesis) -> Diagnosis:
     """The diagnosis of the model that the rule chose, `named`, and of the one that predicts best with its effects."""
     result, view_set = _under_assumption(begun, search, best)
-    result.best = _with_base_refitted(result, view_set, best.fit)
+    weighted = search.under(best.assumed)[0].weighted(search.score.force_weight(best))
+    result.best = _with_base_refitted(result, weighted.view_set, best.fit)
+    at_end = fit(weighted.views.fitted, result.best.model, result.best.free, max_steps=0)
+    reported = weighted.hypothesis(at_end, best.names, best.forms)
     result.base_structure, result.structure = (_structure(view_set, found) for found in (result.base, result.best))
     result.line = strongest_line(view_set.whole, result.best.model)
-    result.check = checked(search.under("")[0].blocks, search.score, search.base, best)
+    result.check = checked(weighted.blocks, search.score, search.base, reported)
     result.faults = faults_of(result, named.fit.model)
-    judge(search, named, best, result)
+    judge(search, named, best, reported, result)
     _find_noise(result, view_set, search, best)
     result.intervals = parameter_intervals(result.best)
     result.stages = _stages(result, view_set)

@@ -42,6 +42,8 @@ from .rule_numbers import (
 
 OWN_NUMBERS, ONE_SESSION = "own numbers", "one session"
 """How recordings may be assumed to differ: by a factor and a zero each, or as one session in their order."""
+IMPOSSIBLE = 1e4
+"""By how much S of a model that cannot have made the readings is lower: more than squares that fall from any to rounding."""
 
 
 @dataclass(eq=False)
@@ -120,6 +122,8 @@ class Score:
         Weights of the blocks, of mean one; the first draw has equal ones.
     formula_errors : dict of str to (2,) float
         φ of the forms that were tried, by their labels.
+    has_few_values : bool
+        True if readings repeat a few values: noise repeats none, so a model without steps cannot have made them.
     """
 
     noise: NoiseLevel
@@ -127,6 +131,7 @@ class Score:
     price: float
     weights: np.ndarray
     formula_errors: dict[str, np.ndarray] = field(default_factory=dict)
+    has_few_values: bool = False
     _kept: dict[int, tuple[Hypothesis, np.ndarray]] = field(default_factory=dict)
 
     def parts(self, one: Hypothesis, weights: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -171,7 +176,10 @@ class Score:
         if kept is None or kept[0] is not one:
             excess, allowed = self.parts(one)
             total = np.log(excess + allowed + self.noise.error)[:, self.measured].sum(axis=1)
-            kept = self._kept[id(one)] = one, -0.5 * STRETCHES * total - self.price * one.price_count
+            cost = self.price * one.price_count
+            if self.has_few_values and not one.fit.model.is_stepped:
+                cost += IMPOSSIBLE
+            kept = self._kept[id(one)] = one, -0.5 * STRETCHES * total - cost
         return kept[1]
 
     def prediction(self, one: Hypothesis) -> float:
@@ -193,6 +201,18 @@ class Score:
         free = [one for one in forms if form_of(*one.forms[-1].split("/")).error is not None]
         return all(map(self.leaves_gap, free or forms))
 
+    def force_weight(self, one: Hypothesis) -> float:
+        """Return the weight of the squares of forces, of those of readings, with which a fit of a model raises S most.
+
+        It is the ratio of the derivatives of S by the squares, 1/(N (E + B + e)) for N values. Where noise accounts for what
+        the model leaves, weights are those of the noise.
+        """
+        if not self.measured.all() or not self.leaves_gap(one):
+            return 1.0
+        excess, allowed = self.parts(one, self.weights[:1])
+        squares = (self.weights[0] @ one.sums.count) * (excess[0] + allowed[0] + self.noise.error)
+        return float(squares[0] / squares[1])
+
     def value(self, one: Hypothesis) -> float:
         """Return S."""
         return float(self.values(one)[0])
@@ -205,7 +225,8 @@ class Score:
     @property
     def resolution(self) -> float:
         """By how much scores may change if fits go on: the squares of a right model fall by less than the fits' tolerance."""
-        return float(0.5 * STRETCHES * (FIT_TOLERANCE / self.noise.error)[self.measured].sum())
+        squares = FIT_TOLERANCE * self.noise.under(self.weights[0])
+        return float(0.5 * STRETCHES * (squares / self.noise.error)[self.measured].sum())
 
     def is_near(self, best: Hypothesis, one: Hypothesis) -> bool:
         """Return whether a model does as well as a better one, as far as chance goes, or as scores are known."""

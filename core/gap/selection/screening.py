@@ -119,6 +119,12 @@ class Screening:
     assumed: str
     alone: dict[str, Effect]
 
+    def weighted(self, weight: float) -> Screening:
+        """Return the same screening with another weight of forces in its fits."""
+        if weight == self.views.fitted[0].force_weight:
+            return self
+        return replace(self, view_set=self.view_set.weighted(weight), views=self.views.weighted(weight))
+
     def hypothesis(self, found: Fit, names: tuple[str, ...], forms: tuple[str, ...]) -> Hypothesis:
         """Return a fitted model with what it leaves."""
         return Hypothesis(found, names, forms, self.blocks.sums(found, self.views, self.assumed == OWN_NUMBERS), self.assumed)
@@ -203,8 +209,9 @@ class Screening:
 
     def refined(self, one: Hypothesis) -> Hypothesis:
         """Return a model at the end of its fit: final fits are cut short, as most models are far behind the best."""
+        before = sum(float(view.squares(view.residual(one.fit.model)).sum()) for view in self.views.fitted)
         found = fit(self.views.fitted, one.fit.model, one.fit.free, max_steps=REFINED_STEPS, tolerance=FIT_TOLERANCE)
-        return one if found.sse.sum() >= one.fit.sse.sum() else self.hypothesis(found, one.names, one.forms)
+        return one if found.sse.sum() >= before else self.hypothesis(found, one.names, one.forms)
 
     def final_fit(self, found: Model, free: Sequence[FreeParameter], frozen: int) -> Fit:
         """Fit a model to everything; the first `frozen` derivatives are kept (see :func:`.least_squares.fit`)."""

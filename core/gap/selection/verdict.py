@@ -57,7 +57,7 @@ def _contains(other: Hypothesis, best: Hypothesis, index: int) -> bool:
     return other.is_bent or per_texel
 
 
-def judge(search: Search, named: Hypothesis, best: Hypothesis, result: Diagnosis) -> None:
+def judge(search: Search, named: Hypothesis, best: Hypothesis, reported: Hypothesis, result: Diagnosis) -> None:
     """Write verdict, findings, ambiguous groups and ruled-out kinds into a result that has its models.
 
     Findings are in the order in which effects act.
@@ -69,6 +69,8 @@ def judge(search: Search, named: Hypothesis, best: Hypothesis, result: Diagnosis
         The model that the rule chose.
     best : Hypothesis
         The amended model: the same kinds, and those that help it predict and do not pay for their names.
+    reported : Hypothesis
+        The amended model at the end of its fit, with all identified parameters of the base model free.
     result : Diagnosis
     """
     result.closed, order = closed_shares(search, best), list(library())
@@ -86,15 +88,15 @@ def judge(search: Search, named: Hypothesis, best: Hypothesis, result: Diagnosis
         result.findings = [
             replace(one, confidence=min(one.confidence, JUST_UNSURE), doubts=(*one.doubts, FAULTY)) for one in result.findings
         ]
-    result.verdict = _verdict(search, named, best, result)
+    result.verdict = _verdict(search, named, reported, result)
     _rule_out(search, result)
 
 
-def _verdict(search: Search, named: Hypothesis, best: Hypothesis, result: Diagnosis) -> str:
+def _verdict(search: Search, named: Hypothesis, reported: Hypothesis, result: Diagnosis) -> str:
     """Explained needs a name that is sure, and a remainder that noise and the error of formulas account for."""
-    everywhere = np.ones((1, len(best.sums.count)))  # check recordings, too: they decide the verdict
-    is_open = search.score.leaves_gap(best, everywhere) or len(best.names) > len(named.names) or result.line is not None
-    if not best.components:
+    everywhere = np.ones((1, len(reported.sums.count)))  # check recordings, too: they decide the verdict
+    is_open = search.score.leaves_gap(reported, everywhere) or len(reported.names) > len(named.names) or result.line is not None
+    if not reported.components:
         return "unexplained" if is_open else "no gap"
     is_sure = any(one.confidence >= SURE for one in result.findings) or (not named.names and named.price_count > 0)
     return "explained" if is_sure and not is_open and not result.check.is_refuted else "unexplained"
@@ -171,25 +173,19 @@ def closed_shares(search: Search, best: Hypothesis) -> ClosedShares:
         return ClosedShares()
     blocks = search.under("")[0].blocks
     is_fitted = blocks.recording < len(blocks.views.fitted)
-    sse = [search.base.fit.sse.sum(axis=0), best.fit.sse.sum(axis=0)]
-    seen = _closed(search.score, sse[0], sse[1], best.fit.count.sum(axis=0))
+    seen = [one.fit.sse.sum(axis=0) / np.maximum(one.fit.count.sum(axis=0), 1e-9) for one in (search.base, best)]
     unseen, check = (
-        _closed(
-            search.score, search.base.sums.left[own].sum(axis=0), best.sums.left[own].sum(axis=0), blocks.count[own].sum(axis=0)
-        )
+        [one.sums.left[own].sum(axis=0) / np.maximum(blocks.count[own].sum(axis=0), 1e-9) for one in (search.base, best)]
         for own in (is_fitted, ~is_fitted)
     )
-    return ClosedShares(seen, unseen, check)
+    return ClosedShares(*(_closed(search.score, before, after) for before, after in (seen, unseen, check)))
 
 
-def _closed(score: Score, before: np.ndarray, after: np.ndarray, count: np.ndarray) -> tuple[float | None, float | None]:
-    """Share of the squared gap that closes, for readings and forces; None where there is none beyond the noise's error."""
-    level = score.noise.under(score.weights[0])
-    gap = before - level * count
+def _closed(score: Score, before: np.ndarray, after: np.ndarray) -> tuple[float | None, float | None]:
+    """Share of the gap between mean squares that closes, for readings and forces; None without one beyond the noise's error."""
+    gap = before - score.noise.under(score.weights[0])
     shares = [
-        float(min((before[q] - after[q]) / gap[q], 1.0))
-        if gap[q] > SIGNIFICANT_ERRORS * score.noise.error[q] * count[q] > 0
-        else None
+        float(min((before[q] - after[q]) / gap[q], 1.0)) if gap[q] > SIGNIFICANT_ERRORS * score.noise.error[q] else None
         for q in (0, 1)
     ]
     return shares[0], shares[1]

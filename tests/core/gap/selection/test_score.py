@@ -366,3 +366,92 @@ def test_a_form_with_fewer_numbers_describes_as_well_what_the_noise_leaves_open(
     """The error of the noise is 0.01; blocks are alike, so that the difference has no error of its own."""
     forms = [model(1.0, "creep/power", numbers=3), model(left, "creep/exponential", numbers=2)]
     assert rule().best_form(forms).forms == (chosen,)
+
+
+# --- readings and net forces together
+
+
+def swinging(seed=1):
+    """A sensor whose gain swings with a temperature that nobody records; its net forces are those of the base model."""
+    rng = np.random.default_rng(seed)
+
+    def swing(force, time):
+        return force * (1.0 + 0.35 * np.sin(2.0 * np.pi * time / 5.0 + rng.uniform(0.0, 6.0)))[:, None]
+
+    rig, measured = cases.rig(trials=4, seconds=8.0, seed=seed, stated=80.0, change=swing), []
+    for one in predictors_of(rig.trials, rig):
+        normal = one.normal_force(Model(rig.parameters)).sum(axis=1)
+        force = np.column_stack([np.zeros((len(normal), 2)), -normal])
+        measured.append(replace(one.trial, force=force + 0.003 * normal.max() * rng.normal(size=force.shape)))
+    return replace(rig, trials=tuple(measured))
+
+
+def test_fits_weigh_readings_and_forces_as_the_score_does():
+    """The weight is the ratio of the derivatives of S by the squares; it is one where noise is all that is left."""
+    count = np.tile([COUNT, 0.1 * COUNT], (BLOCKS, 1))
+    found = Score(NoiseLevel(count, count, np.array([0.01, 0.02])), np.array([True, True]), PRICE, drawn_weights(BLOCKS))
+
+    def leaving(readings, forces):
+        one = model(1.0, "creep/power", changes=(4.0,))
+        one.sums = Sums(count * [readings, forces], count, np.stack([count] * 2), np.stack([count] * 2), one.sums.changes)
+        return one
+
+    step = 1e-5
+    by_readings, by_forces = (
+        found.value(leaving(3.0 + step * share, 1.4 + 10.0 * step * (1.0 - share))) for share in (1.0, 0.0)
+    )
+    at = found.value(leaving(3.0, 1.4))
+    assert found.force_weight(leaving(3.0, 1.4)) == pytest.approx((by_forces - at) / (by_readings - at), rel=1e-3)
+    assert found.force_weight(leaving(1.01, 1.02)) == 1.0 == rule().force_weight(model(3.0))
+
+
+def test_sums_are_in_units_of_the_noise_whatever_the_weight_of_forces():
+    rig = swinging()
+    views = blocks.views_of(predictors_of(rig.trials, rig), (0.01, 0.02), (1.0, 1.0))
+    effect = Effect("stiffening", "polynomial", {"beta2": 300.0, "beta3": 0.0})
+    found = Fit(Model(rig.parameters, (effect,)), (), np.zeros((1, 2)), np.ones((1, 2)))
+    plain, weighted = (blocks.Blocks(views).sums(found, own, False) for own in (views, views.weighted(50.0)))
+    for name in ("left", "count", "rest", "changes"):
+        np.testing.assert_allclose(getattr(weighted, name), getattr(plain, name), rtol=1e-12)
+    squares = [
+        sum(view.squares(view.residual(found.model)) for view in own.fitted) / sum(view.counts for view in own.fitted)
+        for own in (views, views.weighted(50.0))
+    ]
+    np.testing.assert_allclose(*squares, rtol=1e-12)  # a value counts as much as its square
+
+
+@pytest.mark.slow("a whole diagnosis")
+def test_what_disturbs_the_readings_brings_no_name_through_the_forces():
+    """With the weights of the noise the base model followed the readings, and a drift (0.99) mended its error in the forces."""
+    concluded, kept = diagnosis._concluded, []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(diagnosis, "_concluded", lambda begun, one, *models: kept.append(one) or concluded(begun, one, *models))
+        result = cases.diagnosed(swinging())
+    assert result.verdict == "unexplained" and not any(one.confidence >= rule_numbers.SURE for one in result.findings)
+    (found,) = kept
+    screening, base = found.under("")
+    plain = fit(screening.views.fitted, base.fit.model, base.fit.free)
+    assert found.score.value(base) > found.score.value(screening.hypothesis(plain, (), ())) + found.score.price
+
+
+# --- converters
+
+
+def test_a_model_without_steps_cannot_have_made_readings_that_repeat_a_few_values():
+    found, step = rule(), Effect("quantization", "round", {"step": 0.5})
+    plain, stepped = model(1.0), model(3.0, "quantization/round")
+    for one, effects in ((plain, ()), (stepped, (step,))):
+        one.fit.model = Model(cases.rig(trials=1, seconds=1.0).parameters, effects)
+    before = found.value(plain) - found.value(stepped)
+    found = replace(found, has_few_values=True, _kept={})
+    assert before > 0.0 and found.value(plain) - found.value(stepped) == pytest.approx(before - score.IMPOSSIBLE)
+
+
+@pytest.mark.slow("a whole diagnosis")
+def test_a_coarse_converter_is_named_although_the_noise_is_not_seen_without_load():
+    """Noise moves readings over an edge only there, so that half the squares of the base model remain."""
+    rig = cases.rig(trials=4, seconds=8.0, seed=2, stated=80.0)
+    step = 0.12 * max(one.reading.max() for one in rig.trials)
+    coarse = replace(rig, trials=tuple(replace(one, reading=step * np.round(one.reading / step)) for one in rig.trials))
+    result = cases.diagnosed(coarse)
+    assert [(one.name, one.confidence > 0.99) for one in result.findings] == [("quantization", True)]
