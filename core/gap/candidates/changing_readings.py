@@ -14,13 +14,14 @@ MOST_READINGS = 6000
 """Number of changing readings to which they are thinned."""
 
 
-def moving_readings(views: Sequence[TrialView], model: Model) -> np.ndarray:
-    """Return some thousand readings of samples at which the model changes by more than the noise."""
-    moving = [np.zeros(0)]
+def moving_values(views: Sequence[TrialView], model: Model) -> np.ndarray:
+    """Return some thousand readings of samples at which the model changes by more than the noise, and predictions, (n, 2)."""
+    moving = [np.zeros((0, 2))]
     for view in views:
         reading = view.predictor.trial.reading
         if reading is not None:
-            change = np.abs(np.gradient(view.predictor.predict(model).reading, axis=0))
-            moving.append(reading[(change > 0.5 * view.noise[0]) & np.isfinite(reading)])
+            predicted = view.predictor.predict(model).reading
+            used = (np.abs(np.gradient(predicted, axis=0)) > 0.5 * view.noise[0]) & np.isfinite(reading)
+            moving.append(np.column_stack([reading[used], predicted[used]]))
     values = np.concatenate(moving)
     return values[:: max(1, len(values) // MOST_READINGS)]

@@ -107,7 +107,7 @@ def quantization_starts(values: np.ndarray, views: Sequence[TrialView], candidat
     Parameters
     ----------
     values : (n,) float
-        Readings that change (see :func:`moving_readings`).
+        Readings that change (see :meth:`.view_set.ViewSet.moving_readings`).
     views : sequence of TrialView
         All texels and samples.
     candidate : Candidate
@@ -229,5 +229,6 @@ def unloaded_reading(views: Sequence[TrialView]) -> float:
 
 def few_levels(values: np.ndarray) -> np.ndarray | None:
     """Return the distinct values of readings, in order, if they are so few that noise did not make them; else None."""
-    levels = np.unique(np.round(values, 12))
+    size = float(np.abs(values).max(initial=0.0)) or 1.0
+    levels = values[np.unique(np.round(values / size, 9), return_index=True)[1]]
     return levels if 3 <= len(levels) <= MOST_LEVELS and len(values) >= SAMPLES_PER_LEVEL * len(levels) else None

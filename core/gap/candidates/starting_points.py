@@ -9,12 +9,12 @@ from ...effects.engine.registry import form_of
 from ...effects.engine.specification import SILENT_TEXELS, STEPS, scalar
 from ...model.sensor import Effect
 from .candidates import IN_PLANE, SMALL_SHIFT, SMALL_TURN, START_COUNT, Candidate, Scales, search_range
-from .direct_estimates import few_levels, quantization_starts, unresponsive_texels
+from .direct_estimates import quantization_starts, unresponsive_texels
 from .rao_score import ScoreTest
 from .view_set import ViewSet
 
-VISIBLE_STEPS_PROMISE = 0.5
-"""Added to the promise of quantization whose steps are seen in the readings, as a share of the squares: it is always fitted."""
+SEEN = 1.0
+"""Added to the promise of a converter whose steps are seen in the readings, as a share of the squares: it is always fitted."""
 LARGEST_SHIFT, LARGEST_TURN = 0.5, 0.1
 """Bounds of the starting points of displaced texels: a share of the pitch, and an angle in rad."""
 DISPLACEMENT_SCANS = ((0.15, 8), (0.02, 8))
@@ -94,10 +94,13 @@ def _scanned_threshold(candidate: Candidate, score_test: ScoreTest, scales: Scal
 def _quantization_starts(candidate: Candidate, score_test: ScoreTest, view_set: ViewSet) -> list[tuple[float, Effect]]:
     """The best of the steps that are estimated from the readings; the other parameters follow it by half a step."""
     values = view_set.moving_readings(score_test.model)
-    sure = VISIBLE_STEPS_PROMISE * score_test.total if few_levels(values) is not None else 0.0
     starts = quantization_starts(values, view_set.whole, candidate)
-    decreases = [(sure + score_test.decrease_after_step(effect), effect) for effect in starts]
-    return [max(decreases, key=lambda entry: entry[0])] if starts else []
+    decreases = [(score_test.decrease_after_step(effect), effect) for effect in starts]
+    if not starts:
+        return []
+    decrease, best = max(decreases, key=lambda entry: entry[0])
+    is_seen = view_set.repeats_few_values(score_test.model)
+    return [(max(decrease, 0.0) + SEEN * score_test.total if is_seen else decrease, best)]
 
 
 def _texel_parameter_starts(candidate: Candidate, score_test: ScoreTest, scales: Scales) -> list[tuple[float, Effect]]:

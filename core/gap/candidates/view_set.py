@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,8 @@ from ..dataset.trial import Trial
 from ..fitting.least_squares import TrialView
 from ..forward.predictor import Model, Predictor, predictors_of
 from .candidates import DIRECTLY_ESTIMATED, Candidate, is_spatial
-from .changing_readings import moving_readings
+from .changing_readings import moving_values
+from .direct_estimates import few_levels
 
 FEW_TEXELS = 16
 """Texels of each trial in the views with few texels."""
@@ -50,29 +52,32 @@ class ViewSet:
     few_texels: list[TrialView]
     few_texels_with_forces: list[TrialView]
     _moving: np.ndarray | None = None
-    _few_samples: list[TrialView] | None = None
 
-    @property
+    @cached_property
     def few_samples(self) -> list[TrialView]:
         """All texels, few samples. For effects that couple texels or displace them."""
-        if self._few_samples is None:
-            like, predictors = self.few_texels[0], _thinned([view.predictor for view in self.whole])
-            self._few_samples = [replace(like, predictor=one, subset=None) for one in predictors]
-        return self._few_samples
-
-    def weighted(self, weight: float) -> ViewSet:
-        """Return the same views with another weight of forces."""
-        views = (self.whole, self.few_texels, self.few_texels_with_forces, self.few_samples)
-        whole, few_texels, with_forces, few_samples = ([replace(one, force_weight=weight) for one in own] for own in views)
-        return ViewSet(whole, few_texels, with_forces, self._moving, few_samples)
+        with_forces = self.few_texels[0].with_forces
+        predictors = _thinned([view.predictor for view in self.whole])
+        return [TrialView(one, noise=self.whole[0].noise, with_forces=with_forces) for one in predictors]
 
     def moving_readings(self, model: Model) -> np.ndarray:
         """Return readings that change, (n,) float, in which steps of a converter are looked for.
 
         The first model, that of the first search, says which these are: effects that join it later move no step.
         """
+        return self._moving_values(model)[:, 0]
+
+    def repeats_few_values(self, model: Model) -> bool:
+        """Return whether readings that change repeat a few values (see :func:`few_levels`), and predictions of them do not.
+
+        Noise repeats no value, so a converter made them.
+        """
+        readings, predictions = self._moving_values(model).T
+        return few_levels(readings) is not None and few_levels(predictions) is None
+
+    def _moving_values(self, model: Model) -> np.ndarray:
         if self._moving is None:
-            self._moving = moving_readings(self.whole, model)
+            self._moving = moving_values(self.whole, model)
         return self._moving
 
     def quick(self, candidate: Candidate, model: Model) -> list[TrialView]:

@@ -157,7 +157,7 @@ class TrialView:
     with_forces : bool
         True if measured net forces are part of the residual.
     force_weight : float
-        Weight of the squares of forces, of those of readings. A value counts as so many.
+        Weight of the squares of forces relative to those of readings; each force counts as so many values.
     """
 
     predictor: Predictor
@@ -189,7 +189,8 @@ class TrialView:
     def residual(self, model: Model) -> np.ndarray:
         """Return measured minus predicted values in units of the noise, (T, c + 3); zero if a value is missing.
 
-        The first c columns are readings of the texels, the last three components of the net force, by the root of their weight.
+        The first c columns are readings of the texels, the last three components of the net force times the root of
+        their weight.
         """
         predicted = self.predictor.predict(model, self.subset, self.with_forces)
         reading, force = self._measured

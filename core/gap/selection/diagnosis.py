@@ -20,7 +20,6 @@ from ..base.contact_heights import with_starting_heights
 from ..base.quantities import FORCES, READINGS, friction_kinds
 from ..base.recording_differences import RecordingDifferences, as_one_session, may_differ, own_numbers, with_own_numbers
 from ..candidates.candidates import scales_of
-from ..candidates.direct_estimates import few_levels
 from ..candidates.view_set import ViewSet, view_set_of
 from ..data_faults.data_fault import DataFault
 from ..data_faults.search import find_faults, put_right
@@ -63,8 +62,8 @@ def diagnose(rig: Rig) -> Job[Diagnosis]:
     """
     begun = yield from _begin(rig)
     is_repeated = begun.result.noise[begun.main_quantity].source == MEASURED_REPEATS
-    levels = few_levels(begun.view_set.moving_readings(begun.result.base.model))
-    search = Search(_starts(begun), MOST_SQUARE - 1.0 if is_repeated else None, levels is not None)
+    has_few_values = begun.view_set.repeats_few_values(begun.result.base.model)
+    search = Search(_starts(begun), MOST_SQUARE - 1.0 if is_repeated else None, has_few_values)
     chosen = yield from _progress_of(search.run(), SELECTION_BEGINS, VERDICT_BEGINS)
     named = with_best_kinds(search, chosen)
     best = yield from _progress_of(search.predicting(named), SELECTION_BEGINS, VERDICT_BEGINS)
@@ -160,15 +159,12 @@ def _with_own_numbers(result: Diagnosis) -> _Begun:
 def _concluded(begun: _Begun, search: Search, named: Hypothesis, best: Hypothesis) -> Diagnosis:
     """The diagnosis of the model that the rule chose, `named`, and of the one that predicts best with its effects."""
     result, view_set = _under_assumption(begun, search, best)
-    weighted = search.under(best.assumed)[0].weighted(search.score.force_weight(best))
-    result.best = _with_base_refitted(result, weighted.view_set, best.fit)
-    at_end = fit(weighted.views.fitted, result.best.model, result.best.free, max_steps=0)
-    reported = weighted.hypothesis(at_end, best.names, best.forms)
+    result.best = _with_base_refitted(result, view_set, best.fit)
     result.base_structure, result.structure = (_structure(view_set, found) for found in (result.base, result.best))
     result.line = strongest_line(view_set.whole, result.best.model)
-    result.check = checked(weighted.blocks, search.score, search.base, reported)
+    result.check = checked(search.under("")[0].blocks, search.score, search.base, best)
     result.faults = faults_of(result, named.fit.model)
-    judge(search, named, best, reported, result)
+    judge(search, named, best, result)
     _find_noise(result, view_set, search, best)
     result.intervals = parameter_intervals(result.best)
     result.stages = _stages(result, view_set)
@@ -185,7 +181,8 @@ def _under_assumption(begun: _Begun, search: Search, best: Hypothesis) -> tuple[
     by_name = {one.trial.name: one for one in predictors}
     order = [by_name[one.trial.name] for one in plain.predictors]
     rig = replace(plain.rig, trials=tuple(one.trial for one in order))
-    view_set, found = screening.view_set, base.fit
+    view_set = screening.view_set
+    found = fit(view_set.whole, base.fit.model, base.fit.free)
     result = Diagnosis(rig, order, plain.noise, plain.full, plain.coverage, screening.scales, found, found, faults=plain.faults)
     result.assumed_session = best.assumed == ONE_SESSION
     if best.assumed == OWN_NUMBERS:
@@ -207,8 +204,8 @@ def _differences(result: Diagnosis, search: Search, best: Hypothesis, before: fl
 
 def _find_noise(result: Diagnosis, view_set: ViewSet, search: Search, best: Hypothesis) -> None:
     """Add noise that grows with the reading, where the rest has no structure and is larger than the noise without load."""
-    if result.structure.total >= LEAST_STRUCTURE or result.line is not None:
-        return
+    if result.structure.total >= LEAST_STRUCTURE or result.line is not None or search.has_few_values:
+        return  # of noise before a converter only what moves a reading over an edge is seen
     found = proportional_noise(view_set.whole, result.best.model)
     if found is None:
         return

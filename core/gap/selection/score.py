@@ -43,7 +43,7 @@ from .rule_numbers import (
 OWN_NUMBERS, ONE_SESSION = "own numbers", "one session"
 """How recordings may be assumed to differ: by a factor and a zero each, or as one session in their order."""
 IMPOSSIBLE = 1e4
-"""By how much S of a model that cannot have made the readings is lower: more than squares that fall from any to rounding."""
+"""By how much S of a model that cannot have made the readings is lower: more than it can rise as squares fall to rounding."""
 
 
 @dataclass(eq=False)
@@ -176,9 +176,7 @@ class Score:
         if kept is None or kept[0] is not one:
             excess, allowed = self.parts(one)
             total = np.log(excess + allowed + self.noise.error)[:, self.measured].sum(axis=1)
-            cost = self.price * one.price_count
-            if self.has_few_values and not one.fit.model.is_stepped:
-                cost += IMPOSSIBLE
+            cost = self.price * one.price_count + IMPOSSIBLE * self.cannot_be(one)
             kept = self._kept[id(one)] = one, -0.5 * STRETCHES * total - cost
         return kept[1]
 
@@ -190,11 +188,13 @@ class Score:
     def leaves_gap(self, one: Hypothesis, weights: np.ndarray | None = None) -> bool:
         """Return whether a model leaves more than noise and the error of its formulas account for, `weights` (1, b)."""
         excess, allowed = self.parts(one, self.weights[:1] if weights is None else weights)
-        return bool((excess[0] > np.maximum(SIGNIFICANT_ERRORS * self.noise.error, allowed[0]))[self.measured].any())
+        most = np.maximum(SIGNIFICANT_ERRORS * self.noise.error, allowed[0])
+        return self.cannot_be(one) or bool((excess[0] > most)[self.measured].any())
 
     def reaches_noise(self, one: Hypothesis) -> bool:
         """Return whether a model leaves no more than noise accounts for."""
-        return bool((self.parts(one, self.weights[:1])[0][0] <= SIGNIFICANT_ERRORS * self.noise.error)[self.measured].all())
+        excess = self.parts(one, self.weights[:1])[0][0]
+        return not self.cannot_be(one) and bool((excess <= SIGNIFICANT_ERRORS * self.noise.error)[self.measured].all())
 
     def is_refuted(self, forms: Sequence[Hypothesis]) -> bool:
         """Return whether a kind leaves a gap in all its forms that are free to follow any law, or in all if it has none."""
@@ -207,11 +207,16 @@ class Score:
         It is the ratio of the derivatives of S by the squares, 1/(N (E + B + e)) for N values. Where noise accounts for what
         the model leaves, weights are those of the noise.
         """
-        if not self.measured.all() or not self.leaves_gap(one):
+        count = self.weights[0] @ one.sums.count
+        if not (count > 0).all() or not self.leaves_gap(one):
             return 1.0
         excess, allowed = self.parts(one, self.weights[:1])
-        squares = (self.weights[0] @ one.sums.count) * (excess[0] + allowed[0] + self.noise.error)
+        squares = count * (excess[0] + allowed[0] + self.noise.error)
         return float(squares[0] / squares[1])
+
+    def cannot_be(self, one: Hypothesis) -> bool:
+        """Return whether a model cannot have made the readings: they repeat a few values, and it has no steps."""
+        return self.has_few_values and not one.fit.model.is_stepped
 
     def value(self, one: Hypothesis) -> float:
         """Return S."""
@@ -283,7 +288,8 @@ class Score:
         """Return by how much one more effect could raise S at most: if nothing remained beyond the allowance."""
         excess, allowed = self.parts(one)
         rest = allowed[0] + self.noise.error
-        return float(0.5 * STRETCHES * np.log1p(excess[0] / rest)[self.measured].sum()) - self.price
+        gain = float(0.5 * STRETCHES * np.log1p(excess[0] / rest)[self.measured].sum())
+        return gain + IMPOSSIBLE * self.cannot_be(one) - self.price
 
     def most_left(self, one: Hypothesis, least: float) -> float:
         """Return which share of its excess a model may leave, with one effect more, to reach a score of `least`.
@@ -295,7 +301,7 @@ class Score:
 
         def lead(left: float) -> float:
             gain = 0.5 * STRETCHES * np.log((excess[0] + rest) / (left * excess[0] + rest))[measured].sum()
-            return float(self.value(one) + gain - self.price) - least
+            return float(self.value(one) + gain + IMPOSSIBLE * self.cannot_be(one) - self.price) - least
 
         if lead(1.0) >= 0.0:
             return 1.0

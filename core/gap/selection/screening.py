@@ -25,7 +25,7 @@ from ..candidates.candidates import (
 from ..candidates.direct_estimates import of_silent_texels
 from ..candidates.plausibility import is_plausible
 from ..candidates.rao_score import ScoreTest
-from ..candidates.starting_points import is_large_shift, starting_points
+from ..candidates.starting_points import SEEN, is_large_shift, starting_points
 from ..candidates.view_set import ViewSet
 from ..fitting.least_squares import BASE, Fit, FreeParameter, TrialView, fit
 from ..forward.predictor import Model
@@ -49,6 +49,8 @@ rigs 89 of 92 effects that were missing from a model belonged to the five kinds 
 TRIED_FORMS = 2
 """Forms of a kind that are fitted alone to a part of the data: for speed. On 82 development rigs one of the two forms that
 promise most left least for 350 of 371 kinds; for hidden kinds among the others it left at most 0.02 of the gap more."""
+FIRST = 1e3
+"""By how much the rank of an effect that is seen in the readings is lower: it is fitted to everything, before all others."""
 ALL_FORMS = 2
 """Kinds of which all forms are fitted to everything, so that a kind is judged by its whole library: for speed."""
 
@@ -60,7 +62,7 @@ class Promise:
     Attributes
     ----------
     share : float
-        By how much it could lower the squares, as a share of them.
+        By how much it could lower the squares, as a share of them; more than one if it is seen in the readings.
     candidate : Candidate
     starts : list of Effect
         Starting points of a fit, best first.
@@ -120,10 +122,10 @@ class Screening:
     alone: dict[str, Effect]
 
     def weighted(self, weight: float) -> Screening:
-        """Return the same screening with another weight of forces in its fits."""
+        """Return the same screening with another weight of forces in its fits to everything."""
         if weight == self.views.fitted[0].force_weight:
             return self
-        return replace(self, view_set=self.view_set.weighted(weight), views=self.views.weighted(weight))
+        return replace(self, views=self.views.weighted(weight))
 
     def hypothesis(self, found: Fit, names: tuple[str, ...], forms: tuple[str, ...]) -> Hypothesis:
         """Return a fitted model with what it leaves."""
@@ -269,6 +271,8 @@ class Screening:
             initial_derivatives=None if is_far else test.initial_derivatives,
         )
         left, rank = (share_left(found, before) for before in (tests.gap(test), test.least))
+        if one.share >= SEEN:
+            left, rank = 0.0, rank - FIRST
         return FirstFit(left, rank, one.candidate, found)
 
     def _final_fits(self, first_fits: Iterable[FirstFit], parent: Hypothesis) -> Making:

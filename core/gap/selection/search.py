@@ -135,11 +135,13 @@ class Search:
         return self.under(one.assumed)[0].weighted(self.score.force_weight(one))
 
     def _reweighted(self, screening: Screening, base: Hypothesis) -> Hypothesis:
-        """The base model at the largest score; the score, a sum of logarithms, rises with each fit."""
+        """The base model with the weights of forces at which its score is largest."""
         for _ in range(REWEIGHTINGS):
             weight = self.score.force_weight(base)
-            if weight != 1.0:
-                base = screening.weighted(weight).refined(base)
+            better = screening.weighted(weight).refined(base) if weight != 1.0 else base
+            if self.score.value(better) <= self.score.value(base):
+                break
+            base = better
         return base
 
     def in_place_of(self, one: Hypothesis, index: int) -> tuple[Hypothesis, dict[str, list[Hypothesis]]]:

@@ -57,7 +57,7 @@ def _contains(other: Hypothesis, best: Hypothesis, index: int) -> bool:
     return other.is_bent or per_texel
 
 
-def judge(search: Search, named: Hypothesis, best: Hypothesis, reported: Hypothesis, result: Diagnosis) -> None:
+def judge(search: Search, named: Hypothesis, best: Hypothesis, result: Diagnosis) -> None:
     """Write verdict, findings, ambiguous groups and ruled-out kinds into a result that has its models.
 
     Findings are in the order in which effects act.
@@ -69,8 +69,6 @@ def judge(search: Search, named: Hypothesis, best: Hypothesis, reported: Hypothe
         The model that the rule chose.
     best : Hypothesis
         The amended model: the same kinds, and those that help it predict and do not pay for their names.
-    reported : Hypothesis
-        The amended model at the end of its fit, with all identified parameters of the base model free.
     result : Diagnosis
     """
     result.closed, order = closed_shares(search, best), list(library())
@@ -88,15 +86,15 @@ def judge(search: Search, named: Hypothesis, best: Hypothesis, reported: Hypothe
         result.findings = [
             replace(one, confidence=min(one.confidence, JUST_UNSURE), doubts=(*one.doubts, FAULTY)) for one in result.findings
         ]
-    result.verdict = _verdict(search, named, reported, result)
+    result.verdict = _verdict(search, named, best, result)
     _rule_out(search, result)
 
 
-def _verdict(search: Search, named: Hypothesis, reported: Hypothesis, result: Diagnosis) -> str:
+def _verdict(search: Search, named: Hypothesis, best: Hypothesis, result: Diagnosis) -> str:
     """Explained needs a name that is sure, and a remainder that noise and the error of formulas account for."""
-    everywhere = np.ones((1, len(reported.sums.count)))  # check recordings, too: they decide the verdict
-    is_open = search.score.leaves_gap(reported, everywhere) or len(reported.names) > len(named.names) or result.line is not None
-    if not reported.components:
+    everywhere = np.ones((1, len(best.sums.count)))  # check recordings, too: they decide the verdict
+    is_open = search.score.leaves_gap(best, everywhere) or len(best.names) > len(named.names) or result.line is not None
+    if not best.components:
         return "unexplained" if is_open else "no gap"
     is_sure = any(one.confidence >= SURE for one in result.findings) or (not named.names and named.price_count > 0)
     return "explained" if is_sure and not is_open and not result.check.is_refuted else "unexplained"

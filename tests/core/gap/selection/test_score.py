@@ -13,6 +13,7 @@ import pytest
 from palpate.core.effects.engine.registry import effect, library
 from palpate.core.gap.base.base_model import with_recording_numbers
 from palpate.core.gap.base.recording_differences import with_own_numbers
+from palpate.core.gap.candidates.view_set import view_set_of
 from palpate.core.gap.fitting.least_squares import Fit, FreeParameter, fit
 from palpate.core.gap.forward.predictor import Model, number_name, predictors_of
 from palpate.core.gap.selection import blocks, diagnosis, noise_level, rule_numbers, score, search, verdict
@@ -443,15 +444,52 @@ def test_a_model_without_steps_cannot_have_made_readings_that_repeat_a_few_value
     for one, effects in ((plain, ()), (stepped, (step,))):
         one.fit.model = Model(cases.rig(trials=1, seconds=1.0).parameters, effects)
     before = found.value(plain) - found.value(stepped)
+    assert before > 0.0 and found.reaches_noise(plain) and not found.leaves_gap(plain)
     found = replace(found, has_few_values=True, _kept={})
-    assert before > 0.0 and found.value(plain) - found.value(stepped) == pytest.approx(before - score.IMPOSSIBLE)
+    assert found.value(plain) - found.value(stepped) == pytest.approx(before - score.IMPOSSIBLE)
+    assert found.leaves_gap(plain) and not found.reaches_noise(plain)
+    assert found.most_left(plain, found.value(stepped)) == 1.0 and found.most_to_gain(plain) > 0.0  # a converter may join
 
 
-@pytest.mark.slow("a whole diagnosis")
-def test_a_coarse_converter_is_named_although_the_noise_is_not_seen_without_load():
-    """Noise moves readings over an edge only there, so that half the squares of the base model remain."""
-    rig = cases.rig(trials=4, seconds=8.0, seed=2, stated=80.0)
-    step = 0.12 * max(one.reading.max() for one in rig.trials)
-    coarse = replace(rig, trials=tuple(replace(one, reading=step * np.round(one.reading / step)) for one in rig.trials))
-    result = cases.diagnosed(coarse)
-    assert [(one.name, one.confidence > 0.99) for one in result.findings] == [("quantization", True)]
+def in_steps(rounding, **words):
+    """A sensor behind a converter with steps of 6 % of the range."""
+    rig = cases.rig(trials=4, seconds=8.0, seed=2, stated=80.0, **words)
+    step = 0.06 * max(one.reading.max() for one in rig.trials)
+    return replace(rig, trials=tuple(replace(one, reading=step * rounding(one.reading / step)) for one in rig.trials))
+
+
+@pytest.mark.slow("whole diagnoses")
+@pytest.mark.parametrize(
+    ("rounding", "words", "named"),
+    [(np.floor, {}, {"quantization"}), (np.round, {"contact": cases.relaxing()}, {"quantization", "creep"})],
+)
+def test_a_coarse_converter_is_named_whatever_noise_it_hides(rounding, words, named):
+    """Without load no noise is seen. With readings rounded down, a drift alone once left no more than that."""
+    result = cases.diagnosed(in_steps(rounding, **words))
+    assert {one.name for one in result.findings if one.confidence >= rule_numbers.SURE} == named
+
+
+def test_values_are_few_if_readings_have_fewer_of_them_than_their_load():
+    def are_few(one):
+        return view_set_of(predictors_of(one.trials, one), (1e-15, 1.0)).repeats_few_values(Model(one.parameters))
+
+    plain = cases.rig(trials=4, seconds=8.0, seed=2, stated=80.0)
+    small = replace(plain, trials=tuple(replace(one, reading=1e-12 * one.reading) for one in plain.trials))  # in farads, say
+    assert are_few(in_steps(np.floor)) and not are_few(plain) and not are_few(small)
+    level = np.repeat(1e-3 * np.array([0.0, 1.0, 2.0, 3.0, 2.0, 1.0, 0.0]), 200)  # a load that has steps itself
+    sensed = cases.depth_trial(np.arange(len(level)) / cases.RATE, level, reading=np.zeros((len(level), 24)))
+    rig = cases.grid_rig(6, 4, cases.PITCH, plain.parameters)
+    (one,) = predictors_of([sensed], rig)
+    made = replace(sensed, reading=one.predict(Model(rig.parameters)).reading ** 2)
+    assert not are_few(replace(rig, trials=(made,)))
+
+
+def test_forces_in_check_recordings_alone_weigh_nothing():
+    count = np.tile([COUNT, 0.0], (BLOCKS, 1))
+    count[-1, 1] = COUNT
+    weights = drawn_weights(BLOCKS)
+    weights[:, -1] = 0.0
+    found = Score(NoiseLevel(count, count, np.full(2, 0.01)), count.sum(axis=0) > 0, PRICE, weights)
+    one = model(3.0)
+    one.sums = Sums(3.0 * count, count, np.stack([count] * 2), np.stack([count] * 2), one.sums.changes)
+    assert found.force_weight(one) == 1.0
