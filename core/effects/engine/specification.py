@@ -61,8 +61,9 @@ FAMILIES = {
 """Families of effects that resemble each other, so that a better fit says little which of them acts."""
 
 EXACT_FORM_ERROR = 0.001
-"""φ of a form that contains every law of its kind. It leaves 0.0002 at most (benchmarks/RESULTS.md), and up to five times that
-of a dead zone of another generator. With 0.005, as of forms that approximate, rivals of dead zones leave ten times as much."""
+"""φ of a form that contains every law of its kind, or of a converter, whose values are read off. It leaves 0.0002 at most
+(benchmarks/RESULTS.md), and up to five times that of a dead zone of another generator. With 0.005, as of forms that
+approximate, rivals of dead zones leave ten times as much."""
 FIT, SILENT_TEXELS, STEPS, SCATTER = "fit", "silent texels", "steps", "scatter"
 FOUND_BY = {
     FIT: "a fit of its formulas",
@@ -258,8 +259,9 @@ class Form:
     needs : str
         What recordings must hold for this form, one of :data:`NEEDS`, if it differs from the kind's.
     error : float or None
-        φ of a form that is free to follow any law of its kind: the share of the mean square of the kind's change that it leaves
-        of other laws at most, as measured: :data:`EXACT_FORM_ERROR`, or rounded up to 0.005. None for formulas of textbooks.
+        φ of a form that is free to follow any law of its kind, or of a converter: the share of the mean square of the kind's
+        change that it leaves of other laws at most, as measured: :data:`EXACT_FORM_ERROR`, or rounded up to 0.005. None for
+        formulas of textbooks.
     jumps_at : tuple of str
         The parameter, if the reading jumps where a load reaches its value: no derivative leads there, so it is scanned.
     is_apart : bool
