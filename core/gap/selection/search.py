@@ -26,8 +26,8 @@ BEAMS = {1: 3, 2: 2}
 """Models on top of which a further effect is looked for, by their number of names: for speed."""
 MOST_EFFECTS = 3
 REWEIGHTINGS = 3
-"""Fits of the base model, each with the weight of forces that the fit before gives: for speed. S of three sensors with a
-disturbance that is no effect of the library rises by 5 to 13 in three of them, and by 0.1 at most in five more."""
+"""Fits of the base model, each with the weight of forces that the fit before gives: for speed. With a disturbance that is no
+effect of the library, S of three sensors rises by 5 to 13 in the first three fits, and by 0.1 at most in five more."""
 LEAST_REMEMBERED = 1e-6
 """Change of a prediction, in deviations of the noise, that is more than rounding."""
 STAGES = {"alone": 0.0, "differing recordings": 0.3, "further effects": 0.5, "reconsidered": 0.8, "prediction": 0.9}
