@@ -13,8 +13,6 @@ from .direct_estimates import quantization_starts, unresponsive_texels
 from .rao_score import ScoreTest
 from .view_set import ViewSet
 
-SEEN = 1.0
-"""Added to the promise of a converter whose steps are seen in the readings, as a share of the squares: it is always fitted."""
 LARGEST_SHIFT, LARGEST_TURN = 0.5, 0.1
 """Bounds of the starting points of displaced texels: a share of the pitch, and an angle in rad."""
 DISPLACEMENT_SCANS = ((0.15, 8), (0.02, 8))
@@ -96,11 +94,7 @@ def _quantization_starts(candidate: Candidate, score_test: ScoreTest, view_set: 
     values = view_set.moving_readings(score_test.model)
     starts = quantization_starts(values, view_set.whole, candidate)
     decreases = [(score_test.decrease_after_step(effect), effect) for effect in starts]
-    if not starts:
-        return []
-    decrease, best = max(decreases, key=lambda entry: entry[0])
-    is_seen = view_set.repeats_few_values(score_test.model)
-    return [(max(decrease, 0.0) + SEEN * score_test.total if is_seen else decrease, best)]
+    return [max(decreases, key=lambda entry: entry[0])] if starts else []
 
 
 def _texel_parameter_starts(candidate: Candidate, score_test: ScoreTest, scales: Scales) -> list[tuple[float, Effect]]:

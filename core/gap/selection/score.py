@@ -42,8 +42,9 @@ from .rule_numbers import (
 
 OWN_NUMBERS, ONE_SESSION = "own numbers", "one session"
 """How recordings may be assumed to differ: by a factor and a zero each, or as one session in their order."""
-IMPOSSIBLE = 1e4
-"""By how much S of a model that cannot have made the readings is lower: more than it can rise as squares fall to rounding."""
+IMPOSSIBLE = -STRETCHES * float(np.log(np.finfo(float).tiny))
+"""By how much S of a model that cannot have made the readings is lower: as squares of readings and forces fall from one to the
+smallest number above zero. Infinity is meant, and differences of two such models remain numbers."""
 
 
 @dataclass(eq=False)

@@ -25,7 +25,7 @@ from ..candidates.candidates import (
 from ..candidates.direct_estimates import of_silent_texels
 from ..candidates.plausibility import is_plausible
 from ..candidates.rao_score import ScoreTest
-from ..candidates.starting_points import SEEN, is_large_shift, starting_points
+from ..candidates.starting_points import is_large_shift, starting_points
 from ..candidates.view_set import ViewSet
 from ..fitting.least_squares import BASE, Fit, FreeParameter, TrialView, fit
 from ..forward.predictor import Model
@@ -49,8 +49,6 @@ rigs 89 of 92 effects that were missing from a model belonged to the five kinds 
 TRIED_FORMS = 2
 """Forms of a kind that are fitted alone to a part of the data: for speed. On 82 development rigs one of the two forms that
 promise most left least for 350 of 371 kinds; for hidden kinds among the others it left at most 0.02 of the gap more."""
-FIRST = 1e3
-"""By how much the rank of an effect that is seen in the readings is lower: it is fitted to everything, before all others."""
 ALL_FORMS = 2
 """Kinds of which all forms are fitted to everything, so that a kind is judged by its whole library: for speed."""
 
@@ -62,15 +60,18 @@ class Promise:
     Attributes
     ----------
     share : float
-        By how much it could lower the squares, as a share of them; more than one if it is seen in the readings.
+        By how much it could lower the squares, as a share of them.
     candidate : Candidate
     starts : list of Effect
         Starting points of a fit, best first.
+    is_seen : bool
+        True if the readings show it, whatever it leaves in a part of them: it is fitted to everything, before all others.
     """
 
     share: float
     candidate: Candidate
     starts: list[Effect]
+    is_seen: bool
 
 
 @dataclass(frozen=True)
@@ -84,12 +85,23 @@ class FirstFit:
     rank : float
         The same share of the squares there after one linear step of the initial parameters. The candidate that leaves least
         comes first: parts differ between kinds, and on the pressed texels alone the base model may fit better.
+    promise : Promise
+    fit : Fit
     """
 
     left: float
     rank: float
-    candidate: Candidate
+    promise: Promise
     fit: Fit
+
+    @property
+    def candidate(self) -> Candidate:
+        """The candidate that was fitted."""
+        return self.promise.candidate
+
+    def may_leave(self, most_left: float) -> bool:
+        """Return whether a fit to everything is worth while: it leaves little enough, or the readings show it."""
+        return self.promise.is_seen or self.left <= most_left
 
 
 Making = Generator[str, None, list[Hypothesis]]
@@ -165,14 +177,15 @@ class Screening:
                 yield "screening every effect"
                 wide = [one for one in forms if one.form.is_wide]
                 screened.append(self._promises(parent, tests, wide) or self._promises(parent, tests, forms))
-        screened = sorted((own for own in screened if own), key=lambda own: -own[0].share)
+        screened = sorted((own for own in screened if own), key=lambda own: (not own[0].is_seen, -own[0].share))
         first_fits = []
         for own in screened[: None if is_first else TRIED_KINDS]:
             for one in own[: TRIED_FORMS if is_first else 1]:
                 yield f"fitting {one.candidate.name}"
                 first_fits.append(self._first_fit(one, tests))
         best_fits: dict[str, FirstFit] = {}
-        for fitted in sorted((one for one in first_fits if one.left <= most_left), key=lambda one: one.rank):
+        kept = [one for one in first_fits if one.may_leave(most_left)]
+        for fitted in sorted(kept, key=lambda one: (not one.promise.is_seen, one.rank)):
             best_fits.setdefault(fitted.candidate.name, fitted)
             if is_first:
                 self.alone.setdefault(fitted.candidate.label, fitted.fit.model.effects[-1])
@@ -193,7 +206,7 @@ class Screening:
         parent, tests = start or parent, _Tests(self.view_set, (start or parent).fit, parent.fit)
         own = [one for one in self._candidates_beside(parent) if one.name == name and one.label not in done]
         fitted = [self._first_fit(one, tests) for one in self._promises(parent, tests, own)]
-        return (yield from self._final_fits([one for one in fitted if one.left <= most_left], parent))
+        return (yield from self._final_fits([one for one in fitted if one.may_leave(most_left)], parent))
 
     def without(self, one: Hypothesis, index: int) -> Hypothesis:
         """Return a model without one of its effects, fitted again."""
@@ -241,8 +254,10 @@ class Screening:
             starts = starting_points(one, test, self.view_set, self.scales, count)
             starts += [(test.score(effect)[0], effect) for effect in known]
             starts.sort(key=lambda entry: -entry[0])
-            if starts and starts[0][0] > 0:
-                promises.append(Promise(starts[0][0] / max(test.total, 1e-300), one, [effect for _, effect in starts]))
+            is_seen = one.kind.found_by == STEPS and self.view_set.repeats_few_values(parent.fit.model)
+            if starts and (is_seen or starts[0][0] > 0):
+                share = starts[0][0] / max(test.total, 1e-300)
+                promises.append(Promise(share, one, [effect for _, effect in starts], is_seen))
         return sorted(promises, key=lambda one: (one.candidate.has_texel_parameters, -one.share))
 
     def _known(self, one: Candidate, gain: float) -> list[Effect]:
@@ -271,9 +286,7 @@ class Screening:
             initial_derivatives=None if is_far else test.initial_derivatives,
         )
         left, rank = (share_left(found, before) for before in (tests.gap(test), test.least))
-        if one.share >= SEEN:
-            left, rank = 0.0, rank - FIRST
-        return FirstFit(left, rank, one.candidate, found)
+        return FirstFit(left, rank, one, found)
 
     def _final_fits(self, first_fits: Iterable[FirstFit], parent: Hypothesis) -> Making:
         """Candidates fitted to all fitted recordings, and read on unseen blocks, but for those without their signature."""

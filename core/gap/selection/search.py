@@ -25,9 +25,6 @@ from .screening import ALL_FORMS, Screening
 BEAMS = {1: 3, 2: 2}
 """Models on top of which a further effect is looked for, by their number of names: for speed."""
 MOST_EFFECTS = 3
-REWEIGHTINGS = 3
-"""Fits of the base model, each with the weight of forces that the fit before gives: for speed. With a disturbance that is no
-effect of the library, S of three sensors rises by 5 to 13 in the first three fits, and by 0.1 at most in five more."""
 LEAST_REMEMBERED = 1e-6
 """Change of a prediction, in deviations of the noise, that is more than rounding."""
 STAGES = {"alone": 0.0, "differing recordings": 0.3, "further effects": 0.5, "reconsidered": 0.8, "prediction": 0.9}
@@ -135,11 +132,10 @@ class Search:
         return self.under(one.assumed)[0].weighted(self.score.force_weight(one))
 
     def _reweighted(self, screening: Screening, base: Hypothesis) -> Hypothesis:
-        """The base model with the weights of forces at which its score is largest."""
-        for _ in range(REWEIGHTINGS):
-            weight = self.score.force_weight(base)
-            better = screening.weighted(weight).refined(base) if weight != 1.0 else base
-            if self.score.value(better) <= self.score.value(base):
+        """The base model at the weight of forces that its own score gives; each fit raises the score, to its resolution."""
+        while (weight := self.score.force_weight(base)) != 1.0:
+            better = screening.weighted(weight).refined(base)
+            if self.score.value(better) <= self.score.value(base) + self.score.resolution:
                 break
             base = better
         return base
