@@ -114,11 +114,15 @@ ANY_SENSOR = Condition(
     lambda context: any(obj.palpate.role == "SENSOR" for obj in context.scene.objects),
     "There is no sensor in this scene: use Make Sensor first",
 )
-IDLE = Condition(
-    lambda _context: BAKE not in session_state.session.jobs and not session_state.session.catching_up,
-    "Frames are being computed",
-)
-"""No bake and no computation of missing frames is running."""
+
+
+def _is_idle(_context) -> bool:
+    session = session_state.session
+    return BAKE not in session.jobs and not session.catching_up and not session.rendering
+
+
+IDLE = Condition(_is_idle, "Frames are being computed or rendered")
+"""No bake, no computation of missing frames and no render is running: each of them moves the scene to other frames."""
 NO_STUDY = Condition(
     lambda _context: STUDY not in session_state.session.jobs, "A study is running: wait for it, or press ESC to stop it"
 )

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
 import bpy
@@ -130,14 +130,15 @@ def current_frame(scene) -> tuple[int, float]:
 
 
 @contextmanager
-def frame_kept(scene) -> Iterator[None]:
-    """Let the scene stand at other frames inside the ``with`` block, and return to the present one."""
+def frame_kept(scene, unless: Callable[[], bool] = lambda: False) -> Iterator[None]:
+    """Let the scene stand at other frames inside the ``with`` block, and return to the present one `unless` it is taken."""
     before = scene.frame_current, scene.frame_subframe
     try:
         yield
     finally:
         with suppress(ReferenceError):  # the scene was deleted meanwhile
-            scene.frame_set(before[0], subframe=before[1])
+            if not unless():
+                scene.frame_set(before[0], subframe=before[1])
 
 
 @contextmanager

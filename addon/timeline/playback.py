@@ -151,14 +151,21 @@ def forget_error(scene) -> None:
 
 
 def compute_to_present_frame(scene) -> Generator[Progress, None, None]:
-    """Compute the missing frames up to the present one, and return to it. Closing the generator keeps what was computed."""
+    """Compute the missing frames up to the present one, and return to it. Closing the generator keeps what was computed.
+
+    A render that begins meanwhile ends it, and so does whoever moves the scene to another frame; the scene then stays there.
+    """
     if scene.session_uid in _waiting:
         yield from first_use.wait()
-    frames = missing_frames(scene)
-    session_state.session.catching_up = True
+    frames, session, number = missing_frames(scene), session_state.session, scene.frame_current
+    session.catching_up = True
+
+    def is_taken() -> bool:
+        return session.rendering or scene.frame_current != number
+
     try:
         # At the return to the present frame still catching up, so that what was stopped does not start again.
-        with fcurves.frame_kept(scene), fcurves.without_time_stretching(scene):
+        with fcurves.frame_kept(scene, unless=is_taken), fcurves.without_time_stretching(scene):
             for done, number in enumerate(frames, 1):
                 scene.frame_set(number)
                 if scene.session_uid in _waiting:
@@ -168,8 +175,10 @@ def compute_to_present_frame(scene) -> Generator[Progress, None, None]:
                 if run is None or number not in run.frames:
                     break  # the panel says why
                 yield Progress("Computing forces", done, len(frames), number)
+                if is_taken():
+                    break
     finally:
-        session_state.session.catching_up = False
+        session.catching_up = False
 
 
 def file_is_open() -> None:
@@ -188,7 +197,7 @@ def _compute_opened_file() -> None:
 def offer_to_compute() -> None:
     """Timer after a jump or a change: compute the missing frames with progress. The handler itself must return at once."""
     scene = bpy.context.scene
-    if scene is not None and not session_state.session.catching_up and missing_frames(scene):
+    if scene is not None and bpy.ops.palpate.catch_up.poll():
         bpy.ops.palpate.catch_up("INVOKE_DEFAULT", by_itself=True)
 
 

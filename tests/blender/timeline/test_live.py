@@ -113,6 +113,21 @@ def test_a_stopped_jump_keeps_what_was_computed():
     assert not session_state.session.catching_up
 
 
+@pytest.mark.parametrize("frame, rendering", [(1, False), (3, True)])
+def test_a_render_and_another_frame_end_a_jump(frame, rendering, monkeypatch):
+    """A render of the first frames that begins while a changed scene is computed again renders those frames."""
+    scene, *_ = press(frames=12)
+    play(scene, 1, 10)
+    job = playback.compute_to_present_frame(scene)
+    next(job), next(job)
+    scene.frame_set(frame)
+    monkeypatch.setattr(session_state.session, "rendering", rendering)
+    assert next(job, None) is None and scene.frame_current == frame
+    assert not session_state.session.catching_up
+    scene.frame_set(10)
+    assert bpy.ops.palpate.catch_up.poll() is not rendering and bpy.ops.palpate.bake.poll() is not rendering
+
+
 def watched(scene, obj, moments):
     """Return where a body is and what the bake's nodes show at moments of the timeline."""
     seen = []
