@@ -13,6 +13,10 @@ LARGEST_DENSE = 1500
 """Up to this number of texels every pair counts. Of more texels only pairs within reach count, since the matrix would not fit
 into memory."""
 
+BALANCING_STEPS = 30
+"""Each halves what the sums lack where no eigenvalue is negative: 1e-9 is left, and 1e-7 of the flattest weights. The number is
+the same for all, so that the result is a smooth function of the weights."""
+
 LARGEST_KEPT = 256
 """Up to this number of texels all distances are kept: a fit asks thousands of times for those of the same texels."""
 
@@ -49,11 +53,22 @@ class CouplingMatrix:
         """Return the sum of the weights of each source, (n,) float."""
         return np.bincount(self.source, self.weight, texels) if self.matrix is None else self.matrix.sum(axis=0)
 
-    def divided(self, by: np.ndarray) -> CouplingMatrix:
-        """Return the weights of each source divided by a number of its own, `by` (n,) float."""
+    def divided(self, by: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> CouplingMatrix:
+        """Return each weight divided by a number, which `by` computes from the indices of its target and of its source."""
         if self.matrix is None:
-            return replace(self, weight=self.weight / by[self.source])
-        return replace(self, matrix=self.matrix / by)
+            return replace(self, weight=self.weight / by(self.target, self.source))
+        texel = np.arange(len(self.matrix))
+        return replace(self, matrix=self.matrix / by(texel[:, None], texel))
+
+    def balance(self, texels: int) -> np.ndarray:
+        """Return the numbers u, (n,) float, with which rows and columns of ``uᵢ wᵢⱼ uⱼ`` sum to one, for symmetric weights w.
+
+        Knight, Ruiz and Uçar, SIAM J. Matrix Anal. 35 (2014): Sinkhorn's iteration for symmetric matrices.
+        """
+        scale = self.sums(texels) ** -0.5
+        for _ in range(BALANCING_STEPS):
+            scale = np.sqrt(scale / self.apply(scale[None])[0])
+        return scale
 
 
 def coupled(signal: np.ndarray, matrix: np.ndarray) -> np.ndarray:
@@ -96,7 +111,10 @@ def coupling_matrix(
         target, source, distance = pairs_within(position, reach)
         values = weight(distance)
         weights = CouplingMatrix(None, target, source, values if area is None else values * area[target])
-    return weights if area is None else weights.divided(weights.sums(n))
+    if area is None:
+        return weights
+    sums = weights.sums(n)
+    return weights.divided(lambda _, source: sums[source])
 
 
 def _distances(position: np.ndarray) -> np.ndarray:

@@ -37,16 +37,21 @@ def open_rim(values: Values, transducers: TransducerArray) -> CouplingMatrix:
 
     What would fall on texels outside is lost. The pitch of the lattice is the root of a texel's median area.
     """
-    return stretched_exponential({"width": 2.0**0.5 * scalar(values, "width"), "shape": 2.0, "lost": 1.0}, transducers)
+    width = 2.0**0.5 * scalar(values, "width")
+    return stretched_exponential({"width": width, "shape": 2.0, "lost": 1.0, "reflected": 0.0}, transducers)
 
 
 def stretched_exponential(values: Values, transducers: TransducerArray) -> CouplingMatrix:
-    """Weights ``exp(−(r/s)^q)``, of which the share lost falls on texels outside.
+    """Weights ``exp(−(r/s)^q)`` under a cover that ends at the rim, or goes on beyond it.
 
-    Without a loss they are divided by their sum on the texels. With it the sum is that on a square lattice which goes on beyond
-    them, as their cover does; it counts for a part where a part is lost. Weights end at :data:`LATTICE_REACH` pitches.
+    What falls beyond the rim of a cover that goes on is lost: the weights are divided by their sum on a square lattice that
+    contains the texels. A cover that ends keeps its load. Where its rim reflects, texels give each other the same share, and
+    what a texel gives and what it receives sum to one, as in diffusion inside a boundary without flux. Where it does not, the
+    weights of each texel are divided by their sum, so that texels at the rim receive less than they give. The shares `lost` and
+    `reflected` mix the three. Weights end at :data:`LATTICE_REACH` pitches.
     """
-    width, shape, lost = max(scalar(values, "width"), 1e-9), scalar(values, "shape"), scalar(values, "lost")
+    width, shape = max(scalar(values, "width"), 1e-9), scalar(values, "shape")
+    lost, reflected = scalar(values, "lost"), scalar(values, "reflected")
     pitch = float(np.sqrt(np.median(transducers.area)))
     rounding = -np.log(np.finfo(float).eps)  # weights with larger exponents are lost beside the largest one
     reach = min(width * rounding ** (1.0 / shape), LATTICE_REACH * pitch)
@@ -57,7 +62,11 @@ def stretched_exponential(values: Values, transducers: TransducerArray) -> Coupl
     weights = coupling_matrix(transducers.position, weight, reach, None)
     distance, count = _lattice()
     whole, own = count @ weight(distance * pitch), weights.sums(len(transducers))
-    return weights.divided(1.0 / (lost / whole + (1.0 - lost) / own))
+    one_way, both_ways = lost / whole + (1.0 - lost) * (1.0 - reflected) / own, (1.0 - lost) * reflected
+    if both_ways == 0.0:
+        return weights.divided(lambda _, source: 1.0 / one_way[source])
+    scale = weights.balance(len(transducers))
+    return weights.divided(lambda target, source: 1.0 / (one_way[source] + both_ways * scale[target] * scale[source]))
 
 
 @cache
@@ -124,14 +133,16 @@ KIND = Kind(
         ),
         Form(
             "stretched-exponential",
-            "rᵢ = Σⱼ wᵢⱼ fⱼ,  w ∝ exp(−(r/s)^q),  Σᵢ wᵢⱼ = 1 over the texels or all lattice points",
-            "Diggle and Ribeiro, Model-based Geostatistics (2007), section 3.4: the powered exponential family",
+            "rᵢ = Σⱼ wᵢⱼ fⱼ,  w ∝ exp(−(r/s)^q),  Σᵢ wᵢⱼ = 1 over the texels, in part with Σⱼ wᵢⱼ = 1, or over a lattice",
+            "Diggle and Ribeiro, Model-based Geostatistics (2007), section 3.4: the powered exponential family; Sinkhorn and "
+            "Knopp, Pacific J. Math. 21 (1967)",
             (
                 _WIDTH,
                 Parameter("shape", "1", 1.5, 0.4, 8.0, "Exponent q of the distance: 1 has a cusp, 2 is a Gaussian, 8 is flat."),
                 Parameter("lost", "1", 1.0, 0.0, 1.0, "Share that is lost of the load which falls beyond the rim."),
+                Parameter("reflected", "1", 0.0, 0.0, 1.0, "Share of what is kept that texels give each other alike."),
             ),
-            neutral={"width": 0.0, "lost": 0.0},
+            neutral={"width": 0.0, "lost": 0.0, "reflected": 0.0},
             coupling=stretched_exponential,
             error=0.005,  # at most, of five kernels of 0.5 to 1.2 pitches on two pads, kept or lost (benchmarks/RESULTS.md)
         ),

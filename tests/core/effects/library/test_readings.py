@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from scipy.ndimage import uniform_filter1d
 from scipy.optimize import least_squares
 from scipy.signal import TransferFunction, lsim
@@ -325,14 +326,48 @@ def test_a_stretched_exponential_loses_the_share_that_it_states():
     np.testing.assert_allclose(1.0 - half, 0.5 * (1.0 - gone), rtol=1e-9)
 
 
+def test_a_rim_that_reflects_gives_each_texel_what_it_takes():
+    """Texels give to each other alike, and a load that is the same everywhere stays so, at corners, too."""
+    weights = read(
+        effect("load-spreading", "stretched-exponential", width=0.006, shape=1.2, lost=0.0, reflected=1.0), np.eye(N)
+    )
+    np.testing.assert_allclose(weights.sum(axis=1), 1.0, atol=1e-9)
+    np.testing.assert_allclose(weights, weights.T, atol=1e-15)
+
+
+def test_a_rim_that_reflects_is_that_of_diffusion():
+    """Heat that leaves no rim, exp(−tL) of the lattice's Laplacian L: what is left of its effect, as a share of squares."""
+    near = np.abs(POSITION[:, None] - POSITION).sum(axis=2) < 1.5 * PITCH
+    laplacian = np.diag(near.sum(axis=1)) - near
+    diffused = expm(-laplacian.astype(float))
+    words = {"width": 1.78 * PITCH, "shape": 1.79, "lost": 0.0, "reflected": 1.0}
+    found = read(effect("load-spreading", "stretched-exponential", **words), np.eye(N))
+    kernel = np.exp(-((np.linalg.norm(POSITION[:, None] - POSITION, axis=2) / (1.78 * PITCH)) ** 1.79))
+    left, without_reflection = (np.square(one - diffused).sum() for one in (found, kernel / kernel.sum(axis=0)))
+    whole = np.square(diffused - np.eye(N)).sum()
+    assert left < 2e-4 * whole < 1e-3 * whole < without_reflection
+
+
+@pytest.mark.parametrize("shape", [0.4, 2.0, 8.0])
+def test_a_rim_reflects_between_texels_at_any_places(shape):
+    position = np.random.default_rng(3).uniform(0.0, 0.02, (60, 3))
+    array = TransducerArray(position, np.full(60, 4e-6))
+    weights = stretched_exponential({"width": 0.004, "shape": shape, "lost": 0.0, "reflected": 1.0}, array)
+    np.testing.assert_allclose(weights.sums(60), 1.0, atol=1e-6)
+    np.testing.assert_allclose(weights.apply(np.ones((1, 60))), 1.0, atol=1e-6)
+
+
 def test_a_stretched_exponential_couples_pairs_within_its_reach_alone():
     """Of many texels a list of all pairs would not fit into memory."""
     y, x = np.mgrid[0:50, 0:50] * 0.002
     position = np.stack([x.ravel(), y.ravel(), np.zeros(2500)], axis=1)
     array = TransducerArray(position, np.full(2500, 4e-6))
-    found = stretched_exponential({"width": 0.003, "shape": 2.0, "lost": 1.0}, array)
+    found = stretched_exponential({"width": 0.003, "shape": 2.0, "lost": 1.0, "reflected": 0.0}, array)
     assert found.matrix is None and len(found.weight) < 2500 * 270  # texels within 6 widths
     np.testing.assert_allclose(found.sums(2500)[25 * 50 + 25], 1.0, rtol=1e-9)
+    found = stretched_exponential({"width": 0.003, "shape": 2.0, "lost": 0.0, "reflected": 1.0}, array)
+    np.testing.assert_allclose(found.apply(np.ones((1, 2500))), 1.0, rtol=1e-9)
+    np.testing.assert_allclose(found.sums(2500), 1.0, rtol=1e-9)
 
 
 def test_crosstalk():
