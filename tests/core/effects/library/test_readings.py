@@ -13,6 +13,7 @@ from scipy.signal import TransferFunction, lsim
 from palpate.core.effects.engine.readout_chain import ReadoutChain, readings
 from palpate.core.effects.engine.registry import effect, form_of
 from palpate.core.effects.engine.specification import TransducerArray
+from palpate.core.effects.library import channel_curve
 from palpate.core.effects.library.load_spreading import stretched_exponential
 from palpate.core.errors import EffectError
 
@@ -368,6 +369,27 @@ def test_a_stretched_exponential_couples_pairs_within_its_reach_alone():
     found = stretched_exponential({"width": 0.003, "shape": 2.0, "lost": 0.0, "reflected": 1.0}, array)
     np.testing.assert_allclose(found.apply(np.ones((1, 2500))), 1.0, rtol=1e-9)
     np.testing.assert_allclose(found.sums(2500), 1.0, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        lambda x: x**0.4,
+        lambda x: np.tanh(5.0 * x),
+        lambda x: -np.log1p(5.0 * x),
+        lambda x: 1.0 / (1.5 - x) ** 3 - 1.0 / 1.5**3,
+        lambda x: np.sin(2.0 * np.pi * x),
+        lambda x: np.maximum(x - 0.2, 0.0),
+    ],
+)
+def test_the_free_curve_of_a_channel_follows_other_curves(law):
+    """The share of squares that it leaves is far below the error that it states."""
+    load = np.concatenate([np.zeros(200), np.linspace(0.0, 1.0, 400)])
+    values = np.linalg.lstsq(np.vander(load, 6, increasing=True), law(load), rcond=None)[0]
+    words = dict(zip(channel_curve.POWERS, values.tolist(), strict=True))
+    found = read(effect("channel-curve", "quintic", **words), load[:, None] * np.ones(N), np.linspace(0.0, 6.0, 600))[:, 0]
+    assert np.square(found - law(load)).sum() < 0.0011 * np.square(law(load)).sum()
+    assert form_of("channel-curve", "quintic").error == 0.005
 
 
 def test_crosstalk():
