@@ -13,10 +13,6 @@ LARGEST_DENSE = 1500
 """Up to this number of texels every pair counts. Of more texels only pairs within reach count, since the matrix would not fit
 into memory."""
 
-BALANCING_STEPS = 30
-"""Each halves what the sums lack where no eigenvalue is negative: 1e-9 is left, and 1e-7 of the flattest weights. The number is
-the same for all, so that the result is a smooth function of the weights."""
-
 LARGEST_KEPT = 256
 """Up to this number of texels all distances are kept: a fit asks thousands of times for those of the same texels."""
 
@@ -63,10 +59,12 @@ class CouplingMatrix:
     def balance(self, texels: int) -> np.ndarray:
         """Return the numbers u, (n,) float, with which rows and columns of ``uᵢ wᵢⱼ uⱼ`` sum to one, for symmetric weights w.
 
-        Knight, Ruiz and Uçar, SIAM J. Matrix Anal. 35 (2014): Sinkhorn's iteration for symmetric matrices.
+        Knight, Ruiz and Uçar, SIAM J. Matrix Anal. 35 (2014): Sinkhorn's iteration for symmetric matrices. Each step halves
+        what the sums lack, where no eigenvalue is negative, so as many steps as a number has bits reach rounding. All weights
+        have the same number of steps, so that the result is a smooth function of them.
         """
         scale = self.sums(texels) ** -0.5
-        for _ in range(BALANCING_STEPS):
+        for _ in range(np.finfo(float).nmant):
             scale = np.sqrt(scale / self.apply(scale[None])[0])
         return scale
 

@@ -32,8 +32,6 @@ LONG = 12
 """How many times as long as wide a grid is no picture any more."""
 Pick = Callable[[Model], np.ndarray]
 """What a model predicts of one channel."""
-VALUE_BOX: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}
-"""Behind the value of a bar, so that no line crosses it."""
 HEADING: dict[str, Any] = {"fontsize": 8.5, "color": INK, "weight": "bold"}
 
 
@@ -217,16 +215,8 @@ def _draw_stages(axes: Axes, result: Diagnosis, errors: GapErrors) -> None:
     values = [100.0 * (error or 0.0) for _, error, _ in rows]
     axes.barh(places, values, 0.72, color=[colour for *_, colour in rows])
     for place, value in zip(places, values, strict=True):
-        axes.annotate(
-            f"{value:.2f}",
-            (value, place),
-            (3, 0),
-            textcoords="offset points",
-            va="center",
-            fontsize=8,
-            color=INK,
-            bbox=VALUE_BOX,
-        )
+        text = axes.text(value, place, f" {value:.2f}", ha="left", va="center", fontsize=8, color=INK)
+        text.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 0.0})  # the line of the noise floor does not cross it
     floor = 100.0 * errors.noise_floor
     axes.axvline(floor, color=INK, lw=0.9, ls=(0, (4, 3)))
     axes.text(floor, 0.25 - count, f" noise floor {floor:.2f}", ha="left", va="center", fontsize=8, color=INK)

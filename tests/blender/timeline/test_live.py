@@ -115,7 +115,7 @@ def test_a_stopped_jump_keeps_what_was_computed():
 
 @pytest.mark.parametrize("frame, rendering", [(1, False), (3, True)])
 def test_a_render_and_another_frame_end_a_jump(frame, rendering, monkeypatch):
-    """A render of the first frames that begins while a changed scene is computed again renders those frames."""
+    """A render that begins while a changed scene is computed again gets the frames that it asks for."""
     scene, *_ = press(frames=12)
     play(scene, 1, 10)
     job = playback.compute_to_present_frame(scene)
