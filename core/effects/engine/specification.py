@@ -266,6 +266,9 @@ class Form:
         The parameter, if the reading jumps where a load reaches its value: no derivative leads there, so it is scanned.
     is_apart : bool
         Whether the free forms of its kind explain a part of it and do not follow it, so that it is looked for beside them.
+    level_number : callable
+        Of a converter: ``level_number(sizes, values) → numbers``: how many steps lead to readings so far from the one without
+        load, in the sensor's unit; whole numbers at its levels.
     """
 
     name: str
@@ -293,6 +296,7 @@ class Form:
     error: float | None = None
     jumps_at: tuple[str, ...] = ()
     is_apart: bool = False
+    level_number: Callable[[np.ndarray, Values], np.ndarray] | None = None
 
     @property
     def is_wide(self) -> bool:

@@ -12,6 +12,21 @@ from ...model.sensor import Values
 from ..engine.specification import EXACT_FORM_ERROR, STEPS, Drawing, Form, Kind, TransducerArray, scalar
 
 
+def even(sizes: np.ndarray, values: Values) -> np.ndarray:
+    """Return sizes in steps Δ."""
+    return sizes / scalar(values, "step")
+
+
+def after_logarithm(sizes: np.ndarray, values: Values) -> np.ndarray:
+    """Return sizes in steps that are even after a logarithm."""
+    return np.log1p(sizes / scalar(values, "scale")) / scalar(values, "growth")
+
+
+def after_power(sizes: np.ndarray, values: Values) -> np.ndarray:
+    """Return sizes in steps that are even after a power."""
+    return (sizes / scalar(values, "first")) ** scalar(values, "exponent")
+
+
 def rounded(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Round to the nearest step."""
     return _stepped(signal, scalar(values, "step"), np.round)
@@ -33,7 +48,7 @@ def companded(signal: np.ndarray, time: np.ndarray, values: Values, transducers:
     if growth <= 0.0:
         return signal
     change = signal - transducers.zero
-    steps = np.floor(np.log1p(np.abs(change) / scale) / growth + scalar(values, "rounding"))
+    steps = np.floor(after_logarithm(np.abs(change), values) + scalar(values, "rounding"))
     return transducers.zero + np.sign(change) * scale * np.expm1(growth * steps)
 
 
@@ -43,7 +58,7 @@ def power(signal: np.ndarray, time: np.ndarray, values: Values, transducers: Tra
     if first <= 0.0:
         return signal
     change = signal - transducers.zero
-    steps = np.floor((np.abs(change) / first) ** exponent + scalar(values, "rounding"))
+    steps = np.floor(after_power(np.abs(change), values) + scalar(values, "rounding"))
     return transducers.zero + np.sign(change) * first * steps ** (1.0 / exponent)
 
 
@@ -70,6 +85,7 @@ KIND = Kind(
             neutral={"step": 0.0},
             memoryless=rounded,
             after_conversion=True,
+            level_number=even,
             error=EXACT_FORM_ERROR,  # the values of a converter are these exactly
         ),
         Form(
@@ -80,6 +96,7 @@ KIND = Kind(
             neutral={"step": 0.0},
             memoryless=rounded_down,
             after_conversion=True,
+            level_number=even,
             error=EXACT_FORM_ERROR,  # the values of a converter are these exactly
         ),
         Form(
@@ -107,6 +124,7 @@ KIND = Kind(
             neutral={"growth": 0.0},
             memoryless=companded,
             after_conversion=True,
+            level_number=after_logarithm,
             error=EXACT_FORM_ERROR,  # the values of a converter are these exactly
         ),
         Form(
@@ -121,6 +139,7 @@ KIND = Kind(
             neutral={"first": 0.0},
             memoryless=power,
             after_conversion=True,
+            level_number=after_power,
             error=EXACT_FORM_ERROR,  # the values of a converter are these exactly
         ),
     ),

@@ -5,16 +5,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
+from scipy.optimize import least_squares
 
-from ...model.sensor import Effect
+from ...effects.engine.specification import Form
+from ...model.sensor import Effect, Value
 from ..fitting.least_squares import FreeParameter, TrialView
 from ..forward.contact_phases import relative_load
 from ..forward.predictor import Model
 from .candidates import Candidate
-from .companded_steps import CHARACTERISTIC_NOISE, LEAST_CHARACTERISTIC, companded_steps
 
 MOST_LEVELS = 48
 """Most distinct values of all readings for them to be quantization levels; noise alone makes thousands."""
@@ -33,15 +33,17 @@ noise, its measured reading by less than `LEAST_SPREAD_SHARE` of that, and if it
 predicted."""
 MOST_DEAD_SHARE = 0.4
 """If a larger share of the loaded texels seems dead, the model is wrong and not the texels."""
-LEAST_READINGS = 400
-"""Number of changing readings from which on steps are looked for."""
-COARSEST_FREQUENCY, FREQUENCY_STEP, STEP_IN_NOISE = 5.0, 0.12, 2.5
-"""Frequencies of the search for fine steps, in units of one over the range: from a fifth of the range (coarser steps are seen
-as levels) to steps of 2.5 standard deviations of the noise."""
-MOST_FREQUENCIES = 20000
-AS_CLEAR = 0.9
-"""Of a power and a logarithm the one counts behind which steps are seen best, and the other if its characteristic function
-reaches this share. Chosen by eye from 40 readings behind companding converters."""
+SAME_LEVEL = 1e-9
+"""Share of the largest reading within which values are the same but for rounding."""
+LEAST_REPEATS, LEAST_LEVELS, STEP_IN_NOISE = 2.0, 3, 2.5
+"""Levels are looked for if readings repeat each value so often on average, so that most levels are among them; if so many lie
+above rest; and if neighbours are apart by so many standard deviations of the noise, because noise hides finer ones."""
+ROUNDING = "rounding"
+"""Name of the share of a step that a converter rounds up, which its levels do not show."""
+LEVEL_RANGE, LEAST_SHARE, GRID, MOST_ROUNDS = 10.0, 1e-3, 24, 20
+"""Bounds of the parameters of levels, as multiples of the smallest and the largest level, or as a number without a unit; points
+of the grid of first values along each; and how often levels are numbered anew. With them all levels of powers from 0.3 to 2.5
+and logarithms are numbered rightly if a tenth of 8 to 2000 is missing."""
 
 
 def unresponsive_texels(views: Sequence[TrialView], model: Model, candidate: Candidate, texels: int) -> Effect | None:
@@ -98,11 +100,9 @@ def of_silent_texels(free: Sequence[FreeParameter], effect: Effect) -> Iterator[
 
 
 def quantization_starts(values: np.ndarray, views: Sequence[TrialView], candidate: Candidate) -> list[Effect]:
-    """Return the effect with each step in which the readings may be quantised; empty if they seem not to be.
+    """Return the effect with the levels of a converter that readings show; empty if they show none.
 
-    Few levels that all samples share are seen at once; uneven steps stand for several even ones. Readings with finer steps q
-    have a characteristic function that is large at the frequency 1/q, whatever their distribution (Widrow and Kollár,
-    Quantization Noise, 2008). Constant readings would look the same, so only changing samples are used.
+    Noise repeats no value, so values that repeat are the levels of a converter.
 
     Parameters
     ----------
@@ -113,108 +113,57 @@ def quantization_starts(values: np.ndarray, views: Sequence[TrialView], candidat
     candidate : Candidate
         The form of the effect.
     """
-    if len(values) < LEAST_READINGS:
+    levels = distinct(values)
+    if len(values) < LEAST_REPEATS * len(levels) or np.median(np.diff(levels)) < STEP_IN_NOISE * views[0].noise[0]:
         return []
-    levels, rest = few_levels(values), unloaded_reading(views)
-    if candidate.form.name == "companding":
-        return _companding_starts(values - rest, candidate) if levels is None else companding_starts(levels, rest, candidate)
-    if candidate.form.name == "power":
-        return _power_starts(values - rest, candidate) if levels is None else power_starts(levels, rest, candidate)
-    if levels is not None:
-        apart = np.diff(levels)
-        tried = np.unique([np.median(apart), apart.mean(), apart.max(), float(np.average(apart, weights=apart))])
-        return [Effect(candidate.name, candidate.form.name, {"step": float(step)}) for step in tried]
-    step = even_steps(values, views[0].noise[0])
-    return [] if step is None else [Effect(candidate.name, candidate.form.name, {"step": step})]
+    change = levels - unloaded_reading(views)
+    change = change if change[-1] >= -change[0] else -change[::-1]
+    sizes = change[change > SAME_LEVEL * change[-1]]
+    if len(sizes) < LEAST_LEVELS:
+        return []
+    found = level_parameters(sizes, candidate.form)
+    shares = (0.0, 0.5) if ROUNDING in candidate.form.defaults() else ()
+    return [
+        Effect(candidate.name, candidate.form.name, one) for one in [found | {ROUNDING: share} for share in shares] or [found]
+    ]
 
 
-def _companding_starts(above_rest: np.ndarray, candidate: Candidate) -> list[Effect]:
-    """Steps behind a logarithm that are seen in many levels."""
-    seen = companded_steps(above_rest)
-    found = [one for one in seen if one.logarithmic and one.strength >= AS_CLEAR * seen[0].strength and one.bend > 0.0]
-    return [effect for one in found for effect in _roundings(candidate, {"scale": one.scale, "growth": one.growth})]
+def level_parameters(sizes: np.ndarray, form: Form) -> dict[str, Value]:
+    """Return the parameters of a converter with which its levels have whole numbers (:attr:`.specification.Form.level_number`).
 
+    They start where neighbouring levels are nearest to a distance of one, by absolute deviations, because a few levels may be
+    missing. Then each distance is a whole number, and least squares fit the parameters to the sums of these.
 
-def _power_starts(above_rest: np.ndarray, candidate: Candidate) -> list[Effect]:
-    """Steps behind a power that are seen in many levels."""
-    seen = companded_steps(above_rest)
-    bounds = {p.name: p for p in candidate.form.parameters}["exponent"]
-    found = [one for one in seen if not one.logarithmic and one.strength >= AS_CLEAR * seen[0].strength]
-    found = [one for one in found if bounds.low <= one.exponent <= bounds.high]
-    return [effect for one in found for effect in _roundings(candidate, {"first": one.first, "exponent": one.exponent})]
-
-
-def _roundings(candidate: Candidate, values: dict[str, float]) -> list[Effect]:
-    """The effect of a converter that cuts off, and of one that rounds to the nearest."""
-    return [Effect(candidate.name, candidate.form.name, {**values, "rounding": share}) for share in (0.0, 0.5)]
-
-
-def even_steps(values: np.ndarray, noise: float) -> float | None:
-    """Return the even step of readings by their characteristic function, in the sensor's unit; None if none is seen."""
-    return _even_steps_kept(np.ascontiguousarray(values, float).tobytes(), noise)
-
-
-@lru_cache(maxsize=2)
-def _even_steps_kept(raw: bytes, noise: float) -> float | None:
-    """Levels of readings given as bytes. Several forms ask for the steps of the same readings."""
-    values = np.frombuffer(raw)
-    full = float(np.ptp(values))
-    if full == 0.0:
-        return None
-    frequency = np.arange(COARSEST_FREQUENCY / full, 1.0 / (STEP_IN_NOISE * noise), FREQUENCY_STEP / full)
-    if not 2 < len(frequency) < MOST_FREQUENCIES:
-        return None
-    size = _characteristic_function(values, frequency)
-    if size.max() < LEAST_CHARACTERISTIC + CHARACTERISTIC_NOISE / np.sqrt(len(values)):
-        return None
-    best = frequency[int(np.argmax(size))]  # harmonics are smaller, because noise blurs them more
-    fine = best + np.linspace(-FREQUENCY_STEP, FREQUENCY_STEP, 49) / full
-    return float(1.0 / fine[int(np.argmax([abs(np.exp(2j * np.pi * f * values).mean()) for f in fine]))])
-
-
-def _characteristic_function(values: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """Magnitude of the characteristic function of values (n,) at evenly spaced frequencies (m,)."""
-    phase = np.exp(2j * np.pi * frequency[0] * values)
-    turn = np.exp(2j * np.pi * (frequency[1] - frequency[0]) * values)
-    size = np.empty(len(frequency))
-    for i in range(len(frequency)):
-        size[i] = abs(phase.mean())
-        phase *= turn  # twenty times as fast as an exponential; twenty thousand products are off by 1e-12
-    return size
-
-
-def companding_starts(levels: np.ndarray, rest: float, candidate: Candidate) -> list[Effect]:
-    """Return the effect with the growing steps that fit a few levels best: ``A (exp(b k) - 1)`` for the k-th level above rest;
-    once cut off and once rounded. Empty if there are too few levels.
+    Parameters
+    ----------
+    sizes : (k,) float, increasing
+        Distances of levels from the reading without load, above zero, in the sensor's unit.
+    form : Form
     """
-    above = levels[levels > rest + 1e-9] - rest
-    if len(above) < 3:
-        return []
-    growth = np.geomspace(0.01, 3.0, 200)
-    lattice = np.expm1(growth[:, None] * np.arange(1, len(above) + 1))
-    scale, best = _nearest_lattice(lattice, above)
-    return _roundings(candidate, {"scale": scale, "growth": float(growth[best])})
+    own = [p for p in form.parameters if p.name != ROUNDING]
+    in_units = (sizes[0] / LEVEL_RANGE, sizes[-1] * LEVEL_RANGE)
+    bounds = [in_units if p.unit == "unit" else (max(p.low, LEAST_SHARE), p.high) for p in own]
+    low, high = np.log(np.transpose(bounds))
 
+    def values(at: np.ndarray) -> dict[str, Value]:
+        return {p.name: float(value) for p, value in zip(own, np.exp(at), strict=True)}
 
-def power_starts(levels: np.ndarray, rest: float, candidate: Candidate) -> list[Effect]:
-    """Return the effect with the steps behind a power that fit a few levels best: ``s k^(1/p)`` for the k-th level above rest;
-    once cut off and once rounded. Empty if there are too few levels.
-    """
-    above = levels[levels > rest + 1e-9] - rest
-    if len(above) < 3:
-        return []
-    bounds = {p.name: p for p in candidate.form.parameters}["exponent"]
-    exponent = np.geomspace(max(bounds.low, 0.2), bounds.high, 200)
-    lattice = np.arange(1, len(above) + 1) ** (1.0 / exponent[:, None])
-    first, best = _nearest_lattice(lattice, above)
-    return _roundings(candidate, {"first": first, "exponent": float(exponent[best])})
+    def numbers(at: np.ndarray) -> np.ndarray:
+        assert form.level_number is not None
+        return form.level_number(sizes, values(at))
 
+    def distances(at: np.ndarray) -> np.ndarray:
+        return np.log(np.maximum(np.diff(numbers(at)), 1e-9))
 
-def _nearest_lattice(lattice: np.ndarray, above: np.ndarray) -> tuple[float, int]:
-    """Factor and number of the lattice (m, k) that comes nearest to levels (k,) after a factor."""
-    scale = lattice @ above / (lattice * lattice).sum(axis=1)
-    best = int(np.argmin(((above - scale[:, None] * lattice) ** 2).sum(axis=1)))
-    return float(scale[best]), best
+    grid = np.stack(np.meshgrid(*np.linspace(low, high, GRID).T), axis=-1).reshape(-1, len(own))
+    start = min(grid, key=lambda at: float(np.abs(distances(at)).sum()))
+    at, before = least_squares(distances, start, bounds=(low, high), loss="soft_l1", f_scale=0.1).x, np.zeros(0)
+    for _ in range(MOST_ROUNDS):
+        whole = np.cumsum(np.maximum(np.round(np.diff(numbers(at), prepend=0.0)), 1.0))
+        if np.array_equal(whole, before):
+            break
+        at, before = least_squares(lambda x, whole=whole: numbers(x) - whole, at, bounds=(low, high)).x, whole
+    return values(at)
 
 
 def unloaded_reading(views: Sequence[TrialView]) -> float:
@@ -227,8 +176,13 @@ def unloaded_reading(views: Sequence[TrialView]) -> float:
     return float(np.median(np.concatenate(found))) if any(map(len, found)) else 0.0
 
 
-def few_levels(values: np.ndarray) -> np.ndarray | None:
-    """Return the distinct values of readings, in order, if they are so few that noise did not make them; else None."""
+def few_levels(values: np.ndarray) -> bool:
+    """Return whether readings have so few distinct values, and repeat them so often, that noise did not make them."""
+    count = len(distinct(values))
+    return 3 <= count <= MOST_LEVELS and len(values) >= SAMPLES_PER_LEVEL * count
+
+
+def distinct(values: np.ndarray) -> np.ndarray:
+    """Return the distinct values of readings, in order; those that rounding of numbers alone sets apart are one."""
     size = float(np.abs(values).max(initial=0.0)) or 1.0
-    levels = values[np.unique(np.round(values / size, 9), return_index=True)[1]]
-    return levels if 3 <= len(levels) <= MOST_LEVELS and len(values) >= SAMPLES_PER_LEVEL * len(levels) else None
+    return values[np.unique(np.round(values / (size * SAME_LEVEL)), return_index=True)[1]]

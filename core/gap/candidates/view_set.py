@@ -19,7 +19,6 @@ from ..dataset.trial import Trial
 from ..fitting.least_squares import TrialView
 from ..forward.predictor import Model, Predictor, predictors_of
 from .candidates import DIRECTLY_ESTIMATED, Candidate, is_spatial
-from .changing_readings import moving_values
 from .direct_estimates import few_levels
 
 FEW_TEXELS = 16
@@ -30,6 +29,8 @@ SAMPLE_STRIDE = 4
 """The view with few samples has every fourth sample."""
 LEAST_SAMPLES = 60
 """A trial with fewer samples than this after thinning keeps all of them."""
+MOST_READINGS = 6000
+"""Number of changing readings to which they are thinned."""
 HELD_OUT_STRETCHES = 2
 """Number of stretches of time into which a trial is cut if a part of it has to be left out of a fit."""
 
@@ -73,11 +74,20 @@ class ViewSet:
         Noise repeats no value, so a converter made them.
         """
         readings, predictions = self._moving_values(model).T
-        return few_levels(readings) is not None and few_levels(predictions) is None
+        return few_levels(readings) and not few_levels(predictions)
 
     def _moving_values(self, model: Model) -> np.ndarray:
+        """Some thousand readings of samples at which the model changes by more than the noise, and predictions, (n, 2)."""
         if self._moving is None:
-            self._moving = moving_values(self.whole, model)
+            moving = [np.zeros((0, 2))]
+            for view in self.whole:
+                reading = view.predictor.trial.reading
+                if reading is not None:
+                    predicted = view.predictor.predict(model).reading
+                    used = (np.abs(np.gradient(predicted, axis=0)) > 0.5 * view.noise[0]) & np.isfinite(reading)
+                    moving.append(np.column_stack([reading[used], predicted[used]]))
+            values = np.concatenate(moving)
+            self._moving = values[:: max(1, len(values) // MOST_READINGS)]
         return self._moving
 
     def quick(self, candidate: Candidate, model: Model) -> list[TrialView]:

@@ -14,7 +14,7 @@ from palpate.core.effects.engine.registry import effect, form_of, kind_of
 from palpate.core.gap.base.base_model import friction_parameters_to_search, prepared
 from palpate.core.gap.base.quantities import friction_kinds
 from palpate.core.gap.candidates.candidates import Candidate, _halton_points, candidates, scales_of, search_range
-from palpate.core.gap.candidates.direct_estimates import companding_starts, few_levels, unresponsive_texels
+from palpate.core.gap.candidates.direct_estimates import distinct, few_levels, unresponsive_texels
 from palpate.core.gap.candidates.rao_score import ScoreTest
 from palpate.core.gap.candidates.starting_points import starting_points
 from palpate.core.gap.candidates.view_set import view_set_of
@@ -34,21 +34,10 @@ from palpate.core.model.sensor_parameters import SensorParameters
 def test_a_handful_of_values_is_seen():
     rng = np.random.default_rng(1)
     smooth = rng.uniform(0, 1, 4000)
-    np.testing.assert_allclose(few_levels(0.25 * np.round(smooth / 0.25)), [0, 0.25, 0.5, 0.75, 1])
-    uneven = np.floor(4 * np.sqrt(smooth)) ** 2
-    assert list(few_levels(uneven)) == [0, 1, 4, 9]
-    assert few_levels(smooth) is None
-    assert few_levels(np.round(smooth, 2)) is None  # a hundred values: no step is seen by eye
-    assert few_levels(np.ones(4000)) is None
-
-
-def test_steps_that_grow_are_read_off():
-    scale, growth = 0.02, 0.3
-    levels = 7.0 + scale * np.expm1(growth * np.arange(-1, 12))
-    found, other = companding_starts(levels, 7.0, Candidate(kind_of("quantization"), form_of("quantization", "companding")))
-    assert (found.values["rounding"], other.values["rounding"]) == (0.0, 0.5)
-    assert found.values["growth"] == pytest.approx(growth, rel=0.02) and found.values["scale"] == pytest.approx(scale, rel=0.05)
-    assert not companding_starts(levels[:3], 7.0, Candidate(kind_of("quantization"), form_of("quantization", "companding")))
+    np.testing.assert_allclose(distinct(0.25 * np.round(smooth / 0.25)), [0, 0.25, 0.5, 0.75, 1])
+    assert few_levels(0.25 * np.round(smooth / 0.25)) and few_levels(np.floor(4 * np.sqrt(smooth)) ** 2)
+    assert not few_levels(smooth) and not few_levels(np.ones(4000))
+    assert not few_levels(np.round(smooth, 2))  # a hundred values: no step is seen by eye
 
 
 def test_a_stated_fall_of_friction_is_held_and_its_level_free():

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Levels of a converter are read off with its parameters, and none are seen where there is no converter."""
+
+from dataclasses import replace
+
+import gap_cases as cases
+import numpy as np
+import pytest
+
+from palpate.core.effects.engine.readout_chain import readings
+from palpate.core.effects.engine.registry import effect, form_of, kind_of
+from palpate.core.effects.engine.specification import TransducerArray
+from palpate.core.gap.candidates.candidates import Candidate
+from palpate.core.gap.candidates.direct_estimates import level_parameters, quantization_starts
+from palpate.core.gap.candidates.view_set import view_set_of
+from palpate.core.gap.forward.predictor import Model, predictors_of
+
+LEVELS = {
+    "round": lambda k, v: v["step"] * k,
+    "power": lambda k, v: v["first"] * k ** (1.0 / v["exponent"]),
+    "companding": lambda k, v: v["scale"] * np.expm1(v["growth"] * k),
+}
+CONVERTERS = [
+    ("round", {"step": 0.02}),
+    ("power", {"first": 0.02, "exponent": 0.5}),
+    ("power", {"first": 0.02, "exponent": 1.6}),
+    ("companding", {"scale": 0.1, "growth": 0.05}),
+    ("companding", {"scale": 0.02, "growth": 0.02}),
+]
+
+
+@pytest.mark.parametrize(("count", "missing"), [(8, 0.0), (60, 0.1), (400, 0.1)])
+@pytest.mark.parametrize(("form", "values"), CONVERTERS)
+def test_levels_have_the_parameters_of_their_converter(form, values, count, missing):
+    """Exactly, even if a tenth of the levels is missing: an error in the number of one level is seen in all above it."""
+    k = np.arange(1, count + 1)
+    k = k[np.random.default_rng(count).random(count) >= missing]
+    found = level_parameters(LEVELS[form](k, values), form_of("quantization", form))
+    assert found == pytest.approx(values, rel=1e-6)
+
+
+@pytest.mark.parametrize("gain", [1.0, -1.0])
+@pytest.mark.parametrize(("form", "values"), [("round", {"step": 0.01}), ("power", {"first": 0.01, "exponent": 0.6})])
+def test_readings_behind_a_converter_show_its_levels(form, values, gain):
+    """Whether readings rise or fall under load. Those that noise moves over an edge are levels, too."""
+    rig = cases.rig(trials=2, seconds=8.0, seed=2, stated=80.0)
+    behind = effect("quantization", form, **values)
+    size = max(one.reading.max() for one in rig.trials)
+    pad = TransducerArray(np.zeros((rig.trials[0].reading.shape[1], 3)), np.ones(rig.trials[0].reading.shape[1]), gain=gain)
+    trials = [replace(one, reading=readings((behind,), pad, one.time, one.reading / size)) for one in rig.trials]
+    views = view_set_of(predictors_of(trials, rig), (1e-4, 1.0))
+    model = Model(replace(rig.parameters, gain=gain * rig.parameters.gain / size))
+    candidate = Candidate(kind_of("quantization"), form_of("quantization", form))
+    found = quantization_starts(views.moving_readings(model), views.whole, candidate)
+    for name, value in values.items():
+        assert [one.values[name] for one in found] == pytest.approx([value] * len(found), rel=1e-4)
+    assert [one.values["rounding"] for one in found if "rounding" in one.values] == ([0.0, 0.5] if form == "power" else [])
+    assert found
+
+
+def test_no_levels_are_seen_in_noise_or_below_it():
+    rig = cases.rig(trials=2, seconds=8.0, seed=2, stated=80.0)
+    coarse = tuple(replace(one, reading=np.round(one.reading, 2)) for one in rig.trials)
+    candidate = Candidate(kind_of("quantization"), form_of("quantization", "round"))
+    for trials, noise in ((rig.trials, 1e-9), (coarse, 0.01)):
+        views = view_set_of(predictors_of(trials, rig), (noise, 1.0))
+        assert quantization_starts(views.moving_readings(Model(rig.parameters)), views.whole, candidate) == []
