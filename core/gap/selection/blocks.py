@@ -15,7 +15,7 @@ import numpy as np
 
 from ..fitting.least_squares import Fit, TrialView, cross_fitted
 from ..forward.predictor import NEUTRAL_NUMBERS, Model, Predictor, number_name
-from .block_sums import Sums
+from .noise_level import Sums
 from .rule_numbers import BLOCKS, MEMORIES
 
 

@@ -7,9 +7,7 @@ set of effects with the best score, and the verdict names them.
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 
@@ -35,17 +33,13 @@ from .findings import Diagnosis, Finding
 from .rule_numbers import SURE
 from .score import ONE_SESSION, OWN_NUMBERS, Hypothesis
 from .screening import Screening
-from .search import Search, Start
+from .search import TOTAL_WORK, Search, Start
 from .verdict import closed_shares, judge, with_best_forms, with_best_kinds
 
-TOTAL_WORK = 1000
-BASE_MODEL_BEGINS, SELECTION_BEGINS, VERDICT_BEGINS = 40, 60, 950
-"""Share of the whole work, in thousandths, at which the fit of the base model, the search and the verdict begin."""
-
+BASE_MODEL, VERDICT = 40, 950
+"""Work that is done when the fit of the base model and the verdict begin, of :data:`.search.TOTAL_WORK`."""
 LAST_STEPS, LAST_TOLERANCE = 40, 1e-6
 """Of the last fit, of the model that was chosen."""
-
-Outcome = TypeVar("Outcome")
 
 
 def diagnose(rig: Rig) -> Job[Diagnosis]:
@@ -64,10 +58,10 @@ def diagnose(rig: Rig) -> Job[Diagnosis]:
     is_repeated = begun.result.noise[begun.main_quantity].source == MEASURED_REPEATS
     has_few_values = begun.view_set.repeats_few_values(begun.result.base.model)
     search = Search(_starts(begun), MOST_SQUARE - 1.0 if is_repeated else None, has_few_values)
-    chosen = yield from _progress_of(search.run(), SELECTION_BEGINS, VERDICT_BEGINS)
+    chosen = yield from search.run()
     named = with_best_kinds(search, chosen)
-    best = yield from _progress_of(search.predicting(named), SELECTION_BEGINS, VERDICT_BEGINS)
-    yield Progress("verdict", VERDICT_BEGINS, TOTAL_WORK)
+    best = yield from search.predicting(named)
+    yield Progress("verdict", VERDICT, TOTAL_WORK)
     if best is named:
         best = with_best_forms(search, named)
     elif search.score.weight(best, named) >= SURE:
@@ -88,12 +82,12 @@ class _Begun:
         return READINGS if self.result.base.count[:, READINGS].any() else FORCES
 
 
-def _begin(rig: Rig) -> Generator[Progress, None, _Begun]:
+def _begin(rig: Rig) -> Job[_Begun]:
     """Prepare recordings and fit the base model."""
     yield Progress("contacts of every trial", 0, TOTAL_WORK)
     rig, predictors, faults = _with_checked_data(with_starting_heights(rig))
     noise, full = prepared(rig, predictors)
-    yield Progress("base model", BASE_MODEL_BEGINS, TOTAL_WORK)
+    yield Progress("base model", BASE_MODEL, TOTAL_WORK)
     begun = _begun_with(rig, predictors, noise, full)
     begun.result.faults = faults
     return begun
@@ -110,19 +104,6 @@ def _begun_with(
     return _Begun(Diagnosis(rig, predictors, noise, full, coverage(fitted), scales, base, base), view_set)
 
 
-def _progress_of(
-    work: Generator[tuple[str, float], None, Outcome], begins: int, ends: int
-) -> Generator[Progress, None, Outcome]:
-    """Progress of a work that says which share of it is done, between two shares of the whole work."""
-    while True:
-        try:
-            what, share = next(work)
-        except StopIteration as stop:
-            outcome: Outcome = stop.value
-            return outcome
-        yield Progress(what, begins + int((ends - begins) * share), TOTAL_WORK)
-
-
 def _starts(begun: _Begun) -> dict[str, Start]:
     """The base model under each assumption about how recordings differ, made when the search asks for it."""
     result = begun.result
@@ -136,7 +117,7 @@ def _starts(begun: _Begun) -> dict[str, Start]:
         used = views if own is begun else views.with_predictors(own.result.predictors)
         screening = Screening(own.view_set, blocks, used, own.result.scales, assumed, alone)
         base = fit(used.fitted, own.result.base.model, own.result.base.free, max_steps=3)
-        return screening, screening.hypothesis(base, (), ())
+        return screening, screening.hypothesis(base)
 
     starts: dict[str, Start] = {"": lambda: start(begun, "")}
     if may_differ(result.rig):

@@ -16,13 +16,33 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .block_sums import Sums
 from .rule_numbers import LEAST_NOISE_ERROR, LEAST_VALUES
 
 ROUNDING = 1e-6
 """Least mean square of noise-free recordings, in units of the variance measured before any fit: rounding of their files."""
 WHITE = 2.0
 """Variance of the square of a standard normal variable (chi-squared with one degree of freedom)."""
+
+
+@dataclass(frozen=True)
+class Sums:
+    """Sums over each of b blocks, for readings and net forces, in units of the noise's variance: (b, 2) float each.
+
+    Attributes
+    ----------
+    left, count : (b, 2) float
+        Squares that a model leaves on unseen blocks, and the number of values.
+    rest, rest_count : (2, b, 2) float
+        The same of values without load: while nothing touches the sensor, and of texels that nothing touches.
+    changes : (components, b, 2) float
+        Squares of the change of the prediction that each component of the model makes, beyond a factor and a zero.
+    """
+
+    left: np.ndarray
+    count: np.ndarray
+    rest: np.ndarray
+    rest_count: np.ndarray
+    changes: np.ndarray
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...jobs import Job, Progress
 from ...model.sensor import Effect
 from ..candidates.candidates import DIRECTLY_ESTIMATED, Candidate, is_free_already
 from ..candidates.rao_score import ScoreTest
 from ..fitting.least_squares import Fit, fit
 from .score import Hypothesis
-from .screening import LATER_STARTS, Making, Screening, free_with
+from .screening import LATER_STARTS, Screening, free_with
 
 PAIRS = 3
 """Pairs of kinds that are fitted: for speed. In 20 of 21 rigs with two effects the hidden pair ranks first or second, of 33 to
@@ -36,9 +37,9 @@ class _Entry:
     length: float = 1.0
 
 
-def best_pairs(screening: Screening, base: Hypothesis) -> Making:
+def best_pairs(screening: Screening, base: Hypothesis) -> Job[list[Hypothesis]]:
     """Fit the best pairs of effects on top of the base model."""
-    yield "pairs of effects"
+    yield Progress("pairs of effects", 0, 1)
     test = ScoreTest(screening.view_set.few_samples, base.fit)
     pairs = [(one, _change(test, one.effect)) for one in _dictionary(screening, base)]
     entries = [one for one, change in pairs if change is not None]
@@ -52,7 +53,7 @@ def best_pairs(screening: Screening, base: Hypothesis) -> Making:
         residual, table = residual - q @ (q.T @ residual), table - (table @ q) @ q.T
     made = []
     for pair in _ranked(entries, (table @ table.T).astype(float), (table @ residual).astype(float))[:PAIRS]:
-        yield f"fitting {pair[0].candidate.name} and {pair[1].candidate.name}"
+        yield Progress(f"fitting {pair[0].candidate.name} and {pair[1].candidate.name}", 0, 1)
         made += _fitted(screening, base, pair)
     return made
 
@@ -127,7 +128,7 @@ def _fitted(screening: Screening, base: Hypothesis, pair: tuple[_Entry, _Entry])
     for index, one in enumerate(pair):
         if not screening.shows_signature(one.candidate, with_effect_last(found, index)):
             return []
-    return [screening.hypothesis(found, tuple(x.candidate.name for x in pair), tuple(x.candidate.label for x in pair))]
+    return [screening.hypothesis(found)]
 
 
 def with_effect_last(found: Fit, index: int) -> Fit:

@@ -26,8 +26,7 @@ from scipy.optimize import brentq
 from ...effects.engine.registry import form_of, kind_of
 from ..candidates.candidates import IN_PLANE, parameters_at_bounds
 from ..fitting.least_squares import BASE, Fit
-from .block_sums import Sums
-from .noise_level import NoiseLevel
+from .noise_level import NoiseLevel, Sums
 from .rule_numbers import (
     DRAWS,
     FEWER_NUMBERS,
@@ -54,18 +53,24 @@ class Hypothesis:
     Attributes
     ----------
     fit : Fit
-    names, forms : tuple of str
-        Kinds of its effects in the order of the stack, and the labels of their forms.
     sums : Sums
     assumed : str
         How recordings differ: :data:`OWN_NUMBERS`, :data:`ONE_SESSION` or not at all (empty).
     """
 
     fit: Fit
-    names: tuple[str, ...]
-    forms: tuple[str, ...]
     sums: Sums
     assumed: str = ""
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Kinds of its effects, in the order of the stack."""
+        return tuple(one.name for one in self.fit.model.effects)
+
+    @cached_property
+    def forms(self) -> tuple[str, ...]:
+        """Labels of their forms."""
+        return tuple(f"{one.name}/{one.form}" for one in self.fit.model.effects)
 
     @cached_property
     def is_bent(self) -> bool:
@@ -82,12 +87,13 @@ class Hypothesis:
     def number_count(self) -> int:
         """Number of fitted values of effects and recordings; one for each texel where each has its own.
 
-        Displacements and thresholds that a scan has found count, too.
+        Displacements and thresholds that a scan has found, and what was read off a converter's levels, count, too.
         """
         scanned = set()
         for index, one in enumerate(self.fit.model.effects):
             form = form_of(one.name, one.form)
-            names = form.jumps_at or (IN_PLANE if form.placement is not None else ())
+            read_off = tuple(one.values) if form.level_number is not None else ()
+            names = form.jumps_at or read_off or (IN_PLANE if form.placement is not None else ())
             scanned |= {(index, name) for name in names if one.values.get(name, 0.0) != 0.0}
         scanned -= {(item.effect, item.name) for item in self.fit.free}
         texels = max([len(v) for e in self.fit.model.effects for v in e.values.values() if isinstance(v, tuple)] + [1])

@@ -8,10 +8,11 @@ effects.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Generator, Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from ...effects.engine.specification import SILENT_TEXELS, STEPS, scalar
+from ...jobs import Job, Progress
 from ...model.sensor import Effect
 from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
 from ..candidates.candidates import (
@@ -104,10 +105,6 @@ class FirstFit:
         return self.promise.is_seen or self.left <= most_left
 
 
-Making = Generator[str, None, list[Hypothesis]]
-"""Makes models; yields what is being done."""
-
-
 @dataclass
 class Screening:
     """Fits of one more effect on top of models.
@@ -139,9 +136,9 @@ class Screening:
             return self
         return replace(self, views=self.views.weighted(weight))
 
-    def hypothesis(self, found: Fit, names: tuple[str, ...], forms: tuple[str, ...]) -> Hypothesis:
+    def hypothesis(self, found: Fit) -> Hypothesis:
         """Return a fitted model with what it leaves."""
-        return Hypothesis(found, names, forms, self.blocks.sums(found, self.views, self.assumed == OWN_NUMBERS), self.assumed)
+        return Hypothesis(found, self.blocks.sums(found, self.views, self.assumed == OWN_NUMBERS), self.assumed)
 
     def candidates(self, model: Model) -> list[Candidate]:
         """Return the candidates that could show in the fitted recordings."""
@@ -149,7 +146,7 @@ class Screening:
 
     def with_one_more(
         self, parent: Hypothesis, kinds: set[str] | None = None, most_left: float = 1.0, start: Hypothesis | None = None
-    ) -> Making:
+    ) -> Job[list[Hypothesis]]:
         """Return the parent with one effect more, for the kinds that promise most, in one form of each.
 
         It is a form that is free to follow any law, or that those do not follow, if the kind has one that promises anything, so
@@ -174,14 +171,14 @@ class Screening:
         screened = []
         for name, forms in by_kind.items():
             if kinds is None or name in kinds:
-                yield "screening every effect"
+                yield Progress("screening every effect", 0, 1)
                 wide = [one for one in forms if one.form.is_wide]
                 screened.append(self._promises(parent, tests, wide) or self._promises(parent, tests, forms))
         screened = sorted((own for own in screened if own), key=lambda own: (not own[0].is_seen, -own[0].share))
         first_fits = []
         for own in screened[: None if is_first else TRIED_KINDS]:
             for one in own[: TRIED_FORMS if is_first else 1]:
-                yield f"fitting {one.candidate.name}"
+                yield Progress(f"fitting {one.candidate.name}", 0, 1)
                 first_fits.append(self._first_fit(one, tests))
         best_fits: dict[str, FirstFit] = {}
         kept = [one for one in first_fits if one.may_leave(most_left)]
@@ -197,7 +194,7 @@ class Screening:
 
     def other_forms(
         self, parent: Hypothesis, name: str, done: Collection[str], most_left: float = 1.0, start: Hypothesis | None = None
-    ) -> Making:
+    ) -> Job[list[Hypothesis]]:
         """Return the parent with the forms of a kind that were not fitted yet, so that it is judged by its whole library.
 
         Forms that leave more than `most_left` of the gap in a part of the data are left out, and fits begin at `start`, as in
@@ -210,23 +207,21 @@ class Screening:
 
     def without(self, one: Hypothesis, index: int) -> Hypothesis:
         """Return a model without one of its effects, fitted again."""
-        again = fit(self.views.fitted, one.fit.model.without(index), _without(one, index), max_steps=8, tolerance=1e-4)
-        names, forms = (tuple(x for i, x in enumerate(own) if i != index) for own in (one.names, one.forms))
-        return self.hypothesis(again, names, forms)
+        model, free = one.fit.model.without(index), _without(one, index)
+        return self.hypothesis(fit(self.views.fitted, model, free, max_steps=8, tolerance=1e-4))
 
     def start_without(self, one: Hypothesis, index: int, parent: Hypothesis) -> Hypothesis:
         """Return a model without one of its effects: base model refitted, other values kept. Its sums are the parent's."""
         model, free = one.fit.model.without(index), _without(one, index)
         base = [item for item in free if item.effect == BASE]
         again = fit(self.views.fitted, model, base, max_steps=8, tolerance=1e-3, with_equations=False)
-        names, forms = (tuple(x for i, x in enumerate(own) if i != index) for own in (one.names, one.forms))
-        return replace(parent, fit=replace(again, free=tuple(free)), names=names, forms=forms)
+        return replace(parent, fit=replace(again, free=tuple(free)))
 
     def refined(self, one: Hypothesis) -> Hypothesis:
         """Return a model at the end of its fit: final fits are cut short, as most models are far behind the best."""
         before = sum(float(view.squares(view.residual(one.fit.model)).sum()) for view in self.views.fitted)
         found = fit(self.views.fitted, one.fit.model, one.fit.free, max_steps=REFINED_STEPS, tolerance=FIT_TOLERANCE)
-        return one if found.sse.sum() >= before else self.hypothesis(found, one.names, one.forms)
+        return one if found.sse.sum() >= before else self.hypothesis(found)
 
     def final_fit(self, found: Model, free: Sequence[FreeParameter], frozen: int) -> Fit:
         """Fit a model to everything; the first `frozen` derivatives are kept (see :func:`.least_squares.fit`)."""
@@ -288,16 +283,15 @@ class Screening:
         left, rank = (share_left(found, before) for before in (tests.gap(test), test.least))
         return FirstFit(left, rank, one, found)
 
-    def _final_fits(self, first_fits: Iterable[FirstFit], parent: Hypothesis) -> Making:
+    def _final_fits(self, first_fits: Iterable[FirstFit], parent: Hypothesis) -> Job[list[Hypothesis]]:
         """Candidates fitted to all fitted recordings, and read on unseen blocks, but for those without their signature."""
         made = []
         for one in first_fits:
-            yield f"fitting {one.candidate.name} to everything"
+            yield Progress(f"fitting {one.candidate.name} to everything", 0, 1)
             free = free_with(parent.fit.free, parent.fit.model, one.candidate, one.fit.model.effects[-1], self.scales)
             found = self.final_fit(one.fit.model, free, len(parent.fit.free))
             if self.shows_signature(one.candidate, found):
-                names, forms = (*parent.names, one.candidate.name), (*parent.forms, one.candidate.label)
-                made.append(self.hypothesis(found, names, forms))
+                made.append(self.hypothesis(found))
         return made
 
 

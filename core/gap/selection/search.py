@@ -10,12 +10,12 @@ and one session in their order (what the sensor remembers goes on, which costs n
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TypeVar
 
 import numpy as np
 
+from ...jobs import Job, Progress, Result, part_of_job, run_job
 from .noise_level import measured_noise, noise_level
 from .pairs import best_pairs
 from .rule_numbers import DRAWS, LEAST_WEIGHT
@@ -27,14 +27,12 @@ BEAMS = {1: 3, 2: 2}
 MOST_EFFECTS = 3
 LEAST_REMEMBERED = 1e-6
 """Change of a prediction, in deviations of the noise, that is more than rounding."""
-STAGES = {"alone": 0.0, "differing recordings": 0.3, "further effects": 0.5, "reconsidered": 0.8, "prediction": 0.9}
-"""Share of the work at which each stage begins."""
+TOTAL_WORK = 1000
+ALONE, DIFFERENCES, FURTHER_EFFECTS, EXCHANGES, PREDICTION = 60, 330, 500, 770, 860
+"""Work that is done when each stage of the search begins, and all work of a diagnosis."""
 
 Start = Callable[[], tuple[Screening, Hypothesis]]
 """Prepares recordings under an assumption and fits the base model to them."""
-Steps = Generator[str, None, None]
-"""Work that yields what is being done."""
-Outcome = TypeVar("Outcome")
 
 
 @dataclass
@@ -62,8 +60,8 @@ class Search:
     _at_end: set[Hypothesis] = field(default_factory=set)
     _made: dict[str, tuple[Screening, Hypothesis]] = field(default_factory=dict)
 
-    def run(self) -> Generator[tuple[str, float], None, Hypothesis]:
-        """Return the model that the rule chooses; yield what is being done, and which share of the work is done."""
+    def run(self) -> Job[Hypothesis]:
+        """Return the model that the rule chooses."""
         plain, self.base = self.under("")
         self.library = Counter(one.name for one in plain.candidates(self.base.fit.model))
         self._weigh(is_noise_measured=True)
@@ -73,20 +71,20 @@ class Search:
         self._weigh(is_noise_measured=True)
         if not self.is_open(self.base):
             return self.base
-        yield from _in_stage("alone", self._grow(self.base))
+        yield from _in_stage(ALONE, self._grow(self.base))
         self._weigh(is_noise_measured=True)
         self.refined(self.best())
         self._weigh(is_noise_measured=True)
         if self.is_open(self.best()):
-            yield from _in_stage("differing recordings", self._assume_differences())
-            self.tried += yield from _in_stage("differing recordings", best_pairs(self._screening(self.base), self.base))
+            yield from _in_stage(DIFFERENCES, self._assume_differences())
+            self.tried += yield from _in_stage(DIFFERENCES, best_pairs(self._screening(self.base), self.base))
         for size in range(1, MOST_EFFECTS):
             self._weigh()
             if not self.is_open(self.best()):
                 break
-            yield from _in_stage("further effects", self._extend(size))
+            yield from _in_stage(FURTHER_EFFECTS, self._extend(size))
         self._weigh()
-        yield from _in_stage("reconsidered", self._reconsider())
+        yield from _in_stage(EXCHANGES, self._reconsider())
         return self.best()
 
     def is_open(self, one: Hypothesis) -> bool:
@@ -105,14 +103,14 @@ class Search:
         simpler = [one for one in near if self.score.is_near(best, one) and self.score.is_simpler(one, best)]
         return max(simpler, key=self.score.value) if simpler else best
 
-    def predicting(self, named: Hypothesis) -> Generator[tuple[str, float], None, Hypothesis]:
+    def predicting(self, named: Hypothesis) -> Job[Hypothesis]:
         """Return the model that predicts best of all that hold the effects of the chosen one, while it leaves a gap.
 
         An added effect need not pay for a name. The amended model predicts better, and the report calls the name a guess.
         """
         best = named
         while self.score.leaves_gap(best) and best.components and len(best.names) < MOST_EFFECTS:
-            yield from _in_stage("prediction", self._grow(best))
+            yield from _in_stage(PREDICTION, self._grow(best))
             longer = [one for one in self.tried if _holds(one, best) and self.score.weight(one, best) > LEAST_WEIGHT]
             top = max(longer, key=self.score.prediction, default=best)
             if self.score.prediction(top) <= self.score.prediction(best):
@@ -142,14 +140,14 @@ class Search:
 
     def in_place_of(self, one: Hypothesis, index: int) -> tuple[Hypothesis, dict[str, list[Hypothesis]]]:
         """Return a model without one of its effects, and the fitted forms of each kind in its place, itself included."""
-        parent = _finished(self._replaced(one, index))
+        parent = run_job(self._replaced(one, index))
         found, place = self._forms_in_place(one, index, parent), _place(one, index, parent)
         best = {name: max(map(self.score.value, forms)) for name, forms in found.items()}
         for name in sorted(best, key=lambda name: -best[name])[:ALL_FORMS]:
             if name not in self._done[place]:
                 screening, start = self._screening(parent), self._start(one, index, parent)
                 labels = self._done[place] | {one.forms[index]}
-                made = _finished(screening.other_forms(parent, name, labels, self._most_left(parent), start))
+                made = run_job(screening.other_forms(parent, name, labels, self._most_left(parent), start))
                 self._note(place, made, name)
         return parent, self._forms_in_place(one, index, parent)
 
@@ -168,19 +166,19 @@ class Search:
 
     # --- stages
 
-    def _assume_differences(self) -> Steps:
+    def _assume_differences(self) -> Job[None]:
         """Try recordings that remember each other, and numbers of their own."""
         for assumed in self.starts:
             if not assumed:
                 continue
-            yield "how recordings differ"
+            yield Progress("how recordings differ", 0, 1)
             screening, base = self.under(assumed)
             if assumed == ONE_SESSION:
                 yield from self._try_session(screening, base)
             else:
                 self.tried.append(base)
 
-    def _try_session(self, screening: Screening, base: Hypothesis) -> Steps:
+    def _try_session(self, screening: Screening, base: Hypothesis) -> Job[None]:
         """Kinds that explain no more in a session than in recordings that begin untouched are left out of it."""
         kinds, screening = self._remembering(screening), self._screening(base)
         made = yield from screening.with_one_more(base, kinds)
@@ -202,7 +200,7 @@ class Search:
                 kinds.add(effect.name)
         return kinds
 
-    def _extend(self, size: int) -> Steps:
+    def _extend(self, size: int) -> Job[None]:
         """Try one effect more on top of the best models of a size that could still become the best."""
         for parent in self._beam(size):
             if self._could_lead(parent):
@@ -233,7 +231,7 @@ class Search:
                 chosen.setdefault((frozenset(one.names), one.assumed), one)
         return list(chosen.values())[: BEAMS[size]]
 
-    def _reconsider(self) -> Steps:
+    def _reconsider(self) -> Job[None]:
         """Replace each effect of the best model by every kind, until no replacement improves the model."""
         best = None
         while best is not self.best():
@@ -242,7 +240,7 @@ class Search:
                 yield from self._replaced(best, index)
             self._weigh()
 
-    def _replaced(self, one: Hypothesis, index: int) -> Generator[str, None, Hypothesis]:
+    def _replaced(self, one: Hypothesis, index: int) -> Job[Hypothesis]:
         """Replace an effect by every kind; return the refitted model without it."""
         forms = tuple(form for i, form in enumerate(one.forms) if i != index)
         key = (*sorted(forms), one.assumed)
@@ -265,7 +263,7 @@ class Search:
             self._begun[place] = self._screening(parent).start_without(one, index, parent)
         return self._begun[place]
 
-    def _grow(self, parent: Hypothesis, place: object = None, start: Hypothesis | None = None) -> Steps:
+    def _grow(self, parent: Hypothesis, place: object = None, start: Hypothesis | None = None) -> Job[None]:
         """Add one effect to a model.
 
         With `place` and `start` it replaces an effect of another model, from whose values the fits start.
@@ -319,22 +317,6 @@ def _holds(one: Hypothesis, best: Hypothesis) -> bool:
     return one.assumed == best.assumed and set(one.names) >= set(best.names) and len(one.names) <= len(best.names) + 1
 
 
-def _in_stage(stage: str, work: Generator[str, None, Outcome]) -> Generator[tuple[str, float], None, Outcome]:
-    """Progress of a stage."""
-    while True:
-        try:
-            what = next(work)
-        except StopIteration as stop:
-            outcome: Outcome = stop.value
-            return outcome
-        yield what, STAGES[stage]
-
-
-def _finished(work: Generator[str, None, Outcome]) -> Outcome:
-    """Outcome of a work whose progress is not shown."""
-    while True:
-        try:
-            next(work)
-        except StopIteration as stop:
-            outcome: Outcome = stop.value
-            return outcome
+def _in_stage(done: int, work: Job[Result]) -> Job[Result]:
+    """A stage of the search, with the progress of the whole diagnosis."""
+    return part_of_job(work, lambda one: Progress(one.stage, done, TOTAL_WORK))

@@ -17,8 +17,7 @@ from palpate.core.gap.candidates.view_set import view_set_of
 from palpate.core.gap.fitting.least_squares import Fit, FreeParameter, fit
 from palpate.core.gap.forward.predictor import Model, number_name, predictors_of
 from palpate.core.gap.selection import blocks, diagnosis, noise_level, rule_numbers, score, search, verdict
-from palpate.core.gap.selection.block_sums import Sums
-from palpate.core.gap.selection.noise_level import NoiseLevel
+from palpate.core.gap.selection.noise_level import NoiseLevel, Sums
 from palpate.core.gap.selection.score import OWN_NUMBERS, Hypothesis, Score, drawn_weights
 from palpate.core.jobs import run_job
 from palpate.core.model.sensor import Effect
@@ -42,10 +41,10 @@ def sums(left, changes=()):
 
 def model(left, *labels, changes=None, assumed="", numbers=1):
     """A model of some forms that leaves this much; its effects change the prediction by `changes`."""
-    names = tuple(label.split("/")[0] for label in labels)
+    effects = tuple(Effect(*label.split("/"), {}) for label in labels)
     free = tuple(FreeParameter(0, f"number {i}", 0.0, 1.0) for i in range(numbers)) if labels else ()
-    fit = SimpleNamespace(free=free, model=SimpleNamespace(effects=()))
-    one = Hypothesis(fit, names, labels, sums(left, (0.0,) * len(labels) if changes is None else changes), assumed)
+    fit = SimpleNamespace(free=free, model=SimpleNamespace(effects=effects))
+    one = Hypothesis(fit, sums(left, (0.0,) * len(labels) if changes is None else changes), assumed)
     one.__dict__["is_bent"] = False
     return one
 
@@ -69,9 +68,7 @@ def test_the_score_is_the_logarithm_of_what_is_left_and_allowed():
 def test_displacements_that_a_scan_has_found_are_numbers():
     free = (FreeParameter(0, "z", 0.0, 1.0),)
     moved = effect("misalignment", "rigid", x=0.001, y=0.0, z=0.0, about_x=0.0, about_y=0.0, about_z=0.02)
-    one = Hypothesis(
-        SimpleNamespace(free=free, model=SimpleNamespace(effects=(moved,))), ("misalignment",), ("misalignment/rigid",), None
-    )
+    one = Hypothesis(SimpleNamespace(free=free, model=SimpleNamespace(effects=(moved,))), None)
     assert one.number_count == 3  # the height, and two of the motion along the skin
 
 
@@ -432,7 +429,7 @@ def test_what_disturbs_the_readings_brings_no_name_through_the_forces():
     (found,) = kept
     screening, base = found.under("")
     plain = fit(screening.views.fitted, base.fit.model, base.fit.free)
-    assert found.score.value(base) > found.score.value(screening.hypothesis(plain, (), ())) + found.score.price
+    assert found.score.value(base) > found.score.value(screening.hypothesis(plain)) + found.score.price
 
 
 # --- converters
