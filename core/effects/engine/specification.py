@@ -84,6 +84,7 @@ NEEDS = {
     "no clock": "recordings of which each begins with an untouched sensor",
     "signed channels": "channels of which some rise and others fall under the same load",
     "axes": "the same, with a number of channels that is a multiple of three",
+    "rows": "texels in rows and columns",
 }
 """Contents of recordings without which an effect, or a form of it, is no candidate."""
 DRAWINGS = {
@@ -269,6 +270,8 @@ class Form:
     level_number : callable
         Of a converter: ``level_number(sizes, values) → numbers``: how many steps lead to readings so far from the one without
         load, in the sensor's unit; whole numbers at its levels.
+    couples : bool
+        Whether a formula on readings (`memoryless`) couples texels.
     """
 
     name: str
@@ -297,6 +300,12 @@ class Form:
     jumps_at: tuple[str, ...] = ()
     is_apart: bool = False
     level_number: Callable[[np.ndarray, Values], np.ndarray] | None = None
+    couples: bool = False
+
+    @property
+    def is_spatial(self) -> bool:
+        """True if what the form does to a texel depends on others."""
+        return self.coupling is not None or self.couples
 
     @property
     def is_wide(self) -> bool:

@@ -51,6 +51,7 @@ KIND = Kind(
             _parameters("unit", 0.05, 1e5, "Field"),
             neutral=dict.fromkeys(AXES, 0.0),
             memoryless=constant,
+            couples=True,
             after_conversion=True,
             needs="axes",
             is_tried=False,  # a zero of each channel does the same
@@ -62,6 +63,7 @@ KIND = Kind(
             _parameters("unit/s", 1e-3, 1e3, "Change of the field per second"),
             neutral=dict.fromkeys(AXES, 0.0),
             memoryless=linear,
+            couples=True,
             after_conversion=True,
             needs="axes",
         ),

@@ -58,6 +58,7 @@ KIND = Kind(
             tuple(Parameter(axis, "rad", 0.05, -3.2, 3.2, f"Rotation about {axis}, as a vector of rotation.") for axis in AXES),
             neutral=dict.fromkeys(AXES, 0.0),
             memoryless=rotation,
+            couples=True,
             needs="axes",
             is_tried=False,  # curves of single channels do the same, and more, as long as one stimulus moves them all
         ),
@@ -71,6 +72,7 @@ KIND = Kind(
             ),
             neutral={name: 0.0 for name, _, _ in PAIRS},
             memoryless=soft_iron,
+            couples=True,
             needs="axes",
             is_tried=False,  # as above
         ),

@@ -94,6 +94,8 @@ KIND = Kind(
             (Parameter("share", "1", 0.1, 0.0, 2.0, "Share c of the mean of a line that is added."),),
             neutral={"share": 0.0},
             memoryless=lines,
+            couples=True,
+            needs="rows",
         ),
         Form(
             "common",
@@ -102,6 +104,7 @@ KIND = Kind(
             (Parameter("share", "1", 0.2, 0.0, 5.0, "Share c of the mean of all texels that is added."),),
             neutral={"share": 0.0},
             memoryless=common,
+            couples=True,
             is_apart=True,
         ),
         Form(
@@ -112,6 +115,7 @@ KIND = Kind(
             (Parameter("share", "1", 0.05, 0.0, 1.0, "Share c that the texel scanned before leaves."),),
             neutral={"share": 0.0},
             memoryless=previous,
+            couples=True,
             is_apart=True,
         ),
         Form(
@@ -124,6 +128,8 @@ KIND = Kind(
             ),
             neutral={"share": 0.0},
             memoryless=wires,
+            couples=True,
+            needs="rows",
             fitted_up_to={"share": 0.25},  # as neighbours: half of a signal in the next wire is how loads spread
             error=0.005,  # of neighbours and lines it leaves 0.0022 at most
         ),

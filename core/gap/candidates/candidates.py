@@ -10,14 +10,13 @@ from functools import cache
 import numpy as np
 
 from ...effects.engine.registry import form_of, library, names_found_by
-from ...effects.engine.specification import SCATTER, SILENT_TEXELS, STEPS, Form, Kind, TransducerArray
-from ...errors import EffectError
+from ...effects.engine.specification import SCATTER, SILENT_TEXELS, STEPS, Form, Kind
 from ...geometry.grid_layout import GridLayout
 from ...geometry.rotations import rotation_matrices
 from ...model.parameter import Parameter
 from ...model.sensor import Effect
 from ..fitting.identifiability import unidentifiable
-from ..fitting.least_squares import Fit, FreeParameter, value_of
+from ..fitting.least_squares import FreeParameter, value_of
 from ..fitting.noise_floor import coverage
 from ..forward.predictor import Model, Predictor
 
@@ -49,8 +48,6 @@ SIGNED_CORRELATION, LEAST_SIGNED = 0.5, 0.1
 """Channels are signed if at least this share of them follows the load with this correlation, and as many with its negative.
 Chosen by eye: of eFlesh's channels 12 rise and 3 fall under a normal force, and 8 and 19 in shear; the texels of each other
 set of benchmarks/_foreign.py all go one way."""
-THREES = "axes"
-"""What forms need, of :data:`.specification.NEEDS`, that are only defined for the channels of all magnetometers."""
 START_COUNT = 8
 """Number of starting points of a candidate. Where only the six of largest promise were compared by the squares there, a load
 spreading was called crosstalk."""
@@ -60,8 +57,6 @@ IN_PLANE = ("x", "y", "about_z")
 """Parameters of a displacement along the skin."""
 SMALL_SHIFT, SMALL_TURN = 0.02, 2e-3
 """Test steps of displaced texels: a share of the pitch, and an angle in rad, up to which a face is parallel to texels."""
-COUPLING_PITCH, COUPLING_LOAD = 0.003, 0.05
-"""Distance (m) and load (N) of the texels on which :func:`is_spatial` tests a form."""
 
 
 @dataclass(frozen=True)
@@ -290,14 +285,6 @@ def _halton_points(dimensions: int, count: int) -> np.ndarray:
     return points
 
 
-@dataclass(frozen=True)
-class FittedCandidate:
-    """A candidate that was fitted on top of a model: the last effect of `fit`."""
-
-    candidate: Candidate
-    fit: Fit
-
-
 def parameters_at_bounds(model: Model, free: Sequence[FreeParameter], index: int) -> dict[str, float]:
     """Return the fitted parameters of an effect that are at a bound, with the bound.
 
@@ -351,7 +338,7 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
     signed = has_signed_channels(predictors, model)
     in_threes = signed and len(predictors[0].rig.texels) % 3 == 0
     lacking = {"temperature": not warmed, "clock": not on_clock, "no clock": on_clock}
-    lacking |= {"signed channels": not signed, THREES: not in_threes}
+    lacking |= {"signed channels": not signed, "axes": not in_threes, "rows": several and not in_rows}
     found = []
     for kind in library().values():
         if kind.name in NOT_FITTED or kind.name in cannot:
@@ -374,11 +361,8 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
             moves = form.placement is not None
             held = form.jumps_at or (IN_PLANE if moves and in_steps else ())
             one = Candidate(kind, _without(fitted, ("z",)) if moves and heights_open else fitted, held)
-            if several and not in_rows and _needs_rows(form):
-                continue
-            if not several and (one.has_texel_parameters or is_spatial(form)):
-                continue
-            found.append(one)
+            if several or not (one.has_texel_parameters or form.is_spatial):
+                found.append(one)
     return found
 
 
@@ -417,32 +401,3 @@ def has_signed_channels(predictors: Sequence[Predictor], model: Model) -> bool:
 def _without(form: Form, names: Sequence[str]) -> Form:
     """A form in which some parameters are not free."""
     return replace(form, parameters=tuple(p for p in form.parameters if p.name not in names)) if names else form
-
-
-def _needs_rows(form: Form) -> bool:
-    """True if a form is only defined for texels in rows and columns."""
-    if form.memoryless is None or any(p.per_texel for p in form.parameters):
-        return False
-    site = TransducerArray(np.zeros((1, 3)), np.full(1, 9e-6))
-    try:
-        form.memoryless(np.zeros((2, 1)), np.zeros(2), {**form.neutral, **form.defaults()}, site, 0)
-    except EffectError:
-        return True
-    return False
-
-
-def is_spatial(form: Form) -> bool:
-    """Return whether a form couples texels or needs them all: it is tested by loading one of three, and one alone."""
-    if form.coupling is not None:
-        return True
-    if form.memoryless is None:
-        return False
-    position = np.array([[0.0, 0.0, 0.0], [COUPLING_PITCH, 0.0, 0.0], [2 * COUPLING_PITCH, 0.0, 0.0]])
-    site = TransducerArray(position, np.full(3, 9e-6), np.zeros(3, int), np.arange(3))
-    values = {**form.neutral, **form.defaults()}  # of a form in which some parameters are not free, too
-    for p in form.parameters:
-        if p.per_texel:
-            values[p.name] = tuple([float(values[p.name])] * 3)  # type: ignore[arg-type]
-    time = np.zeros(2)
-    alone, loaded = (form.memoryless(np.array([[0.0, x, 0.0]] * 2), time, values, site, 0)[0] for x in (0.0, COUPLING_LOAD))
-    return bool(np.abs(loaded - alone)[[0, 2]].max() > 1e-9) or form.needs == THREES

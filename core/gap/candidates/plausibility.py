@@ -7,12 +7,15 @@ without load. Then it stands for something else, and is not reported under its n
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from ..fitting.least_squares import Fit, TrialView
 from ..fitting.noise_floor import UNLOADED_SHARE
 from ..forward.contact_phases import relative_load
-from .candidates import FittedCandidate, parameters_at_bounds
-from .view_set import ViewSet
+from ..forward.predictor import Model
+from .candidates import Candidate, parameters_at_bounds
 
 PULL_LEVEL = -0.5
 """Readings below this many standard deviations of the noise are pulls."""
@@ -26,30 +29,29 @@ LEAST_PRESENT_SHARE = 0.4
 """Least share of the predicted signature that must be measured."""
 
 
-def is_plausible(found: FittedCandidate, view_set: ViewSet) -> bool:
-    """Return True if the recordings support a fitted effect, or do not contain its signature."""
-    signature = found.candidate.kind.signature
+def is_plausible(candidate: Candidate, found: Fit, views: Sequence[TrialView]) -> bool:
+    """Return True if recordings support an effect, the last one of a fit, or do not contain its signature."""
+    signature = candidate.kind.signature
     if signature == "pull":
-        return _adhesion_pulls(found, view_set)
+        return _adhesion_pulls(found.model, views)
     if signature == "unloaded":
-        return _offset_is_present_unloaded(found, view_set)
-    return signature != "end" or _loss_comes_to_an_end(found)
+        return _offset_is_present_unloaded(found.model, views, not candidate.has_texel_parameters)
+    return signature != "end" or _loss_comes_to_an_end(candidate, found)
 
 
-def _loss_comes_to_an_end(found: FittedCandidate) -> bool:
+def _loss_comes_to_an_end(candidate: Candidate, found: Fit) -> bool:
     """True if a fitted loss is over when its session ends: no path is at the bound that says so."""
-    index, paths = len(found.fit.model.effects) - 1, found.candidate.form.over_within
-    at = parameters_at_bounds(found.fit.model, found.fit.free, index)
-    own = (item for item in found.fit.free if item.effect == index and item.name in paths)
+    index, paths = len(found.model.effects) - 1, candidate.form.over_within
+    at = parameters_at_bounds(found.model, found.free, index)
+    own = (item for item in found.free if item.effect == index and item.name in paths)
     return all(at.get(item.name) != item.high for item in own)
 
 
-def _adhesion_pulls(found: FittedCandidate, view_set: ViewSet) -> bool:
+def _adhesion_pulls(model: Model, views: Sequence[TrialView]) -> bool:
     """True if readings are negative where fitted adhesion predicts a pull, and there is such a place."""
-    predicted, measured = [], []
-    for view in view_set.whole:
-        p = found.fit.model.parameters
-        reading = (view.predictor.predict(found.fit.model).reading - p.zero) / p.gain * abs(p.gain) / view.noise[0]
+    predicted, measured, p = [], [], model.parameters
+    for view in views:
+        reading = (view.predictor.predict(model).reading - p.zero) / p.gain * abs(p.gain) / view.noise[0]
         pulled = reading < PULL_LEVEL
         if view.predictor.trial.reading is not None:
             own = (view.predictor.trial.reading - p.zero) / p.gain * abs(p.gain) / view.noise[0]
@@ -61,19 +63,16 @@ def _adhesion_pulls(found: FittedCandidate, view_set: ViewSet) -> bool:
     return len(pull) > ENOUGH_SAMPLES and float(np.nanmean(seen)) < LEAST_PRESENT_SHARE * float(pull.mean()) < LEAST_MEAN_PULL
 
 
-def _offset_is_present_unloaded(found: FittedCandidate, view_set: ViewSet) -> bool:
+def _offset_is_present_unloaded(model: Model, views: Sequence[TrialView], is_common: bool) -> bool:
     """True if a fitted offset is measured without load, from the beginning of the trials on and in each of them.
 
     What appears only under load, or with time (as the misfit of a drift's formula does), is something else. So is what appears
     from recording to recording, as the drift of a session that differs from texel to texel does.
     """
-    model = found.fit.model
-    index = len(model.effects) - 1
-    texels = len(view_set.whole[0].predictor.rig.texels)
+    index, texels = len(model.effects) - 1, len(views[0].predictor.rig.texels)
     claimed = np.broadcast_to(np.asarray(model.effects[index].values["offset"], float), texels)
-    is_common = not found.candidate.has_texel_parameters
     always, first = np.zeros((2, texels)), np.zeros((2, texels))
-    for view in view_set.whole:
+    for view in views:
         trial = view.predictor.trial
         if trial.reading is None:
             continue

@@ -18,7 +18,7 @@ from ...effects.engine.registry import form_of
 from ..dataset.trial import Trial
 from ..fitting.least_squares import TrialView
 from ..forward.predictor import Model, Predictor, predictors_of
-from .candidates import DIRECTLY_ESTIMATED, Candidate, is_spatial
+from .candidates import DIRECTLY_ESTIMATED, Candidate
 from .direct_estimates import few_levels
 
 FEW_TEXELS = 16
@@ -96,7 +96,7 @@ class ViewSet:
             return self.whole
         forms = [candidate.form, *(form_of(e.name, e.form) for e in model.effects)]
         on_friction = candidate.form.friction_law is not None
-        if any(is_spatial(form) or form.placement is not None for form in forms):
+        if any(form.is_spatial or form.placement is not None for form in forms):
             # Bristle states need every sample, and friction shows in net forces alone.
             return self.whole if on_friction else self.few_samples
         return self.few_texels_with_forces if on_friction else self.few_texels

@@ -18,7 +18,6 @@ from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
 from ..candidates.candidates import (
     START_COUNT,
     Candidate,
-    FittedCandidate,
     Scales,
     candidates,
     is_free_already,
@@ -232,7 +231,7 @@ class Screening:
 
     def shows_signature(self, candidate: Candidate, found: Fit) -> bool:
         """Return whether the recordings hold what the library asks of an effect, the last one of a fit."""
-        return is_plausible(FittedCandidate(candidate, found), replace(self.view_set, whole=self.views.fitted))
+        return is_plausible(candidate, found, self.views.fitted)
 
     def _candidates_beside(self, parent: Hypothesis) -> list[Candidate]:
         """Candidates of the kinds that a model does not have."""

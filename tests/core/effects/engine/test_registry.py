@@ -3,12 +3,14 @@
 
 import dataclasses
 import sys
+from contextlib import nullcontext
 
+import numpy as np
 import pytest
 
 from palpate.core.effects import library as library_package
 from palpate.core.effects.engine.registry import effect, from_dict, kind_of, library, names_where, only_name_where
-from palpate.core.effects.engine.specification import SCATTER
+from palpate.core.effects.engine.specification import SCATTER, TransducerArray
 from palpate.core.errors import EffectError
 
 MODULE = """
@@ -84,3 +86,23 @@ def test_effects_at_one_site_have_different_places_in_the_order():
     """With equal numbers the order of two effects would follow the user's stack, so each new kind takes a free number."""
     places = [(kind.site, kind.order) for kind in library().values()]
     assert len(places) == len(set(places))
+
+
+def test_forms_say_whether_they_couple_texels_and_need_rows():
+    """A load on one texel of three reaches another, or none; a form that needs rows refuses texels without them."""
+    position = np.array([[0.0, 0.0, 0.0], [3e-3, 0.0, 0.0], [6e-3, 0.0, 0.0]])
+    in_rows = TransducerArray(position, np.full(3, 9e-6), np.zeros(3, int), np.arange(3))
+    loose = TransducerArray(position, np.full(3, 9e-6))
+    for kind in library().values():
+        for form in kind.forms:
+            if form.memoryless is None or form.random:
+                continue
+            per_texel = {p.name: tuple([p.default] * 3) for p in form.parameters if p.per_texel}
+            values = {**form.neutral, **form.defaults(), **per_texel}
+            alone, loaded = (
+                form.memoryless(np.array([[0.0, x, 0.0]] * 2), np.zeros(2), values, in_rows, 0) for x in (0.0, 0.05)
+            )
+            is_coupled = np.abs(loaded - alone)[:, [0, 2]].max() > 1e-9
+            assert form.couples == is_coupled or form.needs == "axes", (kind.name, form.name)
+            with pytest.raises(EffectError, match="rows") if form.needs == "rows" else nullcontext():
+                form.memoryless(np.zeros((2, 3)), np.zeros(2), values, loose, 0)

@@ -9,7 +9,7 @@ import pytest
 
 from palpate.core.effects.engine.registry import effect, form_of, kind_of
 from palpate.core.gap.base.base_model import prepared
-from palpate.core.gap.candidates.candidates import Candidate, FittedCandidate, scales_of
+from palpate.core.gap.candidates.candidates import Candidate, scales_of
 from palpate.core.gap.candidates.plausibility import is_plausible
 from palpate.core.gap.candidates.view_set import view_set_of
 from palpate.core.gap.fitting.least_squares import fit, free_base_parameters
@@ -28,7 +28,7 @@ def offset_each(rig):
     free = free_base_parameters(rig.parameters, ("k", "cn"), full[0])
     free += candidate.free_parameters(0, scales_of(predictors, Model(rig.parameters)), 1.0)
     found = fit(view_set.whole, Model(rig.parameters, (effect("offset", "listed", offset=none),)), free)
-    return FittedCandidate(candidate, found), view_set
+    return candidate, found, view_set.whole
 
 
 def always(reading, _time):
@@ -51,11 +51,11 @@ def growing():
 
 @pytest.mark.parametrize(("change", "is_one"), [(always, True), (only_under_load, False), (later, False), (growing(), False)])
 def test_an_offset_is_there_without_load_from_the_beginning(change, is_one):
-    found, view_set = offset_each(cases.rig(change=change, seed=4, trials=6))
-    touched = np.any([(s.predictor.stimulus.depth > 0).any(axis=0) for s in view_set.whole], axis=0)
-    values = np.array(found.fit.model.effects[0].values["offset"])[touched]
+    candidate, found, views = offset_each(cases.rig(change=change, seed=4, trials=6))
+    touched = np.any([(s.predictor.stimulus.depth > 0).any(axis=0) for s in views], axis=0)
+    values = np.array(found.model.effects[0].values["offset"])[touched]
     assert np.corrcoef(values, SPREAD[touched])[0, 1] > 0.6  # it fits either way
-    assert is_plausible(found, view_set) == is_one
+    assert is_plausible(candidate, found, views) == is_one
 
 
 @pytest.mark.parametrize(("share_of_way", "is_one"), [(0.1, True), (2.0, False)])
@@ -72,4 +72,4 @@ def test_a_softening_comes_to_its_end_within_its_session(share_of_way, is_one):
     start = effect("softening", "path", share=0.3, path=share_of_way * scales.travel)
     view_set = view_set_of(predictors, (noise[0].deviation, 1.0))
     found = fit(view_set.whole, Model(rig.parameters, (start,)), free, max_steps=0)
-    assert is_plausible(FittedCandidate(candidate, found), view_set) == is_one
+    assert is_plausible(candidate, found, view_set.whole) == is_one
