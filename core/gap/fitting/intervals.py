@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .least_squares import TEXEL_PRECISION, Fit, NormalEquations, all_equations, summed_equations, value_of
+from .least_squares import TEXEL_PRECISION, Fit, NormalEquations, summed_equations, value_of
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,7 @@ def parameter_intervals(found: Fit) -> list[ParameterInterval]:
 def _covariances(found: Fit) -> tuple[np.ndarray, ...]:
     """Covariances (p, p) of the common parameters in their coordinates, four of them (see :func:`parameter_intervals`)."""
     assert found.equations is not None
-    total = summed_equations(all_equations(found.equations))
+    total = summed_equations([one for trial in found.equations for one in trial])
     m = total.texel_gradient.shape[1]
     shift = _texel_response(total) if m else np.zeros((total.coupling.shape[0], m, len(total.common)))
     a = total.common - np.einsum("nmp,nmq->pq", total.coupling, shift)
