@@ -85,26 +85,25 @@ def reading_noise(predictors: Sequence[Predictor], full: float) -> ChannelNoise:
     curves: list[np.ndarray] = []
     for predictor in predictors:
         for part in _unloaded_parts(predictor):
-            if part.shape[1]:
-                variance, curve, known = _variance_and_autocovariance(part)
-                variances += list(variance)
-                weights += list(known)
-                curves.append(curve * known.sum())
+            variance, curve, known = _variance_and_autocovariance(part)
+            variances += list(variance)
+            weights += list(known)
+            curves.append(curve * known.sum())
     smallest = SMALLEST_NOISE * full
     alive = np.array(variances) > smallest**2
-    if alive.sum() >= 1:
+    if alive.any():
         values, weight = np.array(variances)[alive], np.array(weights)[alive]
         order = np.argsort(values)
         share = (np.cumsum(weight[order]) - 0.5 * weight[order]) / weight.sum()
         middle = np.interp(0.5, share, values[order])
         return ChannelNoise(float(np.sqrt(middle)), integral_time(curves), "stretches without load")
-    deviation = _median_deviation([p.trial.reading for p in predictors if p.trial.reading is not None])
+    deviation = _white_noise_deviation([p.trial.reading for p in predictors if p.trial.reading is not None])
     return ChannelNoise(max(deviation, smallest), 1.0, "differences between samples")
 
 
 def force_noise(predictors: Sequence[Predictor], full: float) -> ChannelNoise:
     """Measure the noise of the force sensor from second differences: there is no other channel to compare with."""
-    deviation = _median_deviation([p.trial.force for p in predictors if p.trial.force is not None])
+    deviation = _white_noise_deviation([p.trial.force for p in predictors if p.trial.force is not None])
     return ChannelNoise(max(deviation, SMALLEST_NOISE * full), 1.0, "differences between samples")
 
 
@@ -190,22 +189,17 @@ def integral_time(curves: list[np.ndarray]) -> float:
     return float(max(1.0, 1.0 + 2.0 * correlation[1:last].sum()))
 
 
-def _white_noise_deviation(values: np.ndarray) -> np.ndarray:
-    """Standard deviation of white noise in each column (c,), on top of any smooth signal; NaN if too few values are known."""
-    second = values[2:] - 2.0 * values[1:-1] + values[:-2]
-    deviations = np.full(values.shape[1], np.nan)
-    for column, changes in enumerate(np.abs(second).T):
-        known = changes[np.isfinite(changes)]
+def _white_noise_deviation(values: Sequence[np.ndarray]) -> float:
+    """Median, over columns of arrays (T, c), of the standard deviation of white noise on top of any smooth signal; 0 if in no
+    column enough values are known.
+    """
+    deviations = []
+    for column in (column for array in values for column in array.T):
+        second = column[2:] - 2.0 * column[1:-1] + column[:-2]
+        known = np.abs(second[np.isfinite(second)])
         if len(known) >= LEAST_DIFFERENCES:
-            deviations[column] = MAD_TO_DEVIATION * np.median(known) / np.sqrt(6.0)
-    return deviations
-
-
-def _median_deviation(values: Sequence[np.ndarray]) -> float:
-    """Median of the deviations of all columns of which enough values are known; 0 if there are none."""
-    deviations = np.concatenate([np.zeros(0), *map(_white_noise_deviation, values)])
-    known = deviations[np.isfinite(deviations)]
-    return float(np.median(known)) if len(known) else 0.0
+            deviations.append(MAD_TO_DEVIATION * np.median(known) / np.sqrt(6.0))
+    return float(np.median(deviations)) if deviations else 0.0
 
 
 @dataclass(frozen=True)
@@ -275,7 +269,7 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
         where = predictor.trial.session or id(predictor)  # the sensor remembers the cycles of a whole session
         cycles[where] = cycles.get(where, 0) + _cycle_count(total, max(UNLOADED_SHARE * full, band))
         slides |= bool(s.slide_speed.max(initial=0.0) > LEAST_SLIDING_SPEED)
-    quick = np.concatenate(speeds) if speeds else np.zeros(0)
+    quick = np.concatenate(speeds)
     spread = float(np.quantile(quick, 0.9) / np.quantile(quick, 0.1)) if len(quick) > 4 else 1.0
     return Coverage(
         touched_share=float(touched.mean()),

@@ -58,23 +58,17 @@ def residual_structure(predictors: Sequence[Predictor], residuals: Sequence[np.n
     residuals : sequence of (T, n) float
         In units of the noise; zero if a value is missing.
     """
-    if len(predictors) == 1:  # the halves of a single trial serve as two trials
-        predictors, residuals, halves = [predictors[0]] * 2, [residuals[0]] * 2, True
-    else:
-        halves = False
     found = [features(predictor, residual) for predictor, residual in zip(predictors, residuals, strict=True)]
     sizes = {name: len(columns) for groups in found for name, columns in groups.items()}
-    parts, sums = [], []
-    for number, (predictor, groups, residual) in enumerate(zip(predictors, found, residuals, strict=True)):
-        table = _table(groups, sizes, residual.shape)
+    sums = []
+    for predictor, groups, residual in zip(predictors, found, residuals, strict=True):
+        # A group that only other trials have is zero, such as depth beside no contact.
+        table = np.concatenate([groups.get(name, np.zeros((size, *residual.shape))) for name, size in sizes.items()])
         table[:, ~known_readings(predictor)] = 0.0
-        part = slice(None)
-        if halves:
-            middle = len(residual) // 2
-            part = slice(None, middle) if number == 0 else slice(middle, None)
-        x, r = table[:, part].reshape(len(table), -1), residual[part].ravel()
-        parts.append(residual[part])
-        sums.append((x @ x.T, x @ r, float(r @ r)))
+        middle = len(residual) // 2  # the halves of a single trial serve as two trials
+        for part in [slice(None)] if len(predictors) > 1 else [slice(None, middle), slice(middle, None)]:
+            x, r = table[:, part].reshape(len(table), -1), residual[part].ravel()
+            sums.append((x @ x.T, x @ r, float(r @ r)))
     total = sum(square for _, _, square in sums)
     if total <= 0:
         return ResidualStructure(0.0, dict.fromkeys(sizes, 0.0))
@@ -83,19 +77,14 @@ def residual_structure(predictors: Sequence[Predictor], residuals: Sequence[np.n
         shares[name] = _share_predicted(sums, np.arange(start, start + size))
         start += size
     everything = _share_predicted(sums, np.arange(start))
-    if residuals[0].shape[1] > 1 and not halves:
-        shares["texel"] = _share_predicted_by_texel(predictors, parts, total)
-        everything = 1.0 - (1.0 - max(everything, 0.0)) * (1.0 - max(shares["texel"], 0.0))
-    return ResidualStructure(max(everything, *shares.values(), 0.0), {name: max(share, 0.0) for name, share in shares.items()})
-
-
-def _table(groups: dict[str, np.ndarray], sizes: dict[str, int], shape: tuple[int, ...]) -> np.ndarray:
-    """Features of one trial (p, T, n); zero for a group that only other trials have, such as depth beside no contact."""
-    return np.concatenate([groups.get(name, np.zeros((size, *shape))) for name, size in sizes.items()])
+    if residuals[0].shape[1] > 1 and len(predictors) > 1:
+        shares["texel"] = _share_predicted_by_texel(predictors, residuals, total)
+        everything = 1.0 - (1.0 - everything) * (1.0 - shares["texel"])
+    return ResidualStructure(max(everything, *shares.values()), shares)
 
 
 def _share_predicted(sums: list[tuple[np.ndarray, np.ndarray, float]], use: np.ndarray) -> float:
-    """Share of the squares that a ridge regression on some features predicts in folds that it has not seen.
+    """Share of the squares that a ridge regression on some features predicts in folds that it has not seen; never below 0.
 
     Parameters
     ----------
@@ -110,7 +99,7 @@ def _share_predicted(sums: list[tuple[np.ndarray, np.ndarray, float]], use: np.n
         seen = whole - a
         weights = np.linalg.solve(seen + np.diag(1e-3 * np.diag(seen) + 1e-9 * (1.0 + np.trace(seen))), along - b)
         left += float(weights @ a @ weights - 2.0 * weights @ b)
-    return 1.0 - left / sum(squares)
+    return max(1.0 - left / sum(squares), 0.0)
 
 
 def _share_predicted_by_texel(predictors: Sequence[Predictor], residuals: Sequence[np.ndarray], total: float) -> float:
@@ -130,7 +119,7 @@ def _share_predicted_by_texel(predictors: Sequence[Predictor], residuals: Sequen
         miss = r - offset - gain * relative_load(predictor.stimulus)
         miss[~known_readings(predictor)] = 0.0
         left += float(np.vdot(miss, miss))
-    return 1.0 - left / total
+    return max(1.0 - left / total, 0.0)
 
 
 # Heteroscedastic noise: noise whose standard deviation is proportional to the reading, which no fit can explain.
@@ -285,6 +274,8 @@ def strongest_line(views: Sequence[TrialView], model: Model) -> SpectralLine | N
         Whole trials.
     model : Model
     """
+    from scipy.special import gammaincc
+
     resting = [one for one in (_unloaded_residual(view, model) for view in views) if one is not None]
     if not resting:
         return None
@@ -300,16 +291,14 @@ def strongest_line(views: Sequence[TrialView], model: Model) -> SpectralLine | N
         resampled[indices] = values
         powers.append((np.abs(np.fft.rfft(resampled, axis=0)) ** 2).sum(axis=1) / max(float(known.sum()), 1.0))
     usable = slice(LINE_HALF_WIDTH + 1, len(powers[0]) - 2)
-    levels = [_noise_level(power) for power in powers]
-    ratio = np.sum([power / level for power, level in zip(powers, levels, strict=True)], axis=0)[usable]
+    ratios = [power / _noise_level(power) for power in powers]
+    ratio = np.sum(ratios, axis=0)[usable]
     if len(ratio) < 2 * NEIGHBOUR_FREQUENCIES:
         return None
     peak = int(np.argmax(ratio)) + usable.start
-    around = slice(peak - 1, peak + 2)
-    in_all_trials = all(
-        float((power[around] / level[around]).max()) > LEAST_PROMINENCE for power, level in zip(powers, levels, strict=True)
-    )
-    if not in_all_trials or _false_alarm_probability(float(ratio.max()), len(powers)) * len(ratio) > FALSE_ALARM:
+    in_all_trials = all(one[peak - 1 : peak + 2].max() > LEAST_PROMINENCE for one in ratios)
+    by_chance = gammaincc(len(powers), ratio.max())  # that a sum of exponential values of mean one is larger than this
+    if not in_all_trials or by_chance * len(ratio) > FALSE_ALARM:
         return None
     near = (peak + np.linspace(-SEARCH_WIDTH, SEARCH_WIDTH, SEARCH_POINTS)) / (length * step)
     best = max((_line_at(resting, float(f), views[0].noise[0]) for f in near), key=lambda line: line.share)
@@ -338,13 +327,6 @@ def _noise_level(power: np.ndarray) -> np.ndarray:
     kept = np.abs(np.arange(-NEIGHBOUR_FREQUENCIES, NEIGHBOUR_FREQUENCIES + 1)) > LINE_HALF_WIDTH
     level: np.ndarray = np.maximum(np.median(windows[:, kept], axis=1) / np.log(2.0), 1e-300)
     return level
-
-
-def _false_alarm_probability(total: float, trials: int) -> float:
-    """Probability that the sum of so many exponential values of mean one is larger than `total`."""
-    from scipy.special import gammaincc
-
-    return float(gammaincc(trials, total))
 
 
 def _line_at(resting: list[UnloadedResidual], frequency: float, noise: float) -> SpectralLine:
