@@ -23,7 +23,7 @@ from ...model.sensor import Sensor
 from ...solver.simulation import Simulation
 from ..dataset.rig import Rig
 from ..dataset.trial import Trial
-from .closed_form_contact import Contact, box_contact, sphere_contact
+from .closed_form_contact import Contact, shape_contact
 
 PRECISION, WEIGHT_ERROR = 1e-6, 1e-3
 """Relative error of the force that is carried at the height at which an indenter rests: of the search, and at most."""
@@ -140,9 +140,8 @@ def surface_stimulus_of(trial: Trial, rig: Rig, texels: Texels | None = None, he
     texels = rig.surface if texels is None else texels
     if height is None:
         height = trial.height_start if isinstance(trial.contact_height, str) else trial.contact_height
-    if height != 0.0 and trial.stimulus != "force":
-        return replace(_stimulus(_raised(trial, rig, height), rig, texels), trial=trial)
-    return _stimulus(trial, rig, texels)
+    seen = trial if height == 0.0 or trial.stimulus == "force" else _raised(trial, rig, height)
+    return replace(_stimulus(seen, rig, texels), trial=trial)
 
 
 def _raised(trial: Trial, rig: Rig, height: float) -> Trial:
@@ -157,7 +156,6 @@ def _raised(trial: Trial, rig: Rig, height: float) -> Trial:
 
 def _stimulus(trial: Trial, rig: Rig, texels: Texels) -> Stimulus:
     """The stimulus of the texels, at the poses and depths of a trial."""
-    n = len(texels)
     along = None
     if np.ptp(trial.travel, axis=0).any():
         velocity = np.gradient(trial.travel, trial.time, axis=0)
@@ -167,19 +165,30 @@ def _stimulus(trial: Trial, rig: Rig, texels: Texels) -> Stimulus:
     if trial.stimulus == "force" and trial.position is not None and rig.indenter_of(trial) is not None:
         return _weighted(trial, rig, texels, along)
     assert trial.level is not None
-    level = np.repeat(np.maximum(trial.level, 0.0)[:, None], n, axis=1)
-    slip = None if along is None else along * (level > 0)[:, :, None]
-    nothing = np.zeros_like(level)
-    slide = nothing if slip is None else np.sqrt(dot(slip, slip))
+    level = np.repeat(np.maximum(trial.level, 0.0)[:, None], len(texels), axis=1)
     if trial.stimulus == "force":
-        return Stimulus(trial, nothing, nothing, level / _texel_count(rig), None, slide, slip)
+        return _of_forces(trial, level / texel_shares(rig).sum(), None, along)
     rate = np.where(level > 0, np.gradient(trial.level, trial.time)[:, None], 0.0)
-    return Stimulus(trial, level, rate, None, None, slide, slip)
+    return Stimulus(trial, level, rate, None, None, *_slid(along, level))
 
 
-def _texel_count(rig: Rig) -> float:
-    """Number of texels by area that share a force on the whole surface."""
-    return float(len(rig.texels)) if rig.cover is None else float(rig.cover.share.sum())
+def texel_shares(rig: Rig) -> np.ndarray:
+    """Return how many texels, by area, each point of a rig's surface stands for, (m,) float."""
+    return np.ones(len(rig.texels)) if rig.cover is None else rig.cover.share
+
+
+def _of_forces(trial: Trial, load: np.ndarray, normal: np.ndarray | None, along: np.ndarray | None) -> Stimulus:
+    """Stimulus of known forces (T, n)."""
+    nothing = np.zeros_like(load)
+    return Stimulus(trial, nothing, nothing, load, normal, *_slid(along, load))
+
+
+def _slid(along: np.ndarray | None, load: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+    """Speed (T, n) and velocity (T, n, 3) of a surface that slides by itself, where it is loaded."""
+    if along is None:
+        return np.zeros_like(load), None
+    slip = along * (load > 0)[:, :, None]
+    return np.sqrt(dot(slip, slip)), slip
 
 
 def joined_stimuli(stimuli: Sequence[Stimulus], texels: Texels) -> tuple[Stimulus, list[int]]:
@@ -297,15 +306,22 @@ def split_velocities(motion, along, depth, normal, point, split):  # type: ignor
 
 
 def _contact(trial: Trial, rig: Rig, texels: Texels, reach: float) -> Contact:
-    """Contact of texels with what pressed in a trial; returns as of :func:`sphere_contact`."""
+    """Contact of texels with what pressed in a trial; returns as of :func:`shape_contact`."""
     indenter = rig.indenter_of(trial)
     assert trial.position is not None and trial.quaternion is not None and indenter is not None
-    if indenter.radius is not None:
-        return sphere_contact(trial.position, indenter.radius, texels.position, texels.normal, reach)
-    if indenter.edges is not None:
-        pose, edges = (trial.position, trial.quaternion), np.array(indenter.edges)
-        return box_contact(*pose, edges, texels.position, texels.normal, reach)
-    return _mesh_contact(trial, rig, texels, reach)
+    half_edges = None if indenter.edges is None else 0.5 * np.array(indenter.edges)
+    size = half_edges if indenter.radius is None else np.array([indenter.radius])
+    if size is not None:
+        return shape_contact(trial.position, trial.quaternion, size, texels.position, texels.normal, reach)
+    start = Motion.at_rest(trial.position[0], trial.quaternion[0])
+    scenario = Scenario(
+        bodies=(Body("sensor", Motion.at_rest()), Body("indenter", start)),
+        sensors=(Sensor("sensor", 0, texels, replace(rig.parameters, max_penetration=reach)),),
+        targets=(Target("indenter", 1, indenter.mesh),),
+        frame_end=1,
+        name=rig.name,
+    )
+    return Simulation(scenario).contacts_along(1, trial.position, trial.quaternion)
 
 
 def _weighted(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) -> Stimulus:
@@ -322,7 +338,7 @@ def _weighted(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) 
     size = float(np.linalg.norm(indenter.mesh.vertices, axis=1).max())
     high = np.full(len(states), float(texels.position[:, 2].max()) + size)
     low = high - 2.0 * size - rig.parameters.max_penetration - float(np.ptp(texels.position[:, 2]))
-    share = np.ones(len(texels)) if rig.cover is None else rig.cover.share
+    share = texel_shares(rig)
     part = replace(trial, time=np.arange(float(len(states))), position=states[:, :3].copy(), quaternion=states[:, 3:7].copy())
     reach = 4.0 * (rig.parameters.max_penetration + size)
     excess, lack = np.zeros(len(states)), wanted.copy()  # of the force at the lower and the upper end
@@ -351,10 +367,7 @@ def _weighted(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) 
             "the units of force, x and y, and k."
         )
     load = np.where(wanted > 0.0, wanted / np.where(carried > 0.0, carried, 1.0), 0.0)[:, None] * depth
-    load, normal = load[back], normal[back]
-    slip = None if along is None else along * (load > 0)[:, :, None]
-    nothing = np.zeros_like(load)
-    return Stimulus(trial, nothing, nothing, load, normal, nothing if slip is None else np.sqrt(dot(slip, slip)), slip)
+    return _of_forces(trial, load[back], normal[back], along)
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -371,22 +384,3 @@ def _spin(quaternion: np.ndarray, time: np.ndarray) -> np.ndarray:
     before, after = np.maximum(np.arange(len(time)) - 1, 0), np.minimum(np.arange(len(time)) + 1, len(time) - 1)
     turn = rotation_vectors(quaternion_product(quaternion[after], conjugate[before]))
     return turn / (time[after] - time[before])[:, None]
-
-
-def _mesh_contact(trial: Trial, rig: Rig, texels: Texels, reach: float) -> Contact:
-    """Contact of any mesh, as :func:`sphere_contact` of a ball, through the solver's contact search."""
-    assert trial.position is not None and trial.quaternion is not None
-    indenter = rig.indenter_of(trial)
-    assert indenter is not None
-    parameters = replace(rig.parameters, max_penetration=reach)
-    scenario = Scenario(
-        bodies=(
-            Body("sensor", Motion.at_rest()),
-            Body("indenter", Motion.at_rest(trial.position[0], trial.quaternion[0])),
-        ),
-        sensors=(Sensor("sensor", 0, texels, parameters),),
-        targets=(Target("indenter", 1, indenter.mesh),),
-        frame_end=1,
-        name=rig.name,
-    )
-    return Simulation(scenario).contacts_along(1, trial.position, trial.quaternion)
