@@ -3,14 +3,7 @@
 fitted.
 
 Each effect shows in one feature of the recordings, its signature: hysteresis, for example, in readings that differ after
-unloading. Recordings without this feature do not identify the effect, however well its formula fits. Two functions say this:
-
-============================  =================================================  ==========================================
-function                      what the recordings lack                           what follows
-============================  =================================================  ==========================================
-`unidentifiable`              the signature of the effect                        the effect is no candidate
-`indistinguishable`           what separates the effect from certain others      these are rivals, however well each fits
-============================  =================================================  ==========================================
+unloading. Recordings without this feature do not identify the effect, however well its formula fits.
 """
 
 from __future__ import annotations
@@ -61,37 +54,25 @@ def indistinguishable(coverage: Coverage, name: str, curvature: float = np.inf) 
     """Return the kinds that recordings cannot distinguish from one of this name, however much better one of them fits.
 
     A sensor need not follow any of the formulas, so a better fit is no evidence if the signature of the effect is not recorded.
-
-    Parameters
-    ----------
-    coverage : Coverage
-    name : str
-    curvature : float
-        Of the fitted curve (see :func:`curvature_ratio`).
+    `curvature` is that of the fitted curve (see :func:`curvature_ratio`).
     """
     groups: list[tuple[str, ...]] = []
+    one_speed = coverage.speed_ratio < SINGLE_SPEED_RATIO
     if not coverage.unloading and name in NONLINEAR and curvature < LOOP_CURVATURE:
         groups.append((name, *LOOPS))
-    if not coverage.unloading and coverage.speed_ratio < SINGLE_SPEED_RATIO and coverage.longest_hold == 0.0:
-        groups.append(
-            (*(NONLINEAR if name not in NONLINEAR else (name,)), *KNOWN_FROM_TIMING)
-        )  # time and depth are proportional
+    if not coverage.unloading and one_speed and coverage.longest_hold == 0.0:  # time and depth are proportional
+        groups.append((*((name,) if name in NONLINEAR else NONLINEAR), *KNOWN_FROM_TIMING))
     if not coverage.load_moves:
         groups.append(KNOWN_FROM_PLACES)
     if coverage.unloading and coverage.cycles < LEAST_CYCLES:
-        still = coverage.speed_ratio < SINGLE_SPEED_RATIO and coverage.longest_hold < SHORT_HOLD
+        still = one_speed and coverage.longest_hold < SHORT_HOLD
         groups.append((*KNOWN_FROM_CYCLES, *LATE) if still else KNOWN_FROM_CYCLES)
     return tuple(dict.fromkeys(other for group in groups if name in group for other in group if other != name))
 
 
 def curvature_ratio(predictors: Sequence[Predictor], model: Model) -> float:
-    """Return the ratio of the steepest to the flattest eighth of a model's curve of reading over load.
-
-    Parameters
-    ----------
-    predictors : sequence of Predictor
-        The curve is that of the texel with the largest load in these trials.
-    model : Model
+    """Return the ratio of the steepest to the flattest eighth of a model's curve of reading over load. The curve is that of the
+    texel with the largest load.
     """
     deepest = max(predictors, key=lambda one: float(one.stimulus.load.max(initial=0.0)))
     texel = int(np.argmax(deepest.stimulus.load.max(axis=0)))

@@ -27,26 +27,15 @@ class Estimate:
         return f"{self.value:.4g}{f' {unit}' if unit else ''} (95 %: {self.low:.4g} to {self.high:.4g})"
 
 
-def student_quantile(freedom: float) -> float:
-    """Return the 97.5 % quantile of Student's t; infinite without degrees of freedom, since the scatter is then unknown."""
+def student_quantile(freedom: np.ndarray | float) -> np.ndarray | float:
+    """Return the 97.5 % quantile of Student's t for some degrees of freedom, above zero."""
     from scipy.special import stdtrit
 
-    return float(stdtrit(freedom, 0.975)) if freedom > 0 else float("inf")
+    return stdtrit(freedom, 0.975)
 
 
 def linear_estimates(columns: np.ndarray, values: np.ndarray) -> list[Estimate]:
-    """Return the estimates of ordinary least squares, ``values ≈ columns @ coefficients``.
-
-    Parameters
-    ----------
-    columns : (m, p) float
-        Of full rank.
-    values : (m,) float
-
-    Returns
-    -------
-    list of p Estimate
-    """
+    """Return the p estimates of ordinary least squares, ``values (m,) ≈ columns (m, p) @ coefficients``, of full rank."""
     coefficients, *_ = np.linalg.lstsq(columns, values, rcond=None)
     freedom = len(values) - columns.shape[1]
     residual = values - columns @ coefficients
@@ -58,7 +47,9 @@ def linear_estimates(columns: np.ndarray, values: np.ndarray) -> list[Estimate]:
 def linearised_estimates(
     values: np.ndarray, jacobian: np.ndarray, transformation: np.ndarray, residual: np.ndarray, scale: float = 1.0
 ) -> list[Estimate]:
-    """Return the estimates of nonlinear least squares, with the model linearised at the solution.
+    """Return the p estimates of nonlinear least squares, with the model linearised at the solution.
+
+    The interval of a variable on which no residual depends is infinite.
 
     Parameters
     ----------
@@ -72,11 +63,6 @@ def linearised_estimates(
         At the solution.
     scale : float
         Unit in which the search measured the residuals.
-
-    Returns
-    -------
-    list of p Estimate
-        The interval of a variable on which no residual depends is infinite.
     """
     freedom = len(residual) - len(values)
     covariance = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-14) * (residual @ residual) / scale**2 / max(freedom, 1)
@@ -143,12 +129,7 @@ def parameter_intervals(found: Fit) -> list[ParameterInterval]:
     - from the scatter of the gradients of whole trials, which holds if the formula is not quite the sensor's.
 
     If few channels or trials inform about a parameter, as about friction, the last two have too few gradients: they sum to zero
-    at the end of the fit. Then they hold for the other parameters only.
-
-    Parameters
-    ----------
-    found : Fit
-        With normal equations.
+    at the end of the fit. Then they hold for the other parameters only. The fit needs normal equations.
     """
     common = [item for item in found.free if not item.per_texel]
     if not common:
@@ -224,7 +205,7 @@ def _sandwich(bread: np.ndarray, gradients: np.ndarray) -> np.ndarray:
     influence = gradients @ bread
     squares, fourth = (influence**2).sum(axis=0), (influence**4).sum(axis=0)
     effective = np.clip(3.0 * squares**2 / np.maximum(fourth, 1e-300), 2.0, max(groups, 2))
-    reach = np.array([student_quantile(number - 1.0) for number in effective]) / NORMAL_QUANTILE
+    reach = student_quantile(effective - 1.0) / NORMAL_QUANTILE
     factor = groups / max(groups - len(bread), 1)
     covariance: np.ndarray = factor * np.outer(reach, reach) * (influence.T @ influence)
     return covariance

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -181,7 +182,7 @@ class TrialView:
     def stretches(self, residual: np.ndarray) -> list[slice]:
         """Return the stretches of time that are left out one after the other, as rows of a residual."""
         edges = np.linspace(0, len(residual), self.stretch_count + 1).astype(int)
-        return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        return [slice(a, b) for a, b in pairwise(edges)]
 
     @property
     def texels(self) -> np.ndarray:
@@ -312,11 +313,8 @@ def fit(
 
     Parameters
     ----------
-    views : sequence of TrialView
     model : Model
         Where the fit starts.
-    free : sequence of FreeParameter
-    max_steps : int
     tolerance : float
         The fit ends when the sum of squares decreases by less than this share of it.
     frozen : int
@@ -340,8 +338,12 @@ def fit(
             derivatives(view, point.model, free, point.at, residual, table, known)
         complete = known == 0
         total = summed_equations([_equations_of(view, free, table, residual) for view, residual, table in parts])
-        better, damping = _better_point(views, free, point, total, damping)
-        if better is None:
+        for _ in range(TRIES_PER_STEP):
+            better = _Point.of(views, point.model, free, _after_step(total, free, point.at, damping))
+            if better.objective < point.objective:
+                break
+            damping = max(damping * DAMPING_UP, RAISED_DAMPING)
+        else:  # no step leads down
             if complete:
                 break
             known, damping = 0, FIRST_DAMPING
@@ -383,19 +385,6 @@ class _Point:
         return cls(at, model, residuals, sum(map(_sum_of_squares, residuals)) + _prior_penalty(free, at))
 
 
-def _better_point(
-    views: Sequence[TrialView], free: Sequence[FreeParameter], point: _Point, total: NormalEquations, damping: float
-) -> tuple[_Point | None, float]:
-    """Raise the damping until a step leads down; the point after that step and the damping, or None if no step does."""
-    for _ in range(TRIES_PER_STEP):
-        moved = _point_after(point.at, free, _solved_step(total, free, point.at, damping))
-        tried = _Point.of(views, point.model, free, moved)
-        if np.isfinite(tried.objective) and tried.objective < point.objective:
-            return tried, damping
-        damping = max(damping * DAMPING_UP, RAISED_DAMPING)
-    return None, damping
-
-
 def _prior_penalty(free: Sequence[FreeParameter], at: list[np.ndarray]) -> float:
     """Squares that the prior adds for parameters of single texels away from their resting values."""
     return sum(
@@ -403,16 +392,6 @@ def _prior_penalty(free: Sequence[FreeParameter], at: list[np.ndarray]) -> float
         for item, x in zip(free, at, strict=True)
         if item.per_texel
     )
-
-
-def _point_after(at: list[np.ndarray], free: Sequence[FreeParameter], step: list[np.ndarray]) -> list[np.ndarray]:
-    """Coordinates after a step, inside the bounds; steps on a logarithmic scale are limited."""
-    moved = []
-    for x, item, change in zip(at, free, step, strict=True):
-        if item.log:
-            change = np.clip(change, -LARGEST_LOG_STEP, LARGEST_LOG_STEP)
-        moved.append(item.to_coordinate(item.from_coordinate(x + change)))
-    return moved
 
 
 def derivatives(
@@ -428,9 +407,6 @@ def derivatives(
 
     Parameters
     ----------
-    view : TrialView
-    model : Model
-    free : tuple of FreeParameter
     at : list of float or (n,) float
         Coordinates of the free parameters in the model.
     residual : (T, c + 3) float
@@ -516,14 +492,14 @@ def _reduced_equations(
     )
 
 
-def _solved_step(
+def _after_step(
     total: NormalEquations,
     free: Sequence[FreeParameter],
     at: list[np.ndarray],
     damping: float,
     whole: NormalEquations | None = None,
 ) -> list[np.ndarray]:
-    """Solve damped normal equations; a step for each free parameter, in its coordinate.
+    """Coordinates after a step that solves damped normal equations, inside the bounds; steps of logarithms are limited.
 
     With the equations of the `whole` of the trials there is no step in directions, and of parameters of single texels, about
     which these equations have too little information.
@@ -533,11 +509,21 @@ def _solved_step(
     if whole is None:
         common = np.linalg.lstsq(a, rhs, rcond=1e-13)[0]
     else:
-        share, along = _information_shares(a, _reduced_equations(whole, free, at, 0.0, held)[0])
+        # The directions are those in which the information of the whole is one, and that of these equations its share.
+        known = _reduced_equations(whole, free, at, 0.0, held)[0]
+        inverse = np.linalg.inv(np.linalg.cholesky(known + 1e-10 * np.diag(np.diag(known)) + 1e-300 * np.eye(len(known))))
+        share, turned = np.linalg.eigh(inverse @ a @ inverse.T)
+        along = inverse.T @ turned
         weight = np.where(share > LEAST_INFORMATION, 1.0 / np.maximum(share, LEAST_INFORMATION), 0.0)
         common = along @ (weight * (along.T @ rhs))
     shared, own = iter(common), iter((alone - follow @ common).T)
-    return [next(own if item.per_texel else shared) for item in free]
+    moved = []
+    for x, item in zip(at, free, strict=True):
+        change = next(own if item.per_texel else shared)
+        if item.log:
+            change = np.clip(change, -LARGEST_LOG_STEP, LARGEST_LOG_STEP)
+        moved.append(item.to_coordinate(item.from_coordinate(x + change)))
+    return moved
 
 
 def _texel_information(equations: NormalEquations) -> np.ndarray:
@@ -545,30 +531,12 @@ def _texel_information(equations: NormalEquations) -> np.ndarray:
     return np.diagonal(equations.texel, axis1=1, axis2=2)
 
 
-def _information_shares(a: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Share of the information of all trials, `known`, that `a` has in each of p directions, and the directions as columns.
-
-    `known` is one in each direction.
-    """
-    inverse = np.linalg.inv(np.linalg.cholesky(known + 1e-10 * np.diag(np.diag(known)) + 1e-300 * np.eye(len(known))))
-    share, turned = np.linalg.eigh(inverse @ a @ inverse.T)
-    return share, inverse.T @ turned
-
-
 def cross_fitted(found: Fit, views: Sequence[TrialView], seen: Sequence[np.ndarray]) -> list[np.ndarray]:
     """Return residuals of every stretch under a fit that has not seen it: of two folds of alternating ones, that to the other.
 
     Parameters about which a fold has too little information keep their values. If the Newton step does not even fit the other
-    fold better, it is shortened, at last to nothing.
-
-    Parameters
-    ----------
-    found : Fit
-        With equations.
-    views : sequence of TrialView
-        To which it was fitted.
-    seen : sequence of (T, c + 3) float
-        Its residuals.
+    fold better, it is shortened, at last to nothing. `seen` are the residuals (T, c + 3) of the fit on the views to which it
+    was fitted; it has equations.
     """
     if found.equations is None or not found.free:
         return list(seen)
@@ -580,7 +548,7 @@ def cross_fitted(found: Fit, views: Sequence[TrialView], seen: Sequence[np.ndarr
         total = summed_equations([one for trial in found.equations for one in trial[1 - fold :: 2]])
         before, damping = total.sse + _prior_penalty(free, at), 1e-6
         for _ in range(3):
-            moved = _point_after(at, free, _solved_step(total, free, at, damping, whole))
+            moved = _after_step(total, free, at, damping, whole)
             model = with_coordinates(found.model, free, moved)
             residuals = [view.residual(model) for view in views]
             fitted = [r[part] for r, parts in zip(residuals, stretches, strict=True) for part in parts[1 - fold :: 2]]
@@ -598,16 +566,8 @@ def _sum_of_squares(residual: np.ndarray) -> float:
 
 
 def free_base_parameters(parameters: SensorParameters, wanted: Sequence[str], full: float) -> list[FreeParameter]:
-    """Return free parameters of the base model.
-
-    Parameters
-    ----------
-    parameters : SensorParameters
-        Where they start.
-    wanted : sequence of str
-        Their names; :data:`FRICTION_LEVEL` is one parameter for both friction coefficients.
-    full : float
-        Range of the readings, in the sensor's unit.
+    """Return free parameters of the base model. They start at `parameters`; :data:`FRICTION_LEVEL` is one for both friction
+    coefficients. `full` is the range of the readings, in the sensor's unit.
     """
 
     def free(name: str) -> FreeParameter:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -72,30 +73,19 @@ def reading_noise(predictors: Sequence[Predictor], full: float) -> ChannelNoise:
 
     Every unloaded stretch of every texel gives an estimate of the variance, without the texels' common mode and a linear drift.
     The result is the weighted median of these, so that a few texels that respond to their neighbours do not matter. If no
-    stretch is long enough, second differences of the readings are used, which assumes white noise.
-
-    Parameters
-    ----------
-    predictors : sequence of Predictor
-    full : float
-        Range of the readings; smaller noise than a ten-thousandth of it is taken as that.
+    stretch is long enough, second differences of the readings are used, which assumes white noise. Noise smaller than a
+    ten-thousandth of `full`, the range of the readings, is taken as that.
     """
-    variances: list[float] = []
-    weights: list[float] = []
-    curves: list[np.ndarray] = []
-    for predictor in predictors:
-        for part in _unloaded_parts(predictor):
-            variance, curve, known = _variance_and_autocovariance(part)
-            variances += list(variance)
-            weights += list(known)
-            curves.append(curve * known.sum())
+    parts = [_variance_and_autocovariance(part) for predictor in predictors for part in _unloaded_parts(predictor)]
+    values, weight = (np.concatenate([np.zeros(0), *(part[i] for part in parts)]) for i in (0, 2))
     smallest = SMALLEST_NOISE * full
-    alive = np.array(variances) > smallest**2
+    alive = values > smallest**2
     if alive.any():
-        values, weight = np.array(variances)[alive], np.array(weights)[alive]
+        values, weight = values[alive], weight[alive]
         order = np.argsort(values)
         share = (np.cumsum(weight[order]) - 0.5 * weight[order]) / weight.sum()
         middle = np.interp(0.5, share, values[order])
+        curves = [curve * known.sum() for _, curve, known in parts]
         return ChannelNoise(float(np.sqrt(middle)), integral_time(curves), "stretches without load")
     deviation = _white_noise_deviation([p.trial.reading for p in predictors if p.trial.reading is not None])
     return ChannelNoise(max(deviation, smallest), 1.0, "differences between samples")
@@ -113,8 +103,7 @@ def _unloaded_parts(predictor: Predictor) -> list[np.ndarray]:
     if reading is None:
         return []
     free = [(a, b) for a, b in runs(~pressed.any(axis=1)) if b - a >= SHORTEST_STRETCH]
-    parts = [reading[a:b][:, ~pressed[a:b].any(axis=0)] for a, b in (*free, (0, len(pressed)))]
-    return [part[:, np.isfinite(part).sum(axis=0) >= SHORTEST_STRETCH] for part in parts]
+    return [reading[a:b][:, ~pressed[a:b].any(axis=0)] for a, b in (*free, (0, len(pressed)))]
 
 
 def _variance_and_autocovariance(part: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -269,7 +258,8 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
         where = predictor.trial.session or id(predictor)  # the sensor remembers the cycles of a whole session
         cycles[where] = cycles.get(where, 0) + _cycle_count(total, max(UNLOADED_SHARE * full, band))
         slides |= bool(s.slide_speed.max(initial=0.0) > LEAST_SLIDING_SPEED)
-    quick = np.concatenate(speeds)
+    quick, centre = np.concatenate(speeds), np.concatenate(centres)
+    mostly_touched = bool(touched.mean() > MOST_OF_THE_TEXELS)
     spread = float(np.quantile(quick, 0.9) / np.quantile(quick, 0.1)) if len(quick) > 4 else 1.0
     return Coverage(
         touched_share=float(touched.mean()),
@@ -279,7 +269,7 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
         cycles=max(cycles.values()),
         slides=slides,
         unloaded_share=rest,
-        load_moves=_load_moves(np.concatenate(centres), texels.area, touched),
+        load_moves=mostly_touched or len(centre) == 0 or bool(np.ptp(centre, axis=0).max() > np.sqrt(np.median(texels.area))),
         held_load_ratio=max(levels) / min(levels) if levels else 1.0,
     )
 
@@ -305,7 +295,7 @@ def _without_load_noise(load: np.ndarray, time: np.ndarray) -> tuple[np.ndarray,
         out[i] = at
     out = np.maximum(out, 0.0)
     rate = np.gradient(out, time)
-    for a, b in zip(edges, [*edges[1:], len(load)], strict=True):
+    for a, b in pairwise([*edges, len(load)]):
         if b - a >= SHORTEST_STRETCH:
             t = time[a:b] - time[a:b].mean()
             rate[a:b] = float(t @ load[a:b]) / float(t @ t)
@@ -334,13 +324,6 @@ def _cycle_count(load: np.ndarray, band: float) -> int:
     return int(np.count_nonzero(np.diff(known, prepend=0) > 0))
 
 
-def _load_moves(centre: np.ndarray, area: np.ndarray, touched: np.ndarray) -> bool:
-    """True if the centre of the load (T, 3) moved by more than the width of a texel, or most texels are touched."""
-    if len(centre) == 0 or touched.mean() > MOST_OF_THE_TEXELS:
-        return True
-    return float(np.ptp(centre, axis=0).max()) > float(np.sqrt(np.median(area)))
-
-
 MEASURED_REPEATS = "measured repeats"
 """Source of such noise, in words."""
 MOST_DIFFERENT = 0.1
@@ -355,12 +338,7 @@ on sets of other stimuli, scatter and effects: 0.5 to 1.2 with nothing hidden (6
 
 def with_repeats(noise: ChannelNoise, predictors: Sequence[Predictor], part: str) -> ChannelNoise:
     """Return the noise of a channel, or the scatter of the recordings that are repeats of each other where that is larger.
-
-    Parameters
-    ----------
-    noise : ChannelNoise
-    predictors : sequence of Predictor
-    part : "reading" or "force"
+    `part` is "reading" or "force".
 
     Raises
     ------

@@ -49,15 +49,7 @@ NO_STRUCTURE = ResidualStructure(0.0, {})
 
 
 def residual_structure(predictors: Sequence[Predictor], residuals: Sequence[np.ndarray]) -> ResidualStructure:
-    """Find out on which features residuals depend.
-
-    Parameters
-    ----------
-    predictors : sequence of Predictor
-        Of the trials.
-    residuals : sequence of (T, n) float
-        In units of the noise; zero if a value is missing.
-    """
+    """Find out on which features residuals (T, n) depend, in units of the noise, and zero if a value is missing."""
     found = [features(predictor, residual) for predictor, residual in zip(predictors, residuals, strict=True)]
     sizes = {name: len(columns) for groups in found for name, columns in groups.items()}
     sums = []
@@ -85,13 +77,8 @@ def residual_structure(predictors: Sequence[Predictor], residuals: Sequence[np.n
 
 def _share_predicted(sums: list[tuple[np.ndarray, np.ndarray, float]], use: np.ndarray) -> float:
     """Share of the squares that a ridge regression on some features predicts in folds that it has not seen; never below 0.
-
-    Parameters
-    ----------
-    sums : list of ((p, p) float, (p,) float, float)
-        Of each fold: products of the features with each other and with the residual, and the squares of the residual.
-    use : (f,) int
-        Features.
+    `sums` are, for each fold, the products of the features with each other (p, p) and with the residual (p,), and the squares
+    of the residual; `use` (f,) are indices of features.
     """
     grams, products, squares = zip(*((a[np.ix_(use, use)], b[use], square) for a, b, square in sums), strict=True)
     whole, along, left = sum(grams), sum(products), sum(squares)
@@ -104,20 +91,18 @@ def _share_predicted(sums: list[tuple[np.ndarray, np.ndarray, float]], use: np.n
 
 def _share_predicted_by_texel(predictors: Sequence[Predictor], residuals: Sequence[np.ndarray], total: float) -> float:
     """The same for a constant and a gain of each texel."""
-    parts = []
-    for predictor, r in zip(predictors, residuals, strict=True):
-        known = known_readings(predictor).astype(float)
-        d = relative_load(predictor.stimulus) * known
-        parts.append(np.stack([known.sum(axis=0), d.sum(axis=0), (d * d).sum(axis=0), r.sum(axis=0), (d * r).sum(axis=0)]))
-    left = 0.0
-    for i, (predictor, r) in enumerate(zip(predictors, residuals, strict=True)):
-        one, d1, d2, r1, rd = sum(p for j, p in enumerate(parts) if j != i)
+    known = [known_readings(predictor) for predictor in predictors]
+    loads = [relative_load(predictor.stimulus) * k for predictor, k in zip(predictors, known, strict=True)]
+    parts, left = [], 0.0
+    for k, d, r in zip(known, loads, residuals, strict=True):
+        parts.append(np.stack([table.sum(axis=0) for table in (k.astype(float), d, d * d, r, d * r)]))
+    for i, (k, d, r) in enumerate(zip(known, loads, residuals, strict=True)):
+        one, d1, d2, r1, rd = sum(parts[:i] + parts[i + 1 :])
         # Ridge regression: texels that were hardly loaded get small coefficients.
         one, d2 = one * 1.01 + 1.0, d2 * 1.01 + 1.0
         det = one * d2 - d1 * d1
         offset, gain = (d2 * r1 - d1 * rd) / det, (one * rd - d1 * r1) / det
-        miss = r - offset - gain * relative_load(predictor.stimulus)
-        miss[~known_readings(predictor)] = 0.0
+        miss = np.where(k, r - offset - gain * d, 0.0)
         left += float(np.vdot(miss, miss))
     return max(1.0 - left / total, 0.0)
 
@@ -146,14 +131,8 @@ STEADY = (0.3, 3.0)
 
 
 def proportional_noise(views: Sequence[TrialView], model: Model) -> Effect | None:
-    """Return noise in proportion to the reading if a model's residual is like that, else None.
-
-    Parameters
-    ----------
-    views : sequence of TrialView
-        Whole trials.
-    model : Model
-        A fitted model without noise.
+    """Return noise in proportion to the reading if a model's residual is like that, else None. The views are of whole trials,
+    and the fitted model has no noise.
     """
     sizes, squares, correlations, rest = [], [], [], [np.zeros(0)]
     for view in views:
@@ -191,14 +170,7 @@ def _correlations(size: np.ndarray, residual: np.ndarray, loaded: np.ndarray) ->
     """Correlations of the residual (T, n) at large readings with the sample before, and between texels.
 
     They are of residuals in units of the local reading, so that a few large ones do not decide. At small readings the noise at
-    rest would hide what a model lacks.
-
-    Parameters
-    ----------
-    size : (T, n) float
-        Magnitude of the predicted readings, in units of the noise.
-    residual : (T, n) float
-    loaded : (T, n) bool
+    rest would hide what a model lacks. `size` (T, n) is the magnitude of the predicted readings, in units of the noise.
     """
     large = loaded & (size > np.quantile(size[loaded], LARGE_QUANTILE)) if loaded.any() else loaded
     unit = np.where(large, residual / np.maximum(size, 1.0), 0.0)
@@ -266,14 +238,7 @@ not known, and where it is known, because a texel is unloaded and was measured, 
 
 
 def strongest_line(views: Sequence[TrialView], model: Model) -> SpectralLine | None:
-    """Return the strongest line that all trials have without load; None without a line.
-
-    Parameters
-    ----------
-    views : sequence of TrialView
-        Whole trials.
-    model : Model
-    """
+    """Return the strongest line that all trials have without load; None without a line. The views are of whole trials."""
     from scipy.special import gammaincc
 
     resting = [one for one in (_unloaded_residual(view, model) for view in views) if one is not None]
