@@ -27,7 +27,7 @@ from ...laws.friction import (
 )
 from ...model.sensor import Effect
 from ...model.sensor_parameters import SensorParameters
-from .stimulus import Stimulus, dot
+from .stimulus import Stimulus, dot, texel_shares
 
 if TYPE_CHECKING:
     from ..dataset.rig import Rig
@@ -115,8 +115,7 @@ class ContactHistory:
         arrays += [] if stimulus.slip is None else [stimulus.slip]
         first, group = _equal_texels(arrays, touched_texels)
         one = touched_texels[first]
-        share = None if rig.cover is None else rig.cover.share[touched_texels]
-        count = np.bincount(group, share, minlength=len(one)).astype(float)
+        count = np.bincount(group, texel_shares(rig)[touched_texels], minlength=len(one))
         step = np.diff(stimulus.time, prepend=stimulus.time[0])
         samples = _contact_samples(stimulus, normal, one, count, step) if with_samples else None
         depth, rate, slide = (values[:, one].copy() for values in (stimulus.depth, stimulus.rate, stimulus.slide_speed))
@@ -133,14 +132,8 @@ class ContactHistory:
         return force
 
     def total_force(self, p: SensorParameters, friction_effects: Sequence[Effect], force: np.ndarray) -> np.ndarray:
-        """Return the sum of normal and friction forces of all texels on the sensor, (T, 3) N.
-
-        Parameters
-        ----------
-        p : SensorParameters
-        friction_effects : sequence of Effect
-        force : (T, c) float, N
-            Normal force of each texel.
+        """Return the sum of normal and friction forces of all texels on the sensor, (T, 3) N. `force` (T, c) is the normal
+        force of each texel, N.
         """
         t = self.samples
         assert t is not None, "the history was made without samples"

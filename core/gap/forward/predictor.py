@@ -122,7 +122,6 @@ class Session:
     ----------
     trials : sequence of Trial
         In any order; a single one if the sensor was untouched before it.
-    rig : Rig
 
     Attributes
     ----------
@@ -157,16 +156,16 @@ class Session:
         """Return the readings of each texel, or of some, (T, n) in the sensor's unit."""
         p = model.parameters
         key = (self._force_key(model, subset), p.gain, p.zero, _effects_key(model.readout_effects))
-        return self._readings.get_or(key, lambda: self._computed_reading(model, subset))
 
-    def _computed_reading(self, model: Model, subset: np.ndarray | None) -> np.ndarray:
-        """Return the readings under effects on the readout."""
-        effects, site = model.readout_effects, replace(self._site, gain=model.parameters.gain, zero=model.parameters.zero)
-        if subset is not None:
-            effects = tuple(_effect_on_texels(effect, subset) for effect in effects)
-            row, column = (None if index is None else index[subset] for index in (site.row, site.column))
-            site = replace(site, position=site.position[subset], area=site.area[subset], row=row, column=column)
-        return readout_chain.readings(effects, site, self.stimulus.time, self.normal_force(model, subset))
+        def compute() -> np.ndarray:
+            effects, site = model.readout_effects, replace(self._site, gain=p.gain, zero=p.zero)
+            if subset is not None:
+                effects = tuple(_effect_on_texels(effect, subset) for effect in effects)
+                row, column = (None if index is None else index[subset] for index in (site.row, site.column))
+                site = replace(site, position=site.position[subset], area=site.area[subset], row=row, column=column)
+            return readout_chain.readings(effects, site, self.stimulus.time, self.normal_force(model, subset))
+
+        return self._readings.get_or(key, compute)
 
     @cached_property
     def _site(self) -> TransducerArray:
@@ -249,8 +248,6 @@ class Predictor:
 
     Parameters
     ----------
-    trial : Trial
-    rig : Rig
     session : Session, optional
         The session that the trial belongs to; without it the trial begins with an untouched sensor.
 
@@ -270,15 +267,8 @@ class Predictor:
         self.stimulus, self.samples = self.responses.part(trial)
 
     def predict(self, model: Model, subset: np.ndarray | None = None, with_forces: bool = True) -> Prediction:
-        """Return the prediction of a model. Its arrays are kept and must not be written to.
-
-        Parameters
-        ----------
-        model : Model
-        subset : (c,) int, optional
-            Only these texels. This is right only if no effect couples texels.
-        with_forces : bool
-            True if the net force is wanted, if it was measured.
+        """Return the prediction of a model. Its arrays are kept and must not be written to. Only some texels, (c,) int, are
+        right if no effect couples texels. The net force is predicted if it was measured, and wanted.
         """
         trial = self.trial
         reading = self.responses.reading(model, subset)[self.samples]
@@ -314,20 +304,18 @@ class Predictor:
         Free numbers that the model does not have are those of a specimen of which no recording was fitted. They are computed
         from the recording itself, by least squares.
         """
-        given: list[float | None] = []
-        for word, value in (("factor", self.trial.factor), ("zero", self.trial.zero)):
-            given.append(model.recordings.get(number_name(word, value)) if isinstance(value, str) else value)
-        factor, zero = given
+        factor, zero = (
+            model.recordings.get(number_name(word, value)) if isinstance(value, str) else value
+            for word, value in (("factor", self.trial.factor), ("zero", self.trial.zero))
+        )
         if (factor is None or zero is None) and self.trial.use == "check":
             x, y = predicted[np.isfinite(measured)], measured[np.isfinite(measured)]
             if factor is None:
-                shift = (float(x.mean()), float(y.mean())) if zero is None else (0.0, zero)
-                x, y = x - shift[0], y - shift[1]
-                square = float(x @ x)
-                factor = float(x @ y) / square if square > 0.0 else 1.0
+                from_x, from_y = (x - float(x.mean()), y - float(y.mean())) if zero is None else (x, y - zero)
+                square = float(from_x @ from_x)
+                factor = float(from_x @ from_y) / square if square > 0.0 else 1.0
             if zero is None:
-                good = np.isfinite(measured)
-                zero = float((measured[good] - factor * predicted[good]).mean()) if good.any() else 0.0
+                zero = float((y - factor * x).mean()) if len(y) else 0.0
         return 1.0 if factor is None else factor, 0.0 if zero is None else zero
 
     def with_numbers_of(self, trial: Trial) -> Predictor:
@@ -342,13 +330,8 @@ class Predictor:
 
 
 def predictors_of(trials: Sequence[Trial], rig: Rig) -> list[Predictor]:
-    """Return a predictor for each trial; those of one session share its history.
-
-    Parameters
-    ----------
-    trials : sequence of Trial
-        All trials of each session, whatever their use: a recording that is only checked has worn the sensor, too.
-    rig : Rig
+    """Return a predictor for each trial; those of one session share its history. All trials of each session are needed,
+    whatever their use: a recording that is only checked has worn the sensor, too.
     """
     names = {trial.session for trial in trials if trial.session}
     sessions = {name: Session([trial for trial in trials if trial.session == name], rig) for name in names}

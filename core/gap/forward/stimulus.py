@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -80,14 +82,8 @@ class Stimulus:
 
 
 def stimulus_of(trial: Trial, rig: Rig, height: float | None = None) -> Stimulus:
-    """Return the stimulus of the texels in a trial of a rig; under a cover the weighted one of its points.
-
-    Parameters
-    ----------
-    trial : Trial
-    rig : Rig
-    height : float, metres, optional
-        Another contact height than the trial's own, or than the one from which the fit of a free one starts.
+    """Return the stimulus of the texels in a trial of a rig; under a cover the weighted one of its points. `height` (m) is
+    another contact height than the trial's own, or than the one from which the fit of a free one starts.
     """
     return of_texels(surface_stimulus_of(trial, rig, height=height), rig)
 
@@ -126,16 +122,8 @@ def of_texels(stimulus: Stimulus, rig: Rig) -> Stimulus:
 
 
 def surface_stimulus_of(trial: Trial, rig: Rig, texels: Texels | None = None, height: float | None = None) -> Stimulus:
-    """Return the stimulus of the points of a rig's surface, which are its texels if it has no cover.
-
-    Parameters
-    ----------
-    trial : Trial
-    rig : Rig
-    texels : Texels, optional
-        These points at other places than the rig's.
-    height : float, metres, optional
-        As in :func:`stimulus_of`.
+    """Return the stimulus of the points of a rig's surface, which are its texels if it has no cover. `texels` are these points
+    at other places than the rig's; `height` is as in :func:`stimulus_of`.
     """
     texels = rig.surface if texels is None else texels
     if height is None:
@@ -195,51 +183,34 @@ def joined_stimuli(stimuli: Sequence[Stimulus], texels: Texels) -> tuple[Stimulu
     """Return the stimuli of a session's trials as one, and the index of each trial's first sample.
 
     In a pause between two trials nothing touches the sensor: an unloaded sample follows the one trial, and another one precedes
-    the next. There is no pause between the parts of a recording whose samples simply go on.
-
-    Parameters
-    ----------
-    stimuli : sequence of Stimulus
-        In order of time.
-    texels : Texels
+    the next. There is no pause between the parts of a recording whose samples simply go on. The stimuli are in order of time.
     """
     if len(stimuli) == 1:
         return stimuli[0], [0]
-    parts, starts, count = [stimuli[0]], [0], len(stimuli[0].time)
-    for before, after in zip(stimuli[:-1], stimuli[1:], strict=True):
+    parts, starts = [stimuli[0]], [0]
+    for before, after in pairwise(stimuli):
         pause = float(after.time[0] - before.time[-1])
         if pause > LONGEST_SPLIT * max(before.trial.step, after.trial.step):
             ends = [before.time[-1] + min(before.trial.step, pause / 3), after.time[0] - min(after.trial.step, pause / 3)]
-            parts.append(_unloaded(before, np.array(ends)))
-            count += 2
-        starts.append(count)
+            nothing = np.zeros((2, len(texels)))
+            share = None if before.force_share is None else nothing
+            parts.append(Stimulus(replace(before.trial, time=np.array(ends)), nothing, nothing, share, None, nothing, None))
+        starts.append(sum(len(part.time) for part in parts))
         parts.append(after)
-        count += len(after.time)
-    first = stimuli[0]
-    no_slip, no_normal = all(one.slip is None for one in stimuli), all(one.normal is None for one in stimuli)
+    missing = {"normal": -texels.normal, "slip": np.zeros((len(texels), 3))}
 
-    def vectors(name: str, missing: np.ndarray) -> np.ndarray:
-        values = [(getattr(part, name), len(part.time)) for part in parts]
-        return np.concatenate([np.broadcast_to(missing, (n, *missing.shape)) if x is None else x for x, n in values])
+    def joined(name: str) -> np.ndarray | None:
+        values = [getattr(part, name) for part in parts]
+        if all(one is None for one in values):
+            return None
+        rows = [np.repeat(missing[name][None], len(part.time), axis=0) for part in parts] if name in missing else values
+        return np.concatenate([row if one is None else one for one, row in zip(values, rows, strict=True)])
 
-    joined = Stimulus(
-        trial=replace(first.trial, time=np.concatenate([part.time for part in parts])),
-        depth=np.concatenate([part.depth for part in parts]),
-        rate=np.concatenate([part.rate for part in parts]),
-        force_share=None if first.force_share is None else np.concatenate([part.load for part in parts]),
-        normal=None if no_normal else vectors("normal", -texels.normal),
-        slide_speed=np.concatenate([part.slide_speed for part in parts]),
-        slip=None if no_slip else vectors("slip", np.zeros((len(texels), 3))),
-        overpressed=max(one.overpressed for one in stimuli),
-    )
-    return joined, starts
-
-
-def _unloaded(like: Stimulus, time: np.ndarray) -> Stimulus:
-    """A stimulus of the same kind at some times at which nothing touches the sensor."""
-    nothing = np.zeros((len(time), like.depth.shape[1]))
-    share = None if like.force_share is None else nothing
-    return Stimulus(replace(like.trial, time=time), nothing, nothing, share, None, nothing, None)
+    names = ("depth", "rate", "force_share", "normal", "slide_speed", "slip")
+    arrays: dict[str, Any] = {name: joined(name) for name in names}
+    time = np.concatenate([part.time for part in parts])
+    overpressed = max(one.overpressed for one in stimuli)
+    return replace(stimuli[0], trial=replace(stimuli[0].trial, time=time), overpressed=overpressed, **arrays), starts
 
 
 def _posed(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) -> Stimulus:
