@@ -31,13 +31,8 @@ LARGEST_OWN_FACTOR = 1e3
 
 
 def prepared(rig: Rig, predictors: Sequence[Predictor]) -> tuple[tuple[ChannelNoise, ChannelNoise], tuple[float, float]]:
-    """Check the recordings, and measure noise and range of readings and of net forces.
-
-    Parameters
-    ----------
-    rig : Rig
-    predictors : sequence of Predictor
-        Of the rig's trials, in their order.
+    """Check the recordings, and measure noise and range of readings and of net forces. The predictors are of the rig's trials,
+    in their order.
 
     Returns
     -------
@@ -78,32 +73,20 @@ def start_model(rig: Rig, predictors: Sequence[Predictor]) -> Model:
         predicted = np.concatenate([one.predict(base).reading.ravel() for one in recorded])
         measured = np.concatenate([np.ravel(one.trial.responses[0]) for one in recorded])
         good = np.isfinite(measured)
-        gain, zero = _line_through(predicted[good], measured[good])
-        p = replace(p, gain=gain, zero=p.zero if "zero" in rig.given else zero)
+        x, y = predicted[good], measured[good]
+        from_mean = x - x.mean()
+        square = float(from_mean @ from_mean)
+        slope = float(from_mean @ y) / square if square > 0.0 else 0.0
+        gain = slope if np.isfinite(slope) and slope != 0.0 else 1.0  # of readings that never change
+        p = replace(p, gain=gain, zero=p.zero if "zero" in rig.given else float(y.mean() - gain * x.mean()))
     return with_recording_numbers(Model(p), predictors)
-
-
-def _line_through(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
-    """Slope and intercept of ``y ≈ slope · x + intercept`` (m,); a slope of 1 where x or y never changes."""
-    from_mean = x - x.mean()
-    square = float(from_mean @ from_mean)
-    slope = float(from_mean @ y) / square if square > 0.0 else 0.0
-    if not np.isfinite(slope) or slope == 0.0:
-        slope = 1.0
-    return slope, float(y.mean() - slope * x.mean())
 
 
 def base_fit(rig: Rig, views: Sequence[TrialView], full: float) -> Fit:
     """Fit the base model to recordings, from several stiffnesses of the bristles if the rig does not state one.
 
-    The misfit of net forces has a local minimum where bristles are so soft that they never slip.
-
-    Parameters
-    ----------
-    rig : Rig
-    views : sequence of TrialView
-    full : float
-        Range of the readings.
+    The misfit of net forces has a local minimum where bristles are so soft that they never slip. `full` is the range of the
+    readings.
     """
     predictors = [view.predictor for view in views]
     start = start_model(rig, predictors)
@@ -121,19 +104,13 @@ def base_fit(rig: Rig, views: Sequence[TrialView], full: float) -> Fit:
 
 
 def free_parameters(rig: Rig, predictors: Sequence[Predictor], model: Model, full: float) -> list[FreeParameter]:
-    """Return the parameters of the base model and of recordings that are free during the search for effects.
-
-    Parameters
-    ----------
-    rig : Rig
-    predictors : sequence of Predictor
-        Of the trials that are fitted.
-    model : Model
-        Where they start.
-    full : float
-        Range of the readings.
+    """Return the parameters of the base model and of recordings that are free during the search for effects. They are those of
+    the trials of the predictors, start at `model`, and `full` is the range of the readings.
     """
-    names = base_parameters_to_search(rig, predictors)
+    identified = identified_base_parameters(rig, predictors)
+    names = [name for name in identified if name not in FITTED_FRICTION_PARAMETERS]
+    if len(names) < len(identified):
+        names += friction_parameters_to_search(rig)
     return [*free_base_parameters(model.parameters, names, full), *_recording_numbers(rig, predictors, full)]
 
 
@@ -228,13 +205,6 @@ def with_recording_numbers(model: Model, predictors: Sequence[Predictor]) -> Mod
     named = [p.trial for p in predictors if isinstance(p.trial.contact_height, str)]
     numbers |= {number_name(CONTACT_HEIGHT, str(trial.contact_height)): trial.height_start for trial in named}
     return replace(model, recordings=numbers)
-
-
-def base_parameters_to_search(rig: Rig, predictors: Sequence[Predictor]) -> list[str]:
-    """Return the names of the base model's parameters that are free during the search for effects."""
-    names = identified_base_parameters(rig, predictors)
-    others = [name for name in names if name not in FITTED_FRICTION_PARAMETERS]
-    return others + friction_parameters_to_search(rig) if len(others) < len(names) else others
 
 
 def friction_parameters_to_search(rig: Rig) -> list[str]:

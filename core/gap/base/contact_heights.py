@@ -36,14 +36,10 @@ def with_starting_heights(rig: Rig) -> Rig:
 def _best_height(rig: Rig, trials: Sequence[Trial]) -> float:
     """The height at which loads and responses are best correlated."""
     step = rig.parameters.max_penetration / GRID_STEPS
-    best, value = 0.0, _agreement(rig, trials, 0.0)
+    best = 0.0
     for size, count in ((step, GRID_STEPS), (step / FINER_STEPS, FINER_STEPS)):
-        middle = best
-        for number in range(-count, count + 1):
-            height = middle + number * size
-            other = _agreement(rig, trials, height)
-            if other > value:
-                best, value = height, other
+        others = [best + number * size for number in range(-count, count + 1) if number]
+        best = max(best, *others, key=lambda height: _agreement(rig, trials, height))
     return best
 
 
@@ -53,10 +49,10 @@ def _agreement(rig: Rig, trials: Sequence[Trial], height: float) -> float:
         stimuli = [stimulus_of(trial, rig, height=height) for trial in trials]
     except SceneError:
         return -1.0
-    readings = responses_of(rig, stimuli, "reading")
-    forces = responses_of(rig, [one for one in stimuli if one.trial.reading is None], "force")
-    touches = any(load.any() for load, _ in readings + forces)
-    return max(abs(correlation(readings)), abs(correlation(forces))) if touches else -1.0
+    pairs = responses_of(rig, stimuli, "reading")
+    net = responses_of(rig, [one for one in stimuli if one.trial.reading is None], "force")
+    values = [abs(correlation(part)) for part in (pairs, net) if part]
+    return max(values) if any(load.any() for load, _ in pairs + net) else -1.0
 
 
 def _thinned(trial: Trial) -> Trial:
