@@ -49,20 +49,9 @@ def linearised_estimates(
 ) -> list[Estimate]:
     """Return the p estimates of nonlinear least squares, with the model linearised at the solution.
 
-    The interval of a variable on which no residual depends is infinite.
-
-    Parameters
-    ----------
-    values : (p,) float
-        Solution.
-    jacobian : (m, p) float
-        Derivatives of ``residual / scale`` with respect to the variables of the search.
-    transformation : (p, p) float
-        Derivatives of `values` with respect to the variables of the search.
-    residual : (m,) float
-        At the solution.
-    scale : float
-        Unit in which the search measured the residuals.
+    The interval of a variable on which no residual depends is infinite. `values` (p,) are the solution and `residual` (m,) is
+    that there, which the search measured in units of `scale`. `jacobian` (m, p) and `transformation` (p, p) are the derivatives
+    of ``residual / scale`` and of `values` with respect to the variables of the search.
     """
     freedom = len(residual) - len(values)
     covariance = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-14) * (residual @ residual) / scale**2 / max(freedom, 1)
@@ -98,8 +87,6 @@ class ParameterInterval:
     ----------
     effect : int
         Index of the effect in the model's stack; -1 for the base model.
-    name : str
-    value, low, high : float
     bounds : (float, float)
         Within which the parameter was fitted.
     """
@@ -178,8 +165,7 @@ def _texel_response(total: NormalEquations) -> np.ndarray:
     follow = inverse @ total.coupling
     pulled = np.einsum("nmk,nk->nmk", inverse, informed)
     stiffness, drift = np.einsum("nm,nmk->mk", informed, pulled), np.einsum("nm,nmp->mp", informed, follow)
-    kept: np.ndarray = follow - pulled @ np.linalg.lstsq(stiffness, drift, rcond=None)[0]
-    return kept
+    return follow - pulled @ np.linalg.lstsq(stiffness, drift, rcond=None)[0]
 
 
 def _inverse(a: np.ndarray) -> np.ndarray:
@@ -189,8 +175,7 @@ def _inverse(a: np.ndarray) -> np.ndarray:
     size = np.sqrt(np.where(squares > 1e-30 * squares.max(initial=0.0), squares, 1.0))
     informed, along = np.linalg.eigh(a / np.outer(size, size))
     eigenvalue = np.where(informed > UNIDENTIFIED, informed, UNIDENTIFIED_EIGENVALUE)
-    inverse: np.ndarray = (along / eigenvalue) @ along.T / np.outer(size, size)
-    return inverse
+    return (along / eigenvalue) @ along.T / np.outer(size, size)
 
 
 def _sandwich(bread: np.ndarray, gradients: np.ndarray) -> np.ndarray:
@@ -207,5 +192,4 @@ def _sandwich(bread: np.ndarray, gradients: np.ndarray) -> np.ndarray:
     effective = np.clip(3.0 * squares**2 / np.maximum(fourth, 1e-300), 2.0, max(groups, 2))
     reach = student_quantile(effective - 1.0) / NORMAL_QUANTILE
     factor = groups / max(groups - len(bread), 1)
-    covariance: np.ndarray = factor * np.outer(reach, reach) * (influence.T @ influence)
-    return covariance
+    return factor * np.outer(reach, reach) * (influence.T @ influence)

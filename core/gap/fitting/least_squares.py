@@ -58,14 +58,12 @@ class FreeParameter:
     effect : int
         Index of the effect in the model's stack; :data:`BASE` for a parameter of the base model, :data:`RECORDING` for a number
         of recordings.
-    name : str
     low, high : float or (n,) float
         Bounds; equal where a texel keeps its value.
     log : bool
         True if it is fitted on a logarithmic scale.
     scale : float
         A change that matters, for parameters that are not on a logarithmic scale.
-    per_texel : bool
     resting_value : float
         Mean of the prior of a parameter of single texels (see :data:`TEXEL_PRECISION`).
     tied : tuple of str
@@ -98,8 +96,7 @@ class FreeParameter:
 
     def _inside(self, value: np.ndarray) -> np.ndarray:
         """The value inside the bounds; `numpy.clip` takes five times as long for single numbers."""
-        inside: np.ndarray = np.minimum(np.maximum(value, self.low), self.high)
-        return inside
+        return np.minimum(np.maximum(value, self.low), self.high)
 
 
 def value_of(model: Model, free: FreeParameter) -> np.ndarray | float:
@@ -157,10 +154,8 @@ class TrialView:
 
     Attributes
     ----------
-    predictor : Predictor
     subset : (c,) int or None
         Texels; None for all. Only the whole set is right for effects that couple texels.
-    samples : slice
     noise : (float, float)
         Standard deviation of readings and of forces, in their units.
     stretch_count : int
@@ -277,8 +272,6 @@ class Fit:
 
     Attributes
     ----------
-    model : Model
-    free : tuple of FreeParameter
     sse : (trials, 2) float
         Sum of squares of the residuals of each trial, of readings and of forces, in units of the noise.
     count : (trials, 2) float
@@ -326,7 +319,7 @@ def fit(
         Derivatives by the first parameters, for each view, near the start.
     """
     free = tuple(free)
-    point = _Point.of(views, model, free, coordinates_of(model, free))
+    point = _Point(views, model, free, coordinates_of(model, free))
     tables = [np.empty((len(free), *residual.shape)) for residual in point.residuals]
     damping, known = FIRST_DAMPING, 0 if initial_derivatives is None else frozen
     for table, first in zip(tables, initial_derivatives or (), strict=initial_derivatives is not None):
@@ -339,7 +332,7 @@ def fit(
         complete = known == 0
         total = summed_equations([_equations_of(view, free, table, residual) for view, residual, table in parts])
         for _ in range(TRIES_PER_STEP):
-            better = _Point.of(views, point.model, free, _after_step(total, free, point.at, damping))
+            better = _Point(views, point.model, free, _after_step(total, free, point.at, damping))
             if better.objective < point.objective:
                 break
             damping = max(damping * DAMPING_UP, RAISED_DAMPING)
@@ -368,21 +361,13 @@ def fit(
     return found
 
 
-@dataclass
 class _Point:
     """A point of a fit: coordinates of the free parameters, the model there, its residuals and the objective."""
 
-    at: list[np.ndarray]
-    model: Model
-    residuals: list[np.ndarray]
-    objective: float
-
-    @classmethod
-    def of(cls, views: Sequence[TrialView], model: Model, free: Sequence[FreeParameter], at: list[np.ndarray]) -> _Point:
-        """The point of a model whose free parameters get the coordinates `at`."""
-        model = with_coordinates(model, free, at)
-        residuals = [view.residual(model) for view in views]
-        return cls(at, model, residuals, sum(map(_sum_of_squares, residuals)) + _prior_penalty(free, at))
+    def __init__(self, views: Sequence[TrialView], model: Model, free: Sequence[FreeParameter], at: list[np.ndarray]):
+        self.at, self.model = at, with_coordinates(model, free, at)
+        self.residuals = [view.residual(self.model) for view in views]
+        self.objective = sum(map(_sum_of_squares, self.residuals)) + _prior_penalty(free, at)
 
 
 def _prior_penalty(free: Sequence[FreeParameter], at: list[np.ndarray]) -> float:
@@ -403,18 +388,9 @@ def derivatives(
     table: np.ndarray,
     known: int,
 ) -> None:
-    """Write by how much a step along each free parameter lowers the residual into a table.
-
-    Parameters
-    ----------
-    at : list of float or (n,) float
-        Coordinates of the free parameters in the model.
-    residual : (T, c + 3) float
-        Of the model.
-    table : (p, T, c + 3) float
-        Written to; for a parameter of single texels each column is the derivative by that of its own texel.
-    known : int
-        The first `known` derivatives are in the table already.
+    """Write by how much a step along each free parameter lowers the residual into a table. `at` are the coordinates of the free
+    parameters in the model, and `residual` (T, c + 3) is its residual. The first `known` derivatives are in the table (p, T, c
+    + 3) already. For a parameter of single texels each column is the derivative by that of its own texel.
     """
     step = QUANTIZED_DIFFERENCE_STEP if model.is_stepped else DIFFERENCE_STEP
     here = [item.from_coordinate(x) for item, x in zip(free, at, strict=True)]
@@ -484,12 +460,8 @@ def _reduced_equations(
         h, coupling = t.texel_gradient * moves, coupling * moves[:, :, None]
         c = np.where(moves[:, :, None] & moves[:, None], c, np.eye(m))
     follow, alone = np.linalg.solve(c, coupling), np.linalg.solve(c, h[:, :, None])[:, :, 0]
-    return (
-        a - np.einsum("nmp,nmq->pq", coupling, follow),
-        t.common_gradient - np.einsum("nmp,nm->p", coupling, alone),
-        follow,
-        alone,
-    )
+    a, rhs = a - np.einsum("nmp,nmq->pq", coupling, follow), t.common_gradient - np.einsum("nmp,nm->p", coupling, alone)
+    return a, rhs, follow, alone
 
 
 def _after_step(

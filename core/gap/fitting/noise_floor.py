@@ -146,8 +146,7 @@ def _about_lines(part: np.ndarray) -> np.ndarray:
     t = np.linspace(-1.0, 1.0, len(part))[:, None]
     t = np.where(known, t - (t * known).sum(axis=0) / count, 0.0)
     part = part - np.nansum(part, axis=0) / count
-    result: np.ndarray = part - t * np.nansum(t * part, axis=0) / (t * t).sum(axis=0)
-    return result
+    return part - t * np.nansum(t * part, axis=0) / (t * t).sum(axis=0)
 
 
 def _common_mode(part: np.ndarray) -> np.ndarray:
@@ -354,10 +353,9 @@ def with_repeats(noise: ChannelNoise, predictors: Sequence[Predictor], part: str
         if len(members) < 2:
             continue
         scatter = _scatter(members, part, name)
-        good = np.isfinite(scatter)
-        values = np.where(good, scatter, 0.0)
+        values = np.where(np.isfinite(scatter), scatter, 0.0)
         square += float((values**2).sum())
-        count += int(good.sum())
+        count += int(np.isfinite(scatter).sum())
         for lag in range(min(AUTOCOVARIANCE_LAGS, values.shape[1] // 4 + 1)):
             curve[lag] += float((values[:, : values.shape[1] - lag] * values[:, lag:]).sum())
     deviation = float(np.sqrt(square / count)) if count else 0.0
@@ -380,8 +378,7 @@ def _scatter(members: Sequence[Predictor], part: str, name: str) -> np.ndarray:
                 "name only recordings of the same stimulus, begun at the same moment of it."
             )
     values = np.array([_at(clock, one, getattr(one.trial, part)) for one in members])
-    scatter: np.ndarray = (values - values.mean(axis=0)) * np.sqrt(len(members) / (len(members) - 1.0))
-    return scatter
+    return (values - values.mean(axis=0)) * np.sqrt(len(members) / (len(members) - 1.0))
 
 
 def _at(clock: np.ndarray, one: Predictor, values: np.ndarray) -> np.ndarray:

@@ -49,7 +49,7 @@ NO_STRUCTURE = ResidualStructure(0.0, {})
 
 
 def residual_structure(predictors: Sequence[Predictor], residuals: Sequence[np.ndarray]) -> ResidualStructure:
-    """Find out on which features residuals (T, n) depend, in units of the noise, and zero if a value is missing."""
+    """Find out on which features residuals depend: (T, n) in units of the noise, zero if a value is missing."""
     found = [features(predictor, residual) for predictor, residual in zip(predictors, residuals, strict=True)]
     sizes = {name: len(columns) for groups in found for name, columns in groups.items()}
     sums = []
@@ -290,8 +290,7 @@ def _noise_level(power: np.ndarray) -> np.ndarray:
     wide = np.pad(power, NEIGHBOUR_FREQUENCIES, mode="reflect")
     windows = np.lib.stride_tricks.sliding_window_view(wide, 2 * NEIGHBOUR_FREQUENCIES + 1)
     kept = np.abs(np.arange(-NEIGHBOUR_FREQUENCIES, NEIGHBOUR_FREQUENCIES + 1)) > LINE_HALF_WIDTH
-    level: np.ndarray = np.maximum(np.median(windows[:, kept], axis=1) / np.log(2.0), 1e-300)
-    return level
+    return np.maximum(np.median(windows[:, kept], axis=1) / np.log(2.0), 1e-300)
 
 
 def _line_at(resting: list[UnloadedResidual], frequency: float, noise: float) -> SpectralLine:
