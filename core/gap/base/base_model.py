@@ -91,8 +91,8 @@ def base_fit(rig: Rig, views: Sequence[TrialView], full: float) -> Fit:
     predictors = [view.predictor for view in views]
     start = start_model(rig, predictors)
     free = free_parameters(rig, predictors, start, full)
-    is_soft = any(item.name == "sigma0" for item in free) and "sigma0" not in rig.given
-    others = _bristle_starts(views, start) if is_soft else []
+    stiffness_is_open = "sigma0" not in rig.given and any(item.name == "sigma0" for item in free)
+    others = _bristle_starts(views, start) if stiffness_is_open else []
     if others:
         fits = [
             fit(views, model, free_parameters(rig, predictors, model, full), TRIAL_STEPS, 1e-7, with_equations=False)
@@ -104,8 +104,9 @@ def base_fit(rig: Rig, views: Sequence[TrialView], full: float) -> Fit:
 
 
 def free_parameters(rig: Rig, predictors: Sequence[Predictor], model: Model, full: float) -> list[FreeParameter]:
-    """Return the parameters of the base model and of recordings that are free during the search for effects. They are those of
-    the trials of the predictors, start at `model`, and `full` is the range of the readings.
+    """Return the parameters of the base model and of recordings that are free during the search for effects.
+
+    The predictors are of the trials that are fitted, the fit starts at `model`, and `full` is the range of the readings.
     """
     identified = identified_base_parameters(rig, predictors)
     names = [name for name in identified if name not in FITTED_FRICTION_PARAMETERS]

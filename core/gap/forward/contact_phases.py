@@ -24,12 +24,11 @@ SLIDING_SPEED = 2e-4
 def relative_load(stimulus: Stimulus) -> np.ndarray:
     """Return the load of each texel, depth or force, as a share of the largest in the trial, (T, n) float."""
     load = stimulus.load
-    shares: np.ndarray = load / max(float(load.max(initial=0.0)), 1e-300)
-    return shares
+    return load / max(float(load.max(initial=0.0)), 1e-300)
 
 
 def hold_rate_limit(rate: np.ndarray) -> float:
-    """Return the rate below which a load counts as held. Rates are those of the load, as a share of the largest load, 1/s."""
+    """Return the rate below which a load counts as held. `rate` is of loads, as shares of the largest one, 1/s."""
     if not rate.size:
         return HOLD_RATE
     return float(np.clip(HOLD_RATE_SHARE * np.quantile(np.abs(rate), 0.99), ROUNDING_RATE, HOLD_RATE))
@@ -41,14 +40,14 @@ def phase_indices(stimulus: Stimulus) -> np.ndarray:
     rate = np.gradient(load, stimulus.time, axis=0)
     still = hold_rate_limit(rate[load > 0]) * np.maximum(load.max(axis=0, keepdims=True), 1e-12)
     touching = load > 0
-    before = ~np.maximum.accumulate(touching, axis=0)
-    found = np.full(load.shape, PHASES.index("released"))
-    found[before] = PHASES.index("approach")
-    found[touching] = PHASES.index("hold")
-    found[touching & (rate > still)] = PHASES.index("loading")
-    found[touching & (rate < -still)] = PHASES.index("unloading")
-    found[touching & (np.abs(rate) <= 5 * still) & (stimulus.slide_speed > SLIDING_SPEED)] = PHASES.index("sliding")
-    return found
+    first_of = {
+        "sliding": touching & (np.abs(rate) <= 5 * still) & (stimulus.slide_speed > SLIDING_SPEED),
+        "unloading": touching & (rate < -still),
+        "loading": touching & (rate > still),
+        "hold": touching,
+        "approach": ~np.maximum.accumulate(touching, axis=0),
+    }
+    return np.select(list(first_of.values()), list(map(PHASES.index, first_of)), PHASES.index("released"))
 
 
 CONSTANT_LOAD = 1e-9

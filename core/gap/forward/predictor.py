@@ -39,8 +39,6 @@ class Model:
 
     Attributes
     ----------
-    parameters : SensorParameters
-    effects : tuple of Effect
     recordings : mapping of str to float
         Free numbers by which recordings differ, such as ``factor of NAME`` and ``contact height of NAME`` (see
         :class:`.trial.Trial`).
@@ -240,7 +238,7 @@ class Session:
         which = None if subset is None else subset.tobytes()
         key = which, _effects_key(model.placing_effects), self._heights(model.recordings)
         sums = subset is None and any(trial.force is not None for trial in self.trials)
-        return self._histories.get_or(key, lambda: ContactHistory.of(self.placed(model), subset, self.rig, sums))
+        return self._histories.get_or(key, lambda: ContactHistory(self.placed(model), subset, self.rig, sums))
 
 
 class Predictor:
@@ -267,8 +265,9 @@ class Predictor:
         self.stimulus, self.samples = self.responses.part(trial)
 
     def predict(self, model: Model, subset: np.ndarray | None = None, with_forces: bool = True) -> Prediction:
-        """Return the prediction of a model. Its arrays are kept and must not be written to. Only some texels, (c,) int, are
-        right if no effect couples texels. The net force is predicted if it was measured, and wanted.
+        """Return the prediction of a model. Its arrays are kept and must not be written to.
+
+        A `subset` (c,) of the texels is right only if no effect couples texels. The net force is None if it was not measured.
         """
         trial = self.trial
         reading = self.responses.reading(model, subset)[self.samples]

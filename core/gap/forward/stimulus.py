@@ -43,7 +43,6 @@ class Stimulus:
 
     Attributes
     ----------
-    trial : Trial
     depth : (T, n) float, metres
         Perpendicular penetration; zero without contact, and in force trials.
     rate : (T, n) float, m/s
@@ -203,8 +202,9 @@ def joined_stimuli(stimuli: Sequence[Stimulus], texels: Texels) -> tuple[Stimulu
         values = [getattr(part, name) for part in parts]
         if all(one is None for one in values):
             return None
-        rows = [np.repeat(missing[name][None], len(part.time), axis=0) for part in parts] if name in missing else values
-        return np.concatenate([row if one is None else one for one, row in zip(values, rows, strict=True)])
+        shapes = [(len(part.time), len(texels), 3) for part in parts]
+        pairs = zip(values, shapes, strict=True)
+        return np.concatenate([np.broadcast_to(missing[name], shape) if one is None else one for one, shape in pairs])
 
     names = ("depth", "rate", "force_share", "normal", "slide_speed", "slip")
     arrays: dict[str, Any] = {name: joined(name) for name in names}
@@ -217,7 +217,6 @@ def _posed(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) -> 
     """Stimulus of a trial with a known pose; `along` (T, n, 3) is the velocity of a surface that slides by itself."""
     assert trial.position is not None and trial.quaternion is not None
     reach = rig.parameters.max_penetration
-    limit, deep = reach, 0
     for _ in range(6):
         depth, normal, point, deep = _contact(trial, rig, texels, reach)
         if not deep:
@@ -235,7 +234,7 @@ def _posed(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) -> 
     nothing = np.zeros((0, 0, 3))
     surface, kept = (nothing if one is None else np.ascontiguousarray(one) for one in (along, slip))
     split_velocities(motion, surface, depth, normal, point, (rate, slide, kept))
-    overpressed = int((depth > limit).sum(axis=1).max(initial=0))
+    overpressed = int((depth > rig.parameters.max_penetration).sum(axis=1).max(initial=0))
     return Stimulus(trial, depth, rate, None, normal, slide, slip, overpressed)
 
 
