@@ -31,8 +31,13 @@ LARGEST_OWN_FACTOR = 1e3
 
 
 def prepared(rig: Rig, predictors: Sequence[Predictor]) -> tuple[tuple[ChannelNoise, ChannelNoise], tuple[float, float]]:
-    """Check the recordings, and measure noise and range of readings and of net forces. The predictors are of the rig's trials,
-    in their order.
+    """Check the recordings, and measure noise and range of readings and of net forces.
+
+    Parameters
+    ----------
+    rig : Rig
+    predictors : sequence of Predictor
+        Of the rig's trials, in their order.
 
     Returns
     -------
@@ -85,8 +90,14 @@ def start_model(rig: Rig, predictors: Sequence[Predictor]) -> Model:
 def base_fit(rig: Rig, views: Sequence[TrialView], full: float) -> Fit:
     """Fit the base model to recordings, from several stiffnesses of the bristles if the rig does not state one.
 
-    The misfit of net forces has a local minimum where bristles are so soft that they never slip. `full` is the range of the
-    readings.
+    The misfit of net forces has a local minimum where bristles are so soft that they never slip.
+
+    Parameters
+    ----------
+    rig : Rig
+    views : sequence of TrialView
+    full : float
+        Range of the readings.
     """
     predictors = [view.predictor for view in views]
     start = start_model(rig, predictors)

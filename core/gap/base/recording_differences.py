@@ -51,8 +51,10 @@ class RecordingDifferences:
     def odd_recording(self, full: float) -> tuple[str, float, float] | None:
         """Return the recording that alone differs from the others; None if several do, or none.
 
-        With its name, its gain relative to the others less 1, and its level above theirs as a share of `full`, the range of the
-        readings.
+        Parameters
+        ----------
+        full : float
+            Range of the readings.
         """
         names = list(self.factors)
         gains, levels = np.array([self.factors[n] for n in names]), np.array([self.zeros.get(n, 0.0) for n in names]) / full

@@ -54,7 +54,13 @@ def indistinguishable(coverage: Coverage, name: str, curvature: float = np.inf) 
     """Return the kinds that recordings cannot distinguish from one of this name, however much better one of them fits.
 
     A sensor need not follow any of the formulas, so a better fit is no evidence if the signature of the effect is not recorded.
-    `curvature` is that of the fitted curve (see :func:`curvature_ratio`).
+
+    Parameters
+    ----------
+    coverage : Coverage
+    name : str
+    curvature : float
+        Of the fitted curve (see :func:`curvature_ratio`).
     """
     groups: list[tuple[str, ...]] = []
     one_speed = coverage.speed_ratio < SINGLE_SPEED_RATIO
@@ -71,8 +77,13 @@ def indistinguishable(coverage: Coverage, name: str, curvature: float = np.inf) 
 
 
 def curvature_ratio(predictors: Sequence[Predictor], model: Model) -> float:
-    """Return the ratio of the steepest to the flattest eighth of a model's curve of reading over load. The curve is that of the
-    texel with the largest load.
+    """Return the ratio of the steepest to the flattest eighth of a model's curve of reading over load.
+
+    Parameters
+    ----------
+    predictors : sequence of Predictor
+        The curve is that of the texel with the largest load in these trials.
+    model : Model
     """
     deepest = max(predictors, key=lambda one: float(one.stimulus.load.max(initial=0.0)))
     texel = int(np.argmax(deepest.stimulus.load.max(axis=0)))

@@ -35,7 +35,18 @@ def student_quantile(freedom: np.ndarray | float) -> np.ndarray | float:
 
 
 def linear_estimates(columns: np.ndarray, values: np.ndarray) -> list[Estimate]:
-    """Return the p estimates of ordinary least squares, ``values (m,) ≈ columns (m, p) @ coefficients``, of full rank."""
+    """Return the estimates of ordinary least squares, ``values ≈ columns @ coefficients``.
+
+    Parameters
+    ----------
+    columns : (m, p) float
+        Of full rank.
+    values : (m,) float
+
+    Returns
+    -------
+    list of p Estimate
+    """
     coefficients, *_ = np.linalg.lstsq(columns, values, rcond=None)
     freedom = len(values) - columns.shape[1]
     residual = values - columns @ coefficients
@@ -47,11 +58,25 @@ def linear_estimates(columns: np.ndarray, values: np.ndarray) -> list[Estimate]:
 def linearised_estimates(
     values: np.ndarray, jacobian: np.ndarray, transformation: np.ndarray, residual: np.ndarray, scale: float = 1.0
 ) -> list[Estimate]:
-    """Return the p estimates of nonlinear least squares, with the model linearised at the solution.
+    """Return the estimates of nonlinear least squares, with the model linearised at the solution.
 
-    The interval of a variable on which no residual depends is infinite. `values` (p,) are the solution and `residual` (m,) is
-    that there, which the search measured in units of `scale`. `jacobian` (m, p) and `transformation` (p, p) are the derivatives
-    of ``residual / scale`` and of `values` with respect to the variables of the search.
+    Parameters
+    ----------
+    values : (p,) float
+        Solution.
+    jacobian : (m, p) float
+        Derivatives of ``residual / scale`` with respect to the variables of the search.
+    transformation : (p, p) float
+        Derivatives of `values` with respect to the variables of the search.
+    residual : (m,) float
+        At the solution.
+    scale : float
+        Unit in which the search measured the residuals.
+
+    Returns
+    -------
+    list of p Estimate
+        The interval of a variable on which no residual depends is infinite.
     """
     freedom = len(residual) - len(values)
     covariance = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-14) * (residual @ residual) / scale**2 / max(freedom, 1)
@@ -87,6 +112,8 @@ class ParameterInterval:
     ----------
     effect : int
         Index of the effect in the model's stack; -1 for the base model.
+    name : str
+    value, low, high : float
     bounds : (float, float)
         Within which the parameter was fitted.
     """
@@ -116,7 +143,12 @@ def parameter_intervals(found: Fit) -> list[ParameterInterval]:
     - from the scatter of the gradients of whole trials, which holds if the formula is not quite the sensor's.
 
     If few channels or trials inform about a parameter, as about friction, the last two have too few gradients: they sum to zero
-    at the end of the fit. Then they hold for the other parameters only. The fit needs normal equations.
+    at the end of the fit. Then they hold for the other parameters only.
+
+    Parameters
+    ----------
+    found : Fit
+        With normal equations.
     """
     common = [item for item in found.free if not item.per_texel]
     if not common:

@@ -58,12 +58,14 @@ class FreeParameter:
     effect : int
         Index of the effect in the model's stack; :data:`BASE` for a parameter of the base model, :data:`RECORDING` for a number
         of recordings.
+    name : str
     low, high : float or (n,) float
         Bounds; equal where a texel keeps its value.
     log : bool
         True if it is fitted on a logarithmic scale.
     scale : float
         A change that matters, for parameters that are not on a logarithmic scale.
+    per_texel : bool
     resting_value : float
         Mean of the prior of a parameter of single texels (see :data:`TEXEL_PRECISION`).
     tied : tuple of str
@@ -154,8 +156,10 @@ class TrialView:
 
     Attributes
     ----------
+    predictor : Predictor
     subset : (c,) int or None
         Texels; None for all. Only the whole set is right for effects that couple texels.
+    samples : slice
     noise : (float, float)
         Standard deviation of readings and of forces, in their units.
     stretch_count : int
@@ -272,6 +276,8 @@ class Fit:
 
     Attributes
     ----------
+    model : Model
+    free : tuple of FreeParameter
     sse : (trials, 2) float
         Sum of squares of the residuals of each trial, of readings and of forces, in units of the noise.
     count : (trials, 2) float
@@ -306,8 +312,11 @@ def fit(
 
     Parameters
     ----------
+    views : sequence of TrialView
     model : Model
         Where the fit starts.
+    free : sequence of FreeParameter
+    max_steps : int
     tolerance : float
         The fit ends when the sum of squares decreases by less than this share of it.
     frozen : int
@@ -388,9 +397,21 @@ def derivatives(
     table: np.ndarray,
     known: int,
 ) -> None:
-    """Write by how much a step along each free parameter lowers the residual into a table. `at` are the coordinates of the free
-    parameters in the model, and `residual` (T, c + 3) is its residual. The first `known` derivatives are in the table (p, T, c
-    + 3) already. For a parameter of single texels each column is the derivative by that of its own texel.
+    """Write by how much a step along each free parameter lowers the residual into a table.
+
+    Parameters
+    ----------
+    view : TrialView
+    model : Model
+    free : tuple of FreeParameter
+    at : list of float or (n,) float
+        Coordinates of the free parameters in the model.
+    residual : (T, c + 3) float
+        Of the model.
+    table : (p, T, c + 3) float
+        Written to; for a parameter of single texels each column is the derivative by that of its own texel.
+    known : int
+        The first `known` derivatives are in the table already.
     """
     step = QUANTIZED_DIFFERENCE_STEP if model.is_stepped else DIFFERENCE_STEP
     here = [item.from_coordinate(x) for item, x in zip(free, at, strict=True)]
@@ -507,8 +528,16 @@ def cross_fitted(found: Fit, views: Sequence[TrialView], seen: Sequence[np.ndarr
     """Return residuals of every stretch under a fit that has not seen it: of two folds of alternating ones, that to the other.
 
     Parameters about which a fold has too little information keep their values. If the Newton step does not even fit the other
-    fold better, it is shortened, at last to nothing. `seen` are the residuals (T, c + 3) of the fit on the views to which it
-    was fitted; it has equations.
+    fold better, it is shortened, at last to nothing.
+
+    Parameters
+    ----------
+    found : Fit
+        With equations.
+    views : sequence of TrialView
+        To which it was fitted.
+    seen : sequence of (T, c + 3) float
+        Its residuals.
     """
     if found.equations is None or not found.free:
         return list(seen)
@@ -538,8 +567,16 @@ def _sum_of_squares(residual: np.ndarray) -> float:
 
 
 def free_base_parameters(parameters: SensorParameters, wanted: Sequence[str], full: float) -> list[FreeParameter]:
-    """Return free parameters of the base model. They start at `parameters`; :data:`FRICTION_LEVEL` is one for both friction
-    coefficients. `full` is the range of the readings, in the sensor's unit.
+    """Return free parameters of the base model.
+
+    Parameters
+    ----------
+    parameters : SensorParameters
+        Where they start.
+    wanted : sequence of str
+        Their names; :data:`FRICTION_LEVEL` is one parameter for both friction coefficients.
+    full : float
+        Range of the readings, in the sensor's unit.
     """
 
     def free(name: str) -> FreeParameter:

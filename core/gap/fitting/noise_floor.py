@@ -73,8 +73,13 @@ def reading_noise(predictors: Sequence[Predictor], full: float) -> ChannelNoise:
 
     Every unloaded stretch of every texel gives an estimate of the variance, without the texels' common mode and a linear drift.
     The result is the weighted median of these, so that a few texels that respond to their neighbours do not matter. If no
-    stretch is long enough, second differences of the readings are used, which assumes white noise. Noise smaller than a
-    ten-thousandth of `full`, the range of the readings, is taken as that.
+    stretch is long enough, second differences of the readings are used, which assumes white noise.
+
+    Parameters
+    ----------
+    predictors : sequence of Predictor
+    full : float
+        Range of the readings; smaller noise than a ten-thousandth of it is taken as that.
     """
     parts = [_variance_and_autocovariance(part) for predictor in predictors for part in _unloaded_parts(predictor)]
     values, weight = (np.concatenate([np.zeros(0), *(part[i] for part in parts)]) for i in (0, 2))
@@ -337,7 +342,12 @@ on sets of other stimuli, scatter and effects: 0.5 to 1.2 with nothing hidden (6
 
 def with_repeats(noise: ChannelNoise, predictors: Sequence[Predictor], part: str) -> ChannelNoise:
     """Return the noise of a channel, or the scatter of the recordings that are repeats of each other where that is larger.
-    `part` is "reading" or "force".
+
+    Parameters
+    ----------
+    noise : ChannelNoise
+    predictors : sequence of Predictor
+    part : "reading" or "force"
 
     Raises
     ------

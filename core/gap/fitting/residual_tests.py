@@ -49,7 +49,15 @@ NO_STRUCTURE = ResidualStructure(0.0, {})
 
 
 def residual_structure(predictors: Sequence[Predictor], residuals: Sequence[np.ndarray]) -> ResidualStructure:
-    """Find out on which features residuals depend: (T, n) in units of the noise, zero if a value is missing."""
+    """Find out on which features residuals depend.
+
+    Parameters
+    ----------
+    predictors : sequence of Predictor
+        Of the trials.
+    residuals : sequence of (T, n) float
+        In units of the noise; zero if a value is missing.
+    """
     found = [features(predictor, residual) for predictor, residual in zip(predictors, residuals, strict=True)]
     sizes = {name: len(columns) for groups in found for name, columns in groups.items()}
     sums = []
@@ -131,8 +139,14 @@ STEADY = (0.3, 3.0)
 
 
 def proportional_noise(views: Sequence[TrialView], model: Model) -> Effect | None:
-    """Return noise in proportion to the reading if a model's residual is like that, else None. The views are of whole trials,
-    and the fitted model has no noise.
+    """Return noise in proportion to the reading if a model's residual is like that, else None.
+
+    Parameters
+    ----------
+    views : sequence of TrialView
+        Whole trials.
+    model : Model
+        A fitted model without noise.
     """
     sizes, squares, correlations, rest = [], [], [], [np.zeros(0)]
     for view in views:
@@ -238,7 +252,14 @@ not known, and where it is known, because a texel is unloaded and was measured, 
 
 
 def strongest_line(views: Sequence[TrialView], model: Model) -> SpectralLine | None:
-    """Return the strongest line that all trials have without load; None without a line. The views are of whole trials."""
+    """Return the strongest line that all trials have without load; None without a line.
+
+    Parameters
+    ----------
+    views : sequence of TrialView
+        Whole trials.
+    model : Model
+    """
     from scipy.special import gammaincc
 
     resting = [one for one in (_unloaded_residual(view, model) for view in views) if one is not None]

@@ -58,8 +58,10 @@ def meet(center, frame, size, position, outward, reach, contact):  # type: ignor
     center : (T, 3) float, metres
     frame : (T, 3, 3) float
         Axes of the shape as columns.
-    size, position, outward, reach
-        As in :func:`shape_contact`.
+    size : (1,) or (3,) float, metres
+        Radius of a sphere, or half of the edges of a box.
+    position, outward, reach
+        As in :func:`sphere_contact`.
     contact : tuple of (T, n), (T, n, 3) and (T, n, 3) float
         Depth, normal and point; written to.
     """

@@ -28,7 +28,13 @@ def relative_load(stimulus: Stimulus) -> np.ndarray:
 
 
 def hold_rate_limit(rate: np.ndarray) -> float:
-    """Return the rate below which a load counts as held. `rate` is of loads, as shares of the largest one, 1/s."""
+    """Return the rate below which a load counts as held.
+
+    Parameters
+    ----------
+    rate : float, 1/s
+        Rates of the load, as a share of the largest load.
+    """
     if not rate.size:
         return HOLD_RATE
     return float(np.clip(HOLD_RATE_SHARE * np.quantile(np.abs(rate), 0.99), ROUNDING_RATE, HOLD_RATE))
@@ -90,8 +96,13 @@ def known_readings(predictor: Predictor) -> np.ndarray:
 
 
 def features(predictor: Predictor, residual: np.ndarray) -> dict[str, np.ndarray]:
-    """Return features of each texel at each sample, arrays (f, T, n) by group of :data:`FEATURES`. The last two groups contain
-    the residual (T, n) of the other texels.
+    """Return features of each texel at each sample, arrays (f, T, n) by group of :data:`FEATURES`.
+
+    Parameters
+    ----------
+    predictor : Predictor
+    residual : (T, n) float
+        Used for the last two groups, which contain the residual of the other texels.
     """
     s, time = predictor.stimulus, predictor.stimulus.time
     d = relative_load(s)

@@ -116,8 +116,14 @@ class ContactHistory:
         return force
 
     def total_force(self, p: SensorParameters, friction_effects: Sequence[Effect], force: np.ndarray) -> np.ndarray:
-        """Return the sum of normal and friction forces of all texels on the sensor, (T, 3) N. `force` (T, c) is the normal
-        force of each texel, N.
+        """Return the sum of normal and friction forces of all texels on the sensor, (T, 3) N.
+
+        Parameters
+        ----------
+        p : SensorParameters
+        friction_effects : sequence of Effect
+        force : (T, c) float, N
+            Normal force of each texel.
         """
         t = self.samples
         assert t is not None, "the history was made without samples"

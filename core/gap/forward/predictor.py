@@ -39,6 +39,8 @@ class Model:
 
     Attributes
     ----------
+    parameters : SensorParameters
+    effects : tuple of Effect
     recordings : mapping of str to float
         Free numbers by which recordings differ, such as ``factor of NAME`` and ``contact height of NAME`` (see
         :class:`.trial.Trial`).
@@ -120,6 +122,7 @@ class Session:
     ----------
     trials : sequence of Trial
         In any order; a single one if the sensor was untouched before it.
+    rig : Rig
 
     Attributes
     ----------
@@ -246,6 +249,8 @@ class Predictor:
 
     Parameters
     ----------
+    trial : Trial
+    rig : Rig
     session : Session, optional
         The session that the trial belongs to; without it the trial begins with an untouched sensor.
 
@@ -267,7 +272,13 @@ class Predictor:
     def predict(self, model: Model, subset: np.ndarray | None = None, with_forces: bool = True) -> Prediction:
         """Return the prediction of a model. Its arrays are kept and must not be written to.
 
-        A `subset` (c,) of the texels is right only if no effect couples texels. The net force is None if it was not measured.
+        Parameters
+        ----------
+        model : Model
+        subset : (c,) int, optional
+            Only these texels. This is right only if no effect couples texels.
+        with_forces : bool
+            True if the net force is wanted, if it was measured.
         """
         trial = self.trial
         reading = self.responses.reading(model, subset)[self.samples]
@@ -329,8 +340,13 @@ class Predictor:
 
 
 def predictors_of(trials: Sequence[Trial], rig: Rig) -> list[Predictor]:
-    """Return a predictor for each trial; those of one session share its history. All trials of each session are needed,
-    whatever their use: a recording that is only checked has worn the sensor, too.
+    """Return a predictor for each trial; those of one session share its history.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        All trials of each session, whatever their use: a recording that is only checked has worn the sensor, too.
+    rig : Rig
     """
     names = {trial.session for trial in trials if trial.session}
     sessions = {name: Session([trial for trial in trials if trial.session == name], rig) for name in names}

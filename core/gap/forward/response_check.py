@@ -23,7 +23,13 @@ _NO_CONTACT = {
 
 
 def check_responses(rig: Rig, stimuli: Sequence[Stimulus]) -> None:
-    """Check the recordings that are to be fitted. The stimuli are those of the rig's trials, in their order.
+    """Check the recordings that are to be fitted.
+
+    Parameters
+    ----------
+    rig : Rig
+    stimuli : sequence of Stimulus
+        Of the rig's trials, in their order.
 
     Raises
     ------
@@ -79,8 +85,12 @@ def centred(load: np.ndarray, response: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def correlation(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> float:
-    """Return the correlation of loads with responses, both less the mean of their channel; zero when nothing changes. Pairs are
-    of arrays (T, c); missing responses are NaN.
+    """Return the correlation of loads with responses, both less the mean of their channel; zero when nothing changes.
+
+    Parameters
+    ----------
+    pairs : sequence of ((T, c) float, (T, c) float)
+        Load and response of each recording; missing responses are NaN.
     """
     product = load_square = response_square = 0.0
     for load, response in pairs:

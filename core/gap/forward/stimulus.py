@@ -43,6 +43,7 @@ class Stimulus:
 
     Attributes
     ----------
+    trial : Trial
     depth : (T, n) float, metres
         Perpendicular penetration; zero without contact, and in force trials.
     rate : (T, n) float, m/s
@@ -81,8 +82,14 @@ class Stimulus:
 
 
 def stimulus_of(trial: Trial, rig: Rig, height: float | None = None) -> Stimulus:
-    """Return the stimulus of the texels in a trial of a rig; under a cover the weighted one of its points. `height` (m) is
-    another contact height than the trial's own, or than the one from which the fit of a free one starts.
+    """Return the stimulus of the texels in a trial of a rig; under a cover the weighted one of its points.
+
+    Parameters
+    ----------
+    trial : Trial
+    rig : Rig
+    height : float, metres, optional
+        Another contact height than the trial's own, or than the one from which the fit of a free one starts.
     """
     return of_texels(surface_stimulus_of(trial, rig, height=height), rig)
 
@@ -121,8 +128,16 @@ def of_texels(stimulus: Stimulus, rig: Rig) -> Stimulus:
 
 
 def surface_stimulus_of(trial: Trial, rig: Rig, texels: Texels | None = None, height: float | None = None) -> Stimulus:
-    """Return the stimulus of the points of a rig's surface, which are its texels if it has no cover. `texels` are these points
-    at other places than the rig's; `height` is as in :func:`stimulus_of`.
+    """Return the stimulus of the points of a rig's surface, which are its texels if it has no cover.
+
+    Parameters
+    ----------
+    trial : Trial
+    rig : Rig
+    texels : Texels, optional
+        These points at other places than the rig's.
+    height : float, metres, optional
+        As in :func:`stimulus_of`.
     """
     texels = rig.surface if texels is None else texels
     if height is None:
@@ -182,7 +197,13 @@ def joined_stimuli(stimuli: Sequence[Stimulus], texels: Texels) -> tuple[Stimulu
     """Return the stimuli of a session's trials as one, and the index of each trial's first sample.
 
     In a pause between two trials nothing touches the sensor: an unloaded sample follows the one trial, and another one precedes
-    the next. There is no pause between the parts of a recording whose samples simply go on. The stimuli are in order of time.
+    the next. There is no pause between the parts of a recording whose samples simply go on.
+
+    Parameters
+    ----------
+    stimuli : sequence of Stimulus
+        In order of time.
+    texels : Texels
     """
     if len(stimuli) == 1:
         return stimuli[0], [0]
