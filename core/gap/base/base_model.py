@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -66,31 +67,24 @@ def _range(arrays: Sequence[np.ndarray]) -> float:
 
 
 def start_model(rig: Rig, predictors: Sequence[Predictor]) -> Model:
-    """Return the model with the rig's own parameters; a linear fit to the readings gives gain and zero if the rig does not."""
+    """Return the model with the rig's own parameters; a linear fit to the readings gives gain and zero if the rig does not.
+
+    Free numbers of recordings have the values of :func:`with_recording_numbers`.
+    """
     p = rig.parameters
-    if p.unit == "N" or "gain" in rig.given:
-        return Model(p)
-    base = Model(replace(p, gain=1.0, zero=0.0))
-    x, y = [], []
-    for predictor in predictors:
-        if predictor.trial.reading is not None:
-            good = np.isfinite(predictor.trial.reading)
-            x.append(predictor.predict(base).reading[good])
-            y.append(predictor.trial.reading[good])
-    if not x:
-        return Model(p)
-    gain, zero = _line_through(np.concatenate(x), np.concatenate(y))
-    return Model(replace(p, gain=gain, zero=p.zero if "zero" in rig.given else zero))
-
-
-def _line_through(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
-    """Slope and intercept of ``y ≈ slope · x + intercept`` (m,); a slope of 1 where x or y never changes."""
-    from_mean = x - x.mean()
-    square = float(from_mean @ from_mean)
-    slope = float(from_mean @ y) / square if square > 0.0 else 0.0
-    if not np.isfinite(slope) or slope == 0.0:
-        slope = 1.0
-    return slope, float(y.mean() - slope * x.mean())
+    recorded = [one for one in predictors if one.trial.reading is not None]
+    if recorded and p.unit != "N" and "gain" not in rig.given:
+        base = Model(replace(p, gain=1.0, zero=0.0))
+        predicted = np.concatenate([one.predict(base).reading.ravel() for one in recorded])
+        measured = np.concatenate([np.ravel(one.trial.responses[0]) for one in recorded])
+        good = np.isfinite(measured)
+        x, y = predicted[good], measured[good]
+        from_mean = x - x.mean()
+        square = float(from_mean @ from_mean)
+        slope = float(from_mean @ y) / square if square > 0.0 else 0.0
+        gain = slope if np.isfinite(slope) and slope != 0.0 else 1.0  # of readings that never change
+        p = replace(p, gain=gain, zero=p.zero if "zero" in rig.given else float(y.mean() - gain * x.mean()))
+    return with_recording_numbers(Model(p), predictors)
 
 
 def base_fit(rig: Rig, views: Sequence[TrialView], full: float) -> Fit:
@@ -106,19 +100,30 @@ def base_fit(rig: Rig, views: Sequence[TrialView], full: float) -> Fit:
         Range of the readings.
     """
     predictors = [view.predictor for view in views]
-    start = with_recording_numbers(start_model(rig, predictors), predictors)
-    names = base_parameters_to_search(rig, predictors)
-    numbers = recording_numbers(rig, predictors, full)
-    starts = [start]
-    if "sigma0" in names and "sigma0" not in rig.given:
-        starts += _bristle_starts(views, start)
-    fits = []
-    for model in starts:
-        free = [*free_base_parameters(model.parameters, names, full), *numbers]
-        steps = FULL_STEPS if len(starts) == 1 else TRIAL_STEPS
-        fits.append(fit(views, model, free, max_steps=steps, tolerance=1e-7, with_equations=len(starts) == 1))
-    best = min(fits, key=lambda one: one.mean)
-    return fits[0] if len(fits) == 1 else fit(views, best.model, best.free, max_steps=FULL_STEPS, tolerance=1e-7)
+    start = start_model(rig, predictors)
+    free = free_parameters(rig, predictors, start, full)
+    stiffness_is_open = "sigma0" not in rig.given and any(item.name == "sigma0" for item in free)
+    others = _bristle_starts(views, start) if stiffness_is_open else []
+    if others:
+        fits = [
+            fit(views, model, free_parameters(rig, predictors, model, full), TRIAL_STEPS, 1e-7, with_equations=False)
+            for model in (start, *others)
+        ]
+        best = min(fits, key=lambda one: one.mean)
+        start, free = best.model, list(best.free)
+    return fit(views, start, free, FULL_STEPS, 1e-7)
+
+
+def free_parameters(rig: Rig, predictors: Sequence[Predictor], model: Model, full: float) -> list[FreeParameter]:
+    """Return the parameters of the base model and of recordings that are free during the search for effects.
+
+    The predictors are of the trials that are fitted, the fit starts at `model`, and `full` is the range of the readings.
+    """
+    identified = identified_base_parameters(rig, predictors)
+    names = [name for name in identified if name not in FITTED_FRICTION_PARAMETERS]
+    if len(names) < len(identified):
+        names += friction_parameters_to_search(rig)
+    return [*free_base_parameters(model.parameters, names, full), *_recording_numbers(rig, predictors, full)]
 
 
 def _bristle_starts(views: Sequence[TrialView], model: Model) -> list[Model]:
@@ -138,7 +143,7 @@ def _bristle_starts(views: Sequence[TrialView], model: Model) -> list[Model]:
     softest = level / max(travels)
     stiffest = max(level / float(np.quantile(moving, SMALL_STEP)), 10.0 * softest)
     stiffnesses = np.geomspace(softest, stiffest, BRISTLE_STARTS)
-    return [replace(model, parameters=replace(p, sigma0=float(x), sigma1=p.sigma1)) for x in stiffnesses]
+    return [replace(model, parameters=replace(p, sigma0=float(x))) for x in stiffnesses]
 
 
 def identified_base_parameters(rig: Rig, predictors: Sequence[Predictor]) -> list[str]:
@@ -152,16 +157,13 @@ def identified_base_parameters(rig: Rig, predictors: Sequence[Predictor]) -> lis
     depth_known = any(p.trial.stimulus != "force" for p in predictors)
     force_known = any(p.trial.stimulus == "force" for p in predictors)
     slides = any(p.trial.force is not None and p.stimulus.slide_speed.any() for p in predictors)
-    own_unit = rig.parameters.unit != "N"
+    own_unit, gain_given = rig.parameters.unit != "N", "gain" in rig.given
     names: list[str] = []
-    if depth_known:
-        names += ["k", "cn"] if rig.parameters.normal_law == "linear" else ["k"]
-        if own_unit and has_readings and "gain" not in rig.given and not has_forces:
-            names.remove("k")
-            names.append("gain")
-        elif own_unit and has_readings and (has_forces or force_known):
-            names.append("gain")
-    if force_known and has_readings and "gain" not in names:
+    if depth_known and not (own_unit and has_readings and not gain_given and not has_forces):
+        names.append("k")
+    if depth_known and rig.parameters.normal_law == "linear":
+        names.append("cn")
+    if has_readings and (force_known or (own_unit and (has_forces or not gain_given))):
         names.append("gain")
     if own_unit and any(p.trial.reading is not None and not p.trial.tared for p in predictors):
         names.append("zero")
@@ -170,19 +172,11 @@ def identified_base_parameters(rig: Rig, predictors: Sequence[Predictor]) -> lis
     return names
 
 
-def recording_numbers(rig: Rig, predictors: Sequence[Predictor], full: float) -> list[FreeParameter]:
-    """Return the free factors, zeros and contact heights of recordings (see :class:`.trial.Trial`).
+def _recording_numbers(rig: Rig, predictors: Sequence[Predictor], full: float) -> list[FreeParameter]:
+    """Free factors, zeros and contact heights of recordings (see :class:`.trial.Trial`).
 
     The first factor is one if all recordings have a free one, because a factor that they share is the sensor's. The same
     holds for zeros if the sensor's own is fitted.
-
-    Parameters
-    ----------
-    rig : Rig
-    predictors : sequence of Predictor
-        Of the trials that are fitted.
-    full : float
-        Range of the readings.
     """
     made = []
     own_zero = "zero" in identified_base_parameters(rig, predictors)
@@ -197,23 +191,19 @@ def recording_numbers(rig: Rig, predictors: Sequence[Predictor], full: float) ->
                 made.append(FreeParameter(RECORDING, called, 1.0 / LARGEST_OWN_FACTOR, LARGEST_OWN_FACTOR, log=True))
             else:
                 made.append(FreeParameter(RECORDING, called, -100.0 * full, 100.0 * full, scale=full))
-    for trial in {p.trial.force_zero: p.trial for p in predictors if p.trial.force is not None}.values():
-        for axis, values in zip(FORCE, np.transpose(trial.force if trial.force is not None else np.zeros((0, 3))), strict=True):
-            if isinstance(trial.force_zero, str) and np.isfinite(values).any():
-                size = max(float(np.nanmax(np.abs(values))), 1e-12)
-                name = number_name(axis, trial.force_zero)
-                made.append(FreeParameter(RECORDING, name, -100.0 * size, 100.0 * size, scale=size))
-    return [*made, *_contact_heights(rig, predictors)]
-
-
-def _contact_heights(rig: Rig, predictors: Sequence[Predictor]) -> list[FreeParameter]:
-    """Free contact heights, between those at which the start is off by the largest penetration."""
+    forces = {p.trial.force_zero: p.trial.force for p in predictors if p.trial.force is not None}
+    for (name, force), (column, axis) in product(forces.items(), enumerate(FORCE)):
+        values = force[:, column]
+        if isinstance(name, str) and np.isfinite(values).any():
+            size = max(float(np.nanmax(np.abs(values))), 1e-12)
+            made.append(FreeParameter(RECORDING, number_name(axis, name), -100.0 * size, 100.0 * size, scale=size))
+    # Heights are between those at which the start is off by the largest penetration.
     starts = {p.trial.contact_height: p.trial.height_start for p in predictors if isinstance(p.trial.contact_height, str)}
     deep = rig.parameters.max_penetration
-    return [
-        FreeParameter(RECORDING, number_name(CONTACT_HEIGHT, str(name)), start - deep, start + deep, scale=HEIGHT_SCALE * deep)
-        for name, start in starts.items()
-    ]
+    for name, start in starts.items():
+        called = number_name(CONTACT_HEIGHT, str(name))
+        made.append(FreeParameter(RECORDING, called, start - deep, start + deep, scale=HEIGHT_SCALE * deep))
+    return made
 
 
 def with_recording_numbers(model: Model, predictors: Sequence[Predictor]) -> Model:
@@ -227,13 +217,6 @@ def with_recording_numbers(model: Model, predictors: Sequence[Predictor]) -> Mod
     named = [p.trial for p in predictors if isinstance(p.trial.contact_height, str)]
     numbers |= {number_name(CONTACT_HEIGHT, str(trial.contact_height)): trial.height_start for trial in named}
     return replace(model, recordings=numbers)
-
-
-def base_parameters_to_search(rig: Rig, predictors: Sequence[Predictor]) -> list[str]:
-    """Return the names of the base model's parameters that are free during the search for effects."""
-    names = identified_base_parameters(rig, predictors)
-    others = [name for name in names if name not in FITTED_FRICTION_PARAMETERS]
-    return others + friction_parameters_to_search(rig) if len(others) < len(names) else others
 
 
 def friction_parameters_to_search(rig: Rig) -> list[str]:

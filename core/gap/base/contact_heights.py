@@ -13,7 +13,7 @@ from dataclasses import replace
 from ...errors import SceneError
 from ..dataset.rig import Rig
 from ..dataset.trial import Trial
-from ..forward.response_check import correlation
+from ..forward.response_check import correlation, responses_of
 from ..forward.stimulus import stimulus_of
 
 GRID_STEPS, FINER_STEPS = 20, 5
@@ -36,30 +36,21 @@ def with_starting_heights(rig: Rig) -> Rig:
 def _best_height(rig: Rig, trials: Sequence[Trial]) -> float:
     """The height at which loads and responses are best correlated."""
     step = rig.parameters.max_penetration / GRID_STEPS
-    best, value = 0.0, _agreement(rig, trials, 0.0)
+    best = 0.0
     for size, count in ((step, GRID_STEPS), (step / FINER_STEPS, FINER_STEPS)):
-        middle = best
-        for number in range(-count, count + 1):
-            height = middle + number * size
-            other = _agreement(rig, trials, height)
-            if other > value:
-                best, value = height, other
+        others = [best + number * size for number in range(-count, count + 1) if number]
+        best = max(best, *others, key=lambda height: _agreement(rig, trials, height))
     return best
 
 
 def _agreement(rig: Rig, trials: Sequence[Trial], height: float) -> float:
     """Magnitude of the correlation of loads with responses; -1 where nothing touches, or the indenter goes right through."""
-    pairs, net = [], []
     try:
-        for trial in trials:
-            stimulus = stimulus_of(trial, rig, height=height)
-            if trial.reading is not None:
-                pairs.append((stimulus.load, trial.reading))
-            elif trial.force is not None:
-                normal = -rig.texels.normal if stimulus.normal is None else stimulus.normal
-                net.append(((stimulus.load[:, :, None] * normal).sum(axis=1), trial.force))
+        stimuli = [stimulus_of(trial, rig, height=height) for trial in trials]
     except SceneError:
         return -1.0
+    pairs = responses_of(rig, stimuli, "reading")
+    net = responses_of(rig, [one for one in stimuli if one.trial.reading is None], "force")
     values = [abs(correlation(part)) for part in (pairs, net) if part]
     return max(values) if any(load.any() for load, _ in pairs + net) else -1.0
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..dataset.rig import Rig
-from ..dataset.trial import Trial, TrialHistory, on_common_clocks
+from ..dataset.trial import TrialHistory, on_common_clocks
 from ..forward.predictor import Model, Predictor
 
 LEAST_RECORDINGS = 3
@@ -48,7 +48,7 @@ class RecordingDifferences:
     factors: dict[str, float]
     zeros: dict[str, float]
 
-    def odd_recording(self, full: float) -> OddRecording | None:
+    def odd_recording(self, full: float) -> tuple[str, float, float] | None:
         """Return the recording that alone differs from the others; None if several do, or none.
 
         Parameters
@@ -63,16 +63,7 @@ class RecordingDifferences:
         first, second = np.argsort(apart)[::-1][:2]
         if not apart[first] > ODD_TIMES * apart[second]:
             return None
-        return OddRecording(names[first], float(gains[first]), float(levels[first]))
-
-
-@dataclass(frozen=True)
-class OddRecording:
-    """The one recording that differs: its gain relative to the others less 1, and its level above theirs in ranges."""
-
-    name: str
-    gain: float
-    level: float
+        return names[first], float(gains[first]), float(levels[first])
 
 
 def may_differ(rig: Rig) -> bool:
@@ -87,11 +78,8 @@ def may_differ(rig: Rig) -> bool:
 
 def with_own_numbers(rig: Rig) -> Rig:
     """Return a rig whose recordings each have a free factor and zero."""
-
-    def zero(trial: Trial) -> str | float:
-        return 0.0 if trial.reading is None or trial.tared else trial.name
-
-    return replace(rig, trials=tuple(replace(one, factor=one.name, zero=zero(one)) for one in rig.trials))
+    trials = (replace(one, factor=one.name, zero=0.0 if one.reading is None or one.tared else one.name) for one in rig.trials)
+    return replace(rig, trials=tuple(trials))
 
 
 def as_one_session(rig: Rig) -> Rig | None:

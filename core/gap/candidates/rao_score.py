@@ -11,7 +11,7 @@ import numpy as np
 from ...effects.engine.registry import form_of
 from ...model.sensor import Effect
 from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
-from ..fitting.least_squares import Fit, FreeParameter, TrialView, derivatives, value_of, with_values
+from ..fitting.least_squares import Fit, FreeParameter, TrialView, coordinates_of, derivatives, with_coordinates
 
 RIDGE = 1e-10
 """Added to the diagonal of a Gram matrix, as a share of one plus its trace."""
@@ -69,7 +69,7 @@ class ScoreTest:
     def __init__(self, views: Sequence[TrialView], found: Fit):
         self.views, self.model, self.free = views, found.model, visible_parameters(views, found)
         common = tuple(item for item in self.free if not item.per_texel)
-        at = [item.to_coordinate(value_of(found.model, item)) for item in common]
+        at = coordinates_of(found.model, common)
         self.residual = [view.residual(found.model) for view in views]
         self.tables = [np.empty((len(common), *r.shape)) for r in self.residual]
         for view, r, table in zip(views, self.residual, self.tables, strict=True):
@@ -133,8 +133,8 @@ class ScoreTest:
         model, common = self.model.with_effect(effect), [item for item in self.free if not item.per_texel]
         along = sum(c @ view.residual(model).ravel() for c, view in zip(self.derivatives, self.views, strict=True))
         steps = np.linalg.solve(self.gram, along)
-        at = [item.to_coordinate(value_of(model, item)) + step for item, step in zip(common, steps, strict=True)]
-        moved = with_values(model, common, [item.from_coordinate(x) for item, x in zip(common, at, strict=True)])
+        at = [x + step for x, step in zip(coordinates_of(model, common), steps, strict=True)]
+        moved = with_coordinates(model, common, at)
         after = sum(float(np.vdot(r, r)) for r in (view.residual(moved) for view in self.views))
         return self.total - after if np.isfinite(after) else -np.inf
 

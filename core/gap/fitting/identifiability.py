@@ -3,14 +3,7 @@
 fitted.
 
 Each effect shows in one feature of the recordings, its signature: hysteresis, for example, in readings that differ after
-unloading. Recordings without this feature do not identify the effect, however well its formula fits. Two functions say this:
-
-============================  =================================================  ==========================================
-function                      what the recordings lack                           what follows
-============================  =================================================  ==========================================
-`unidentifiable`              the signature of the effect                        the effect is no candidate
-`indistinguishable`           what separates the effect from certain others      these are rivals, however well each fits
-============================  =================================================  ==========================================
+unloading. Recordings without this feature do not identify the effect, however well its formula fits.
 """
 
 from __future__ import annotations
@@ -70,16 +63,15 @@ def indistinguishable(coverage: Coverage, name: str, curvature: float = np.inf) 
         Of the fitted curve (see :func:`curvature_ratio`).
     """
     groups: list[tuple[str, ...]] = []
+    one_speed = coverage.speed_ratio < SINGLE_SPEED_RATIO
     if not coverage.unloading and name in NONLINEAR and curvature < LOOP_CURVATURE:
         groups.append((name, *LOOPS))
-    if not coverage.unloading and coverage.speed_ratio < SINGLE_SPEED_RATIO and coverage.longest_hold == 0.0:
-        groups.append(
-            (*(NONLINEAR if name not in NONLINEAR else (name,)), *KNOWN_FROM_TIMING)
-        )  # time and depth are proportional
+    if not coverage.unloading and one_speed and coverage.longest_hold == 0.0:  # time and depth are proportional
+        groups.append((*((name,) if name in NONLINEAR else NONLINEAR), *KNOWN_FROM_TIMING))
     if not coverage.load_moves:
         groups.append(KNOWN_FROM_PLACES)
     if coverage.unloading and coverage.cycles < LEAST_CYCLES:
-        still = coverage.speed_ratio < SINGLE_SPEED_RATIO and coverage.longest_hold < SHORT_HOLD
+        still = one_speed and coverage.longest_hold < SHORT_HOLD
         groups.append((*KNOWN_FROM_CYCLES, *LATE) if still else KNOWN_FROM_CYCLES)
     return tuple(dict.fromkeys(other for group in groups if name in group for other in group if other != name))
 

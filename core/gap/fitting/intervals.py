@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .least_squares import TEXEL_PRECISION, Fit, NormalEquations, all_equations, summed_equations, value_of
+from .least_squares import TEXEL_PRECISION, Fit, NormalEquations, summed_equations, value_of
 
 
 @dataclass(frozen=True)
@@ -27,11 +27,11 @@ class Estimate:
         return f"{self.value:.4g}{f' {unit}' if unit else ''} (95 %: {self.low:.4g} to {self.high:.4g})"
 
 
-def student_quantile(freedom: float) -> float:
-    """Return the 97.5 % quantile of Student's t; infinite without degrees of freedom, since the scatter is then unknown."""
+def student_quantile(freedom: np.ndarray | float) -> np.ndarray | float:
+    """Return the 97.5 % quantile of Student's t for some degrees of freedom, above zero."""
     from scipy.special import stdtrit
 
-    return float(stdtrit(freedom, 0.975)) if freedom > 0 else float("inf")
+    return stdtrit(freedom, 0.975)
 
 
 def linear_estimates(columns: np.ndarray, values: np.ndarray) -> list[Estimate]:
@@ -167,7 +167,7 @@ def parameter_intervals(found: Fit) -> list[ParameterInterval]:
 def _covariances(found: Fit) -> tuple[np.ndarray, ...]:
     """Covariances (p, p) of the common parameters in their coordinates, four of them (see :func:`parameter_intervals`)."""
     assert found.equations is not None
-    total = summed_equations(all_equations(found.equations))
+    total = summed_equations([one for trial in found.equations for one in trial])
     m = total.texel_gradient.shape[1]
     shift = _texel_response(total) if m else np.zeros((total.coupling.shape[0], m, len(total.common)))
     a = total.common - np.einsum("nmp,nmq->pq", total.coupling, shift)
@@ -197,8 +197,7 @@ def _texel_response(total: NormalEquations) -> np.ndarray:
     follow = inverse @ total.coupling
     pulled = np.einsum("nmk,nk->nmk", inverse, informed)
     stiffness, drift = np.einsum("nm,nmk->mk", informed, pulled), np.einsum("nm,nmp->mp", informed, follow)
-    kept: np.ndarray = follow - pulled @ np.linalg.lstsq(stiffness, drift, rcond=None)[0]
-    return kept
+    return follow - pulled @ np.linalg.lstsq(stiffness, drift, rcond=None)[0]
 
 
 def _inverse(a: np.ndarray) -> np.ndarray:
@@ -208,8 +207,7 @@ def _inverse(a: np.ndarray) -> np.ndarray:
     size = np.sqrt(np.where(squares > 1e-30 * squares.max(initial=0.0), squares, 1.0))
     informed, along = np.linalg.eigh(a / np.outer(size, size))
     eigenvalue = np.where(informed > UNIDENTIFIED, informed, UNIDENTIFIED_EIGENVALUE)
-    inverse: np.ndarray = (along / eigenvalue) @ along.T / np.outer(size, size)
-    return inverse
+    return (along / eigenvalue) @ along.T / np.outer(size, size)
 
 
 def _sandwich(bread: np.ndarray, gradients: np.ndarray) -> np.ndarray:
@@ -224,7 +222,6 @@ def _sandwich(bread: np.ndarray, gradients: np.ndarray) -> np.ndarray:
     influence = gradients @ bread
     squares, fourth = (influence**2).sum(axis=0), (influence**4).sum(axis=0)
     effective = np.clip(3.0 * squares**2 / np.maximum(fourth, 1e-300), 2.0, max(groups, 2))
-    reach = np.array([student_quantile(number - 1.0) for number in effective]) / NORMAL_QUANTILE
+    reach = student_quantile(effective - 1.0) / NORMAL_QUANTILE
     factor = groups / max(groups - len(bread), 1)
-    covariance: np.ndarray = factor * np.outer(reach, reach) * (influence.T @ influence)
-    return covariance
+    return factor * np.outer(reach, reach) * (influence.T @ influence)

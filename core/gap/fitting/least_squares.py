@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -97,8 +98,7 @@ class FreeParameter:
 
     def _inside(self, value: np.ndarray) -> np.ndarray:
         """The value inside the bounds; `numpy.clip` takes five times as long for single numbers."""
-        inside: np.ndarray = np.minimum(np.maximum(value, self.low), self.high)
-        return inside
+        return np.minimum(np.maximum(value, self.low), self.high)
 
 
 def value_of(model: Model, free: FreeParameter) -> np.ndarray | float:
@@ -108,6 +108,16 @@ def value_of(model: Model, free: FreeParameter) -> np.ndarray | float:
     if free.effect == BASE:
         return float(getattr(model.parameters, free.name))
     return np.asarray(model.effects[free.effect].values[free.name], float)
+
+
+def coordinates_of(model: Model, free: Sequence[FreeParameter]) -> list[np.ndarray]:
+    """Return the coordinates of a model's free parameters, each a float or (n,) float."""
+    return [item.to_coordinate(value_of(model, item)) for item in free]
+
+
+def with_coordinates(model: Model, free: Sequence[FreeParameter], at: Sequence[np.ndarray]) -> Model:
+    """Return a model with free parameters at other coordinates."""
+    return with_values(model, free, [item.from_coordinate(x) for item, x in zip(free, at, strict=True)])
 
 
 def with_values(model: Model, free: Sequence[FreeParameter], values: Sequence[np.ndarray | float]) -> Model:
@@ -171,7 +181,7 @@ class TrialView:
     def stretches(self, residual: np.ndarray) -> list[slice]:
         """Return the stretches of time that are left out one after the other, as rows of a residual."""
         edges = np.linspace(0, len(residual), self.stretch_count + 1).astype(int)
-        return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        return [slice(a, b) for a, b in pairwise(edges)]
 
     @property
     def texels(self) -> np.ndarray:
@@ -180,8 +190,8 @@ class TrialView:
 
     @cached_property
     def _measured(self) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """Measured readings of the texels, and net forces; None for what was not measured."""
-        reading, force = self.predictor.trial.reading, self.predictor.trial.force
+        """Measured readings of the texels, and net forces; None for what was not measured or is no part of the residual."""
+        reading, force = self.predictor.trial.reading, self.predictor.trial.force if self.with_forces else None
         if reading is not None:
             reading = np.ascontiguousarray(reading[:, self.texels][self.samples], dtype=float)
         return reading, None if force is None else np.ascontiguousarray(force[self.samples], dtype=float)
@@ -206,12 +216,8 @@ class TrialView:
     @cached_property
     def counts(self) -> np.ndarray:
         """Number of measured values of readings and of forces, (2,) float, those of forces by their weight."""
-        trial, number = self.predictor.trial, np.zeros(2)
-        if trial.reading is not None:
-            number[0] = np.isfinite(trial.reading[self.samples][:, self.texels]).sum()
-        if trial.force is not None and self.with_forces:
-            number[1] = self.force_weight * np.isfinite(trial.force[self.samples]).sum()
-        return number
+        reading, force = (0 if part is None else np.isfinite(part).sum() for part in self._measured)
+        return np.array([reading, self.force_weight * force], float)
 
     def squares(self, residual: np.ndarray) -> np.ndarray:
         """Return the sum of squares of readings and of forces in a residual or a part of it, (2,) float."""
@@ -322,9 +328,7 @@ def fit(
         Derivatives by the first parameters, for each view, near the start.
     """
     free = tuple(free)
-    at = [item.to_coordinate(value_of(model, item)) for item in free]
-    start = with_values(model, free, [item.from_coordinate(x) for item, x in zip(free, at, strict=True)])
-    point = _Point.at_model(views, start, free, at)
+    point = _Point(views, model, free, coordinates_of(model, free))
     tables = [np.empty((len(free), *residual.shape)) for residual in point.residuals]
     damping, known = FIRST_DAMPING, 0 if initial_derivatives is None else frozen
     for table, first in zip(tables, initial_derivatives or (), strict=initial_derivatives is not None):
@@ -336,8 +340,12 @@ def fit(
             derivatives(view, point.model, free, point.at, residual, table, known)
         complete = known == 0
         total = summed_equations([_equations_of(view, free, table, residual) for view, residual, table in parts])
-        better, damping = _better_point(views, free, point, total, damping)
-        if better is None:
+        for _ in range(TRIES_PER_STEP):
+            better = _Point(views, point.model, free, _after_step(total, free, point.at, damping))
+            if better.objective < point.objective:
+                break
+            damping = max(damping * DAMPING_UP, RAISED_DAMPING)
+        else:  # no step leads down
             if complete:
                 break
             known, damping = 0, FIRST_DAMPING
@@ -348,59 +356,30 @@ def fit(
             break
         complete = False
         known = 0 if little else frozen  # with frozen derivatives steps may become small long before the minimum
-    equations = _final_equations(views, free, point, tables, complete) if with_equations else None
     squares = np.array([view.squares(r) for view, r in zip(views, point.residuals, strict=True)])
-    return Fit(point.model, free, squares, np.array([view.counts for view in views]), equations)
+    found = Fit(point.model, free, squares, np.array([view.counts for view in views]))
+    if with_equations:
+        found.equations = []
+        for view, residual, table in zip(views, point.residuals, tables, strict=True):
+            if not complete:
+                derivatives(view, point.model, free, point.at, residual, table, 0)
+            rows = view.stretches(residual)
+            found.equations.append(
+                [_equations_of(view, free, table[:, part], residual[part], GRADIENT_BLOCKS) for part in rows]
+            )
+    return found
 
 
-@dataclass
 class _Point:
     """A point of a fit: coordinates of the free parameters, the model there, its residuals and the objective."""
 
-    at: list[np.ndarray]
-    model: Model
-    residuals: list[np.ndarray]
-    objective: float
-
-    @classmethod
-    def at_model(
-        cls, views: Sequence[TrialView], model: Model, free: tuple[FreeParameter, ...], at: list[np.ndarray]
-    ) -> _Point:
-        """The point of a model whose free parameters have the coordinates `at`."""
-        residuals = [view.residual(model) for view in views]
-        return cls(at, model, residuals, sum(map(_sum_of_squares, residuals)) + _prior_penalty(free, at))
+    def __init__(self, views: Sequence[TrialView], model: Model, free: Sequence[FreeParameter], at: list[np.ndarray]):
+        self.at, self.model = at, with_coordinates(model, free, at)
+        self.residuals = [view.residual(self.model) for view in views]
+        self.objective = sum(map(_sum_of_squares, self.residuals)) + _prior_penalty(free, at)
 
 
-def _better_point(
-    views: Sequence[TrialView], free: tuple[FreeParameter, ...], point: _Point, total: NormalEquations, damping: float
-) -> tuple[_Point | None, float]:
-    """Raise the damping until a step leads down; the point after that step and the damping, or None if no step does."""
-    for _ in range(TRIES_PER_STEP):
-        moved = _point_after(point.at, free, _solved_step([total], free, point.at, damping))
-        model = with_values(point.model, free, [item.from_coordinate(x) for item, x in zip(free, moved, strict=True)])
-        tried = _Point.at_model(views, model, free, moved)
-        if np.isfinite(tried.objective) and tried.objective < point.objective:
-            return tried, damping
-        damping = max(damping * DAMPING_UP, RAISED_DAMPING)
-    return None, damping
-
-
-def _final_equations(
-    views: Sequence[TrialView], free: tuple[FreeParameter, ...], point: _Point, tables: list[np.ndarray], complete: bool
-) -> list[list[NormalEquations]]:
-    """Normal equations of each stretch of each trial at a point. Unless the tables are `complete`, the derivatives there are
-    computed.
-    """
-    equations = []
-    for view, residual, table in zip(views, point.residuals, tables, strict=True):
-        if not complete:
-            derivatives(view, point.model, free, point.at, residual, table, 0)
-        rows = view.stretches(residual)
-        equations.append([_equations_of(view, free, table[:, part], residual[part], GRADIENT_BLOCKS) for part in rows])
-    return equations
-
-
-def _prior_penalty(free: tuple[FreeParameter, ...], at: list[np.ndarray]) -> float:
+def _prior_penalty(free: Sequence[FreeParameter], at: list[np.ndarray]) -> float:
     """Squares that the prior adds for parameters of single texels away from their resting values."""
     return sum(
         TEXEL_PRECISION * float(np.sum((x - item.to_coordinate(item.resting_value)) ** 2))
@@ -409,25 +388,10 @@ def _prior_penalty(free: tuple[FreeParameter, ...], at: list[np.ndarray]) -> flo
     )
 
 
-def all_equations(sums: Sequence[Sequence[NormalEquations]]) -> list[NormalEquations]:
-    """Return the normal equations of all stretches of all trials in one list."""
-    return [one for trial in sums for one in trial]
-
-
-def _point_after(at: list[np.ndarray], free: tuple[FreeParameter, ...], step: list[np.ndarray]) -> list[np.ndarray]:
-    """Coordinates after a step, inside the bounds; steps on a logarithmic scale are limited."""
-    moved = []
-    for x, item, change in zip(at, free, step, strict=True):
-        if item.log:
-            change = np.clip(change, -LARGEST_LOG_STEP, LARGEST_LOG_STEP)
-        moved.append(item.to_coordinate(item.from_coordinate(x + change)))
-    return moved
-
-
 def derivatives(
     view: TrialView,
     model: Model,
-    free: tuple[FreeParameter, ...],
+    free: Sequence[FreeParameter],
     at: list[np.ndarray],
     residual: np.ndarray,
     table: np.ndarray,
@@ -456,17 +420,15 @@ def derivatives(
         # At a bound the difference is taken inwards.
         moved = np.where(ahead - at[i] > 0.5 * step, ahead, item.to_coordinate(item.from_coordinate(at[i] - step)))
         change = moved - at[i]
-        values = [*here[:i], item.from_coordinate(moved), *here[i + 1 :]]
-        over = np.full(residual.shape[1], np.inf)
-        over[: len(view.texels)] = np.broadcast_to(change, (len(view.predictor.rig.texels),))[view.texels]
-        if not item.per_texel:
-            over[-3:] = change
+        of_texels = np.broadcast_to(change, (len(view.predictor.rig.texels),))[view.texels]
+        over = np.append(of_texels, [np.inf if item.per_texel else change] * 3)
         over[over == 0.0] = np.inf
+        values = [*here[:i], item.from_coordinate(moved), *here[i + 1 :]]
         write_quotients(residual, view.residual(with_values(model, free, values)), over, table[i])
 
 
 def _equations_of(
-    view: TrialView, free: tuple[FreeParameter, ...], table: np.ndarray, residual: np.ndarray, blocks: int = 0
+    view: TrialView, free: Sequence[FreeParameter], table: np.ndarray, residual: np.ndarray, blocks: int = 0
 ) -> NormalEquations:
     """Normal equations of some rows of a trial, with the gradients of so many blocks of time."""
     own_each = np.array([item.per_texel for item in free], bool)
@@ -489,19 +451,14 @@ def _equations_of(
     return NormalEquations(flat @ flat.T, flat @ residual.ravel(), b, c, h, _sum_of_squares(residual), gradients)
 
 
-def summed_equations(sums: Sequence[NormalEquations]) -> NormalEquations:
+def summed_equations(equations: Sequence[NormalEquations]) -> NormalEquations:
     """Return the sum of normal equations; the gradients by blocks are those of the first."""
-    first = sums[0]
     names = ("common", "common_gradient", "coupling", "texel", "texel_gradient", "sse")
-    return replace(first, **{name: sum(getattr(s, name) for s in sums) for name in names})
+    return replace(equations[0], **{name: sum(getattr(one, name) for one in equations) for name in names})
 
 
 def _reduced_equations(
-    sums: Sequence[NormalEquations],
-    free: tuple[FreeParameter, ...],
-    at: list[np.ndarray],
-    damping: float,
-    held: np.ndarray | None = None,
+    t: NormalEquations, free: Sequence[FreeParameter], at: list[np.ndarray], damping: float, held: np.ndarray | None = None
 ) -> tuple[np.ndarray, ...]:
     """Eliminate the parameters of single texels from damped normal equations (Schur complement).
 
@@ -511,75 +468,60 @@ def _reduced_equations(
     Returns the matrix (p, p) and right-hand side (p,) of the common parameters. Of the parameters of single texels it returns
     how they follow the common ones (n, m, p), and their step if these stay (n, m).
     """
-    t = summed_equations(sums)
     m = t.texel_gradient.shape[1]
     a = t.common + damping * np.diag(np.diag(t.common)) + 1e-12 * (1.0 + np.trace(t.common)) * np.eye(len(t.common))
     if not m:
         return a, t.common_gradient, np.zeros((0, 0, len(a))), np.zeros((0, 0))
-    loads = np.einsum("nmm->nm", t.texel)
     local = [(item, x) for item, x in zip(free, at, strict=True) if item.per_texel]
     h = t.texel_gradient - TEXEL_PRECISION * np.stack([x - item.to_coordinate(item.resting_value) for item, x in local], axis=1)
-    c, coupling = t.texel + np.einsum("nm,mk->nmk", damping * loads + TEXEL_PRECISION, np.eye(m)), t.coupling
+    loads, coupling = damping * _texel_information(t) + TEXEL_PRECISION, t.coupling
+    c = t.texel + np.einsum("nm,mk->nmk", loads, np.eye(m))
     if held is not None:
         moves = ~held
         h, coupling = t.texel_gradient * moves, coupling * moves[:, :, None]
         c = np.where(moves[:, :, None] & moves[:, None], c, np.eye(m))
     follow, alone = np.linalg.solve(c, coupling), np.linalg.solve(c, h[:, :, None])[:, :, 0]
-    return (
-        a - np.einsum("nmp,nmq->pq", coupling, follow),
-        t.common_gradient - np.einsum("nmp,nm->p", coupling, alone),
-        follow,
-        alone,
-    )
+    a, rhs = a - np.einsum("nmp,nmq->pq", coupling, follow), t.common_gradient - np.einsum("nmp,nm->p", coupling, alone)
+    return a, rhs, follow, alone
 
 
-def _solved_step(
-    sums: Sequence[NormalEquations],
-    free: tuple[FreeParameter, ...],
+def _after_step(
+    total: NormalEquations,
+    free: Sequence[FreeParameter],
     at: list[np.ndarray],
     damping: float,
     whole: NormalEquations | None = None,
 ) -> list[np.ndarray]:
-    """Solve damped normal equations; a step for each free parameter, in its coordinate.
+    """Coordinates after a step that solves damped normal equations, inside the bounds; steps of logarithms are limited.
 
     With the equations of the `whole` of the trials there is no step in directions, and of parameters of single texels, about
     which these equations have too little information.
     """
-    held = None if whole is None else _texel_information(sums) <= LEAST_INFORMATION * _texel_information([whole])
-    a, rhs, follow, alone = _reduced_equations(sums, free, at, damping, held)
+    held = None if whole is None else _texel_information(total) <= LEAST_INFORMATION * _texel_information(whole)
+    a, rhs, follow, alone = _reduced_equations(total, free, at, damping, held)
     if whole is None:
         common = np.linalg.lstsq(a, rhs, rcond=1e-13)[0]
     else:
-        share, along = _information_shares(a, _reduced_equations([whole], free, at, 0.0, held)[0])
+        # The directions are those in which the information of the whole is one, and that of these equations its share.
+        known = _reduced_equations(whole, free, at, 0.0, held)[0]
+        inverse = np.linalg.inv(np.linalg.cholesky(known + 1e-10 * np.diag(np.diag(known)) + 1e-300 * np.eye(len(known))))
+        share, turned = np.linalg.eigh(inverse @ a @ inverse.T)
+        along = inverse.T @ turned
         weight = np.where(share > LEAST_INFORMATION, 1.0 / np.maximum(share, LEAST_INFORMATION), 0.0)
         common = along @ (weight * (along.T @ rhs))
-    own = alone - follow @ common
-    step: list[np.ndarray] = []
-    p = q = 0
-    for item in free:
-        if item.per_texel:
-            step.append(own[:, q])
-            q += 1
-        else:
-            step.append(common[p])
-            p += 1
-    return step
+    shared, own = iter(common), iter((alone - follow @ common).T)
+    moved = []
+    for x, item in zip(at, free, strict=True):
+        change = next(own if item.per_texel else shared)
+        if item.log:
+            change = np.clip(change, -LARGEST_LOG_STEP, LARGEST_LOG_STEP)
+        moved.append(item.to_coordinate(item.from_coordinate(x + change)))
+    return moved
 
 
-def _texel_information(sums: Sequence[NormalEquations]) -> np.ndarray:
+def _texel_information(equations: NormalEquations) -> np.ndarray:
     """Information about each parameter of each texel, (n, m) float."""
-    found: np.ndarray = np.einsum("nmm->nm", sum(one.texel for one in sums))
-    return found
-
-
-def _information_shares(a: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Share of the information of all trials, `known`, that `a` has in each of p directions, and the directions as columns.
-
-    `known` is one in each direction.
-    """
-    inverse = np.linalg.inv(np.linalg.cholesky(known + 1e-10 * np.diag(np.diag(known)) + 1e-300 * np.eye(len(known))))
-    share, turned = np.linalg.eigh(inverse @ a @ inverse.T)
-    return share, inverse.T @ turned
+    return np.diagonal(equations.texel, axis1=1, axis2=2)
 
 
 def cross_fitted(found: Fit, views: Sequence[TrialView], seen: Sequence[np.ndarray]) -> list[np.ndarray]:
@@ -599,36 +541,25 @@ def cross_fitted(found: Fit, views: Sequence[TrialView], seen: Sequence[np.ndarr
     """
     if found.equations is None or not found.free:
         return list(seen)
-    free, at = found.free, [item.to_coordinate(value_of(found.model, item)) for item in found.free]
-    whole_sum = summed_equations(all_equations(found.equations))
+    free, at = found.free, coordinates_of(found.model, found.free)
+    whole = summed_equations([one for trial in found.equations for one in trial])
+    stretches = [view.stretches(residual) for view, residual in zip(views, seen, strict=True)]
     out = [residual.copy() for residual in seen]
     for fold in (0, 1):
-        sums = [one for trial in found.equations for i, one in enumerate(trial) if i % 2 != fold]
-        before = sum(one.sse for one in sums) + _prior_penalty(free, at)
-        tried, damping = list(seen), 1e-6
+        total = summed_equations([one for trial in found.equations for one in trial[1 - fold :: 2]])
+        before, damping = total.sse + _prior_penalty(free, at), 1e-6
         for _ in range(3):
-            moved = _point_after(at, free, _solved_step(sums, free, at, damping, whole_sum))
-            model = with_values(found.model, free, [item.from_coordinate(x) for item, x in zip(free, moved, strict=True)])
+            moved = _after_step(total, free, at, damping, whole)
+            model = with_coordinates(found.model, free, moved)
             residuals = [view.residual(model) for view in views]
-            if _squares_of_fold(views, residuals, 1 - fold) + _prior_penalty(free, moved) <= before * (1.0 + 1e-9):
-                tried = residuals
+            fitted = [r[part] for r, parts in zip(residuals, stretches, strict=True) for part in parts[1 - fold :: 2]]
+            if sum(map(_sum_of_squares, fitted)) + _prior_penalty(free, moved) <= before * (1.0 + 1e-9):
+                for unseen, r, parts in zip(out, residuals, stretches, strict=True):
+                    for part in parts[fold::2]:
+                        unseen[part] = r[part]
                 break
             damping = max(1e-2, 30.0 * damping)
-        for view, r, whole in zip(views, tried, out, strict=True):
-            for i, part in enumerate(view.stretches(r)):
-                if i % 2 == fold:
-                    whole[part] = r[part]
     return out
-
-
-def _squares_of_fold(views: Sequence[TrialView], residuals: Sequence[np.ndarray], fold: int) -> float:
-    """Sum of squares of every other stretch, beginning with the first or the second."""
-    return sum(
-        _sum_of_squares(r[part])
-        for view, r in zip(views, residuals, strict=True)
-        for i, part in enumerate(view.stretches(r))
-        if i % 2 == fold
-    )
 
 
 def _sum_of_squares(residual: np.ndarray) -> float:
@@ -647,22 +578,20 @@ def free_base_parameters(parameters: SensorParameters, wanted: Sequence[str], fu
     full : float
         Range of the readings, in the sensor's unit.
     """
-    p, made = parameters, []
-    for name in wanted:
-        value = float(getattr(p, "mus" if name == FRICTION_LEVEL else name))
+
+    def free(name: str) -> FreeParameter:
+        if name == FRICTION_LEVEL:
+            return FreeParameter(BASE, "mus", 1e-3, 20.0, scale=0.1, tied=("mud",))
+        value = float(getattr(parameters, name))
         if name in ("k", "sigma0", "x0"):
-            made.append(FreeParameter(-1, name, value * 1e-5, value * 1e5, log=True))
-        elif name == "cn":
-            made.append(FreeParameter(-1, name, 0.0, 10.0 * p.k, scale=0.01 * p.k))
-        elif name == "gain":
-            size = abs(value)
-            made.append(FreeParameter(-1, name, -1e6 * size, 1e6 * size, scale=size))
-        elif name == "zero":
-            made.append(FreeParameter(-1, name, -100 * full - abs(value), 100 * full + abs(value), scale=full))
-        elif name == FRICTION_LEVEL:
-            made.append(FreeParameter(-1, "mus", 1e-3, 20.0, scale=0.1, tied=("mud",)))
-        elif name in ("mus", "mud"):
-            made.append(FreeParameter(-1, name, 0.0, 20.0, scale=0.1))
-        else:
-            made.append(FreeParameter(-1, name, 0.0, 1e6, scale=max(value, 1e-3)))
-    return made
+            return FreeParameter(BASE, name, value * 1e-5, value * 1e5, log=True)
+        low, high, scale = {
+            "cn": (0.0, 10.0 * parameters.k, 0.01 * parameters.k),
+            "gain": (-1e6 * abs(value), 1e6 * abs(value), abs(value)),
+            "zero": (-100 * full - abs(value), 100 * full + abs(value), full),
+            "mus": (0.0, 20.0, 0.1),
+            "mud": (0.0, 20.0, 0.1),
+        }.get(name, (0.0, 1e6, max(value, 1e-3)))
+        return FreeParameter(BASE, name, low, high, scale=scale)
+
+    return list(map(free, wanted))

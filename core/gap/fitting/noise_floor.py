@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -80,31 +81,24 @@ def reading_noise(predictors: Sequence[Predictor], full: float) -> ChannelNoise:
     full : float
         Range of the readings; smaller noise than a ten-thousandth of it is taken as that.
     """
-    variances: list[float] = []
-    weights: list[float] = []
-    curves: list[np.ndarray] = []
-    for predictor in predictors:
-        for part in _unloaded_parts(predictor):
-            if part.shape[1]:
-                variance, curve, known = _variance_and_autocovariance(part)
-                variances += list(variance)
-                weights += list(known)
-                curves.append(curve * known.sum())
+    parts = [_variance_and_autocovariance(part) for predictor in predictors for part in _unloaded_parts(predictor)]
+    values, weight = (np.concatenate([np.zeros(0), *(part[i] for part in parts)]) for i in (0, 2))
     smallest = SMALLEST_NOISE * full
-    alive = np.array(variances) > smallest**2
-    if alive.sum() >= 1:
-        values, weight = np.array(variances)[alive], np.array(weights)[alive]
+    alive = values > smallest**2
+    if alive.any():
+        values, weight = values[alive], weight[alive]
         order = np.argsort(values)
         share = (np.cumsum(weight[order]) - 0.5 * weight[order]) / weight.sum()
         middle = np.interp(0.5, share, values[order])
+        curves = [curve * known.sum() for _, curve, known in parts]
         return ChannelNoise(float(np.sqrt(middle)), integral_time(curves), "stretches without load")
-    deviation = _median_deviation([p.trial.reading for p in predictors if p.trial.reading is not None])
+    deviation = _white_noise_deviation([p.trial.reading for p in predictors if p.trial.reading is not None])
     return ChannelNoise(max(deviation, smallest), 1.0, "differences between samples")
 
 
 def force_noise(predictors: Sequence[Predictor], full: float) -> ChannelNoise:
     """Measure the noise of the force sensor from second differences: there is no other channel to compare with."""
-    deviation = _median_deviation([p.trial.force for p in predictors if p.trial.force is not None])
+    deviation = _white_noise_deviation([p.trial.force for p in predictors if p.trial.force is not None])
     return ChannelNoise(max(deviation, SMALLEST_NOISE * full), 1.0, "differences between samples")
 
 
@@ -114,8 +108,7 @@ def _unloaded_parts(predictor: Predictor) -> list[np.ndarray]:
     if reading is None:
         return []
     free = [(a, b) for a, b in runs(~pressed.any(axis=1)) if b - a >= SHORTEST_STRETCH]
-    parts = [reading[a:b][:, ~pressed[a:b].any(axis=0)] for a, b in (*free, (0, len(pressed)))]
-    return [part[:, np.isfinite(part).sum(axis=0) >= SHORTEST_STRETCH] for part in parts]
+    return [reading[a:b][:, ~pressed[a:b].any(axis=0)] for a, b in (*free, (0, len(pressed)))]
 
 
 def _variance_and_autocovariance(part: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -158,8 +151,7 @@ def _about_lines(part: np.ndarray) -> np.ndarray:
     t = np.linspace(-1.0, 1.0, len(part))[:, None]
     t = np.where(known, t - (t * known).sum(axis=0) / count, 0.0)
     part = part - np.nansum(part, axis=0) / count
-    result: np.ndarray = part - t * np.nansum(t * part, axis=0) / (t * t).sum(axis=0)
-    return result
+    return part - t * np.nansum(t * part, axis=0) / (t * t).sum(axis=0)
 
 
 def _common_mode(part: np.ndarray) -> np.ndarray:
@@ -190,22 +182,17 @@ def integral_time(curves: list[np.ndarray]) -> float:
     return float(max(1.0, 1.0 + 2.0 * correlation[1:last].sum()))
 
 
-def _white_noise_deviation(values: np.ndarray) -> np.ndarray:
-    """Standard deviation of white noise in each column (c,), on top of any smooth signal; NaN if too few values are known."""
-    second = values[2:] - 2.0 * values[1:-1] + values[:-2]
-    deviations = np.full(values.shape[1], np.nan)
-    for column, changes in enumerate(np.abs(second).T):
-        known = changes[np.isfinite(changes)]
+def _white_noise_deviation(values: Sequence[np.ndarray]) -> float:
+    """Median, over columns of arrays (T, c), of the standard deviation of white noise on top of any smooth signal; 0 if in no
+    column enough values are known.
+    """
+    deviations = []
+    for column in (column for array in values for column in array.T):
+        second = column[2:] - 2.0 * column[1:-1] + column[:-2]
+        known = np.abs(second[np.isfinite(second)])
         if len(known) >= LEAST_DIFFERENCES:
-            deviations[column] = MAD_TO_DEVIATION * np.median(known) / np.sqrt(6.0)
-    return deviations
-
-
-def _median_deviation(values: Sequence[np.ndarray]) -> float:
-    """Median of the deviations of all columns of which enough values are known; 0 if there are none."""
-    deviations = np.concatenate([np.zeros(0), *map(_white_noise_deviation, values)])
-    known = deviations[np.isfinite(deviations)]
-    return float(np.median(known)) if len(known) else 0.0
+            deviations.append(MAD_TO_DEVIATION * np.median(known) / np.sqrt(6.0))
+    return float(np.median(deviations)) if deviations else 0.0
 
 
 @dataclass(frozen=True)
@@ -275,7 +262,8 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
         where = predictor.trial.session or id(predictor)  # the sensor remembers the cycles of a whole session
         cycles[where] = cycles.get(where, 0) + _cycle_count(total, max(UNLOADED_SHARE * full, band))
         slides |= bool(s.slide_speed.max(initial=0.0) > LEAST_SLIDING_SPEED)
-    quick = np.concatenate(speeds) if speeds else np.zeros(0)
+    quick, centre = np.concatenate(speeds), np.concatenate(centres)
+    mostly_touched = bool(touched.mean() > MOST_OF_THE_TEXELS)
     spread = float(np.quantile(quick, 0.9) / np.quantile(quick, 0.1)) if len(quick) > 4 else 1.0
     return Coverage(
         touched_share=float(touched.mean()),
@@ -285,7 +273,7 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
         cycles=max(cycles.values()),
         slides=slides,
         unloaded_share=rest,
-        load_moves=_load_moves(np.concatenate(centres), texels.area, touched),
+        load_moves=mostly_touched or len(centre) == 0 or bool(np.ptp(centre, axis=0).max() > np.sqrt(np.median(texels.area))),
         held_load_ratio=max(levels) / min(levels) if levels else 1.0,
     )
 
@@ -311,7 +299,7 @@ def _without_load_noise(load: np.ndarray, time: np.ndarray) -> tuple[np.ndarray,
         out[i] = at
     out = np.maximum(out, 0.0)
     rate = np.gradient(out, time)
-    for a, b in zip(edges, [*edges[1:], len(load)], strict=True):
+    for a, b in pairwise([*edges, len(load)]):
         if b - a >= SHORTEST_STRETCH:
             t = time[a:b] - time[a:b].mean()
             rate[a:b] = float(t @ load[a:b]) / float(t @ t)
@@ -338,13 +326,6 @@ def _cycle_count(load: np.ndarray, band: float) -> int:
     state = np.where(load > 2.0 * band, 1, np.where(load <= band, 0, -1))
     known = state[state >= 0]
     return int(np.count_nonzero(np.diff(known, prepend=0) > 0))
-
-
-def _load_moves(centre: np.ndarray, area: np.ndarray, touched: np.ndarray) -> bool:
-    """True if the centre of the load (T, 3) moved by more than the width of a texel, or most texels are touched."""
-    if len(centre) == 0 or touched.mean() > MOST_OF_THE_TEXELS:
-        return True
-    return float(np.ptp(centre, axis=0).max()) > float(np.sqrt(np.median(area)))
 
 
 MEASURED_REPEATS = "measured repeats"
@@ -382,10 +363,9 @@ def with_repeats(noise: ChannelNoise, predictors: Sequence[Predictor], part: str
         if len(members) < 2:
             continue
         scatter = _scatter(members, part, name)
-        good = np.isfinite(scatter)
-        values = np.where(good, scatter, 0.0)
+        values = np.where(np.isfinite(scatter), scatter, 0.0)
         square += float((values**2).sum())
-        count += int(good.sum())
+        count += int(np.isfinite(scatter).sum())
         for lag in range(min(AUTOCOVARIANCE_LAGS, values.shape[1] // 4 + 1)):
             curve[lag] += float((values[:, : values.shape[1] - lag] * values[:, lag:]).sum())
     deviation = float(np.sqrt(square / count)) if count else 0.0
@@ -408,8 +388,7 @@ def _scatter(members: Sequence[Predictor], part: str, name: str) -> np.ndarray:
                 "name only recordings of the same stimulus, begun at the same moment of it."
             )
     values = np.array([_at(clock, one, getattr(one.trial, part)) for one in members])
-    scatter: np.ndarray = (values - values.mean(axis=0)) * np.sqrt(len(members) / (len(members) - 1.0))
-    return scatter
+    return (values - values.mean(axis=0)) * np.sqrt(len(members) / (len(members) - 1.0))
 
 
 def _at(clock: np.ndarray, one: Predictor, values: np.ndarray) -> np.ndarray:

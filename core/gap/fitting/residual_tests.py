@@ -58,23 +58,17 @@ def residual_structure(predictors: Sequence[Predictor], residuals: Sequence[np.n
     residuals : sequence of (T, n) float
         In units of the noise; zero if a value is missing.
     """
-    if len(predictors) == 1:  # the halves of a single trial serve as two trials
-        predictors, residuals, halves = [predictors[0]] * 2, [residuals[0]] * 2, True
-    else:
-        halves = False
     found = [features(predictor, residual) for predictor, residual in zip(predictors, residuals, strict=True)]
     sizes = {name: len(columns) for groups in found for name, columns in groups.items()}
-    parts, sums = [], []
-    for number, (predictor, groups, residual) in enumerate(zip(predictors, found, residuals, strict=True)):
-        table = _table(groups, sizes, residual.shape)
+    sums = []
+    for predictor, groups, residual in zip(predictors, found, residuals, strict=True):
+        # A group that only other trials have is zero, such as depth beside no contact.
+        table = np.concatenate([groups.get(name, np.zeros((size, *residual.shape))) for name, size in sizes.items()])
         table[:, ~known_readings(predictor)] = 0.0
-        part = slice(None)
-        if halves:
-            middle = len(residual) // 2
-            part = slice(None, middle) if number == 0 else slice(middle, None)
-        x, r = table[:, part].reshape(len(table), -1), residual[part].ravel()
-        parts.append(residual[part])
-        sums.append((x @ x.T, x @ r, float(r @ r)))
+        middle = len(residual) // 2  # the halves of a single trial serve as two trials
+        for part in [slice(None)] if len(predictors) > 1 else [slice(None, middle), slice(middle, None)]:
+            x, r = table[:, part].reshape(len(table), -1), residual[part].ravel()
+            sums.append((x @ x.T, x @ r, float(r @ r)))
     total = sum(square for _, _, square in sums)
     if total <= 0:
         return ResidualStructure(0.0, dict.fromkeys(sizes, 0.0))
@@ -83,26 +77,16 @@ def residual_structure(predictors: Sequence[Predictor], residuals: Sequence[np.n
         shares[name] = _share_predicted(sums, np.arange(start, start + size))
         start += size
     everything = _share_predicted(sums, np.arange(start))
-    if residuals[0].shape[1] > 1 and not halves:
-        shares["texel"] = _share_predicted_by_texel(predictors, parts, total)
-        everything = 1.0 - (1.0 - max(everything, 0.0)) * (1.0 - max(shares["texel"], 0.0))
-    return ResidualStructure(max(everything, *shares.values(), 0.0), {name: max(share, 0.0) for name, share in shares.items()})
-
-
-def _table(groups: dict[str, np.ndarray], sizes: dict[str, int], shape: tuple[int, ...]) -> np.ndarray:
-    """Features of one trial (p, T, n); zero for a group that only other trials have, such as depth beside no contact."""
-    return np.concatenate([groups.get(name, np.zeros((size, *shape))) for name, size in sizes.items()])
+    if residuals[0].shape[1] > 1 and len(predictors) > 1:
+        shares["texel"] = _share_predicted_by_texel(predictors, residuals, total)
+        everything = 1.0 - (1.0 - everything) * (1.0 - shares["texel"])
+    return ResidualStructure(max(everything, *shares.values()), shares)
 
 
 def _share_predicted(sums: list[tuple[np.ndarray, np.ndarray, float]], use: np.ndarray) -> float:
-    """Share of the squares that a ridge regression on some features predicts in folds that it has not seen.
-
-    Parameters
-    ----------
-    sums : list of ((p, p) float, (p,) float, float)
-        Of each fold: products of the features with each other and with the residual, and the squares of the residual.
-    use : (f,) int
-        Features.
+    """Share of the squares that a ridge regression on some features predicts in folds that it has not seen; never below 0.
+    `sums` are, for each fold, the products of the features with each other (p, p) and with the residual (p,), and the squares
+    of the residual; `use` (f,) are indices of features.
     """
     grams, products, squares = zip(*((a[np.ix_(use, use)], b[use], square) for a, b, square in sums), strict=True)
     whole, along, left = sum(grams), sum(products), sum(squares)
@@ -110,27 +94,25 @@ def _share_predicted(sums: list[tuple[np.ndarray, np.ndarray, float]], use: np.n
         seen = whole - a
         weights = np.linalg.solve(seen + np.diag(1e-3 * np.diag(seen) + 1e-9 * (1.0 + np.trace(seen))), along - b)
         left += float(weights @ a @ weights - 2.0 * weights @ b)
-    return 1.0 - left / sum(squares)
+    return max(1.0 - left / sum(squares), 0.0)
 
 
 def _share_predicted_by_texel(predictors: Sequence[Predictor], residuals: Sequence[np.ndarray], total: float) -> float:
     """The same for a constant and a gain of each texel."""
-    parts = []
-    for predictor, r in zip(predictors, residuals, strict=True):
-        known = known_readings(predictor).astype(float)
-        d = relative_load(predictor.stimulus) * known
-        parts.append(np.stack([known.sum(axis=0), d.sum(axis=0), (d * d).sum(axis=0), r.sum(axis=0), (d * r).sum(axis=0)]))
-    left = 0.0
-    for i, (predictor, r) in enumerate(zip(predictors, residuals, strict=True)):
-        one, d1, d2, r1, rd = sum(p for j, p in enumerate(parts) if j != i)
+    known = [known_readings(predictor) for predictor in predictors]
+    loads = [relative_load(predictor.stimulus) * k for predictor, k in zip(predictors, known, strict=True)]
+    parts, left = [], 0.0
+    for k, d, r in zip(known, loads, residuals, strict=True):
+        parts.append(np.stack([table.sum(axis=0) for table in (k.astype(float), d, d * d, r, d * r)]))
+    for i, (k, d, r) in enumerate(zip(known, loads, residuals, strict=True)):
+        one, d1, d2, r1, rd = sum(parts[:i] + parts[i + 1 :])
         # Ridge regression: texels that were hardly loaded get small coefficients.
         one, d2 = one * 1.01 + 1.0, d2 * 1.01 + 1.0
         det = one * d2 - d1 * d1
         offset, gain = (d2 * r1 - d1 * rd) / det, (one * rd - d1 * r1) / det
-        miss = r - offset - gain * relative_load(predictor.stimulus)
-        miss[~known_readings(predictor)] = 0.0
+        miss = np.where(k, r - offset - gain * d, 0.0)
         left += float(np.vdot(miss, miss))
-    return 1.0 - left / total
+    return max(1.0 - left / total, 0.0)
 
 
 # Heteroscedastic noise: noise whose standard deviation is proportional to the reading, which no fit can explain.
@@ -202,14 +184,7 @@ def _correlations(size: np.ndarray, residual: np.ndarray, loaded: np.ndarray) ->
     """Correlations of the residual (T, n) at large readings with the sample before, and between texels.
 
     They are of residuals in units of the local reading, so that a few large ones do not decide. At small readings the noise at
-    rest would hide what a model lacks.
-
-    Parameters
-    ----------
-    size : (T, n) float
-        Magnitude of the predicted readings, in units of the noise.
-    residual : (T, n) float
-    loaded : (T, n) bool
+    rest would hide what a model lacks. `size` (T, n) is the magnitude of the predicted readings, in units of the noise.
     """
     large = loaded & (size > np.quantile(size[loaded], LARGE_QUANTILE)) if loaded.any() else loaded
     unit = np.where(large, residual / np.maximum(size, 1.0), 0.0)
@@ -285,6 +260,8 @@ def strongest_line(views: Sequence[TrialView], model: Model) -> SpectralLine | N
         Whole trials.
     model : Model
     """
+    from scipy.special import gammaincc
+
     resting = [one for one in (_unloaded_residual(view, model) for view in views) if one is not None]
     if not resting:
         return None
@@ -300,16 +277,14 @@ def strongest_line(views: Sequence[TrialView], model: Model) -> SpectralLine | N
         resampled[indices] = values
         powers.append((np.abs(np.fft.rfft(resampled, axis=0)) ** 2).sum(axis=1) / max(float(known.sum()), 1.0))
     usable = slice(LINE_HALF_WIDTH + 1, len(powers[0]) - 2)
-    levels = [_noise_level(power) for power in powers]
-    ratio = np.sum([power / level for power, level in zip(powers, levels, strict=True)], axis=0)[usable]
+    ratios = [power / _noise_level(power) for power in powers]
+    ratio = np.sum(ratios, axis=0)[usable]
     if len(ratio) < 2 * NEIGHBOUR_FREQUENCIES:
         return None
     peak = int(np.argmax(ratio)) + usable.start
-    around = slice(peak - 1, peak + 2)
-    in_all_trials = all(
-        float((power[around] / level[around]).max()) > LEAST_PROMINENCE for power, level in zip(powers, levels, strict=True)
-    )
-    if not in_all_trials or _false_alarm_probability(float(ratio.max()), len(powers)) * len(ratio) > FALSE_ALARM:
+    in_all_trials = all(one[peak - 1 : peak + 2].max() > LEAST_PROMINENCE for one in ratios)
+    by_chance = gammaincc(len(powers), ratio.max())  # that a sum of exponential values of mean one is larger than this
+    if not in_all_trials or by_chance * len(ratio) > FALSE_ALARM:
         return None
     near = (peak + np.linspace(-SEARCH_WIDTH, SEARCH_WIDTH, SEARCH_POINTS)) / (length * step)
     best = max((_line_at(resting, float(f), views[0].noise[0]) for f in near), key=lambda line: line.share)
@@ -336,15 +311,7 @@ def _noise_level(power: np.ndarray) -> np.ndarray:
     wide = np.pad(power, NEIGHBOUR_FREQUENCIES, mode="reflect")
     windows = np.lib.stride_tricks.sliding_window_view(wide, 2 * NEIGHBOUR_FREQUENCIES + 1)
     kept = np.abs(np.arange(-NEIGHBOUR_FREQUENCIES, NEIGHBOUR_FREQUENCIES + 1)) > LINE_HALF_WIDTH
-    level: np.ndarray = np.maximum(np.median(windows[:, kept], axis=1) / np.log(2.0), 1e-300)
-    return level
-
-
-def _false_alarm_probability(total: float, trials: int) -> float:
-    """Probability that the sum of so many exponential values of mean one is larger than `total`."""
-    from scipy.special import gammaincc
-
-    return float(gammaincc(trials, total))
+    return np.maximum(np.median(windows[:, kept], axis=1) / np.log(2.0), 1e-300)
 
 
 def _line_at(resting: list[UnloadedResidual], frequency: float, noise: float) -> SpectralLine:

@@ -15,13 +15,18 @@ from ...geometry.shapes import box_entry, is_in_box, is_in_sphere, sphere_entry
 Contact = tuple[np.ndarray, np.ndarray, np.ndarray, int]
 
 
-def sphere_contact(center: np.ndarray, radius: float, position: np.ndarray, outward: np.ndarray, reach: float) -> Contact:
-    """Return the contact of texels with a sphere.
+def shape_contact(
+    center: np.ndarray, quaternion: np.ndarray, size: np.ndarray, position: np.ndarray, outward: np.ndarray, reach: float
+) -> Contact:
+    """Return the contact of texels with a sphere or a box.
 
     Parameters
     ----------
     center : (T, 3) float, metres
-    radius : float, metres
+    quaternion : (T, 4) float
+        Orientation of the shape, (w, x, y, z).
+    size : (1,) or (3,) float, metres
+        Radius of a sphere, or half of the edges of a box.
     position, outward : (n, 3) float
         Texels and their unit normals.
     reach : float, metres
@@ -37,37 +42,11 @@ def sphere_contact(center: np.ndarray, radius: float, position: np.ndarray, outw
     overpressed : int
         Most texels at once whose segment begins inside the indenter.
     """
-    straight = np.tile(np.eye(3), (len(center), 1, 1))
-    return _contact(center, straight, np.array([radius], float), position, outward, reach)
-
-
-def box_contact(
-    center: np.ndarray, quaternion: np.ndarray, edges: np.ndarray, position: np.ndarray, outward: np.ndarray, reach: float
-) -> Contact:
-    """Return the contact of texels with a box: intersection of a segment with three pairs of planes.
-
-    Parameters
-    ----------
-    center : (T, 3) float, metres
-    quaternion : (T, 4) float
-        Orientation of the box, (w, x, y, z).
-    edges : (3,) float, metres
-        Full sizes of the box.
-    position, outward, reach
-        As in :func:`sphere_contact`, like the returns.
-    """
-    return _contact(center, rotation_matrices(quaternion), 0.5 * np.asarray(edges, float), position, outward, reach)
-
-
-def _contact(
-    center: np.ndarray, frame: np.ndarray, size: np.ndarray, position: np.ndarray, outward: np.ndarray, reach: float
-) -> Contact:
-    """Contact of texels with a shape (see :func:`meet`)."""
     shape = (len(center), *position.shape)
     contact = np.zeros(shape[:2]), np.broadcast_to(-outward, shape).copy(), np.broadcast_to(position, shape).copy()
     # Contiguous arrays, so that the kernel is compiled only once.
-    arrays = (np.ascontiguousarray(values, dtype=float) for values in (center, frame, size, position, outward))
-    return *contact, int(meet(*arrays, float(reach), contact))
+    arrays = (center, rotation_matrices(quaternion), size, position, outward)
+    return *contact, int(meet(*(np.ascontiguousarray(one, dtype=float) for one in arrays), float(reach), contact))
 
 
 @kernel

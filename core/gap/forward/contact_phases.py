@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from .predictor import Predictor
@@ -22,8 +24,7 @@ SLIDING_SPEED = 2e-4
 def relative_load(stimulus: Stimulus) -> np.ndarray:
     """Return the load of each texel, depth or force, as a share of the largest in the trial, (T, n) float."""
     load = stimulus.load
-    shares: np.ndarray = load / max(float(load.max(initial=0.0)), 1e-300)
-    return shares
+    return load / max(float(load.max(initial=0.0)), 1e-300)
 
 
 def hold_rate_limit(rate: np.ndarray) -> float:
@@ -34,9 +35,9 @@ def hold_rate_limit(rate: np.ndarray) -> float:
     rate : float, 1/s
         Rates of the load, as a share of the largest load.
     """
-    return (
-        float(np.clip(HOLD_RATE_SHARE * np.quantile(np.abs(rate), 0.99), ROUNDING_RATE, HOLD_RATE)) if rate.size else HOLD_RATE
-    )
+    if not rate.size:
+        return HOLD_RATE
+    return float(np.clip(HOLD_RATE_SHARE * np.quantile(np.abs(rate), 0.99), ROUNDING_RATE, HOLD_RATE))
 
 
 def phase_indices(stimulus: Stimulus) -> np.ndarray:
@@ -45,14 +46,14 @@ def phase_indices(stimulus: Stimulus) -> np.ndarray:
     rate = np.gradient(load, stimulus.time, axis=0)
     still = hold_rate_limit(rate[load > 0]) * np.maximum(load.max(axis=0, keepdims=True), 1e-12)
     touching = load > 0
-    before = ~np.maximum.accumulate(touching, axis=0)
-    found = np.full(load.shape, PHASES.index("released"))
-    found[before] = PHASES.index("approach")
-    found[touching] = PHASES.index("hold")
-    found[touching & (rate > still)] = PHASES.index("loading")
-    found[touching & (rate < -still)] = PHASES.index("unloading")
-    found[touching & (np.abs(rate) <= 5 * still) & (stimulus.slide_speed > SLIDING_SPEED)] = PHASES.index("sliding")
-    return found
+    first_of = {
+        "sliding": touching & (np.abs(rate) <= 5 * still) & (stimulus.slide_speed > SLIDING_SPEED),
+        "unloading": touching & (rate < -still),
+        "loading": touching & (rate > still),
+        "hold": touching,
+        "approach": ~np.maximum.accumulate(touching, axis=0),
+    }
+    return np.select(list(first_of.values()), list(map(PHASES.index, first_of)), PHASES.index("released"))
 
 
 CONSTANT_LOAD = 1e-9
@@ -103,9 +104,8 @@ def features(predictor: Predictor, residual: np.ndarray) -> dict[str, np.ndarray
     residual : (T, n) float
         Used for the last two groups, which contain the residual of the other texels.
     """
-    s = predictor.stimulus
+    s, time = predictor.stimulus, predictor.stimulus.time
     d = relative_load(s)
-    time = s.time
     rate = np.gradient(d, time, axis=0)
     rate /= max(float(np.abs(rate).max(initial=0.0)), 1e-300)
     touching = d > 0
@@ -119,10 +119,7 @@ def features(predictor: Predictor, residual: np.ndarray) -> dict[str, np.ndarray
     groups = {
         "depth": [d, d**2, d**3, touching.astype(float)],
         "rate and direction": [rate, np.abs(rate), d * falling, d**2 * falling, np.abs(rate) ** 0.3 * np.sign(rate)],
-        "time since contact": [
-            *(d * np.exp(-since / tau) for tau in RELAXATION_TIMES),
-            np.exp(-since) * touching,
-        ],
+        "time since contact": [*(d * np.exp(-since / tau) for tau in RELAXATION_TIMES), np.exp(-since) * touching],
         "history": [top - d, (top - d) * touching, top**2 - d**2, done * d, done],
         "clock": [clock, clock**2, clock * d],
     }
@@ -130,28 +127,20 @@ def features(predictor: Predictor, residual: np.ndarray) -> dict[str, np.ndarray
         del groups["depth"]
     if predictor.trial.reading is None and s.slip is not None:
         groups |= _sliding_features(s.slip, time, d.shape)
-    n = d.shape[1]
-    if n > 1:
+    if d.shape[1] > 1:
         around = _neighbour_load(predictor, d)
-        groups["neighbours"] = [around - d, around * (d > 0), np.broadcast_to(d.mean(axis=1, keepdims=True), d.shape)]
+        groups["neighbours"] = [around - d, around * touching, np.broadcast_to(d.mean(axis=1, keepdims=True), d.shape)]
         # A missing reading is no residual of zero: it is no other texel either.
         known = known_readings(predictor).astype(float)
         others = (residual.sum(axis=1, keepdims=True) - residual) / np.maximum(known.sum(axis=1, keepdims=True) - known, 1.0)
         groups["common mode"] = [others]
-        shared = [_pattern_of_others(residual, shape, known) for shape in (d, rate)]
-        groups["shared by loaded texels"] = shared
+        groups["shared by loaded texels"] = [_pattern_of_others(residual, shape, known) for shape in (d, rate)]
     return {name: np.stack(columns) for name, columns in groups.items()}
 
 
 def _sliding_features(slip: np.ndarray, time: np.ndarray, shape: tuple[int, ...]) -> dict[str, list[np.ndarray]]:
-    """Speed in the main direction of sliding, and travel since that speed last changed its sign.
-
-    Parameters
-    ----------
-    slip : (T, n, 3) float, m/s
-    time : (T,) float, s
-    shape : (int, int)
-        Of the features, (T, n).
+    """Speed in the main direction of sliding, and travel since that speed last changed its sign. `slip` (T, n, 3) is in m/s,
+    `time` (T,) in s, and `shape` that of the features, (T, n).
     """
     mean = slip.mean(axis=1)
     _, _, axes = np.linalg.svd(mean, full_matrices=False)
@@ -164,7 +153,7 @@ def _sliding_features(slip: np.ndarray, time: np.ndarray, shape: tuple[int, ...]
     since = way - np.maximum.accumulate(np.where(turned, way, 0.0))
     since /= max(float(since.max()), 1e-300)
     wide = lambda x: np.broadcast_to(x[:, None], shape)  # noqa: E731
-    bands = [wide(sign * ((since >= a) & (since < b))) for a, b in zip(TRAVEL_BANDS[:-1], TRAVEL_BANDS[1:], strict=True)]
+    bands = [wide(sign * ((since >= a) & (since < b))) for a, b in pairwise(TRAVEL_BANDS)]
     return {"sliding": [wide(x) for x in (np.ones(len(sign)), sign, speed / fast, (speed / fast) ** 2)], "turning": bands}
 
 

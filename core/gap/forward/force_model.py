@@ -8,8 +8,7 @@ Whatever depends on one sample alone is computed for all samples in one loop; on
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,10 +26,8 @@ from ...laws.friction import (
 )
 from ...model.sensor import Effect
 from ...model.sensor_parameters import SensorParameters
-from .stimulus import Stimulus, dot
-
-if TYPE_CHECKING:
-    from ..dataset.rig import Rig
+from ..dataset.rig import Rig
+from .stimulus import Stimulus, dot, texel_shares
 
 EQUAL_WITHIN = 1e-9
 """Difference of the means of two texels, as a share of the largest value, up to which they have equal histories."""
@@ -72,14 +69,13 @@ class ContactSamples(NamedTuple):
     time_step: np.ndarray
 
 
-@dataclass(frozen=True)
 class ContactHistory:
-    """Contact of some texels during a trial of T samples; equal texels form a group.
+    """Contact of some points of a rig's surface during a trial of T samples, or of all (`subset` None). Equal points form a
+    group. A sum of forces needs the history `with_samples`.
 
     Attributes
     ----------
     time : (T,) float, s
-    texel_count : int
     touched, group : (p,) int
         Indices of the texels that are ever touched, and the column below to which each of them belongs.
     depth : (T, g) float, m
@@ -91,20 +87,7 @@ class ContactHistory:
         None where no sum of forces is wanted.
     """
 
-    time: np.ndarray
-    texel_count: int
-    touched: np.ndarray
-    group: np.ndarray
-    depth: np.ndarray
-    slide_step: np.ndarray
-    rate: np.ndarray
-    samples: ContactSamples | None
-
-    @classmethod
-    def of(cls, stimulus: Stimulus, subset: np.ndarray | None, rig: Rig, with_samples: bool) -> ContactHistory:
-        """Return the contact history of some points of a rig's surface, or of all (`subset` None); for a sum of forces
-        `with_samples`.
-        """
+    def __init__(self, stimulus: Stimulus, subset: np.ndarray | None, rig: Rig, with_samples: bool):
         load = stimulus.load
         chosen = np.arange(load.shape[1]) if subset is None else subset
         (touched,) = np.nonzero(load[:, chosen].any(axis=0))
@@ -115,12 +98,12 @@ class ContactHistory:
         arrays += [] if stimulus.slip is None else [stimulus.slip]
         first, group = _equal_texels(arrays, touched_texels)
         one = touched_texels[first]
-        share = None if rig.cover is None else rig.cover.share[touched_texels]
-        count = np.bincount(group, share, minlength=len(one)).astype(float)
+        count = np.bincount(group, texel_shares(rig)[touched_texels], minlength=len(one))
         step = np.diff(stimulus.time, prepend=stimulus.time[0])
-        samples = _contact_samples(stimulus, normal, one, count, step) if with_samples else None
+        self.time, self.texel_count, self.touched, self.group = stimulus.time, len(chosen), touched, group
         depth, rate, slide = (values[:, one].copy() for values in (stimulus.depth, stimulus.rate, stimulus.slide_speed))
-        return cls(stimulus.time, len(chosen), touched, group, depth, slide * step[:, None], rate, samples)
+        self.depth, self.rate, self.slide_step = depth, rate, slide * step[:, None]
+        self.samples = _contact_samples(stimulus, normal, one, count, step) if with_samples else None
 
     def force(self, p: SensorParameters, force_effects: Sequence[Effect]) -> np.ndarray:
         """Return normal forces under the contact law and effects on it, (T, c) N; zero without contact.

@@ -157,16 +157,16 @@ class Session:
         """Return the readings of each texel, or of some, (T, n) in the sensor's unit."""
         p = model.parameters
         key = (self._force_key(model, subset), p.gain, p.zero, _effects_key(model.readout_effects))
-        return self._readings.get_or(key, lambda: self._computed_reading(model, subset))
 
-    def _computed_reading(self, model: Model, subset: np.ndarray | None) -> np.ndarray:
-        """Return the readings under effects on the readout."""
-        effects, site = model.readout_effects, replace(self._site, gain=model.parameters.gain, zero=model.parameters.zero)
-        if subset is not None:
-            effects = tuple(_effect_on_texels(effect, subset) for effect in effects)
-            row, column = (None if index is None else index[subset] for index in (site.row, site.column))
-            site = replace(site, position=site.position[subset], area=site.area[subset], row=row, column=column)
-        return readout_chain.readings(effects, site, self.stimulus.time, self.normal_force(model, subset))
+        def compute() -> np.ndarray:
+            effects, site = model.readout_effects, replace(self._site, gain=p.gain, zero=p.zero)
+            if subset is not None:
+                effects = tuple(_effect_on_texels(effect, subset) for effect in effects)
+                row, column = (None if index is None else index[subset] for index in (site.row, site.column))
+                site = replace(site, position=site.position[subset], area=site.area[subset], row=row, column=column)
+            return readout_chain.readings(effects, site, self.stimulus.time, self.normal_force(model, subset))
+
+        return self._readings.get_or(key, compute)
 
     @cached_property
     def _site(self) -> TransducerArray:
@@ -241,7 +241,7 @@ class Session:
         which = None if subset is None else subset.tobytes()
         key = which, _effects_key(model.placing_effects), self._heights(model.recordings)
         sums = subset is None and any(trial.force is not None for trial in self.trials)
-        return self._histories.get_or(key, lambda: ContactHistory.of(self.placed(model), subset, self.rig, sums))
+        return self._histories.get_or(key, lambda: ContactHistory(self.placed(model), subset, self.rig, sums))
 
 
 class Predictor:
@@ -314,20 +314,18 @@ class Predictor:
         Free numbers that the model does not have are those of a specimen of which no recording was fitted. They are computed
         from the recording itself, by least squares.
         """
-        given: list[float | None] = []
-        for word, value in (("factor", self.trial.factor), ("zero", self.trial.zero)):
-            given.append(model.recordings.get(number_name(word, value)) if isinstance(value, str) else value)
-        factor, zero = given
+        factor, zero = (
+            model.recordings.get(number_name(word, value)) if isinstance(value, str) else value
+            for word, value in (("factor", self.trial.factor), ("zero", self.trial.zero))
+        )
         if (factor is None or zero is None) and self.trial.use == "check":
             x, y = predicted[np.isfinite(measured)], measured[np.isfinite(measured)]
             if factor is None:
-                shift = (float(x.mean()), float(y.mean())) if zero is None else (0.0, zero)
-                x, y = x - shift[0], y - shift[1]
-                square = float(x @ x)
-                factor = float(x @ y) / square if square > 0.0 else 1.0
+                from_x, from_y = (x - float(x.mean()), y - float(y.mean())) if zero is None else (x, y - zero)
+                square = float(from_x @ from_x)
+                factor = float(from_x @ from_y) / square if square > 0.0 else 1.0
             if zero is None:
-                good = np.isfinite(measured)
-                zero = float((measured[good] - factor * predicted[good]).mean()) if good.any() else 0.0
+                zero = float((y - factor * x).mean()) if len(y) else 0.0
         return 1.0 if factor is None else factor, 0.0 if zero is None else zero
 
     def with_numbers_of(self, trial: Trial) -> Predictor:

@@ -39,9 +39,8 @@ def check_responses(rig: Rig, stimuli: Sequence[Stimulus]) -> None:
     fitted = [stimulus for stimulus in stimuli if stimulus.trial.use == "fit"]
     touching = [stimulus for stimulus in fitted if (stimulus.load > 0).any()]
     if not touching:
-        first = fitted[0].trial
         files = ", ".join(f"'{stimulus.trial.name}.csv'" for stimulus in fitted[:3]) + (" …" if len(fitted) > 3 else "")
-        raise FileError(f"In {files} of '{rig.name}' {_NO_CONTACT[first.stimulus]}.")
+        raise FileError(f"In {files} of '{rig.name}' {_NO_CONTACT[fitted[0].trial.stimulus]}.")
     if not any(stimulus.trial.changes for stimulus in fitted):
         raise FileError(
             f"No response in the recordings of '{rig.name}' that are to be fitted ever changes: "
@@ -74,8 +73,7 @@ def responses_of(rig: Rig, stimuli: Sequence[Stimulus], part: str) -> list[tuple
 def normal_load(rig: Rig, stimulus: Stimulus) -> np.ndarray:
     """Return the sum of all loads, each along its normal force on the sensor, (T, 3) float."""
     normal = -rig.texels.normal if stimulus.normal is None else stimulus.normal
-    total: np.ndarray = np.sum(stimulus.load[:, :, None] * normal, axis=1)
-    return total
+    return np.sum(stimulus.load[:, :, None] * normal, axis=1)
 
 
 def centred(load: np.ndarray, response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

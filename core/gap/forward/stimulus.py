@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +25,7 @@ from ...model.sensor import Sensor
 from ...solver.simulation import Simulation
 from ..dataset.rig import Rig
 from ..dataset.trial import Trial
-from .closed_form_contact import Contact, box_contact, sphere_contact
+from .closed_form_contact import Contact, shape_contact
 
 PRECISION, WEIGHT_ERROR = 1e-6, 1e-3
 """Relative error of the force that is carried at the height at which an indenter rests: of the search, and at most."""
@@ -140,9 +142,8 @@ def surface_stimulus_of(trial: Trial, rig: Rig, texels: Texels | None = None, he
     texels = rig.surface if texels is None else texels
     if height is None:
         height = trial.height_start if isinstance(trial.contact_height, str) else trial.contact_height
-    if height != 0.0 and trial.stimulus != "force":
-        return replace(_stimulus(_raised(trial, rig, height), rig, texels), trial=trial)
-    return _stimulus(trial, rig, texels)
+    seen = trial if height == 0.0 or trial.stimulus == "force" else _raised(trial, rig, height)
+    return replace(_stimulus(seen, rig, texels), trial=trial)
 
 
 def _raised(trial: Trial, rig: Rig, height: float) -> Trial:
@@ -157,7 +158,6 @@ def _raised(trial: Trial, rig: Rig, height: float) -> Trial:
 
 def _stimulus(trial: Trial, rig: Rig, texels: Texels) -> Stimulus:
     """The stimulus of the texels, at the poses and depths of a trial."""
-    n = len(texels)
     along = None
     if np.ptp(trial.travel, axis=0).any():
         velocity = np.gradient(trial.travel, trial.time, axis=0)
@@ -167,19 +167,30 @@ def _stimulus(trial: Trial, rig: Rig, texels: Texels) -> Stimulus:
     if trial.stimulus == "force" and trial.position is not None and rig.indenter_of(trial) is not None:
         return _weighted(trial, rig, texels, along)
     assert trial.level is not None
-    level = np.repeat(np.maximum(trial.level, 0.0)[:, None], n, axis=1)
-    slip = None if along is None else along * (level > 0)[:, :, None]
-    nothing = np.zeros_like(level)
-    slide = nothing if slip is None else np.sqrt(dot(slip, slip))
+    level = np.repeat(np.maximum(trial.level, 0.0)[:, None], len(texels), axis=1)
     if trial.stimulus == "force":
-        return Stimulus(trial, nothing, nothing, level / _texel_count(rig), None, slide, slip)
+        return _of_forces(trial, level / texel_shares(rig).sum(), None, along)
     rate = np.where(level > 0, np.gradient(trial.level, trial.time)[:, None], 0.0)
-    return Stimulus(trial, level, rate, None, None, slide, slip)
+    return Stimulus(trial, level, rate, None, None, *_slid(along, level))
 
 
-def _texel_count(rig: Rig) -> float:
-    """Number of texels by area that share a force on the whole surface."""
-    return float(len(rig.texels)) if rig.cover is None else float(rig.cover.share.sum())
+def texel_shares(rig: Rig) -> np.ndarray:
+    """Return how many texels, by area, each point of a rig's surface stands for, (m,) float."""
+    return np.ones(len(rig.texels)) if rig.cover is None else rig.cover.share
+
+
+def _of_forces(trial: Trial, load: np.ndarray, normal: np.ndarray | None, along: np.ndarray | None) -> Stimulus:
+    """Stimulus of known forces (T, n)."""
+    nothing = np.zeros_like(load)
+    return Stimulus(trial, nothing, nothing, load, normal, *_slid(along, load))
+
+
+def _slid(along: np.ndarray | None, load: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+    """Speed (T, n) and velocity (T, n, 3) of a surface that slides by itself, where it is loaded."""
+    if along is None:
+        return np.zeros_like(load), None
+    slip = along * (load > 0)[:, :, None]
+    return np.sqrt(dot(slip, slip)), slip
 
 
 def joined_stimuli(stimuli: Sequence[Stimulus], texels: Texels) -> tuple[Stimulus, list[int]]:
@@ -196,48 +207,37 @@ def joined_stimuli(stimuli: Sequence[Stimulus], texels: Texels) -> tuple[Stimulu
     """
     if len(stimuli) == 1:
         return stimuli[0], [0]
-    parts, starts, count = [stimuli[0]], [0], len(stimuli[0].time)
-    for before, after in zip(stimuli[:-1], stimuli[1:], strict=True):
+    parts, starts = [stimuli[0]], [0]
+    for before, after in pairwise(stimuli):
         pause = float(after.time[0] - before.time[-1])
         if pause > LONGEST_SPLIT * max(before.trial.step, after.trial.step):
             ends = [before.time[-1] + min(before.trial.step, pause / 3), after.time[0] - min(after.trial.step, pause / 3)]
-            parts.append(_unloaded(before, np.array(ends)))
-            count += 2
-        starts.append(count)
+            nothing = np.zeros((2, len(texels)))
+            share = None if before.force_share is None else nothing
+            parts.append(Stimulus(replace(before.trial, time=np.array(ends)), nothing, nothing, share, None, nothing, None))
+        starts.append(sum(len(part.time) for part in parts))
         parts.append(after)
-        count += len(after.time)
-    first = stimuli[0]
-    no_slip, no_normal = all(one.slip is None for one in stimuli), all(one.normal is None for one in stimuli)
+    missing = {"normal": -texels.normal, "slip": np.zeros((len(texels), 3))}
 
-    def vectors(name: str, missing: np.ndarray) -> np.ndarray:
-        values = [(getattr(part, name), len(part.time)) for part in parts]
-        return np.concatenate([np.broadcast_to(missing, (n, *missing.shape)) if x is None else x for x, n in values])
+    def joined(name: str) -> np.ndarray | None:
+        values = [getattr(part, name) for part in parts]
+        if all(one is None for one in values):
+            return None
+        shapes = [(len(part.time), len(texels), 3) for part in parts]
+        pairs = zip(values, shapes, strict=True)
+        return np.concatenate([np.broadcast_to(missing[name], shape) if one is None else one for one, shape in pairs])
 
-    joined = Stimulus(
-        trial=replace(first.trial, time=np.concatenate([part.time for part in parts])),
-        depth=np.concatenate([part.depth for part in parts]),
-        rate=np.concatenate([part.rate for part in parts]),
-        force_share=None if first.force_share is None else np.concatenate([part.load for part in parts]),
-        normal=None if no_normal else vectors("normal", -texels.normal),
-        slide_speed=np.concatenate([part.slide_speed for part in parts]),
-        slip=None if no_slip else vectors("slip", np.zeros((len(texels), 3))),
-        overpressed=max(one.overpressed for one in stimuli),
-    )
-    return joined, starts
-
-
-def _unloaded(like: Stimulus, time: np.ndarray) -> Stimulus:
-    """A stimulus of the same kind at some times at which nothing touches the sensor."""
-    nothing = np.zeros((len(time), like.depth.shape[1]))
-    share = None if like.force_share is None else nothing
-    return Stimulus(replace(like.trial, time=time), nothing, nothing, share, None, nothing, None)
+    names = ("depth", "rate", "force_share", "normal", "slide_speed", "slip")
+    arrays: dict[str, Any] = {name: joined(name) for name in names}
+    time = np.concatenate([part.time for part in parts])
+    overpressed = max(one.overpressed for one in stimuli)
+    return replace(stimuli[0], trial=replace(stimuli[0].trial, time=time), overpressed=overpressed, **arrays), starts
 
 
 def _posed(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) -> Stimulus:
     """Stimulus of a trial with a known pose; `along` (T, n, 3) is the velocity of a surface that slides by itself."""
     assert trial.position is not None and trial.quaternion is not None
     reach = rig.parameters.max_penetration
-    limit, deep = reach, 0
     for _ in range(6):
         depth, normal, point, deep = _contact(trial, rig, texels, reach)
         if not deep:
@@ -255,7 +255,7 @@ def _posed(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) -> 
     nothing = np.zeros((0, 0, 3))
     surface, kept = (nothing if one is None else np.ascontiguousarray(one) for one in (along, slip))
     split_velocities(motion, surface, depth, normal, point, (rate, slide, kept))
-    overpressed = int((depth > limit).sum(axis=1).max(initial=0))
+    overpressed = int((depth > rig.parameters.max_penetration).sum(axis=1).max(initial=0))
     return Stimulus(trial, depth, rate, None, normal, slide, slip, overpressed)
 
 
@@ -297,15 +297,22 @@ def split_velocities(motion, along, depth, normal, point, split):  # type: ignor
 
 
 def _contact(trial: Trial, rig: Rig, texels: Texels, reach: float) -> Contact:
-    """Contact of texels with what pressed in a trial; returns as of :func:`sphere_contact`."""
+    """Contact of texels with what pressed in a trial; returns as of :func:`shape_contact`."""
     indenter = rig.indenter_of(trial)
     assert trial.position is not None and trial.quaternion is not None and indenter is not None
-    if indenter.radius is not None:
-        return sphere_contact(trial.position, indenter.radius, texels.position, texels.normal, reach)
-    if indenter.edges is not None:
-        pose, edges = (trial.position, trial.quaternion), np.array(indenter.edges)
-        return box_contact(*pose, edges, texels.position, texels.normal, reach)
-    return _mesh_contact(trial, rig, texels, reach)
+    half_edges = None if indenter.edges is None else 0.5 * np.array(indenter.edges)
+    size = half_edges if indenter.radius is None else np.array([indenter.radius])
+    if size is not None:
+        return shape_contact(trial.position, trial.quaternion, size, texels.position, texels.normal, reach)
+    start = Motion.at_rest(trial.position[0], trial.quaternion[0])
+    scenario = Scenario(
+        bodies=(Body("sensor", Motion.at_rest()), Body("indenter", start)),
+        sensors=(Sensor("sensor", 0, texels, replace(rig.parameters, max_penetration=reach)),),
+        targets=(Target("indenter", 1, indenter.mesh),),
+        frame_end=1,
+        name=rig.name,
+    )
+    return Simulation(scenario).contacts_along(1, trial.position, trial.quaternion)
 
 
 def _weighted(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) -> Stimulus:
@@ -322,7 +329,7 @@ def _weighted(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) 
     size = float(np.linalg.norm(indenter.mesh.vertices, axis=1).max())
     high = np.full(len(states), float(texels.position[:, 2].max()) + size)
     low = high - 2.0 * size - rig.parameters.max_penetration - float(np.ptp(texels.position[:, 2]))
-    share = np.ones(len(texels)) if rig.cover is None else rig.cover.share
+    share = texel_shares(rig)
     part = replace(trial, time=np.arange(float(len(states))), position=states[:, :3].copy(), quaternion=states[:, 3:7].copy())
     reach = 4.0 * (rig.parameters.max_penetration + size)
     excess, lack = np.zeros(len(states)), wanted.copy()  # of the force at the lower and the upper end
@@ -351,10 +358,7 @@ def _weighted(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) 
             "the units of force, x and y, and k."
         )
     load = np.where(wanted > 0.0, wanted / np.where(carried > 0.0, carried, 1.0), 0.0)[:, None] * depth
-    load, normal = load[back], normal[back]
-    slip = None if along is None else along * (load > 0)[:, :, None]
-    nothing = np.zeros_like(load)
-    return Stimulus(trial, nothing, nothing, load, normal, nothing if slip is None else np.sqrt(dot(slip, slip)), slip)
+    return _of_forces(trial, load[back], normal[back], along)
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -371,22 +375,3 @@ def _spin(quaternion: np.ndarray, time: np.ndarray) -> np.ndarray:
     before, after = np.maximum(np.arange(len(time)) - 1, 0), np.minimum(np.arange(len(time)) + 1, len(time) - 1)
     turn = rotation_vectors(quaternion_product(quaternion[after], conjugate[before]))
     return turn / (time[after] - time[before])[:, None]
-
-
-def _mesh_contact(trial: Trial, rig: Rig, texels: Texels, reach: float) -> Contact:
-    """Contact of any mesh, as :func:`sphere_contact` of a ball, through the solver's contact search."""
-    assert trial.position is not None and trial.quaternion is not None
-    indenter = rig.indenter_of(trial)
-    assert indenter is not None
-    parameters = replace(rig.parameters, max_penetration=reach)
-    scenario = Scenario(
-        bodies=(
-            Body("sensor", Motion.at_rest()),
-            Body("indenter", Motion.at_rest(trial.position[0], trial.quaternion[0])),
-        ),
-        sensors=(Sensor("sensor", 0, texels, parameters),),
-        targets=(Target("indenter", 1, indenter.mesh),),
-        frame_end=1,
-        name=rig.name,
-    )
-    return Simulation(scenario).contacts_along(1, trial.position, trial.quaternion)

@@ -12,13 +12,13 @@ from ...effects.engine.registry import library
 from ...effects.engine.specification import FIT
 from ...errors import ParameterError
 from ...jobs import Job, Progress
-from ..base.base_model import base_parameters_to_search, prepared, recording_numbers, start_model, with_recording_numbers
+from ..base.base_model import free_parameters, prepared, start_model
 from ..base.contact_heights import with_starting_heights
 from ..base.quantities import friction_kinds
 from ..candidates.candidates import DIRECTLY_ESTIMATED, NOT_FITTED, Candidate, candidates, scales_of
 from ..dataset.rig import Rig
 from ..fitting.identifiability import unidentifiable
-from ..fitting.least_squares import FreeParameter, free_base_parameters
+from ..fitting.least_squares import FreeParameter
 from ..fitting.noise_floor import ChannelNoise, coverage
 from ..forward.predictor import Model, Predictor, predictors_of
 from ..selection.findings import Diagnosis
@@ -122,15 +122,13 @@ def plan_experiment(rig: Rig, wishes: Wishes | None = None) -> Job[ExperimentPla
     predictors = predictors_of(rig.trials, rig)
     noise, _ = prepared(rig, predictors)
     fitted = [predictor for predictor in predictors if predictor.trial.use == "fit"]
-    start = with_recording_numbers(start_model(rig, fitted), fitted)
+    start = start_model(rig, fitted)
     can_show = {*(one.name for one in candidates(fitted, start)), *DIRECTLY_ESTIMATED, *NOT_FITTED, *friction_kinds()}
     reasons = unidentifiable(coverage(fitted))
     cannot_show = {name: reasons.get(name, "these recordings cannot show it") for name in library() if name not in can_show}
     ground = Ground(predictors, wishes.limits(predictors))
     full = scales_of(fitted, start).reading
-    names = base_parameters_to_search(rig, fitted)
-    free = [*free_base_parameters(start.parameters, names, full), *recording_numbers(rig, fitted, full)]
-    search = _Search(ground, fitted, start, free, noise)
+    search = _Search(ground, fitted, start, free_parameters(rig, fitted, start, full), noise)
     shown = [kind for kind in search.kinds if kind not in cannot_show]
     _check_kinds(wishes.between, search.kinds)
     experiment, separations = yield from search.run(wishes.between or tuple(shown), choose_pair=not wishes.between)

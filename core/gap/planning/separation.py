@@ -15,7 +15,7 @@ import numpy as np
 
 from ...model.sensor import Effect
 from ..candidates.candidates import Candidate, scales_of
-from ..fitting.least_squares import FreeParameter, TrialView, derivatives, value_of
+from ..fitting.least_squares import FreeParameter, TrialView, coordinates_of, derivatives
 from ..fitting.noise_floor import ChannelNoise
 from ..forward.predictor import Model, Predictor
 
@@ -151,7 +151,7 @@ class Signals:
         start = view.residual(self._model)
         n, (p, q) = len(view.texels), self._width
         common, texel = np.zeros((p, *start.shape)), np.zeros((q, len(start), n))
-        at = [item.to_coordinate(value_of(self._model, item)) for item in self._free]
+        at = coordinates_of(self._model, self._free)
         derivatives(view, self._model, self._free, at, start, common[: len(self._free)], 0)
         row, own = len(self._free), 0
         rng = np.random.default_rng(0)

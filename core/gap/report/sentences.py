@@ -141,12 +141,12 @@ def _odd_one(result: Diagnosis) -> str:
     odd = result.between.odd_recording(result.full[READINGS]) if result.between is not None else None
     if odd is None:
         return ""
-    said = []
-    if abs(odd.level) > LEAST_LEVEL:
-        said.append(f"reads {abs(odd.level):.1%} of the range {'more' if odd.level > 0 else 'less'} than the others")
-    if abs(odd.gain) > LEAST_GAIN:
-        said.append(f"responds {abs(odd.gain):.0%} {'more' if odd.gain > 0 else 'less'} than they do")
-    return f" Only '{odd.name}' differs: it {' and '.join(said)}." if said else ""
+    (name, gain, level), said = odd, []
+    if abs(level) > LEAST_LEVEL:
+        said.append(f"reads {abs(level):.1%} of the range {'more' if level > 0 else 'less'} than the others")
+    if abs(gain) > LEAST_GAIN:
+        said.append(f"responds {abs(gain):.0%} {'more' if gain > 0 else 'less'} than they do")
+    return f" Only '{name}' differs: it {' and '.join(said)}." if said else ""
 
 
 def _effects(result: Diagnosis, errors: GapErrors) -> str:

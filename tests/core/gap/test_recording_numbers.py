@@ -9,15 +9,10 @@ import numpy as np
 import pytest
 from rig_files import RIG, write
 
-from palpate.core.gap.base.base_model import (
-    base_parameters_to_search,
-    recording_numbers,
-    start_model,
-    with_recording_numbers,
-)
+from palpate.core.gap.base.base_model import free_parameters, start_model
 from palpate.core.gap.candidates.candidates import candidates
 from palpate.core.gap.dataset.rig import read_rig
-from palpate.core.gap.fitting.least_squares import TrialView, cross_fitted, fit, free_base_parameters
+from palpate.core.gap.fitting.least_squares import TrialView, cross_fitted, fit
 from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.forward.stimulus import stimulus_of
 from palpate.core.model.sensor_parameters import SensorParameters
@@ -44,10 +39,8 @@ def fitted(trials):
     predictors = predictors_of(rig.trials, rig)
     own = [one for one in predictors if one.trial.use == "fit"]
     views = [TrialView(one, noise=(NOISE, NOISE), stretch_count=2) for one in own]
-    model = with_recording_numbers(start_model(rig, own), own)
-    free = free_base_parameters(model.parameters, base_parameters_to_search(rig, own), 0.2)
-    free += recording_numbers(rig, own, 0.2)
-    return predictors, views, fit(views, model, free, max_steps=40, tolerance=1e-9)
+    model = start_model(rig, own)
+    return predictors, views, fit(views, model, free_parameters(rig, own, model, 0.2), max_steps=40, tolerance=1e-9)
 
 
 @pytest.mark.parametrize("net", [False, True])

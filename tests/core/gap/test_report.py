@@ -33,7 +33,7 @@ from palpate.core.gap.report.sentences import NOT_IDENTIFIABLE, headline, interv
 def test_one_odd_recording_is_told_from_several(gains, levels, odd):
     own = ({f"t{i}": value for i, value in enumerate(values)} for values in (gains, levels))
     found = RecordingDifferences(0.9, 0.95, 0.05, *own).odd_recording(10.0)
-    assert (found.name if found else None) == odd
+    assert (found[0] if found else None) == odd
 
 
 @pytest.mark.long("a whole diagnosis of recordings of which one is shifted")

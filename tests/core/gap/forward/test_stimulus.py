@@ -12,7 +12,7 @@ from palpate.core.errors import PalpateError
 from palpate.core.gap.dataset.rig import Indenter, Rig, grid_texels
 from palpate.core.gap.dataset.trial import Trial
 from palpate.core.gap.fitting.noise_floor import coverage
-from palpate.core.gap.forward.closed_form_contact import box_contact, sphere_contact
+from palpate.core.gap.forward.closed_form_contact import shape_contact
 from palpate.core.gap.forward.force_model import _equal_texels
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.forward.stimulus import stimulus_of
@@ -143,9 +143,9 @@ def drawn(seed, samples=40, texels=9):
 @pytest.mark.parametrize("seed", range(3))
 def test_a_sphere_is_met_where_the_segment_enters_it(seed):
     """At a distance of the radius from its centre: a quadratic equation for the length of the way from behind the texel."""
-    position, outward, center, _ = drawn(seed)
+    position, outward, center, quaternion = drawn(seed)
     radius, base = 4e-3, position - REACH * outward
-    depth, normal, point, most = sphere_contact(center, radius, position, outward, REACH)
+    depth, normal, point, most = shape_contact(center, quaternion, np.array([radius]), position, outward, REACH)
     offset = base - center[:, None]
     along, square = np.einsum("tnk,nk->tn", offset, outward), (offset**2).sum(axis=2)
     length = -along - np.sqrt(np.maximum(along**2 - square + radius**2, 0.0))
@@ -165,7 +165,7 @@ def test_box_along_its_planes():
     """A segment along two pairs of planes: between them it meets the third, beside them it meets nothing."""
     position, outward = np.array([[0.0, 0.0, 0.0], [5e-3, 0.0, 0.0]]), np.array([[0.0, 0.0, 1.0]] * 2)
     center, straight = np.array([[0.0, 0.0, 2e-3]]), np.array([[1.0, 0.0, 0.0, 0.0]])
-    depth, normal, _, most = box_contact(center, straight, np.array([4e-3, 4e-3, 5e-3]), position, outward, REACH)
+    depth, normal, _, most = shape_contact(center, straight, np.array([2e-3, 2e-3, 2.5e-3]), position, outward, REACH)
     np.testing.assert_allclose(depth, [[0.5e-3, 0.0]], rtol=0, atol=1e-18)
     np.testing.assert_array_equal(normal[0], [[0.0, 0.0, -1.0]] * 2)
     assert most == 0
@@ -173,11 +173,8 @@ def test_box_along_its_planes():
 
 def test_nothing_touched_keeps_texel_and_normal():
     position, outward, center, quaternion = drawn(7)
-    for contact in (
-        sphere_contact(center + 1.0, 4e-3, position, outward, REACH),
-        box_contact(center + 1.0, quaternion, np.full(3, 4e-3), position, outward, REACH),
-    ):
-        depth, normal, point, most = contact
+    for size in (np.full(1, 4e-3), np.full(3, 2e-3)):
+        depth, normal, point, most = shape_contact(center + 1.0, quaternion, size, position, outward, REACH)
         assert not depth.any() and most == 0
         np.testing.assert_array_equal(normal, np.broadcast_to(-outward, normal.shape))
         np.testing.assert_array_equal(point, np.broadcast_to(position, point.shape))
