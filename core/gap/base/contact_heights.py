@@ -13,7 +13,7 @@ from dataclasses import replace
 from ...errors import SceneError
 from ..dataset.rig import Rig
 from ..dataset.trial import Trial
-from ..forward.response_check import correlation
+from ..forward.response_check import correlation, responses_of
 from ..forward.stimulus import stimulus_of
 
 GRID_STEPS, FINER_STEPS = 20, 5
@@ -49,24 +49,16 @@ def _best_height(rig: Rig, trials: Sequence[Trial]) -> float:
 
 def _agreement(rig: Rig, trials: Sequence[Trial], height: float) -> float:
     """Magnitude of the correlation of loads with responses; -1 where nothing touches, or the indenter goes right through."""
-    pairs, net = [], []
     try:
-        for trial in trials:
-            stimulus = stimulus_of(trial, rig, height=height)
-            if trial.reading is not None:
-                pairs.append((stimulus.load, trial.reading))
-            elif trial.force is not None:
-                normal = -rig.texels.normal if stimulus.normal is None else stimulus.normal
-                net.append(((stimulus.load[:, :, None] * normal).sum(axis=1), trial.force))
+        stimuli = [stimulus_of(trial, rig, height=height) for trial in trials]
     except SceneError:
         return -1.0
+    pairs = responses_of(rig, stimuli, "reading")
+    net = responses_of(rig, [one for one in stimuli if one.trial.reading is None], "force")
     values = [abs(correlation(part)) for part in (pairs, net) if part]
     return max(values) if any(load.any() for load, _ in pairs + net) else -1.0
 
 
 def _thinned(trial: Trial) -> Trial:
     """The trial with some of its samples only."""
-    every = slice(None, None, max(1, -(-len(trial.time) // MOST_SAMPLES)))
-    parts = {"time": trial.time, "position": trial.position, "quaternion": trial.quaternion, "level": trial.level}
-    parts |= {"travel": trial.travel, "reading": trial.reading, "force": trial.force}
-    return replace(trial, **{name: None if part is None else part[every] for name, part in parts.items()})  # type: ignore[arg-type]
+    return trial.part(slice(None, None, max(1, -(-len(trial.time) // MOST_SAMPLES))))

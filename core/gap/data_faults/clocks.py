@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -129,7 +128,7 @@ def _explained(rig: Rig, trial: Trial, late: float) -> np.ndarray:
     """Share of the response's changes that load and rate explain, for each further shift and each lead."""
     moved = with_shift(trial, late)
     part = _busiest_part(rig, moved)
-    stimulus = stimulus_of(_part_of(moved, part), rig)
+    stimulus = stimulus_of(moved.part(part), rig)
     reading = stimulus.trial.reading
     channels = None if reading is None else _strongest_channels(stimulus)
     response = _net_force_along_normal(stimulus) if reading is None else reading[:, channels]
@@ -146,7 +145,7 @@ def _explained(rig: Rig, trial: Trial, late: float) -> np.ndarray:
 
     y = changes(response)
     for row, shift in zip(table, late + np.linspace(-REACH, REACH, SHIFTS) * trial.step, strict=True):
-        other = stimulus_of(_part_of(with_shift(trial, float(shift)), part), rig)
+        other = stimulus_of(with_shift(trial, float(shift)).part(part), rig)
         load, rate = (one if channels is None else one[:, channels] for one in (other.load, other.rate))
         for i, lead in enumerate(LEADS):
             force = np.maximum(load + lead * rate, 0.0)  # a contact does not pull
@@ -171,13 +170,6 @@ def _busiest_part(rig: Rig, trial: Trial) -> slice:
     total = np.concatenate([[0.0], np.cumsum(change)])
     first = int(np.argmax(total[most:] - total[:-most]))
     return slice(first, first + most)
-
-
-def _part_of(trial: Trial, part: slice) -> Trial:
-    """A stretch of a trial."""
-    parts = {name: getattr(trial, name) for name in ("time", "position", "quaternion", "level", "travel", "reading", "force")}
-    kept: dict[str, Any] = {name: None if one is None else one[part] for name, one in parts.items()}
-    return replace(trial, **kept)
 
 
 def _is_clearly_better(new: float, old: float) -> bool:
