@@ -128,6 +128,11 @@ class Trial:
         return replace(self, **parts)
 
 
+def columns_at(wanted: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return columns (T,) or (T, c) at other times; before the first sample and after the last one they are as these."""
+    return np.ascontiguousarray(np.apply_along_axis(lambda column: np.interp(wanted, time, column), 0, values))
+
+
 def runs(flag: np.ndarray) -> list[tuple[int, int]]:
     """Return the first sample of each run in which a flag (T,) is set, and the sample after its end."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flag, [False]]).astype(int))).reshape(-1, 2)
