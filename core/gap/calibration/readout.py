@@ -66,8 +66,6 @@ class ReadoutData:
         Of the rig.
     channels : (c,) int
         Texels whose readings are used; those that never change are not.
-    fit, check : tuple of ReadoutRecording
-    notes : tuple of str
     """
 
     targets: tuple[str, ...]
@@ -84,13 +82,7 @@ class ReadoutData:
 
 @dataclass(frozen=True)
 class ContactEstimate:
-    """Stimulus of a sensor, estimated from its readings.
-
-    Attributes
-    ----------
-    value, low, high : (T, q) float
-        NaN where a reading is missing. The interval is of 95 %.
-    """
+    """Stimulus of a sensor by its readings: values and 95 % intervals, (T, q) float, NaN where a reading is missing."""
 
     value: np.ndarray
     low: np.ndarray
@@ -107,10 +99,8 @@ class MethodResult:
 
     Attributes
     ----------
-    name : str
     times : tuple of float, s
         Of its memory.
-    estimate : Estimator
     left_out : (q,) float
         Root mean square error on what was left out while numbers were chosen.
     check : (q,) float or None
@@ -140,7 +130,6 @@ class ReadoutFit:
 
     Attributes
     ----------
-    data : ReadoutData
     results : tuple of MethodResult
         From the simplest to the least simple.
     best : MethodResult
@@ -158,13 +147,7 @@ class ReadoutFit:
     best: MethodResult
 
     def estimate(self, time: np.ndarray, readings: np.ndarray) -> ContactEstimate:
-        """Return the stimulus of the sensor by the method that is proposed.
-
-        Parameters
-        ----------
-        time : (T,) float, s
-        readings : (T, n) float
-            Of all texels of the rig.
+        """Return the stimulus by the method that is proposed, from times (T,), s, and readings (T, n) of all texels of the rig.
 
         Raises
         ------

@@ -26,13 +26,7 @@ MOST_TEXELS = 10**9
 
 @dataclass(frozen=True)
 class FoamData:
-    """A foam under load.
-
-    Attributes
-    ----------
-    compression : (m,) float, metres
-    pressure : (m,) float, Pa
-    """
+    """A foam under load: compressions (m,), metres, and pressures (m,), Pa."""
 
     compression: np.ndarray
     pressure: np.ndarray
@@ -44,7 +38,6 @@ class StiffnessFit:
 
     Attributes
     ----------
-    data : FoamData
     k : Estimate, N/m
         From the line through zero. The model needs this one, since its texels have no force at depth zero.
     k_offset : Estimate, N/m
@@ -77,17 +70,9 @@ class StiffnessFit:
 
 
 def texel_stiffness(pressure: float, area: float, texels: int, compression: float) -> float:
-    """Return ``k = p A / (n x)``, N/m (Eq. 18).
+    """Return ``k = p A / (n x)``, N/m (Eq. 18), of a pressure (Pa) and a compression (m); the area (m²) is the whole sensor's.
 
     The paper prints 58.5 N/m for 9810 Pa, 0.00125 m², 84 texels and 2.5 mm; its inputs give 58.39.
-
-    Parameters
-    ----------
-    pressure : float, Pa
-    area : float, m²
-        Of the whole sensor.
-    texels : int
-    compression : float, metres
     """
     if not AREAS[0] <= area <= AREAS[1]:
         raise ParameterError(f"The sensor's area is {area:g} m²: give a finite value above zero, in m².")
@@ -103,12 +88,7 @@ def texel_stiffness(pressure: float, area: float, texels: int, compression: floa
 def read_foam(path: str | os.PathLike, weight_area: float | None = None) -> FoamData:
     """Read foam measurements: columns `compression` (m) and one of `pressure` (Pa), `force` (N) or `mass` (kg).
 
-    Parameters
-    ----------
-    path : path
-        See :mod:`...io.text_table` for other units.
-    weight_area : float or None, m²
-        Area on which the force or the mass rested.
+    The force or the mass rested on `weight_area`, m². See :mod:`...io.text_table` for other units.
 
     Raises
     ------
@@ -134,14 +114,7 @@ def read_foam(path: str | os.PathLike, weight_area: float | None = None) -> Foam
 
 
 def fit_stiffness(data: FoamData, area: float, texels: int) -> StiffnessFit:
-    """Fit both lines of Fig. 6 by least squares of the pressure.
-
-    Parameters
-    ----------
-    data : FoamData
-    area : float, m²
-        Of the whole sensor.
-    texels : int
+    """Fit both lines of Fig. 6 by least squares of the pressure; `area`, m², is that of the whole sensor.
 
     Raises
     ------

@@ -11,20 +11,9 @@ from ..dataset.trial import FAULT_KINDS, Trial
 
 @dataclass(frozen=True)
 class DataFault:
-    """A fault of the data.
+    """A fault of the data: its kind (a key of :data:`.trial.FAULT_KINDS`) and the names of the recordings that have it.
 
-    Attributes
-    ----------
-    kind : str
-        A key of :data:`.trial.FAULT_KINDS`.
-    trials : tuple of str
-        Names of the recordings that have it.
-    evidence : str
-        What shows it, in one sentence without a full stop.
-    correct : callable
-        Returns one of these recordings without the fault.
-    put_right : bool
-        True if this was done.
+    `evidence` says what shows it, without a full stop. `correct` returns one of these recordings without the fault.
     """
 
     kind: str
@@ -38,6 +27,5 @@ class DataFault:
         """The fault in one sentence, with what was done or can be done."""
         files = ", ".join(f"'{name}.csv'" for name in self.trials[:3]) + (" …" if len(self.trials) > 3 else "")
         what = f"{files}: {FAULT_KINDS[self.kind]}: {self.evidence}"
-        if self.put_right:
-            return f"{what}; this was put right."
-        return f'{what}; correct = ["{self.kind}"] in [data] of the rig puts it right.'
+        mended = "this was put right" if self.put_right else f'correct = ["{self.kind}"] in [data] of the rig puts it right'
+        return f"{what}; {mended}."

@@ -16,14 +16,7 @@ from .scales import find_scale_faults
 
 
 def find_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
-    """Return the faults of a rig's data, in the order in which they are put right.
-
-    Parameters
-    ----------
-    rig : Rig
-    stimuli : sequence of Stimulus
-        Of the rig's trials.
-    """
+    """Return the faults of a rig's data, given the stimuli of its trials, in the order in which they are put right."""
     judged = [s for s in stimuli if (s.load > 0).any() and s.trial.changes]
     if not judged:
         return []
@@ -38,26 +31,18 @@ def find_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
 def put_right(rig: Rig, stimuli: Sequence[Stimulus]) -> tuple[Rig, list[DataFault]]:
     """Return a rig without the faults that it wants to be put right, and all faults that it had.
 
-    Faults are corrected one by one, and the search is repeated after each, because a fault may hide another one.
-
-    Parameters
-    ----------
-    rig : Rig
-    stimuli : sequence of Stimulus
-        Of its trials, in their order.
+    Faults are corrected one by one, and the search is repeated after each, because a fault may hide another one. `stimuli` are
+    those of its trials, in their order.
     """
     done: list[DataFault] = []
     while True:
         found = find_faults(rig, stimuli)
         known = [(fault.kind, name) for fault in done for name in fault.trials]
-        wanted = [
-            fault
-            for fault in found
-            if fault.kind in rig.correct and any((fault.kind, name) not in known for name in fault.trials)
-        ]
-        if not wanted:
+        fresh = (one for one in found if any((one.kind, name) not in known for name in one.trials))
+        fault = next((one for one in fresh if one.kind in rig.correct), None)
+        if fault is None:
             return rig, [*done, *found]
-        trials = tuple(wanted[0].correct(one) if one.name in wanted[0].trials else one for one in rig.trials)
+        trials = tuple(fault.correct(one) if one.name in fault.trials else one for one in rig.trials)
         rig = replace(rig, trials=trials)
         stimuli = [s if s.trial is trial else stimulus_of(trial, rig) for s, trial in zip(stimuli, trials, strict=True)]
-        done.append(replace(wanted[0], put_right=True))
+        done.append(replace(fault, put_right=True))

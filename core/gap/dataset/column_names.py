@@ -64,7 +64,6 @@ class Column:
         The columns: one, or those of all texels in order.
     unit : str
         Empty for texels whose unit is the sensor's own.
-    factor, zero : float
     area : float, m²
         On which a pressure acts that becomes a force; 0 if it is none.
     rate : float, Hz
@@ -106,15 +105,12 @@ class _Source:
 
 
 def read_column(quantity: str, words: Any, where: str, without: Iterable[str] = (), texels: int | None = None) -> Column:
-    """Return the name and the settings of a column from its words: a name alone, or a table.
+    """Return the name and the settings of a column from its words in a file: a name alone, or a table.
 
     Parameters
     ----------
-    quantity : str
-    words : object
-        As TOML gives it.
-    where : str
-        For messages.
+    quantity, words, where : str, object, str
+        `where` names the column in messages.
     without : iterable of str
         Words that are none here.
     texels : int or None
@@ -182,16 +178,9 @@ def read_column_rules(table: Mapping[str, Any], path: Path, texels: int) -> dict
 
 
 def translated(names: Sequence[str], values: np.ndarray, rules: Mapping[str, Column], file: Path) -> dict[str, np.ndarray]:
-    """Return the columns of a file by the names and in the units of Palpate; columns without a rule are as they are.
+    """Return the columns `values` (T, c) of a file by the names and in the units of Palpate.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Of the file's columns.
-    values : (T, c) float
-    rules : mapping of str to Column
-    file : Path
-        For messages.
+    Columns without a rule are as they are. `names` are those of the file, which messages name.
 
     Raises
     ------

@@ -67,13 +67,7 @@ _Table = Annotated[dict[str, Any], wanted("describe it there")]
 
 @dataclass(frozen=True)
 class RigWords:
-    """The words of a rig's file, whose tables are read one by one.
-
-    Attributes
-    ----------
-    clock : "absolute", "own" or None
-        Whether one clock went on through all recordings, or each has its own.
-    """
+    """The words of a rig's file (docs/rig-format.md), whose tables are read one by one."""
 
     sensor: _Table
     trial: Annotated[list[dict[str, Any]], wanted("name at least one CSV file", min_length=1)]
@@ -93,19 +87,14 @@ class Rig:
 
     Attributes
     ----------
-    name : str
-    texels : Texels
     parameters : SensorParameters
         Those that the rig states, and defaults for the others.
     given : frozenset of str
         Names of the parameters that the rig states.
     grid : (int, int, (float, float)) or None
-        Rows, columns and pitch, if the sensor is given as a grid.
-    indenter : Indenter or None
-    trials : tuple of Trial
+        Rows, columns and pitch (m), if the sensor is given as a grid.
     words : mapping
         The `[sensor]` table of the file.
-    warnings : tuple of str
     correct : tuple of str
         Kinds of faults of the data that are to be put right, keys of :data:`.trial.FAULT_KINDS`.
     cover : Cover or None
@@ -142,11 +131,7 @@ class Rig:
 
 
 def read_rig(path: str | Path) -> Rig:
-    """Read a rig and all its recordings.
-
-    Parameters
-    ----------
-    path : path of the TOML file
+    """Read a rig, given the path of its TOML file, and all its recordings.
 
     Raises
     ------
@@ -291,10 +276,7 @@ def _texels(sensor: dict[str, Any], path: Path) -> tuple[Texels, tuple | None, C
 def grid_texels(rows: int, columns: int, pitch_x: float, pitch_y: float) -> Texels:
     """Return texels in z = 0, centred on the origin, rows along +y, columns along +x, normals +z; texel 0 is row 0, column 0.
 
-    Parameters
-    ----------
-    rows, columns : int
-    pitch_x, pitch_y : float, metres
+    Their distances `pitch_x` and `pitch_y` are in metres.
     """
     from ...geometry.grid_layout import GridLayout
 
@@ -410,13 +392,11 @@ def _recorded(columns: dict[str, np.ndarray], file: Path, use: str, texels: int,
             f"Every cell of the response in '{file.name}' is empty: record the trial again, or remove its [[trial]]."
         )
     travel = _vector(columns, SLIDE, 0.0)
-    position = quaternion = level = None
-    if kind == "pose":
-        position, quaternion = _vector(columns, POSE, np.nan), _turns(columns, file)
-    else:
-        level = columns[kind].copy()
-        if kind == "force" and "x" in columns:  # a known weight at a known place, wherever its z is
-            position, quaternion = _vector({**columns, "z": np.zeros(len(time))}, POSE, np.nan), _turns(columns, file)
+    level = None if kind == "pose" else columns[kind].copy()
+    position = quaternion = None
+    if "x" in columns:
+        height = columns["z"] if kind == "pose" else np.zeros(len(time))  # a known weight acts wherever its z is
+        position, quaternion = np.stack([columns["x"], columns["y"], height], axis=1), _turns(columns, file)
     stimuli: dict[str, np.ndarray] = {}
     for names, values in ((POSE, position), (TURN, quaternion), ((kind,), level), (SLIDE, travel)):
         if values is not None:
@@ -551,14 +531,9 @@ def _turns(columns: Mapping[str, np.ndarray], file: Path) -> np.ndarray:
 
 
 def _gaps_filled(stimuli: Mapping[str, np.ndarray], time: np.ndarray, file: Path) -> tuple[np.ndarray, list[str]]:
-    """Interpolate missing values of the columns of the stimulus in place.
+    """Interpolate missing values of the columns of the stimulus in place; return remarks, too.
 
-    Returns
-    -------
-    unknown : (T,) bool
-        Samples in gaps that are too long for it: what answered there cannot be judged.
-    notes : list of str
-        Remarks.
+    The first result, (T,) bool, has the samples in gaps that are too long for it: what answered there cannot be judged.
     """
     unknown, total = np.zeros(len(time), bool), 0
     for name, column in stimuli.items():

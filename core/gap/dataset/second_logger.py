@@ -42,17 +42,9 @@ ERROR_QUANTILE = 0.95
 
 
 def longest_gap(time: np.ndarray, values: np.ndarray) -> float:
-    """Return how long a gap may be to be interpolated, in seconds.
+    """Return how long a gap may be to be interpolated, in seconds, given samples (T,) of which none is missing.
 
-    Parameters
-    ----------
-    time, values : (T,) float
-        Without missing values.
-
-    Returns
-    -------
-    float
-        Infinite for a stimulus that does not move, and zero where even neighbours do not predict the sample between them.
+    It is infinite for a stimulus that does not move, and zero where even neighbours do not predict the sample between them.
     """
     span = float(np.ptp(values)) if len(values) else 0.0
     if span <= 0.0 or len(values) < FEWEST:
@@ -72,18 +64,9 @@ def longest_gap(time: np.ndarray, values: np.ndarray) -> float:
 
 
 def bridged(time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return values with the missing ones interpolated where the gap is short enough.
+    """Return values (T,) at times (T,), in s, with the missing ones interpolated where the gap is short enough.
 
-    Parameters
-    ----------
-    time : (T,) float, s
-    values : (T,) float
-        NaN where a value is missing.
-
-    Returns
-    -------
-    (T,) float
-        NaN within gaps that are too long, and before the first and after the last known value.
+    They stay NaN within gaps that are too long, and before the first and after the last known value.
     """
     known = np.isfinite(values)
     if not known.any():
@@ -95,19 +78,9 @@ def bridged(time: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def peak_offset(values: np.ndarray, top: int) -> float:
-    """Return where the maximum is by a parabola through three values.
+    """Return how far from the largest value, number `top` of (n,), the maximum is by a parabola through three, in spacings.
 
-    Parameters
-    ----------
-    values : (n,) float
-        Agreement at each shift.
-    top : int
-        The largest of them.
-
-    Returns
-    -------
-    float
-        In spacings, from `top`; zero at the ends, where one of the three is missing.
+    It is zero at the ends, where one of the three is missing.
     """
     if not 0 < top < len(values) - 1:
         return 0.0
@@ -122,15 +95,7 @@ LARGEST_SHIFT = 1e10
 
 @dataclass(frozen=True)
 class SecondLogger:
-    """The file of a second logger, by its name in the rig.
-
-    Attributes
-    ----------
-    file : object
-        As the rig writes it; it is checked where it is opened.
-    late : float, s
-        The second clock's time of an event minus the first one's.
-    """
+    """The file of a second logger, which is checked where it is opened, and its time of an event minus the first one's, s."""
 
     file: Any = None
     late: Annotated[float, wanted("write seconds", ge=-LARGEST_SHIFT, le=LARGEST_SHIFT)] = 0.0
@@ -139,15 +104,9 @@ class SecondLogger:
 def joined(
     first: Mapping[str, np.ndarray], second: Mapping[str, np.ndarray], late: float, files: tuple[Path, Path]
 ) -> dict[str, np.ndarray]:
-    """Return the columns of two loggers at the times of the second, on the clock of the first.
+    """Return the columns (T,) of two loggers at the times of the second, on the clock of the first.
 
-    Parameters
-    ----------
-    first, second : mapping of str to (T,) ndarray
-        With checked `time`, in seconds.
-    late : float, s
-    files : (Path, Path)
-        For messages.
+    Both have a checked `time`, in seconds. `late` is the second clock's time of an event minus the first one's.
 
     Raises
     ------

@@ -248,9 +248,8 @@ def on_common_clocks(
 
     Parameters
     ----------
-    trials : sequence of Trial
+    trials, starts : sequence of Trial, sequence of Start
         With the times of their files.
-    starts : sequence of Start
     clock : "absolute", "own" or None
         None: time stamps that go on are one clock.
     path : Path
