@@ -38,10 +38,9 @@ class StiffnessFit:
 
     Attributes
     ----------
-    k : Estimate, N/m
-        From the line through zero. The model needs this one, since its texels have no force at depth zero.
-    k_offset : Estimate, N/m
-        From the line with an offset.
+    k, k_offset : Estimate, N/m
+        From the line through zero, which the model needs, since its texels have no force at depth zero, and from that with an
+        offset.
     slope, slope_offset : float, Pa/m
     offset : Estimate, Pa
         Pressure of the second line at compression zero. If it is negative, the foam has a dead zone.

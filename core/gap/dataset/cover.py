@@ -177,15 +177,12 @@ def _covered(corners: np.ndarray, surface: Texels) -> np.ndarray:
     x, y = surface.position[:, 0], surface.position[:, 1]
     step_x, step_y = (_spacing(values) or float(np.sqrt(surface.area[0])) for values in (x, y))
     offsets = (np.arange(SUBDIVISIONS) + 0.5) / SUBDIVISIONS - 0.5
-    covered = np.zeros(len(surface))
-    for dx in offsets * step_x:
-        for dy in offsets * step_y:
-            px, py, inside = x + dx, y + dy, np.zeros(len(surface), bool)
-            for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-                if ay != by:
-                    inside ^= ((ay > py) != (by > py)) & (px < (bx - ax) * (py - ay) / (by - ay) + ax)
-            covered += inside
-    return covered / SUBDIVISIONS**2
+    px, py = x + (offsets * step_x)[:, None, None], y + (offsets * step_y)[:, None]
+    inside = np.zeros((SUBDIVISIONS, SUBDIVISIONS, len(surface)), bool)
+    for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        if ay != by:
+            inside ^= ((ay > py) != (by > py)) & (px < (bx - ax) * (py - ay) / (by - ay) + ax)
+    return np.asarray(inside.mean(axis=(0, 1)))
 
 
 def _spacing(values: np.ndarray) -> float:

@@ -180,8 +180,11 @@ def _read_trials(words: RigWords, path: Path, texels: int, probes: Mapping[str, 
         where = f"Trial {number} of '{path.name}'"
         said = read_words(entry, TrialWords, where)
         starts.append(read_start(said.session, said.started, where))
-        own = said.own_numbers(where)
+        own = {word: getattr(said, word) for word in ("factor", "zero", "force_zero", "contact_height")}
+        if said.specimen and FREE not in own.values():
+            raise FileError(f'{where} has a specimen and no free number: write factor = "free" or zero = "free".')
         file = _inside(said.file, f"Trial {number}'s file", path)
+        own = {word: said.specimen or Path(said.file).stem if value == FREE else value for word, value in own.items()}
         if said.probe is not None and said.probe not in list(probes):
             known = ", ".join(sorted(probes)) or "none"
             raise FileError(f"probe of {where} is {said.probe!r:.60}: write the name of a [[probe]] of the rig ({known}).")
@@ -488,7 +491,7 @@ def _readings(columns: Mapping[str, np.ndarray], texels: int, file: Path) -> np.
         return None
     wanted = [f"texel_{i}" for i in range(texels)]
     lost = [name for name in wanted if name not in columns]
-    if 0 < len(lost) < texels and wanted[-1] in columns:
+    if lost and wanted[-1] in columns:
         raise FileError(
             f"'{file.name}' has no column {lost[0]}{' and others' if len(lost) > 1 else ''} of the sensor's {texels} texels: "
             "export every texel; one that is not connected has empty cells."

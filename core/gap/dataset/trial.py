@@ -37,12 +37,10 @@ class Trial:
 
     Attributes
     ----------
-    name : str
-        Of its file, without the suffix.
-    use : "fit" or "check"
+    name, use, stimulus : str
+        Its file without the suffix; "fit" or "check"; "pose", "depth" or "force".
     time : (T,) float, seconds, increasing
         Since the first sample of its session, or of the rig's first recording.
-    stimulus : "pose", "depth" or "force"
     position, quaternion : (T, 3), (T, 4) float, or None
         Of the indenter in the sensor's frame. With a known force they say where it acts; z has no meaning then.
     level : (T,) float or None
@@ -53,8 +51,9 @@ class Trial:
         NaN if a value is missing.
     force : (T, 3) float or None, newtons
         Net force on the sensor; NaN if a component is missing.
-    session : str
-        Name of the session in which the sensor's state goes on from recording to recording; empty if it belongs to none.
+    session, probe, repeats : str
+        Names of the session in which the sensor's state goes on from recording to recording, of the probe that pressed (empty
+        for the rig's indenter), and of a group of recordings of the same stimulus; empty if it belongs to none.
     tared : bool
         True if the responses of its first sample were subtracted from all its responses.
     factor, zero : str or float
@@ -65,10 +64,6 @@ class Trial:
     contact_height : str or float, metres
         How much higher the sensor's surface is than poses or depths say: contact begins earlier by as much. A name if it is
         free. Without meaning in a recording with a known force.
-    probe : str
-        Name of the probe that pressed; empty for the rig's indenter.
-    repeats : str
-        Name of a group of recordings of the same stimulus; empty if it belongs to none.
     temperature : pair of (m,) float, or None
         Times (s, on the clock of `time`) and temperatures of the sensor (°C); None if none were recorded.
     height_start : float, metres
@@ -174,20 +169,6 @@ class TrialWords:
     probe: Any = None
     repeats: Name = ""
     readings: Annotated[Mapping[str, Any], wanted('write { file = "readings.csv", late = 0.0 }')] | None = None
-
-    def own_numbers(self, where: str) -> dict[str, Any]:
-        """Return the own numbers of the trial; in the place of free ones the name that the recordings of a specimen share.
-
-        Raises
-        ------
-        FileError
-            It has a specimen and no free number.
-        """
-        numbers = {word: getattr(self, word) for word in ("factor", "zero", "force_zero", "contact_height")}
-        if self.specimen and FREE not in numbers.values():
-            raise FileError(f'{where} has a specimen and no free number: write factor = "free" or zero = "free".')
-        name = self.specimen or Path(str(self.file)).stem
-        return {word: name if value == FREE else value for word, value in numbers.items()}
 
 
 def check_free_heights(trials: Sequence[Trial], path: Path) -> None:
