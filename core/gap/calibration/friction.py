@@ -170,10 +170,8 @@ def _dynamic_starts(
         return [given]
     level = max(steady["mus"], 1e-6) * normal_force
     softest, stiffest = level / float(step.sum()), level / float(step[step > 0].min())
-    tried = []
-    for sigma0 in np.geomspace(softest, max(stiffest, 10.0 * softest), STIFFNESSES):
-        for sigma1 in (base.sigma1, DAMPING_SHARE * float(sigma0)):
-            tried.append(steady | {"sigma0": float(sigma0), "sigma1": sigma1})
+    stiffnesses = np.geomspace(softest, max(stiffest, 10.0 * softest), STIFFNESSES).tolist()
+    tried = [steady | {"sigma0": a, "sigma1": b} for a in stiffnesses for b in (base.sigma1, DAMPING_SHARE * a)]
     tried.sort(key=lambda values: float((_residual(data, normal_force, replace(base, **values)) ** 2).sum()))
     return [given, *tried[:BEST_STARTS]]
 
@@ -204,7 +202,7 @@ def _refine(data: FrictionData, normal_force: float, base: SensorParameters, sta
     from scipy.optimize import least_squares
 
     names = STEADY if data.time is None else DYNAMIC
-    weight, speed = max(normal_force, 1e-12), max(float(np.abs(data.velocity).max()), 1e-12)
+    weight, speed = normal_force, max(float(np.abs(data.velocity).max()), 1e-12)
     units = {"mus": 1.0, "mud": 1.0, "x0": speed, "ct": weight / speed, "sigma0": base.sigma0, "sigma1": max(base.sigma1, 1e-6)}
     low = np.array([0.0, 0.0, 1e-3, 0.0, 1e-4, 0.0][: len(names)])
     # The variables are the values in units of order one; in the place of mus its excess over mud, which is not negative.
@@ -212,19 +210,18 @@ def _refine(data: FrictionData, normal_force: float, base: SensorParameters, sta
     to_values[0, 1] = 1.0
     first = np.linalg.solve(to_values, [start[name] for name in names])
 
-    def residual_of(values: np.ndarray) -> np.ndarray:
-        changes: dict[str, Any] = dict(zip(names, map(float, values), strict=True))
-        return _residual(data, normal_force, replace(base, **changes))
+    def with_values(values: np.ndarray) -> SensorParameters:
+        changes: dict[str, Any] = dict(zip(names, values.tolist(), strict=True))
+        return replace(base, **changes)
 
     found = least_squares(
-        lambda variables: residual_of(to_values @ variables) / weight,
+        lambda variables: _residual(data, normal_force, with_values(to_values @ variables)) / weight,
         np.maximum(first, low + 1e-9),
         bounds=(low, np.inf),
         x_scale="jac",
         **dict.fromkeys(("xtol", "ftol", "gtol"), 1e-14),
     )
     values = to_values @ found.x
-    residual = residual_of(values)
+    residual = _residual(data, normal_force, with_values(values))
     estimates = dict(zip(names, linearised_estimates(values, found.jac, to_values, residual, weight), strict=True))
-    fitted: dict[str, Any] = {name: estimate.value for name, estimate in estimates.items()}
-    return FrictionFit(data, normal_force, replace(base, **fitted), estimates, float(np.sqrt(np.mean(residual**2))))
+    return FrictionFit(data, normal_force, with_values(values), estimates, float(np.sqrt(np.mean(residual**2))))

@@ -91,15 +91,10 @@ def _orders(rig: Rig, n: int) -> dict[str, np.ndarray]:
 
 def _swapped(squared: np.ndarray, judged: np.ndarray) -> list[tuple[int, int]]:
     """Pairs of channels that leave far less with each other's load than with their own."""
-    pairs, free = [], judged.copy()
-    for a in np.flatnonzero(judged):
-        b = int(np.argmax(np.where(judged, squared[:, a], -1.0)))
-        if b <= a or not (free[a] and free[b]) or int(np.argmax(np.where(judged, squared[:, b], -1.0))) != a:
-            continue
-        if all(1.0 - squared[other, one] < SWAPPED_LEAVES * (1.0 - squared[one, one]) for one, other in ((a, b), (b, a))):
-            pairs.append((int(a), b))
-            free[[a, b]] = False
-    return pairs
+    followed = np.argmax(np.where(judged[:, None], squared, -1.0), axis=0).tolist()  # by each channel: whose load
+    pairs = [(a, b) for a, b in enumerate(followed) if judged[a] and a < b and followed[b] == a]
+    left = 1.0 - squared
+    return [(a, b) for a, b in pairs if all(left[j, i] < SWAPPED_LEAVES * left[i, i] for i, j in ((a, b), (b, a)))]
 
 
 def _reordered(trial: Trial, order: np.ndarray) -> Trial:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..dataset.rig import Rig
-from ..dataset.second_logger import peak_offset
+from ..dataset.second_logger import peak_of
 from ..dataset.trial import Trial, columns_at
 from ..forward.stimulus import Stimulus, stimulus_of
 from .data_fault import DataFault
@@ -62,12 +62,11 @@ class Shift:
 
 def find_clock_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
     """Return the shifted clocks of some recordings."""
-    known = {s.trial.name: shift for s in stimuli if (shift := shift_of(s)) is not None}
-    typical = float(np.median([one.late for one in known.values()])) if known else 0.0
+    known = [(s, shift) for s in stimuli if (shift := shift_of(s)) is not None]
+    typical = float(np.median([shift.late for _, shift in known])) if known else 0.0
     shifts = {}
-    for s in stimuli:
-        shift = known.get(s.trial.name)
-        if shift is None or not _is_clearly_better(shift.correlation, shift.unshifted):
+    for s, shift in known:
+        if not _is_clearly_better(shift.correlation, shift.unshifted):
             continue
         least = max(LEAST_SHIFT, LEAST_SHIFT_SAMPLES * s.trial.step)
         is_common = abs(shift.late - typical) < least
@@ -103,8 +102,8 @@ def shift_of(stimulus: Stimulus) -> Shift | None:
     total = np.array([(load * padded[k : k + len(load)]).sum() for k in range(2 * most + 1)]) / size
     if -total.min() > total.max():  # a response that falls under load is as good as one that rises
         total = -total
-    best = int(np.argmax(total))
-    late = (best - most + peak_offset(total, best)) * step
+    best, away, _ = peak_of(total)
+    late = (best - most + away) * step
     return Shift(late, float(total[best]), float(total[most])) if total[best] >= LEAST_CORRELATION else None
 
 
@@ -117,10 +116,10 @@ def refined_shifts(rig: Rig, trials: Sequence[Trial], shifts: Sequence[float]) -
     same in all trials: then the viscosity is fitted too small, and nothing else changes.
     """
     tables = [_explained(rig, trial, shift) for trial, shift in zip(trials, shifts, strict=True)]
-    peaks = [[_peak(column) for column in table.T] for table in tables]
-    best = int(np.argmax([sum(value for _, value in of_lead) for of_lead in zip(*peaks, strict=True)]))
+    peaks = [[peak_of(column) for column in table.T] for table in tables]
+    best = int(np.argmax([sum(value for *_, value in of_lead) for of_lead in zip(*peaks, strict=True)]))
     return [
-        shift + (of_trial[best][0] / (SHIFTS - 1) - 0.5) * 2.0 * REACH * trial.step
+        shift + (sum(of_trial[best][:2]) / (SHIFTS - 1) - 0.5) * 2.0 * REACH * trial.step
         for shift, trial, of_trial in zip(shifts, trials, peaks, strict=True)
     ]
 
@@ -146,13 +145,6 @@ def _explained(rig: Rig, trial: Trial, late: float) -> np.ndarray:
             x = (force[width:] - force[:-width])[both]
             row[i] = float(((x * y).sum(axis=0) ** 2 / np.maximum((x * x).sum(axis=0), 1e-300)).sum())
     return table / max(float((y * y).sum()), 1e-300)
-
-
-def _peak(values: np.ndarray) -> tuple[float, float]:
-    """Place and value of the maximum, between its neighbours by a parabola."""
-    best = int(np.argmax(values))
-    away = peak_offset(values, best)
-    return best + away, float(values[best]) + (0.25 * float(values[best + 1] - values[best - 1]) * away if away else 0.0)
 
 
 def _busiest_part(rig: Rig, trial: Trial) -> slice:

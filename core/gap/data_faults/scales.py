@@ -91,16 +91,9 @@ def _one_of_many(recorded: Mapping[str, Responses], part: str) -> list[DataFault
     if usual.sum() < max(2, len(recorded) // 2):
         return []
     ratios = slope / float(np.exp(np.mean(np.log(slope[usual]))))
-    factors = {name: factor for name, ratio in zip(recorded, ratios, strict=True) if (factor := unit_factor(ratio))}
-    if not factors:
-        return []
-    name, factor = next(iter(factors.items()))
     what, are = ("readings", "are") if part == "reading" else ("net force", "is")
-    said = (
-        f"the {what} of '{name}.csv' for the same load {are} {ratios[list(recorded).index(name)]:.3g} times those of the "
-        f"other recordings, as of a unit {_times(factor)}"
-    )
-    return [DataFault("unit", tuple(factors), said, lambda trial: _scaled(trial, part, 1.0 / factors[trial.name]))]
+    said = f"the {what} of '{{name}}.csv' for the same load {are} {{ratio:.3g}} times those of the other recordings"
+    return _in_other_unit(dict(zip(recorded, ratios.tolist(), strict=True)), part, said)
 
 
 def _against_force(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
@@ -116,7 +109,9 @@ def _against_force(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
     if rig.parameters.unit != "N" or not pairs:
         return []
     ratio = _slope(list(pairs.values()))
-    return _in_other_unit(tuple(pairs), ratio, f"the readings sum to {ratio:.3g} times the measured net force")
+    return _in_other_unit(
+        dict.fromkeys(pairs, ratio), "reading", "the readings sum to {ratio:.3g} times the measured net force"
+    )
 
 
 def _against_stiffness(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
@@ -127,18 +122,19 @@ def _against_stiffness(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]
     if not is_stated or rig.parameters.normal_law != "linear" or correlation(pairs) < LEAST_CORRELATION:
         return []
     found = _slope(pairs)
-    ratio = found / rig.parameters.k
-    said = f"the readings rise by {found:.3g} N per metre of depth, {ratio:.3g} times the k of the rig"
-    return _in_other_unit(tuple(s.trial.name for s in recorded), ratio, said)
+    said = f"the readings rise by {found:.3g} N per metre of depth, {{ratio:.3g}} times the k of the rig"
+    return _in_other_unit({s.trial.name: found / rig.parameters.k for s in recorded}, "reading", said)
 
 
-def _in_other_unit(names: tuple[str, ...], ratio: float, said: str) -> list[DataFault]:
-    """The fault of readings that are a ratio off, if a factor of units is near to it."""
-    factor = unit_factor(ratio)
-    if factor is None:
+def _in_other_unit(ratios: Mapping[str, float], part: str, said: str) -> list[DataFault]:
+    """The fault of the recordings whose ratio to what it should be is near a factor of units; `said` is for the first."""
+    factors = {name: factor for name, ratio in ratios.items() if (factor := unit_factor(ratio))}
+    if not factors:
         return []
-    said += f", as of a unit {_times(factor)}"
-    return [DataFault("unit", names, said, partial(_scaled, part="reading", factor=1.0 / factor))]
+    name, factor = next(iter(factors.items()))
+    times = f"{factor:.3g} times too small" if factor > 1.0 else f"{1.0 / factor:.3g} times too large"
+    said = f"{said.format(name=name, ratio=ratios[name])}, as of a unit {times}"
+    return [DataFault("unit", tuple(factors), said, lambda trial: _scaled(trial, part, 1.0 / factors[trial.name]))]
 
 
 def unit_factor(ratio: float) -> float | None:
@@ -148,10 +144,6 @@ def unit_factor(ratio: float) -> float | None:
     choices = [value for factor in FACTORS for value in (factor, 1.0 / factor)]
     nearest = min(choices, key=lambda value: abs(np.log(ratio / value)))
     return nearest if abs(np.log(ratio / nearest)) < np.log1p(NEAR) else None
-
-
-def _times(factor: float) -> str:
-    return f"{factor:.3g} times too small" if factor > 1.0 else f"{1.0 / factor:.3g} times too large"
 
 
 def _slope(pairs: Responses) -> float:

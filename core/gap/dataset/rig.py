@@ -346,7 +346,8 @@ def _indenter(words: dict[str, Any], path: Path) -> Indenter:
         mesh = _mesh(_inside(words["mesh"], "The indenter's mesh", path), "the indenter")
         return Indenter(turned_outwards(mesh, "the indenter"))
     shape = words["shape"]
-    if not isinstance(shape, dict) or len(shape) != 1 or next(iter(shape)) not in ("sphere", "box", "cylinder"):
+    sizes = {"sphere": ("radius", 1), "box": ("size", 3), "cylinder": ("size", 2)}
+    if not isinstance(shape, dict) or len(shape) != 1 or next(iter(shape)) not in sizes:
         raise FileError(
             f"The indenter's shape of '{path.name}' is {shape!r}: write {{ sphere = radius }}, {{ box = [x, y, z] }} or "
             "{ cylinder = [radius, height] }, in metres."
@@ -354,18 +355,16 @@ def _indenter(words: dict[str, Any], path: Path) -> Indenter:
     import trimesh
 
     ((kind, size),) = shape.items()
-    radius: float | None = None
-    edges: tuple[float, ...] | None = None
+    what, count = sizes[kind]
+    lengths = checked_lengths(size, count, f"The {kind}'s {what} of '{path.name}'")
     if kind == "sphere":
-        (radius,) = checked_lengths(size, 1, f"The sphere's radius of '{path.name}'")
-        solid = trimesh.creation.icosphere(subdivisions=4, radius=radius)
+        solid = trimesh.creation.icosphere(subdivisions=4, radius=lengths[0])
     elif kind == "box":
-        edges = checked_lengths(size, 3, f"The box's size of '{path.name}'")
-        solid = trimesh.creation.box(edges)
+        solid = trimesh.creation.box(lengths)
     else:
-        across, height = checked_lengths(size, 2, f"The cylinder's size of '{path.name}'")
-        solid = trimesh.creation.cylinder(radius=across, height=height, sections=256)
-    return Indenter(checked_mesh(solid.vertices, solid.faces, "the indenter")[0], radius, edges)
+        solid = trimesh.creation.cylinder(radius=lengths[0], height=lengths[1], sections=256)
+    mesh = checked_mesh(solid.vertices, solid.faces, "the indenter")[0]
+    return Indenter(mesh, lengths[0] if kind == "sphere" else None, lengths if kind == "box" else None)
 
 
 # --- trials

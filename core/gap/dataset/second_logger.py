@@ -77,16 +77,18 @@ def bridged(time: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.where(known | (gap > longest_gap(times, found)), values, filled)
 
 
-def peak_offset(values: np.ndarray, top: int) -> float:
-    """Return how far from the largest value, number `top` of (n,), the maximum is by a parabola through three, in spacings.
+def peak_of(values: np.ndarray) -> tuple[int, float, float]:
+    """Return the number of the largest of (n,) values, how far away from it the maximum is, in spacings, and the maximum.
 
-    It is zero at the ends, where one of the three is missing.
+    Both are those of a parabola through three values, unless the largest is at an end.
     """
-    if not 0 < top < len(values) - 1:
-        return 0.0
-    before, here, after = values[top - 1 : top + 2]
-    bend = before - 2.0 * here + after
-    return float(0.5 * (before - after) / bend) if bend < 0.0 else 0.0
+    top = int(np.argmax(values))
+    away = slope = 0.0
+    if 0 < top < len(values) - 1:
+        before, here, after = values[top - 1 : top + 2]
+        bend, slope = before - 2.0 * here + after, 0.5 * (after - before)
+        away = -slope / bend if bend < 0.0 else 0.0
+    return top, float(away), float(values[top] + 0.5 * slope * away)
 
 
 LARGEST_SHIFT = 1e10
