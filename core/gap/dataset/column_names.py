@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -52,6 +52,7 @@ SMALLEST_INVERTED = 1e-30
 """Numbers below it have no inverse."""
 _WORDS = ("name", "unit", "factor", "zero", "missing")
 _OWN_WORDS = {"time": ("rate",), "force": ("area",), "texel": ("names", "first", "count")}
+_WORDS_OF_LOGS = ("rate", "names", "count")
 
 
 @dataclass(frozen=True)
@@ -104,17 +105,11 @@ class _Source:
     count: Annotated[int, wanted("write a whole number above zero", ge=1, le=65536)] = 1
 
 
-def read_column(quantity: str, words: Any, where: str, without: Iterable[str] = (), texels: int | None = None) -> Column:
+def read_column(quantity: str, words: Any, where: str, texels: int | None = None) -> Column:
     """Return the name and the settings of a column from its words in a file: a name alone, or a table.
 
-    Parameters
-    ----------
-    quantity, words, where : str, object, str
-        `where` names the column in messages.
-    without : iterable of str
-        Words that are none here.
-    texels : int or None
-        Number of texels, where no word says it.
+    `where` names the column in messages. A rig has a number of `texels`, and clocks and names of texels need no words of their
+    own (:data:`_WORDS_OF_LOGS`).
 
     Raises
     ------
@@ -124,7 +119,8 @@ def read_column(quantity: str, words: Any, where: str, without: Iterable[str] = 
     words = {"name": words} if isinstance(words, str) else words
     if not isinstance(words, dict):
         raise FileError(f'{where} is {words!r:.60}: write the name of the column, or {{ name = "Fz", unit = "mN" }}.')
-    known_words(words, [word for word in (*_WORDS, *_OWN_WORDS.get(quantity, ())) if word not in without], where)
+    known = [*_WORDS, *_OWN_WORDS.get(quantity, ())]
+    known_words(words, known if texels is None else [word for word in known if word not in _WORDS_OF_LOGS], where)
     unit, units = words.get("unit", QUANTITIES[quantity]), LOG_UNITS.get(QUANTITIES[quantity], {})
     given = {word: words[word] for word in words if word not in ("name", "names", "first", "count")}
     found = read_words(given, Column, where, besides=("unit",), names=(), unit=unit)
@@ -165,7 +161,7 @@ def read_column_rules(table: Mapping[str, Any], path: Path, texels: int) -> dict
     rules = {}
     for column, words in table.items():
         where = f"{column} in [columns] of '{path.name}'"
-        rules[column] = read_column(column, words, where, without=("rate", "names", "count"), texels=texels)
+        rules[column] = read_column(column, words, where, texels)
         if column == "texel" and rules[column].unit not in ("", INVERSE):
             raise FileError(
                 f'unit of {where} is {rules[column].unit!r:.60}: write "{INVERSE}" for one over the values; the unit of the '
