@@ -171,7 +171,7 @@ def fit_readout(rig: Rig) -> ReadoutFit:
         The rig has no readings, nothing that drove the sensor, or too few samples.
     """
     data = readout_data(rig)
-    ways = (False, True) if {"x", "y"} & set(data.targets) else (False,)  # where something presses, the pattern tells
+    ways = (False, True) if {"x", "y"} & set(data.targets) else (False,)  # the pattern shows a place, not the size
     processes = [partial(gaussian_process, length=a, noise=b, by_direction=c) for c, a, b in product(ways, LENGTHS, NOISES)]
     times = _usable_times(data)
     results = [_result(data, "forward model, inverted", [forward_inverse], [()])] if len(data.targets) == 1 else []
