@@ -38,9 +38,15 @@ DAMPING_SHARE = 0.01
 
 @dataclass(frozen=True)
 class FrictionData:
-    """Friction (m,), N, of one texel while something slides over it at velocities (m,), m/s; positive along these.
+    """Friction of one texel while something slides over it.
 
-    With increasing times (m,), s, the surfaces are at rest before the first sample; without, every sample is steady sliding.
+    Attributes
+    ----------
+    velocity : (m,) float, m/s
+    force : (m,) float, N
+        Friction on the texel, along the velocity.
+    time : (m,) float, seconds, or None
+        Increasing; the surfaces are at rest before the first sample. None: every sample is steady sliding.
     """
 
     velocity: np.ndarray
@@ -54,6 +60,7 @@ class FrictionFit:
 
     Attributes
     ----------
+    data : FrictionData
     normal_force : float, N
         Per texel.
     parameters : SensorParameters
@@ -78,18 +85,31 @@ class FrictionFit:
 
 
 def steady_friction(velocity: np.ndarray, normal_force: float, parameters: SensorParameters) -> np.ndarray:
-    """Return the friction (m,), N, of steady sliding at velocities (m,), m/s (Eq. 9, 10, 13 with bristles at rest).
+    """Return the friction of steady sliding (Eq. 9, 10, 13 with bristles at rest), N.
 
-    At velocity zero it is the largest static friction. The normal force is in N.
+    At velocity zero it is the largest static friction.
+
+    Parameters
+    ----------
+    velocity : (m,) float, m/s
+    normal_force : float, N
+    parameters : SensorParameters
     """
     v = np.asarray(velocity, float)
     return np.where(v < 0, -1.0, 1.0) * stribeck_force(np.full(v.shape, normal_force), v, parameters) + parameters.ct * v
 
 
 def friction_over_time(time: np.ndarray, velocity: np.ndarray, normal_force: float, parameters: SensorParameters) -> np.ndarray:
-    """Return the friction (m,), N, of Eq. 9 and 13 along a velocity (m,), m/s, at increasing times (m,), s, from rest.
+    """Return the friction of Eq. 9 and 13 along a velocity, from rest, N.
 
-    Between two samples the velocity is the mean of both, for which Eq. 9 is solved exactly. The normal force is in N.
+    Between two samples the velocity is the mean of both, for which Eq. 9 is solved exactly.
+
+    Parameters
+    ----------
+    time : (m,) float, seconds, increasing
+    velocity : (m,) float, m/s
+    normal_force : float, N
+    parameters : SensorParameters
     """
     force = np.empty(len(time))
     friction_along_path(
@@ -101,7 +121,12 @@ def friction_over_time(time: np.ndarray, velocity: np.ndarray, normal_force: flo
 def read_friction(path: str | os.PathLike, texels: int = 1) -> FrictionData:
     """Read a force–velocity curve: columns `velocity` (m/s) and `force` (N), and `time` (s) where the velocity changes.
 
-    It is that of one of the `texels` that shared the force. See :mod:`...io.text_table` for other units.
+    Parameters
+    ----------
+    path : path
+        See :mod:`...io.text_table` for other units.
+    texels : int
+        Number of texels that shared the force; the curve of one texel is returned.
 
     Raises
     ------
@@ -134,8 +159,13 @@ def friction_data(columns: Mapping[str, np.ndarray], texels: int, source: str) -
 def fit_friction(data: FrictionData, normal_force: float, parameters: SensorParameters | None = None) -> FrictionFit:
     """Fit Eq. 13 to a force–velocity curve, or to a recording over time.
 
-    The normal force, N, is that on one texel. `parameters` are values that are not fitted, and start values of `sigma0` and
-    `sigma1`.
+    Parameters
+    ----------
+    data : FrictionData
+    normal_force : float, N
+        On one texel.
+    parameters : SensorParameters, optional
+        Values that are not fitted, and start values of `sigma0` and `sigma1`.
 
     Raises
     ------

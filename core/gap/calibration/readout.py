@@ -41,7 +41,16 @@ LEVEL = 0.95
 
 @dataclass(frozen=True)
 class ReadoutRecording:
-    """One recording: times (T,) in s, readings (T, c) and targets (T, q), NaN where one is not known."""
+    """One recording.
+
+    Attributes
+    ----------
+    name : str
+    time : (T,) float, s
+    readings : (T, c) float
+    targets : (T, q) float
+        NaN where one is not known.
+    """
 
     name: str
     time: np.ndarray
@@ -66,6 +75,8 @@ class ReadoutData:
         Of the rig.
     channels : (c,) int
         Texels whose readings are used; those that never change are not.
+    fit, check : tuple of ReadoutRecording
+    notes : tuple of str
     """
 
     targets: tuple[str, ...]
@@ -82,7 +93,13 @@ class ReadoutData:
 
 @dataclass(frozen=True)
 class ContactEstimate:
-    """Stimulus of a sensor by its readings: values and 95 % intervals, (T, q) float, NaN where a reading is missing."""
+    """Stimulus of a sensor, estimated from its readings.
+
+    Attributes
+    ----------
+    value, low, high : (T, q) float
+        NaN where a reading is missing. The interval is of 95 %.
+    """
 
     value: np.ndarray
     low: np.ndarray
@@ -99,8 +116,10 @@ class MethodResult:
 
     Attributes
     ----------
+    name : str
     times : tuple of float, s
         Of its memory.
+    estimate : Estimator
     left_out : (q,) float
         Root mean square error on what was left out while numbers were chosen.
     check : (q,) float or None
@@ -130,6 +149,7 @@ class ReadoutFit:
 
     Attributes
     ----------
+    data : ReadoutData
     results : tuple of MethodResult
         From the simplest to the least simple.
     best : MethodResult
@@ -147,7 +167,13 @@ class ReadoutFit:
     best: MethodResult
 
     def estimate(self, time: np.ndarray, readings: np.ndarray) -> ContactEstimate:
-        """Return the stimulus by the method that is proposed, from times (T,), s, and readings (T, n) of all texels of the rig.
+        """Return the stimulus of the sensor by the method that is proposed.
+
+        Parameters
+        ----------
+        time : (T,) float, s
+        readings : (T, n) float
+            Of all texels of the rig.
 
         Raises
         ------

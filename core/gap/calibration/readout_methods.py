@@ -30,9 +30,15 @@ FLOOR = 1e-4
 
 
 def memory_of(time: np.ndarray, readings: np.ndarray, times: Sequence[float]) -> np.ndarray:
-    """Return readings (T, c) behind low passes of first order, less the readings, (T, c · len(times)).
+    """Return readings behind low passes of first order, less the readings, (T, c · len(times)).
 
-    A sample with a missing channel leaves the states as they are. `time` increases; it and the time constants `times` are in s.
+    Parameters
+    ----------
+    time : (T,) float, s, increasing
+    readings : (T, c) float
+        A sample with a missing channel leaves the states as they are.
+    times : sequence of float, s
+        Time constants.
     """
     parts = []
     known = np.isfinite(readings).all(axis=1)
@@ -79,9 +85,17 @@ def gaussian_process(
 ) -> Predictor:
     """Fit a Gaussian process with a squared exponential kernel (Rasmussen and Williams 2006, chapter 2).
 
-    The standard deviation grows away from what was fitted. The length of the kernel is in units of the features' size, and
-    `noise` is the variance of the noise as a share of that of the signal. With `by_direction` features are the direction of the
-    vector of all readings and the logarithm of its length, and not the readings.
+    The standard deviation grows away from what was fitted.
+
+    Parameters
+    ----------
+    readings, memory, targets : (T, c), (T, m), (T, q) float
+    length : float
+        Of the kernel, in units of the features' size.
+    noise : float
+        Variance of the noise, as a share of that of the signal.
+    by_direction : bool
+        Features are the direction of the vector of all readings and the logarithm of its length, and not the readings.
     """
     from scipy.linalg import cho_factor, cho_solve
 
@@ -151,8 +165,17 @@ def forward_curves(
 ) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
     """Fit each channel as a polynomial of a target, and its memory times a line in the target.
 
-    The result is a function from target (T,) and memory (T, m) to readings (T, c). Memory is the target behind low passes, less
-    the target; m may be zero.
+    Parameters
+    ----------
+    readings : (T, c) float
+    target : (T,) float
+    memory : (T, m) float
+        The target behind low passes, less the target; m may be zero.
+
+    Returns
+    -------
+    function
+        From target and memory to readings.
     """
     middle, half = 0.5 * (target.max() + target.min()), 0.5 * float(np.ptp(target))
 

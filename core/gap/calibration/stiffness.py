@@ -26,7 +26,13 @@ MOST_TEXELS = 10**9
 
 @dataclass(frozen=True)
 class FoamData:
-    """A foam under load: compressions (m,), metres, and pressures (m,), Pa."""
+    """A foam under load.
+
+    Attributes
+    ----------
+    compression : (m,) float, metres
+    pressure : (m,) float, Pa
+    """
 
     compression: np.ndarray
     pressure: np.ndarray
@@ -38,9 +44,11 @@ class StiffnessFit:
 
     Attributes
     ----------
-    k, k_offset : Estimate, N/m
-        From the line through zero, which the model needs, since its texels have no force at depth zero, and from that with an
-        offset.
+    data : FoamData
+    k : Estimate, N/m
+        From the line through zero. The model needs this one, since its texels have no force at depth zero.
+    k_offset : Estimate, N/m
+        From the line with an offset.
     slope, slope_offset : float, Pa/m
     offset : Estimate, Pa
         Pressure of the second line at compression zero. If it is negative, the foam has a dead zone.
@@ -69,9 +77,17 @@ class StiffnessFit:
 
 
 def texel_stiffness(pressure: float, area: float, texels: int, compression: float) -> float:
-    """Return ``k = p A / (n x)``, N/m (Eq. 18), of a pressure (Pa) and a compression (m); the area (m²) is the whole sensor's.
+    """Return ``k = p A / (n x)``, N/m (Eq. 18).
 
     The paper prints 58.5 N/m for 9810 Pa, 0.00125 m², 84 texels and 2.5 mm; its inputs give 58.39.
+
+    Parameters
+    ----------
+    pressure : float, Pa
+    area : float, m²
+        Of the whole sensor.
+    texels : int
+    compression : float, metres
     """
     if not AREAS[0] <= area <= AREAS[1]:
         raise ParameterError(f"The sensor's area is {area:g} m²: give a finite value above zero, in m².")
@@ -87,7 +103,12 @@ def texel_stiffness(pressure: float, area: float, texels: int, compression: floa
 def read_foam(path: str | os.PathLike, weight_area: float | None = None) -> FoamData:
     """Read foam measurements: columns `compression` (m) and one of `pressure` (Pa), `force` (N) or `mass` (kg).
 
-    The force or the mass rested on `weight_area`, m². See :mod:`...io.text_table` for other units.
+    Parameters
+    ----------
+    path : path
+        See :mod:`...io.text_table` for other units.
+    weight_area : float or None, m²
+        Area on which the force or the mass rested.
 
     Raises
     ------
@@ -113,7 +134,14 @@ def read_foam(path: str | os.PathLike, weight_area: float | None = None) -> Foam
 
 
 def fit_stiffness(data: FoamData, area: float, texels: int) -> StiffnessFit:
-    """Fit both lines of Fig. 6 by least squares of the pressure; `area`, m², is that of the whole sensor.
+    """Fit both lines of Fig. 6 by least squares of the pressure.
+
+    Parameters
+    ----------
+    data : FoamData
+    area : float, m²
+        Of the whole sensor.
+    texels : int
 
     Raises
     ------

@@ -11,9 +11,20 @@ from ..dataset.trial import FAULT_KINDS, Trial
 
 @dataclass(frozen=True)
 class DataFault:
-    """A fault of the data: its kind (a key of :data:`.trial.FAULT_KINDS`) and the names of the recordings that have it.
+    """A fault of the data.
 
-    `evidence` says what shows it, without a full stop. `correct` returns one of these recordings without the fault.
+    Attributes
+    ----------
+    kind : str
+        A key of :data:`.trial.FAULT_KINDS`.
+    trials : tuple of str
+        Names of the recordings that have it.
+    evidence : str
+        What shows it, in one sentence without a full stop.
+    correct : callable
+        Returns one of these recordings without the fault.
+    put_right : bool
+        True if this was done.
     """
 
     kind: str

@@ -16,7 +16,14 @@ from .scales import find_scale_faults
 
 
 def find_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
-    """Return the faults of a rig's data, given the stimuli of its trials, in the order in which they are put right."""
+    """Return the faults of a rig's data, in the order in which they are put right.
+
+    Parameters
+    ----------
+    rig : Rig
+    stimuli : sequence of Stimulus
+        Of the rig's trials.
+    """
     judged = [s for s in stimuli if (s.load > 0).any() and s.trial.changes]
     if not judged:
         return []
@@ -31,8 +38,13 @@ def find_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
 def put_right(rig: Rig, stimuli: Sequence[Stimulus]) -> tuple[Rig, list[DataFault]]:
     """Return a rig without the faults that it wants to be put right, and all faults that it had.
 
-    Faults are corrected one by one, and the search is repeated after each, because a fault may hide another one. `stimuli` are
-    those of its trials, in their order.
+    Faults are corrected one by one, and the search is repeated after each, because a fault may hide another one.
+
+    Parameters
+    ----------
+    rig : Rig
+    stimuli : sequence of Stimulus
+        Of its trials, in their order.
     """
     done: list[DataFault] = []
     while True:

@@ -65,6 +65,7 @@ class Column:
         The columns: one, or those of all texels in order.
     unit : str
         Empty for texels whose unit is the sensor's own.
+    factor, zero : float
     area : float, m²
         On which a pressure acts that becomes a force; 0 if it is none.
     rate : float, Hz
@@ -174,9 +175,16 @@ def read_column_rules(table: Mapping[str, Any], path: Path, texels: int) -> dict
 
 
 def translated(names: Sequence[str], values: np.ndarray, rules: Mapping[str, Column], file: Path) -> dict[str, np.ndarray]:
-    """Return the columns `values` (T, c) of a file by the names and in the units of Palpate.
+    """Return the columns of a file by the names and in the units of Palpate; columns without a rule are as they are.
 
-    Columns without a rule are as they are. `names` are those of the file, which messages name.
+    Parameters
+    ----------
+    names : sequence of str
+        Of the file's columns.
+    values : (T, c) float
+    rules : mapping of str to Column
+    file : Path
+        For messages.
 
     Raises
     ------

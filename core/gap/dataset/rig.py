@@ -67,7 +67,13 @@ _Table = Annotated[dict[str, Any], wanted("describe it there")]
 
 @dataclass(frozen=True)
 class RigWords:
-    """The words of a rig's file (docs/rig-format.md), whose tables are read one by one."""
+    """The words of a rig's file, whose tables are read one by one.
+
+    Attributes
+    ----------
+    clock : "absolute", "own" or None
+        Whether one clock went on through all recordings, or each has its own.
+    """
 
     sensor: _Table
     trial: Annotated[list[dict[str, Any]], wanted("name at least one CSV file", min_length=1)]
@@ -87,14 +93,19 @@ class Rig:
 
     Attributes
     ----------
+    name : str
+    texels : Texels
     parameters : SensorParameters
         Those that the rig states, and defaults for the others.
     given : frozenset of str
         Names of the parameters that the rig states.
     grid : (int, int, (float, float)) or None
-        Rows, columns and pitch (m), if the sensor is given as a grid.
+        Rows, columns and pitch, if the sensor is given as a grid.
+    indenter : Indenter or None
+    trials : tuple of Trial
     words : mapping
         The `[sensor]` table of the file.
+    warnings : tuple of str
     correct : tuple of str
         Kinds of faults of the data that are to be put right, keys of :data:`.trial.FAULT_KINDS`.
     cover : Cover or None
@@ -131,7 +142,11 @@ class Rig:
 
 
 def read_rig(path: str | Path) -> Rig:
-    """Read a rig, given the path of its TOML file, and all its recordings.
+    """Read a rig and all its recordings.
+
+    Parameters
+    ----------
+    path : path of the TOML file
 
     Raises
     ------
@@ -279,7 +294,10 @@ def _texels(sensor: dict[str, Any], path: Path) -> tuple[Texels, tuple | None, C
 def grid_texels(rows: int, columns: int, pitch_x: float, pitch_y: float) -> Texels:
     """Return texels in z = 0, centred on the origin, rows along +y, columns along +x, normals +z; texel 0 is row 0, column 0.
 
-    Their distances `pitch_x` and `pitch_y` are in metres.
+    Parameters
+    ----------
+    rows, columns : int
+    pitch_x, pitch_y : float, metres
     """
     from ...geometry.grid_layout import GridLayout
 

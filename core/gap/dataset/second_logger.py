@@ -42,9 +42,17 @@ ERROR_QUANTILE = 0.95
 
 
 def longest_gap(time: np.ndarray, values: np.ndarray) -> float:
-    """Return how long a gap may be to be interpolated, in seconds, given samples (T,) of which none is missing.
+    """Return how long a gap may be to be interpolated, in seconds.
 
-    It is infinite for a stimulus that does not move, and zero where even neighbours do not predict the sample between them.
+    Parameters
+    ----------
+    time, values : (T,) float
+        Without missing values.
+
+    Returns
+    -------
+    float
+        Infinite for a stimulus that does not move, and zero where even neighbours do not predict the sample between them.
     """
     span = float(np.ptp(values)) if len(values) else 0.0
     if span <= 0.0 or len(values) < FEWEST:
@@ -64,9 +72,18 @@ def longest_gap(time: np.ndarray, values: np.ndarray) -> float:
 
 
 def bridged(time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return values (T,) at times (T,), in s, with the missing ones interpolated where the gap is short enough.
+    """Return values with the missing ones interpolated where the gap is short enough.
 
-    They stay NaN within gaps that are too long, and before the first and after the last known value.
+    Parameters
+    ----------
+    time : (T,) float, s
+    values : (T,) float
+        NaN where a value is missing.
+
+    Returns
+    -------
+    (T,) float
+        NaN within gaps that are too long, and before the first and after the last known value.
     """
     known = np.isfinite(values)
     if not known.any():
@@ -97,7 +114,15 @@ LARGEST_SHIFT = 1e10
 
 @dataclass(frozen=True)
 class SecondLogger:
-    """The file of a second logger, which is checked where it is opened, and its time of an event minus the first one's, s."""
+    """The file of a second logger, by its name in the rig.
+
+    Attributes
+    ----------
+    file : object
+        As the rig writes it; it is checked where it is opened.
+    late : float, s
+        The second clock's time of an event minus the first one's.
+    """
 
     file: Any = None
     late: Annotated[float, wanted("write seconds", ge=-LARGEST_SHIFT, le=LARGEST_SHIFT)] = 0.0
@@ -106,9 +131,15 @@ class SecondLogger:
 def joined(
     first: Mapping[str, np.ndarray], second: Mapping[str, np.ndarray], late: float, files: tuple[Path, Path]
 ) -> dict[str, np.ndarray]:
-    """Return the columns (T,) of two loggers at the times of the second, on the clock of the first.
+    """Return the columns of two loggers at the times of the second, on the clock of the first.
 
-    Both have a checked `time`, in seconds. `late` is the second clock's time of an event minus the first one's.
+    Parameters
+    ----------
+    first, second : mapping of str to (T,) ndarray
+        With checked `time`, in seconds.
+    late : float, s
+    files : (Path, Path)
+        For messages.
 
     Raises
     ------

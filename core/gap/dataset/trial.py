@@ -37,10 +37,12 @@ class Trial:
 
     Attributes
     ----------
-    name, use, stimulus : str
-        Its file without the suffix; "fit" or "check"; "pose", "depth" or "force".
+    name : str
+        Of its file, without the suffix.
+    use : "fit" or "check"
     time : (T,) float, seconds, increasing
         Since the first sample of its session, or of the rig's first recording.
+    stimulus : "pose", "depth" or "force"
     position, quaternion : (T, 3), (T, 4) float, or None
         Of the indenter in the sensor's frame. With a known force they say where it acts; z has no meaning then.
     level : (T,) float or None
@@ -51,9 +53,8 @@ class Trial:
         NaN if a value is missing.
     force : (T, 3) float or None, newtons
         Net force on the sensor; NaN if a component is missing.
-    session, probe, repeats : str
-        Names of the session in which the sensor's state goes on from recording to recording, of the probe that pressed (empty
-        for the rig's indenter), and of a group of recordings of the same stimulus; empty if it belongs to none.
+    session : str
+        Name of the session in which the sensor's state goes on from recording to recording; empty if it belongs to none.
     tared : bool
         True if the responses of its first sample were subtracted from all its responses.
     factor, zero : str or float
@@ -64,6 +65,10 @@ class Trial:
     contact_height : str or float, metres
         How much higher the sensor's surface is than poses or depths say: contact begins earlier by as much. A name if it is
         free. Without meaning in a recording with a known force.
+    probe : str
+        Name of the probe that pressed; empty for the rig's indenter.
+    repeats : str
+        Name of a group of recordings of the same stimulus; empty if it belongs to none.
     temperature : pair of (m,) float, or None
         Times (s, on the clock of `time`) and temperatures of the sensor (°C); None if none were recorded.
     height_start : float, metres
