@@ -57,7 +57,4 @@ def _agreement(rig: Rig, trials: Sequence[Trial], height: float) -> float:
 
 def _thinned(trial: Trial) -> Trial:
     """The trial with some of its samples only."""
-    every = slice(None, None, max(1, -(-len(trial.time) // MOST_SAMPLES)))
-    parts = {"time": trial.time, "position": trial.position, "quaternion": trial.quaternion, "level": trial.level}
-    parts |= {"travel": trial.travel, "reading": trial.reading, "force": trial.force}
-    return replace(trial, **{name: None if part is None else part[every] for name, part in parts.items()})  # type: ignore[arg-type]
+    return trial.part(slice(None, None, max(1, -(-len(trial.time) // MOST_SAMPLES))))

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..dataset.rig import Rig
-from ..dataset.trial import TrialHistory, on_common_clocks
+from ..dataset.trial import is_mixed, on_common_clocks
 from ..forward.predictor import Model, Predictor
 
 LEAST_RECORDINGS = 3
@@ -87,9 +87,10 @@ def as_one_session(rig: Rig) -> Rig | None:
 
     The pauses between them are assumed, but which recording came first is not.
     """
-    if len({trial.stimulus == "force" for trial in rig.trials}) > 1:
+    if is_mixed(rig.trials):
         return None
-    trials, _ = on_common_clocks(rig.trials, [TrialHistory(ASSUMED)] * len(rig.trials), "own", Path(rig.name))
+    members = [replace(trial, session=ASSUMED) for trial in rig.trials]
+    trials, _ = on_common_clocks(members, [None] * len(members), "own", Path(rig.name))
     return replace(rig, trials=tuple(trials))
 
 

@@ -181,15 +181,13 @@ def fit_friction(data: FrictionData, normal_force: float, parameters: SensorPara
         raise ParameterError("A friction curve needs measurements at different velocities: add some.")
     start = parameters or SensorParameters()
     steady = _steady_start(data, normal_force)
-    if data.time is None:
-        return _refine(data, normal_force, start, STEADY, steady)
-    starts = _dynamic_starts(data, normal_force, start, steady)
-    return min((_refine(data, normal_force, start, DYNAMIC, values) for values in starts), key=lambda one: one.residual)
+    starts = [steady] if data.time is None else _dynamic_starts(data, normal_force, start, steady)
+    return min((_refine(data, normal_force, start, values) for values in starts), key=lambda one: one.residual)
 
 
 def _dynamic_starts(
-    data: FrictionData, normal_force: float, base: SensorParameters, steady: dict[str, float]
-) -> list[dict[str, float]]:
+    data: FrictionData, normal_force: float, base: SensorParameters, steady: dict[str, Any]
+) -> list[dict[str, Any]]:
     """Start values with several stiffnesses of the bristles: the given one, and those that fit best among many as they are.
 
     The misfit has a local minimum where bristles are so soft that they never slip, and another where they are so stiff that
@@ -202,46 +200,39 @@ def _dynamic_starts(
         return [given]
     level = max(steady["mus"], 1e-6) * normal_force
     softest, stiffest = level / float(step.sum()), level / float(step[step > 0].min())
-    tried = []
-    for sigma0 in np.geomspace(softest, max(stiffest, 10.0 * softest), STIFFNESSES):
-        for sigma1 in (base.sigma1, DAMPING_SHARE * float(sigma0)):
-            values = steady | {"sigma0": float(sigma0), "sigma1": sigma1}
-            misfit = friction_over_time(data.time, data.velocity, normal_force, _with(base, values)) - data.force
-            tried.append((float(misfit @ misfit), values))
-    tried.sort(key=lambda one: one[0])
-    return [given, *(values for _, values in tried[:BEST_STARTS])]
+    stiffnesses = np.geomspace(softest, max(stiffest, 10.0 * softest), STIFFNESSES).tolist()
+    tried = [steady | {"sigma0": a, "sigma1": b} for a in stiffnesses for b in (base.sigma1, DAMPING_SHARE * a)]
+    tried.sort(key=lambda values: float((_residual(data, normal_force, replace(base, **values)) ** 2).sum()))
+    return [given, *tried[:BEST_STARTS]]
 
 
-def _steady_start(data: FrictionData, normal_force: float) -> dict[str, float]:
+def _residual(data: FrictionData, normal_force: float, parameters: SensorParameters) -> np.ndarray:
+    """Friction less the measured one, N."""
+    if data.time is None:
+        return steady_friction(data.velocity, normal_force, parameters) - data.force
+    return friction_over_time(data.time, data.velocity, normal_force, parameters) - data.force
+
+
+def _steady_start(data: FrictionData, normal_force: float) -> dict[str, Any]:
     """Return start values from the curve of steady sliding: given `x0`, the others follow by non-negative least squares."""
     from scipy.optimize import nnls
 
     speed = np.abs(data.velocity)
     along = np.where(data.velocity < 0, -1.0, 1.0) * data.force
-    best: tuple[float, float, np.ndarray] | None = None
+    fits = []
     for x0 in np.geomspace(speed[speed > 0].min() / 3, speed.max() * 3, 200):
         columns = np.stack([np.full_like(speed, normal_force), normal_force * np.exp(-((speed / x0) ** 2)), speed], axis=1)
-        values, misfit = nnls(columns, along)
-        if best is None or misfit < best[0]:
-            best = misfit, float(x0), values
-    assert best is not None
-    _, x0, (mud, rise, ct) = best
+        fits.append((float(x0), *nnls(columns, along)))
+    x0, (mud, rise, ct), _ = min(fits, key=lambda fit: fit[2])
     return {"mus": mud + rise, "mud": mud, "x0": x0, "ct": ct}
 
 
-def _with(base: SensorParameters, values: dict[str, float]) -> SensorParameters:
-    """Return parameters with some of them replaced."""
-    changes: dict[str, Any] = dict(values)
-    return replace(base, **changes)
-
-
-def _refine(
-    data: FrictionData, normal_force: float, base: SensorParameters, names: tuple[str, ...], start: dict[str, float]
-) -> FrictionFit:
+def _refine(data: FrictionData, normal_force: float, base: SensorParameters, start: dict[str, Any]) -> FrictionFit:
     """Return the fit by nonlinear least squares from start values."""
     from scipy.optimize import least_squares
 
-    weight, speed = max(normal_force, 1e-12), max(float(np.abs(data.velocity).max()), 1e-12)
+    names = STEADY if data.time is None else DYNAMIC
+    weight, speed = normal_force, max(float(np.abs(data.velocity).max()), 1e-12)
     units = {"mus": 1.0, "mud": 1.0, "x0": speed, "ct": weight / speed, "sigma0": base.sigma0, "sigma1": max(base.sigma1, 1e-6)}
     low = np.array([0.0, 0.0, 1e-3, 0.0, 1e-4, 0.0][: len(names)])
     # The variables are the values in units of order one; in the place of mus its excess over mud, which is not negative.
@@ -249,23 +240,18 @@ def _refine(
     to_values[0, 1] = 1.0
     first = np.linalg.solve(to_values, [start[name] for name in names])
 
-    def residual_of(values: np.ndarray) -> np.ndarray:
-        parameters = _with(base, dict(zip(names, map(float, values), strict=True)))
-        if data.time is None:
-            return steady_friction(data.velocity, normal_force, parameters) - data.force
-        return friction_over_time(data.time, data.velocity, normal_force, parameters) - data.force
+    def with_values(values: np.ndarray) -> SensorParameters:
+        changes: dict[str, Any] = dict(zip(names, values.tolist(), strict=True))
+        return replace(base, **changes)
 
     found = least_squares(
-        lambda variables: residual_of(to_values @ variables) / weight,
+        lambda variables: _residual(data, normal_force, with_values(to_values @ variables)) / weight,
         np.maximum(first, low + 1e-9),
         bounds=(low, np.inf),
         x_scale="jac",
-        xtol=1e-14,
-        ftol=1e-14,
-        gtol=1e-14,
+        **dict.fromkeys(("xtol", "ftol", "gtol"), 1e-14),
     )
     values = to_values @ found.x
-    residual = residual_of(values)
+    residual = _residual(data, normal_force, with_values(values))
     estimates = dict(zip(names, linearised_estimates(values, found.jac, to_values, residual, weight), strict=True))
-    fitted = _with(base, {name: estimate.value for name, estimate in estimates.items()})
-    return FrictionFit(data, normal_force, fitted, estimates, float(np.sqrt(np.mean(residual**2))))
+    return FrictionFit(data, normal_force, with_values(values), estimates, float(np.sqrt(np.mean(residual**2))))

@@ -32,9 +32,7 @@ def plot_stiffness(path: str | Path, fit: StiffnessFit) -> None:
     offset = fit.offset.value + fit.slope_offset * x
     axes.plot(x * 1e3, offset / 1e3, "--", color=SHEAR_COLOUR, lw=1.1, label=f"with offset: k = {fit.k_offset.value:.4g} N/m")
     axes.axhline(0.0, color=GREY, lw=0.5)
-    axes.set_xlim(0.0, x[1] * 1e3)
-    axes.set_xlabel("compression (mm)")
-    axes.set_ylabel("pressure (kPa)")
+    axes.set(xlim=(0.0, x[1] * 1e3), xlabel="compression (mm)", ylabel="pressure (kPa)")
     _finish(axes)
     save_figure(figure, path, DPI)
 
@@ -56,8 +54,7 @@ def plot_friction(path: str | Path, fit: FrictionFit) -> None:
             v = np.linspace(start, stop, 300)
             axes.plot(v, steady_friction(v, fit.normal_force, law) * 1e3, "--", color=SHEAR_COLOUR, lw=1.1, label=label)
             label = "_"
-    axes.set_xlabel("sliding velocity (m/s)")
-    axes.set_ylabel("friction of one texel (mN)")
+    axes.set(xlabel="sliding velocity (m/s)", ylabel="friction of one texel (mN)")
     if low == 0.0:
         axes.set_xlim(0.0, None)
     if data.force.min() >= 0.0:
@@ -71,10 +68,9 @@ def plot_readout(path: str | Path, fit: ReadoutFit) -> None:
     one = (fit.data.check or fit.data.fit)[0]
     found = fit.best.estimate(one.time, one.readings)
     figure = new_figure(2.0 * COLUMN, 1.9 * len(fit.data.targets) + 0.4)
+    since, share = one.time - one.time[0], 1.0 / len(fit.data.targets)
     for i, target in enumerate(fit.data.targets):
-        bottom = 1.0 - (i + 1.0) / len(fit.data.targets)
-        axes = figure.add_axes((0.09, bottom + 0.16 / len(fit.data.targets), 0.89, 0.78 / len(fit.data.targets)))
-        since = one.time - one.time[0]
+        axes = figure.add_axes((0.09, 1.0 - (i + 0.84) * share, 0.89, 0.78 * share))
         axes.fill_between(since, found.low[:, i], found.high[:, i], color=SHEAR_COLOUR, alpha=0.3, lw=0, label="95 % interval")
         axes.plot(since, found.value[:, i], color=SHEAR_COLOUR, lw=1.0, label="from readings")
         axes.plot(since, one.targets[:, i], color=INK, lw=0.7, label="measured")

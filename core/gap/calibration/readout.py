@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -36,8 +37,6 @@ MOST_SAMPLES, MOST_TRIED = 4000, 800
 """Samples from which a method is fitted, and from which its numbers are chosen: evenly taken."""
 LEVEL = 0.95
 """Of intervals."""
-UNITS = {"x": "m", "y": "m", "depth": "m"}
-"""Units of targets that are not in newtons."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +60,7 @@ class ReadoutRecording:
     @property
     def is_complete(self) -> np.ndarray:
         """(T,) bool: samples of which all readings and targets are known."""
-        found: np.ndarray = np.isfinite(self.readings).all(axis=1) & np.isfinite(self.targets).all(axis=1)
-        return found
+        return np.isfinite(np.column_stack([self.readings, self.targets])).all(axis=1)
 
 
 @dataclass(frozen=True)
@@ -90,7 +88,7 @@ class ReadoutData:
 
     def unit(self, target: str) -> str:
         """Return the unit of a target."""
-        return UNITS.get(target, "N")
+        return "m" if target in ("x", "y", "depth") else "N"
 
 
 @dataclass(frozen=True)
@@ -199,11 +197,8 @@ def fit_readout(rig: Rig) -> ReadoutFit:
         The rig has no readings, nothing that drove the sensor, or too few samples.
     """
     data = readout_data(rig)
-    # Where something presses, the pattern tells, not the size.
-    ways = (False, True) if {"x", "y"} & set(data.targets) else (False,)
-    processes = [
-        partial(gaussian_process, length=a, noise=b, by_direction=way) for way in ways for a in LENGTHS for b in NOISES
-    ]
+    ways = (False, True) if {"x", "y"} & set(data.targets) else (False,)  # the pattern shows a place, not the size
+    processes = [partial(gaussian_process, length=a, noise=b, by_direction=c) for c, a, b in product(ways, LENGTHS, NOISES)]
     times = _usable_times(data)
     results = [_result(data, "forward model, inverted", [forward_inverse], [()])] if len(data.targets) == 1 else []
     results.append(_result(data, "ridge, second degree", [partial(ridge, penalty=one) for one in PENALTIES], times))
@@ -314,22 +309,21 @@ def _usable_times(data: ReadoutData) -> list[tuple[float, ...]]:
 
 def _result(data: ReadoutData, name: str, candidates: Sequence[Method], memories: Sequence[tuple[float, ...]]) -> MethodResult:
     """Choose among candidates of one kind, fit the best to all, and check it."""
-    lowest = [min(float(np.nanmin(part.targets[:, i])) for part in data.fit) for i in range(len(data.targets))]
-    is_floor = [target == "force" and low >= 0.0 for target, low in zip(data.targets, lowest, strict=True)]
-    floor = np.where(is_floor, 0.0, -np.inf)  # of a force that was never negative
-    spread = np.maximum(np.nanstd(np.concatenate([part.targets for part in data.fit]), axis=0), 1e-300)
-    best: tuple[float, Method, tuple[float, ...], _Samples, Prediction] | None = None
+    targets = np.concatenate([part.targets for part in data.fit])
+    never_negative = (np.array(data.targets) == "force") & (np.nanmin(targets, axis=0) >= 0.0)
+    floor = np.where(never_negative, 0.0, -np.inf)
+    spread = np.maximum(np.nanstd(targets, axis=0), 1e-300)
+
+    def score_of(error: np.ndarray) -> float:
+        return float(np.mean(_root_mean_square(error) / spread))
+
+    tried = []
     for times in memories:
         samples = _samples(data.fit, times, MOST_TRIED)
-        for method in candidates:
-            error, deviation = _left_out(method, samples, floor)
-            score = float(np.mean(_root_mean_square(error) / spread))
-            if best is None or score < best[0]:
-                best = score, method, times, samples, (error, deviation)
-    assert best is not None
-    score, method, times, samples, (error, deviation) = best
+        tried += [(method, times, samples.part, *_left_out(method, samples, floor)) for method in candidates]
+    method, times, part, error, deviation = min(tried, key=lambda one: score_of(one[3]))
     factor = np.quantile(np.abs(error) / np.maximum(deviation, 1e-300), LEVEL, axis=0)
-    scores = [float(np.mean(_root_mean_square(error[samples.part == k]) / spread)) for k in np.unique(samples.part)]
+    scores = [score_of(error[part == k]) for k in np.unique(part)]
     score_error = float(np.std(scores, ddof=1) / np.sqrt(len(scores)))
     predictor = method(*_samples(data.fit, times, MOST_SAMPLES)[:3])
 
@@ -342,12 +336,12 @@ def _result(data: ReadoutData, name: str, candidates: Sequence[Method], memories
             found[:, known] = np.maximum(np.stack([value, value - reach, value + reach]), floor)
         return ContactEstimate(*found)
 
-    return MethodResult(name, times, estimate, _root_mean_square(error), *_check(data, estimate), score, score_error)
+    checked = _check(data, estimate)
+    return MethodResult(name, times, estimate, _root_mean_square(error), *checked, score_of(error), score_error)
 
 
 def _root_mean_square(errors: np.ndarray) -> np.ndarray:
-    found: np.ndarray = np.sqrt(np.mean(errors**2, axis=0))
-    return found
+    return np.asarray(np.sqrt(np.mean(errors**2, axis=0)))
 
 
 def _left_out(method: Method, samples: _Samples, floor: np.ndarray) -> Prediction:
@@ -363,14 +357,13 @@ def _left_out(method: Method, samples: _Samples, floor: np.ndarray) -> Predictio
 
 def _check(data: ReadoutData, estimate: Estimator) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
     """Root mean square and median error on the check recordings, and the share inside of intervals."""
+    if not data.check:
+        return None, None, None
     errors, inside = [], []
     for one in data.check:
         own = estimate(one.time, one.readings)
-        known = np.isfinite(own.value).all(axis=1) & np.isfinite(one.targets).all(axis=1)
-        errors.append((own.value - one.targets)[known])
-        inside.append(((own.low <= one.targets) & (one.targets <= own.high))[known])
-    if not errors:
-        return None, None, None
+        errors.append((own.value - one.targets)[one.is_complete])
+        inside.append(((own.low <= one.targets) & (one.targets <= own.high))[one.is_complete])
     error = np.concatenate(errors)
     return _root_mean_square(error), np.median(np.abs(error), axis=0), np.concatenate(inside).mean(axis=0)
 

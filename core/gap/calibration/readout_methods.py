@@ -14,7 +14,6 @@ import numpy as np
 
 Prediction = tuple[np.ndarray, np.ndarray]
 Predictor = Callable[[np.ndarray, np.ndarray], Prediction]
-ForwardCurves = Callable[[np.ndarray, np.ndarray], np.ndarray]
 MOST_SQUARED = 40
 """Channels up to which the ridge takes all products of two; of more it takes the squares."""
 ASINH = 2.0
@@ -139,13 +138,11 @@ def forward_inverse(readings: np.ndarray, memory: np.ndarray, targets: np.ndarra
     """
     low, high = float(targets.min()), float(targets.max())
     grid = np.linspace(low - BEYOND * (high - low), high + BEYOND * (high - low), GRID)
-    nothing = np.zeros((len(targets), 0))
-    curves = forward_curves(readings, targets[:, 0], nothing)
-    curve, residual = curves(grid, np.zeros((GRID, 0))), readings - curves(targets[:, 0], nothing)
+    curves = forward_curves(readings, targets[:, 0], memory[:, :0])
+    curve, residual = curves(grid, np.zeros((GRID, 0))), readings - curves(targets[:, 0], memory[:, :0])
     covariance = np.atleast_2d(np.cov(residual.T)) + FLOOR * np.diag(readings.var(axis=0))
     whitening = np.linalg.inv(np.linalg.cholesky(covariance))
-    expected = curve @ whitening.T
-    step = float(grid[1] - grid[0])
+    expected, step = curve @ whitening.T, float(grid[1] - grid[0])
     slope = np.gradient(expected, step, axis=0)
     deviation = 1.0 / np.sqrt(np.maximum(np.sum(slope**2, axis=1), 1e-300))
 
@@ -163,7 +160,9 @@ def forward_inverse(readings: np.ndarray, memory: np.ndarray, targets: np.ndarra
     return predict
 
 
-def forward_curves(readings: np.ndarray, target: np.ndarray, memory: np.ndarray) -> ForwardCurves:
+def forward_curves(
+    readings: np.ndarray, target: np.ndarray, memory: np.ndarray
+) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
     """Fit each channel as a polynomial of a target, and its memory times a line in the target.
 
     Parameters

@@ -67,8 +67,8 @@ class StiffnessFit:
     slope_offset: float
     offset: Estimate
     dead_zone: float
-    bend: float = 0.0
-    is_turned: bool = False
+    bend: float
+    is_turned: bool
 
     @property
     def stiffens(self) -> bool:
@@ -161,16 +161,8 @@ def fit_stiffness(data: FoamData, area: float, texels: int) -> StiffnessFit:
     slope_offset, offset = linear_estimates(np.stack([x, np.ones_like(x)], axis=1), p)
     if slope.value <= 0 or slope_offset.value <= 0:
         raise ParameterError("The foam's pressure does not rise with its compression: check the columns and their signs.")
-    return StiffnessFit(
-        data,
-        slope.scaled(per_texel),
-        slope_offset.scaled(per_texel),
-        slope.value,
-        slope_offset.value,
-        offset,
-        *_beginning_and_bend(x, p),
-        is_turned,
-    )
+    lines = slope.scaled(per_texel), slope_offset.scaled(per_texel), slope.value, slope_offset.value, offset
+    return StiffnessFit(data, *lines, *_beginning_and_bend(x, p), is_turned)
 
 
 def _beginning_and_bend(x: np.ndarray, p: np.ndarray) -> tuple[float, float]:
@@ -181,14 +173,10 @@ def _beginning_and_bend(x: np.ndarray, p: np.ndarray) -> tuple[float, float]:
     half = len(x) // 2
     if half < 4 or not np.ptp(x[:half]) > 0.0:
         return 0.0, 0.0
-    start = _root_below(x[:half], p[:half])
+    # The root of the parabola through the lower half that is nearest below its second point.
+    roots = np.roots(np.polyfit(x[:half], p[:half], 2))
+    start = max((float(root.real) for root in roots if abs(root.imag) < 1e-12 and root.real <= x[1]), default=0.0)
     start = start if start > DEAD_ZONE * x.max() else 0.0
     steep, curved = linear_estimates(np.stack([x - start, (x - start) ** 2], axis=1), p)
     share = curved.value * (x.max() - start) / max(steep.value, 1e-300)
     return start, float(share) if curved.low > 0.0 or curved.high < 0.0 else 0.0
-
-
-def _root_below(x: np.ndarray, p: np.ndarray) -> float:
-    """Return where a parabola through the beginning of a curve is zero: the root that is nearest below its second point."""
-    roots = np.roots(np.polyfit(x, p, 2))
-    return max((float(root.real) for root in roots if abs(root.imag) < 1e-12 and root.real <= x[1]), default=0.0)

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -129,12 +128,7 @@ def _thinned(predictors: Sequence[Predictor]) -> list[Predictor]:
 
 def _thinned_trial(trial: Trial) -> Trial:
     """Every fourth sample of a trial."""
-    every = slice(None, None, SAMPLE_STRIDE if len(trial.time) >= LEAST_SAMPLES * SAMPLE_STRIDE else 1)
-    parts: dict[str, Any] = {
-        name: None if getattr(trial, name) is None else getattr(trial, name)[every]
-        for name in ("time", "position", "quaternion", "level", "travel", "reading", "force")
-    }
-    return replace(trial, **parts)
+    return trial.part(slice(None, None, SAMPLE_STRIDE if len(trial.time) >= LEAST_SAMPLES * SAMPLE_STRIDE else 1))
 
 
 def _texels_of_all_loads(predictor: Predictor) -> np.ndarray | None:

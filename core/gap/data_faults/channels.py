@@ -34,7 +34,7 @@ def find_channel_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault
     xx, xy, yy = _moments(recorded, n)
     with np.errstate(divide="ignore", invalid="ignore"):
         squared = np.nan_to_num(xy * xy / np.outer(xx, yy))  # [texel, channel]
-    loaded = (xx > LEAST_LOADED * xx.max(initial=0.0)) & (xx > 0)
+    loaded = xx > LEAST_LOADED * xx.max()
     if loaded.sum() < 2:
         return []
     names = tuple(s.trial.name for s in recorded)
@@ -46,8 +46,8 @@ def find_channel_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault
 
     given = left(np.arange(n))
     orders = _orders(rig, n)
-    best, what = min(((left(order), what) for what, order in orders.items()), default=(1.0, ""))
-    if what and 1.0 - best > LEAST_ORDER and best < BETTER_ORDER * given:
+    best, what = min((left(order), what) for what, order in orders.items())
+    if 1.0 - best > LEAST_ORDER and best < BETTER_ORDER * given:
         said = f"{what}, the loads explain {1.0 - best:.0%} of the readings, and {1.0 - given:.0%} as they are"
         return [DataFault("reversed-channels", names, said, partial(_reordered, order=orders[what]))]
     pairs = _swapped(squared, loaded & (yy > 0))
@@ -56,13 +56,12 @@ def find_channel_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault
     order = np.arange(n)
     for a, b in pairs:
         order[[a, b]] = b, a
-    listed = ", ".join(f"texel_{a} and texel_{b}" for a, b in pairs[:3]) + (
-        f" and {len(pairs) - 3} more" if len(pairs) > 3 else ""
-    )
+    listed = ", ".join(f"texel_{a} and texel_{b}" for a, b in pairs[:3])
+    more = f" and {len(pairs) - 3} more" if len(pairs) > 3 else ""
     a, b = pairs[0]
     said = (
-        f"{listed} each follow the other's load (texel_{a}: correlation {squared[b, a] ** 0.5:.2f} with the load of texel_{b}, "
-        f"{squared[a, a] ** 0.5:.2f} with its own)"
+        f"{listed}{more} each follow the other's load (texel_{a}: correlation {squared[b, a] ** 0.5:.2f} with the load of "
+        f"texel_{b}, {squared[a, a] ** 0.5:.2f} with its own)"
     )
     return [DataFault("swapped-channels", names, said, partial(_reordered, order=order))]
 
@@ -87,20 +86,15 @@ def _orders(rig: Rig, n: int) -> dict[str, np.ndarray]:
             orders["with rows in reverse order"] = table[::-1].ravel()
             orders["with columns in reverse order"] = table[:, ::-1].ravel()
             orders["column by column"] = np.arange(n).reshape(columns, rows).T.ravel()
-    return {what: order for what, order in orders.items() if (order != np.arange(n)).any()}
+    return orders
 
 
 def _swapped(squared: np.ndarray, judged: np.ndarray) -> list[tuple[int, int]]:
     """Pairs of channels that leave far less with each other's load than with their own."""
-    pairs, free = [], judged.copy()
-    for a in np.flatnonzero(judged):
-        b = int(np.argmax(np.where(judged, squared[:, a], -1.0)))
-        if b <= a or not (free[a] and free[b]) or int(np.argmax(np.where(judged, squared[:, b], -1.0))) != a:
-            continue
-        if all(1.0 - squared[other, one] < SWAPPED_LEAVES * (1.0 - squared[one, one]) for one, other in ((a, b), (b, a))):
-            pairs.append((int(a), b))
-            free[[a, b]] = False
-    return pairs
+    followed = np.argmax(np.where(judged[:, None], squared, -1.0), axis=0).tolist()  # by each channel: whose load
+    pairs = [(a, b) for a, b in enumerate(followed) if judged[a] and a < b and followed[b] == a]
+    left = 1.0 - squared
+    return [(a, b) for a, b in pairs if all(left[j, i] < SWAPPED_LEAVES * left[i, i] for i, j in ((a, b), (b, a)))]
 
 
 def _reordered(trial: Trial, order: np.ndarray) -> Trial:

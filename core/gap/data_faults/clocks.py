@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from ..dataset.rig import Rig
-from ..dataset.second_logger import peak_offset
-from ..dataset.trial import Trial
+from ..dataset.second_logger import peak_of
+from ..dataset.trial import Trial, columns_at
 from ..forward.stimulus import Stimulus, stimulus_of
 from .data_fault import DataFault
 
@@ -62,12 +62,11 @@ class Shift:
 
 def find_clock_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
     """Return the shifted clocks of some recordings."""
-    known = {s.trial.name: shift for s in stimuli if (shift := shift_of(s)) is not None}
-    typical = float(np.median([one.late for one in known.values()])) if known else 0.0
+    known = [(s, shift) for s in stimuli if (shift := shift_of(s)) is not None]
+    typical = float(np.median([shift.late for _, shift in known])) if known else 0.0
     shifts = {}
-    for s in stimuli:
-        shift = known.get(s.trial.name)
-        if shift is None or not _is_clearly_better(shift.correlation, shift.unshifted):
+    for s, shift in known:
+        if not _is_clearly_better(shift.correlation, shift.unshifted):
             continue
         least = max(LEAST_SHIFT, LEAST_SHIFT_SAMPLES * s.trial.step)
         is_common = abs(shift.late - typical) < least
@@ -96,15 +95,15 @@ def shift_of(stimulus: Stimulus) -> Shift | None:
         return None
     time, load, response, step = prepared
     most = int(min(LONGEST_SHIFT, LARGEST_SHIFT_SHARE * (time[-1] - time[0])) / step)
-    size = np.sqrt(float((load * load).sum())) * np.sqrt(float((response * response).sum()))
+    size = np.linalg.norm(load) * np.linalg.norm(response)
     if most < 4 or size <= 0.0:
         return None
-    padded = np.concatenate([np.zeros((most, load.shape[1])), response, np.zeros((most, load.shape[1]))])
+    padded = np.pad(response, ((most, most), (0, 0)))
     total = np.array([(load * padded[k : k + len(load)]).sum() for k in range(2 * most + 1)]) / size
     if -total.min() > total.max():  # a response that falls under load is as good as one that rises
         total = -total
-    best = int(np.argmax(total))
-    late = (best - most + peak_offset(total, best)) * step
+    best, away, _ = peak_of(total)
+    late = (best - most + away) * step
     return Shift(late, float(total[best]), float(total[most])) if total[best] >= LEAST_CORRELATION else None
 
 
@@ -117,10 +116,10 @@ def refined_shifts(rig: Rig, trials: Sequence[Trial], shifts: Sequence[float]) -
     same in all trials: then the viscosity is fitted too small, and nothing else changes.
     """
     tables = [_explained(rig, trial, shift) for trial, shift in zip(trials, shifts, strict=True)]
-    peaks = [[_peak(column) for column in table.T] for table in tables]
-    best = int(np.argmax([sum(value for _, value in of_lead) for of_lead in zip(*peaks, strict=True)]))
+    peaks = [[peak_of(column) for column in table.T] for table in tables]
+    best = int(np.argmax([sum(value for *_, value in of_lead) for of_lead in zip(*peaks, strict=True)]))
     return [
-        shift + (of_trial[best][0] / (SHIFTS - 1) - 0.5) * 2.0 * REACH * trial.step
+        shift + (sum(of_trial[best][:2]) / (SHIFTS - 1) - 0.5) * 2.0 * REACH * trial.step
         for shift, trial, of_trial in zip(shifts, trials, peaks, strict=True)
     ]
 
@@ -129,37 +128,23 @@ def _explained(rig: Rig, trial: Trial, late: float) -> np.ndarray:
     """Share of the response's changes that load and rate explain, for each further shift and each lead."""
     moved = with_shift(trial, late)
     part = _busiest_part(rig, moved)
-    stimulus = stimulus_of(_part_of(moved, part), rig)
-    reading = stimulus.trial.reading
-    channels = None if reading is None else _strongest_channels(stimulus)
-    response = _net_force_along_normal(stimulus) if reading is None else reading[:, channels]
+    response, channels = _response(stimulus_of(moved.part(part), rig))
     width = max(1, round(SMOOTHING / trial.step))
     good = np.isfinite(response).all(axis=1)
     both = good[width:] & good[:-width]
     table = np.zeros((SHIFTS, len(LEADS)))
     if both.sum() < LEAST_SAMPLES or not response.shape[1]:
         return table
-
-    def changes(values: np.ndarray) -> np.ndarray:
-        found: np.ndarray = (values[width:] - values[:-width])[both]
-        return found
-
-    y = changes(response)
+    y = (response[width:] - response[:-width])[both]
     for row, shift in zip(table, late + np.linspace(-REACH, REACH, SHIFTS) * trial.step, strict=True):
-        other = stimulus_of(_part_of(with_shift(trial, float(shift)), part), rig)
+        other = stimulus_of(with_shift(trial, float(shift)).part(part), rig)
         load, rate = (one if channels is None else one[:, channels] for one in (other.load, other.rate))
         for i, lead in enumerate(LEADS):
             force = np.maximum(load + lead * rate, 0.0)  # a contact does not pull
-            x = changes(force.sum(axis=1, keepdims=True) if channels is None else force)
+            force = force.sum(axis=1, keepdims=True) if channels is None else force
+            x = (force[width:] - force[:-width])[both]
             row[i] = float(((x * y).sum(axis=0) ** 2 / np.maximum((x * x).sum(axis=0), 1e-300)).sum())
     return table / max(float((y * y).sum()), 1e-300)
-
-
-def _peak(values: np.ndarray) -> tuple[float, float]:
-    """Place and value of the maximum, between its neighbours by a parabola."""
-    best = int(np.argmax(values))
-    away = peak_offset(values, best)
-    return best + away, float(values[best]) + (0.25 * float(values[best + 1] - values[best - 1]) * away if away else 0.0)
 
 
 def _busiest_part(rig: Rig, trial: Trial) -> slice:
@@ -173,13 +158,6 @@ def _busiest_part(rig: Rig, trial: Trial) -> slice:
     return slice(first, first + most)
 
 
-def _part_of(trial: Trial, part: slice) -> Trial:
-    """A stretch of a trial."""
-    parts = {name: getattr(trial, name) for name in ("time", "position", "quaternion", "level", "travel", "reading", "force")}
-    kept: dict[str, Any] = {name: None if one is None else one[part] for name, one in parts.items()}
-    return replace(trial, **kept)
-
-
 def _is_clearly_better(new: float, old: float) -> bool:
     """True if one correlation is so much larger than another one that this is no accident."""
     return new - old >= LEAST_GAIN and 1.0 - new < MOST_LEFT * (1.0 - old)
@@ -190,65 +168,52 @@ def _correlation_of_lag(stimulus: Stimulus, late: float) -> float:
     from scipy.signal import lfilter
 
     prepared = _changes(stimulus)
-    if prepared is None:
-        return 0.0
+    assert prepared is not None, "its shift was found"
     _, load, response, step = prepared
-    size, best = float((response * response).sum()), 0.0
+    size, best = np.linalg.norm(response), 0.0
     for stages in LAG_STAGES:
         for tau in LAG_TIMES * late / stages:
             keeps = float(np.exp(-step / tau))
             smeared = load
             for _ in range(stages):
                 smeared = lfilter([1.0 - keeps], [1.0, -keeps], smeared, axis=0)
-            product = abs(float((smeared * response).sum()))
-            best = max(best, product / max(np.sqrt(float((smeared * smeared).sum()) * size), 1e-300))
+            best = max(best, abs(float((smeared * response).sum())) / max(float(np.linalg.norm(smeared) * size), 1e-300))
     return best
 
 
 def _changes(stimulus: Stimulus) -> tuple[np.ndarray, np.ndarray, np.ndarray, float] | None:
-    """Even times, changes of load and of response on them (T, c), and the step; None without enough of either."""
+    """Even times, changes of load and of response at them (T, c), and their step; None without enough of either."""
     trial = stimulus.trial
-    load, response = _signals(stimulus)
+    response, channels = _response(stimulus)
+    load = stimulus.load.sum(axis=1, keepdims=True) if channels is None else stimulus.load[:, channels]
     good = np.isfinite(response).all(axis=1)
     if good.sum() < LEAST_SAMPLES or not load.any():
         return None
     step = max(trial.step, float(np.ptp(trial.time)) / MOST_SAMPLES)
     even = np.arange(trial.time[0], trial.time[-1], step)
-    on_even = [
-        np.stack([np.interp(even, trial.time[good], column[good]) for column in values.T], axis=1)
-        for values in (load, response)
-    ]
     width = max(1, round(SMOOTHING / step))
     if len(even) < width + LEAST_SAMPLES:
         return None
+    on_even = (columns_at(even, trial.time[good], values[good]) for values in (load, response))
     x, y = (values[width:] - values[:-width] for values in on_even)
     return even[width:], x / max(float(np.abs(x).max()), 1e-300), y / max(float(np.abs(y).max()), 1e-300), step
 
 
-def _signals(stimulus: Stimulus) -> tuple[np.ndarray, np.ndarray]:
-    """Loads and responses (T, c) of the channels with the largest loads; the net force counts only without readings."""
-    if stimulus.trial.reading is None:
-        return stimulus.load.sum(axis=1, keepdims=True), _net_force_along_normal(stimulus)
-    chosen = _strongest_channels(stimulus)
-    return stimulus.load[:, chosen], stimulus.trial.reading[:, chosen]
+def _response(stimulus: Stimulus) -> tuple[np.ndarray, np.ndarray | None]:
+    """Readings (T, c) and numbers of the channels whose loads change most; without readings the net force and None.
 
-
-def _strongest_channels(stimulus: Stimulus) -> np.ndarray:
-    """Channels with readings whose loads change most."""
-    assert stimulus.trial.reading is not None
-    share = np.isfinite(stimulus.trial.reading).mean(axis=0)
-    known = share > MOST_KNOWN * share.max()
-    strength = np.where(known, (np.diff(stimulus.load, axis=0) ** 2).sum(axis=0), -1.0)
+    The net force (T, 1) is that along the mean normal of the contacts.
+    """
+    trial = stimulus.trial
+    if trial.reading is None:
+        assert trial.force is not None
+        normal = np.array([0.0, 0.0, -1.0]) if stimulus.normal is None else stimulus.normal.mean(axis=(0, 1))
+        return np.nan_to_num(trial.force @ normal)[:, None], None
+    share = np.isfinite(trial.reading).mean(axis=0)
+    strength = np.where(share > MOST_KNOWN * share.max(), (np.diff(stimulus.load, axis=0) ** 2).sum(axis=0), -1.0)
     chosen = np.argsort(-strength)[:MOST_CHANNELS]
-    found: np.ndarray = chosen[strength[chosen] > 0]
-    return found
-
-
-def _net_force_along_normal(stimulus: Stimulus) -> np.ndarray:
-    """Net force along the mean normal of the contacts, (T, 1)."""
-    assert stimulus.trial.force is not None
-    normal = np.array([0.0, 0.0, -1.0]) if stimulus.normal is None else stimulus.normal.mean(axis=(0, 1))
-    return np.nan_to_num(stimulus.trial.force @ normal)[:, None]
+    chosen = chosen[strength[chosen] > 0]
+    return trial.reading[:, chosen], chosen
 
 
 def with_shift(trial: Trial, late: float) -> Trial:
@@ -261,16 +226,8 @@ def with_shift(trial: Trial, late: float) -> Trial:
     margin = 1e-6 * trial.step
     outside = (source < trial.time[0] - margin) | (source > trial.time[-1] + margin)
 
-    def at_source(values: np.ndarray) -> np.ndarray:
-        return np.stack([np.interp(source, trial.time, column) for column in values.T], axis=1)
-
-    quaternion = None if trial.quaternion is None else at_source(trial.quaternion)
-    if quaternion is not None:
-        quaternion = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
-    return replace(
-        trial.without(outside),
-        position=None if trial.position is None else at_source(trial.position),
-        quaternion=quaternion,
-        level=None if trial.level is None else at_source(trial.level[:, None])[:, 0],
-        travel=at_source(trial.travel),
-    )
+    names = [name for name in ("position", "quaternion", "level", "travel") if getattr(trial, name) is not None]
+    moved: dict[str, Any] = {name: columns_at(source, trial.time, getattr(trial, name)) for name in names}
+    if "quaternion" in moved:
+        moved["quaternion"] /= np.linalg.norm(moved["quaternion"], axis=1, keepdims=True)
+    return replace(trial.without(outside), **moved)

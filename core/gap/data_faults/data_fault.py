@@ -38,6 +38,5 @@ class DataFault:
         """The fault in one sentence, with what was done or can be done."""
         files = ", ".join(f"'{name}.csv'" for name in self.trials[:3]) + (" …" if len(self.trials) > 3 else "")
         what = f"{files}: {FAULT_KINDS[self.kind]}: {self.evidence}"
-        if self.put_right:
-            return f"{what}; this was put right."
-        return f'{what}; correct = ["{self.kind}"] in [data] of the rig puts it right.'
+        mended = "this was put right" if self.put_right else f'correct = ["{self.kind}"] in [data] of the rig puts it right'
+        return f"{what}; {mended}."

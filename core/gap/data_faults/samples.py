@@ -42,14 +42,16 @@ def find_sample_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]
     stuck: dict[str, np.ndarray] = {}
     repeated: dict[str, np.ndarray] = {}
     for s in stimuli:
-        equal, moving = _equal_rows(s)
-        if equal is None:
+        load = s.load.sum(axis=1)
+        change = np.abs(np.diff(load, prepend=load[0]))
+        moving = change > MOVING * np.quantile(change, 0.95)
+        if not moving.any():
             continue
+        equal = _equal_rows(s)
         frozen = _frozen(s, equal)
         if frozen.any():
             stuck[s.trial.name] = frozen
-            continue
-        if moving.sum() >= 20 and (equal & moving).sum() > LEAST_REPEATS * moving.sum() and not _is_coarse(s, equal):
+        elif moving.sum() >= 20 and (equal & moving).sum() > LEAST_REPEATS * moving.sum() and not _is_coarse(s, equal):
             repeated[s.trial.name] = equal
     faults = []
     if stuck:
@@ -64,30 +66,20 @@ def find_sample_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]
     return [*faults, *_rails(stimuli)]
 
 
-def _responses(trial: Trial) -> np.ndarray:
-    """All responses side by side, (T, c)."""
-    return np.concatenate(trial.responses, axis=1)
-
-
-def _equal_rows(stimulus: Stimulus) -> tuple[np.ndarray | None, np.ndarray]:
-    """Samples whose responses all equal those of the sample before, and samples at which the load moves; (T,) bool."""
-    values = _responses(stimulus.trial)
+def _equal_rows(stimulus: Stimulus) -> np.ndarray:
+    """Samples whose responses all equal those of the sample before, (T,) bool; channels that never change do not count."""
+    values = np.concatenate(stimulus.trial.responses, axis=1)
     alive = np.fmax.reduce(values, axis=0) > np.fmin.reduce(values, axis=0)
-    load = stimulus.load.sum(axis=1)
-    change = np.abs(np.diff(load, prepend=load[0]))
-    moving = change > MOVING * np.quantile(change, 0.95)
-    if not alive.any() or not moving.any():
-        return None, moving
     before, after = values[:-1, alive], values[1:, alive]
     same = (before == after) | (np.isnan(before) & np.isnan(after))
     silent = ((after == _untouched(stimulus, values)[alive]) | np.isnan(after)).all(axis=1)
-    return np.concatenate([[False], same.all(axis=1) & np.isfinite(after).any(axis=1) & ~silent]), moving
+    return np.concatenate([[False], same.all(axis=1) & np.isfinite(after).any(axis=1) & ~silent])
 
 
 def _untouched(stimulus: Stimulus, values: np.ndarray) -> np.ndarray:
     """Value of each channel of `values` (T, c) where nothing presses, or where it presses least, (c,) float; else NaN."""
     load = stimulus.load.sum(axis=1)
-    free = values[load <= UNTOUCHED * float(load.max(initial=0.0))]
+    free = values[load <= UNTOUCHED * load.max()]
     free = free if len(free) else values[[int(load.argmin())]]
     median, known = np.full(values.shape[1], np.nan), np.isfinite(free).any(axis=0)
     median[known] = np.nanmedian(free[:, known], axis=0)
@@ -96,24 +88,21 @@ def _untouched(stimulus: Stimulus, values: np.ndarray) -> np.ndarray:
 
 def _frozen(stimulus: Stimulus, equal: np.ndarray) -> np.ndarray:
     """Samples of long runs of equal responses during which the load changes, (T,) bool."""
-    load = stimulus.load.sum(axis=1)
-    full = max(float(load.max(initial=0.0)), 1e-300)
-    found = np.zeros(len(equal), bool)
+    load, found = stimulus.load.sum(axis=1), np.zeros(len(equal), bool)
     for start, stop in runs(equal):
         duration = stimulus.time[stop - 1] - stimulus.time[start - 1]
         if stop - start < STUCK_SAMPLES or duration < LEAST_STUCK:
             continue
         elsewhere = np.concatenate([equal[:start], equal[stop:]])
         never_rests = float(elsewhere.mean()) < MOST_QUIET_REPEATS if len(elsewhere) else False
-        if never_rests or np.ptp(load[start - 1 : stop]) > STUCK_MOVE * full:
+        if never_rests or np.ptp(load[start - 1 : stop]) > STUCK_MOVE * load.max():
             found[start:stop] = True
     return found
 
 
 def _is_coarse(stimulus: Stimulus, equal: np.ndarray) -> bool:
     """True if equal responses may be steps of a converter: between samples they change by a few steps only."""
-    values = _responses(stimulus.trial)
-    change = np.abs(np.diff(values, axis=0))
+    change = np.abs(np.diff(np.concatenate(stimulus.trial.responses, axis=1), axis=0))
     step = np.where(change > 0, change, np.inf).min(axis=0, initial=np.inf)
     fresh = np.where(np.isfinite(change), change, 0.0)[~equal[1:]]
     return not bool((np.quantile(fresh, 0.9, axis=0) > MOST_STEPS * step)[np.isfinite(step)].any())
@@ -121,41 +110,34 @@ def _is_coarse(stimulus: Stimulus, equal: np.ndarray) -> bool:
 
 def _rails(stimuli: Sequence[Stimulus]) -> list[DataFault]:
     """A converter at its rail: readings that stay at the largest or smallest value of all while the load changes."""
-    recorded = [s for s in stimuli if s.trial.reading is not None]
+    recorded = [(s, s.trial.reading) for s in stimuli if s.trial.reading is not None]
     if not recorded:
         return []
-    values = [s.trial.reading for s in recorded if s.trial.reading is not None]
+    values = [reading for _, reading in recorded]
     high, low = max(float(np.nanmax(v)) for v in values), min(float(np.nanmin(v)) for v in values)
     levels = len(np.unique(np.concatenate([np.unique(v[np.isfinite(v)])[:MOST_LEVELS] for v in values])))
     least = max(RAIL_MOVE, COARSE_STEPS / max(levels, 1))
-    best: tuple[int, float] | None = None
-    for rail in (high, low):
-        count = sum(_railed_samples(s, rail, least) for s, v in zip(recorded, values, strict=True) if not _rests_at(s, v, rail))
-        if count >= LEAST_RAILED and (best is None or count > best[0]):
-            best = (count, rail)
-    if best is None:
+    counts = {rail: sum(_railed_samples(s, reading, rail, least) for s, reading in recorded) for rail in (high, low)}
+    count, rail = max((count, rail) for rail, count in counts.items())
+    if count < LEAST_RAILED:
         return []
-    count, rail = best
-    names = tuple(s.trial.name for s, v in zip(recorded, values, strict=True) if (v == rail).any())
-    said = (
-        f"{count} readings stay at {rail:.6g}, the {'largest' if rail == high else 'smallest'} of all, while the load changes"
-    )
+    names = tuple(s.trial.name for s, reading in recorded if (reading == rail).any())
+    which = "largest" if rail == high else "smallest"
+    said = f"{count} readings stay at {rail:.6g}, the {which} of all, while the load changes"
     return [DataFault("saturated-converter", names, said, partial(_without_value, rail=rail))]
 
 
-def _rests_at(stimulus: Stimulus, reading: np.ndarray, value: float) -> bool:
-    """True if most channels of an untouched sensor read a value: this is no rail, but where the sensor begins."""
-    return float((_untouched(stimulus, reading) == value).mean()) > 0.5
+def _railed_samples(stimulus: Stimulus, reading: np.ndarray, rail: float, least: float) -> int:
+    """Number of loaded samples at a rail in runs during which the texel's load changes by a share of the largest of all.
 
-
-def _railed_samples(stimulus: Stimulus, rail: float, least: float) -> int:
-    """Number of loaded samples at a rail in runs during which the texel's load changes by a share of the largest of all."""
-    reading, load = stimulus.trial.reading, stimulus.load
-    assert reading is not None
-    full, count = max(float(load.max(initial=0.0)), 1e-300), 0
+    It is no rail, but where the sensor begins, if most channels of an untouched sensor read this value.
+    """
+    if (_untouched(stimulus, reading) == rail).mean() > 0.5:
+        return 0
+    load, count = stimulus.load, 0
     for texel in np.flatnonzero((reading == rail).any(axis=0)):
         for start, stop in runs((reading[:, texel] == rail) & (load[:, texel] > 0)):
-            if stop - start >= RAIL_RUN and np.ptp(load[start:stop, texel]) > least * full:
+            if stop - start >= RAIL_RUN and np.ptp(load[start:stop, texel]) > least * load.max():
                 count += stop - start
     return count
 

@@ -50,14 +50,11 @@ def put_right(rig: Rig, stimuli: Sequence[Stimulus]) -> tuple[Rig, list[DataFaul
     while True:
         found = find_faults(rig, stimuli)
         known = [(fault.kind, name) for fault in done for name in fault.trials]
-        wanted = [
-            fault
-            for fault in found
-            if fault.kind in rig.correct and any((fault.kind, name) not in known for name in fault.trials)
-        ]
-        if not wanted:
+        fresh = (one for one in found if any((one.kind, name) not in known for name in one.trials))
+        fault = next((one for one in fresh if one.kind in rig.correct), None)
+        if fault is None:
             return rig, [*done, *found]
-        trials = tuple(wanted[0].correct(one) if one.name in wanted[0].trials else one for one in rig.trials)
+        trials = tuple(fault.correct(one) if one.name in fault.trials else one for one in rig.trials)
         rig = replace(rig, trials=trials)
         stimuli = [s if s.trial is trial else stimulus_of(trial, rig) for s, trial in zip(stimuli, trials, strict=True)]
-        done.append(replace(wanted[0], put_right=True))
+        done.append(replace(fault, put_right=True))

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -52,6 +52,7 @@ SMALLEST_INVERTED = 1e-30
 """Numbers below it have no inverse."""
 _WORDS = ("name", "unit", "factor", "zero", "missing")
 _OWN_WORDS = {"time": ("rate",), "force": ("area",), "texel": ("names", "first", "count")}
+_WORDS_OF_LOGS = ("rate", "names", "count")
 
 
 @dataclass(frozen=True)
@@ -94,32 +95,22 @@ class Column:
             with np.errstate(divide="ignore"):
                 found = np.where(np.abs(found) < SMALLEST_INVERTED, np.nan, 1.0 / found)
         shift = ZEROS.get(self.unit, 0.0) if unit == "°C" else 0.0
-        in_si: np.ndarray = found * (size * self.factor) + shift
-        return in_si
+        return np.asarray(found * (size * self.factor) + shift)
 
 
 @dataclass
 class _Source:
-    name: str | Annotated[tuple[str, ...], wanted("write a name, or a list of them", min_length=1)] | None = None
+    name: str | Annotated[tuple[str, ...], wanted("write a name, or a list of them", min_length=1)]
     names: Annotated[tuple[str, ...], wanted('write a list of names, as ["R1", "R2"]', names=True, min_length=1)] = ()
     first: Annotated[int, wanted("write the number of the first texel, 0 or 1", ge=0, le=65536)] = 0
     count: Annotated[int, wanted("write a whole number above zero", ge=1, le=65536)] = 1
 
 
-def read_column(quantity: str, words: Any, where: str, without: Iterable[str] = (), texels: int | None = None) -> Column:
-    """Return the name and the settings of a column from its words: a name alone, or a table.
+def read_column(quantity: str, words: Any, where: str, texels: int | None = None) -> Column:
+    """Return the name and the settings of a column from its words in a file: a name alone, or a table.
 
-    Parameters
-    ----------
-    quantity : str
-    words : object
-        As TOML gives it.
-    where : str
-        For messages.
-    without : iterable of str
-        Words that are none here.
-    texels : int or None
-        Number of texels, where no word says it.
+    `where` names the column in messages. A rig has a number of `texels`, and clocks and names of texels need no words of their
+    own (:data:`_WORDS_OF_LOGS`).
 
     Raises
     ------
@@ -129,7 +120,8 @@ def read_column(quantity: str, words: Any, where: str, without: Iterable[str] = 
     words = {"name": words} if isinstance(words, str) else words
     if not isinstance(words, dict):
         raise FileError(f'{where} is {words!r:.60}: write the name of the column, or {{ name = "Fz", unit = "mN" }}.')
-    known_words(words, [word for word in (*_WORDS, *_OWN_WORDS.get(quantity, ())) if word not in without], where)
+    known = [*_WORDS, *_OWN_WORDS.get(quantity, ())]
+    known_words(words, known if texels is None else [word for word in known if word not in _WORDS_OF_LOGS], where)
     unit, units = words.get("unit", QUANTITIES[quantity]), LOG_UNITS.get(QUANTITIES[quantity], {})
     given = {word: words[word] for word in words if word not in ("name", "names", "first", "count")}
     found = read_words(given, Column, where, besides=("unit",), names=(), unit=unit)
@@ -140,20 +132,17 @@ def read_column(quantity: str, words: Any, where: str, without: Iterable[str] = 
         hint = " (a pressure needs area = …, in m²)" if is_pressure else ""
         choice = f"one of {', '.join(units)}{hint}" if units else "its name"
         raise FileError(f"unit of {where} is {unit!r:.60}: write {choice}.")
-    return found if found.rate else replace(found, names=_names(quantity, words, where, texels))
-
-
-def _names(quantity: str, words: Mapping[str, Any], where: str, texels: int | None) -> tuple[str, ...]:
-    found = read_words(words, _Source, where, besides=words)
-    name = ("texel_{}" if quantity == "texel" else quantity) if found.name is None else found.name
-    if quantity == "texel" and isinstance(name, tuple):
-        raise FileError(f"name of {where} is {list(name)!r:.60}: write one name, or names = [...].")
-    names = found.names or (name if isinstance(name, tuple) else (name,))
+    if found.rate:
+        return found
+    source = read_words({"name": "texel_{}" if quantity == "texel" else quantity, **words}, _Source, where, besides=words)
+    if quantity == "texel" and isinstance(source.name, tuple):
+        raise FileError(f"name of {where} is {list(source.name)!r:.60}: write one name, or names = [...].")
+    names = source.names or (source.name if isinstance(source.name, tuple) else (source.name,))
     for one in names:
         checked_name(one, where)
-    if quantity == "texel" and not found.names:
-        return numbered(names[0], found.first, texels or found.count)
-    return names
+    if quantity == "texel" and not source.names:
+        names = numbered(names[0], source.first, texels or source.count)
+    return replace(found, names=names)
 
 
 def numbered(pattern: str, first: int, count: int) -> tuple[str, ...]:
@@ -173,7 +162,7 @@ def read_column_rules(table: Mapping[str, Any], path: Path, texels: int) -> dict
     rules = {}
     for column, words in table.items():
         where = f"{column} in [columns] of '{path.name}'"
-        rules[column] = read_column(column, words, where, without=("rate", "names", "count"), texels=texels)
+        rules[column] = read_column(column, words, where, texels)
         if column == "texel" and rules[column].unit not in ("", INVERSE):
             raise FileError(
                 f'unit of {where} is {rules[column].unit!r:.60}: write "{INVERSE}" for one over the values; the unit of the '
@@ -202,25 +191,25 @@ def translated(names: Sequence[str], values: np.ndarray, rules: Mapping[str, Col
     FileError
         A column is not there, is there twice, or has a value whose inverse is infinite.
     """
-    columns = {name: values[:, i] for i, name in enumerate(names)}
-    wanted_ones: dict[str, tuple[str, Column]] = {}
-    for column, rule in rules.items():
-        if column != "texel":
-            wanted_ones[column] = rule.names[0], rule
+    columns = dict(zip(names, values.T, strict=True))
+    sources = {}
+    for quantity, rule in rules.items():
+        if quantity != "texel":
+            sources[quantity] = quantity, rule.names[0]
         elif any(name in columns for name in rule.names):
-            wanted_ones |= {f"texel_{i}": (name, rule) for i, name in enumerate(rule.names)}
-    taken = {source for source, _ in wanted_ones.values()}
+            sources |= {f"texel_{i}": (quantity, name) for i, name in enumerate(rule.names)}
+    taken = {source for _, source in sources.values()}
     found = {}
-    for column, (source, rule) in wanted_ones.items():
+    for column, (quantity, source) in sources.items():
         if source not in columns:
             if column in (*FORCE, *SLIDE, "temperature"):
                 continue  # not every recording has them
             raise FileError(f"'{file.name}' has no column '{source}', which [columns] names for {column}.")
         if column != source and column in columns and column not in taken:
             raise FileError(f"'{file.name}' has '{source}' and '{column}' for {column}: remove one of them.")
-        quantity = "texel" if column.startswith("texel_") else column
-        found[column] = rule.in_si(quantity, columns[source])
-        (lost,) = np.nonzero(np.isnan(found[column]) & ~np.isnan(columns[source]) & (columns[source] != rule.missing))
+        found[column] = rules[quantity].in_si(quantity, columns[source])
+        is_missing = np.isnan(columns[source]) | (columns[source] == rules[quantity].missing)
+        (lost,) = np.nonzero(np.isnan(found[column]) & ~is_missing)
         if len(lost):
             raise FileError(
                 f"Line {lost[0] + 2} of '{file.name}' has zero for {source}, which has no inverse: leave the cell empty."

@@ -74,13 +74,12 @@ def read_cover(sensor: Mapping[str, Any], path: Path) -> tuple[Texels, Cover]:
         if not depth:
             raise FileError(f"{where} has no depth: write how far below the surface the sensors are, in metres.")
         places = _places(sensor["sensors"], f"sensors of '{path.name}'", 1, size)
-        surface = _surface(size, _pitch(words, size, depth / POINTS_PER_DEPTH, where), where)
+        surface = _surface(size, words, depth / POINTS_PER_DEPTH, where)
         area = float(np.prod(size)) / len(places)
         weights = _load_at_depth(places, surface, depth)
-        return flat_texels(places, np.full(len(places), area)), Cover(surface, _cut(weights), surface.area / area)
+        return flat_texels(places, np.full(len(places), area)), Cover(surface, weights, surface.area / area)
     strips = _strips(sensor["strips"], f"strips of '{path.name}'", size)
-    narrowest = min(_width(strip) for strip in strips)
-    surface = _surface(size, _pitch(words, size, narrowest / POINTS_PER_STRIP, where), where)
+    surface = _surface(size, words, min(map(_width, strips)) / POINTS_PER_STRIP, where)
     covered = np.array([_covered(strip, surface) for strip in strips]) * surface.area
     areas = covered.sum(axis=1)
     (missed,) = np.nonzero(areas <= 0.0)
@@ -88,16 +87,8 @@ def read_cover(sensor: Mapping[str, Any], path: Path) -> tuple[Texels, Cover]:
         raise FileError(f"Strip {missed[0]} of '{path.name}' lies between the points of the {where}: give it a smaller pitch.")
     centres = covered @ surface.position[:, :2] / areas[:, None]
     if depth:
-        spread = _cut(_load_at_depth(surface.position[:, :2], surface, depth))
-        covered = covered @ spread
+        covered = covered @ _load_at_depth(surface.position[:, :2], surface, depth)
     return flat_texels(centres, areas), Cover(surface, covered / areas.mean(), surface.area / areas.mean())
-
-
-def _pitch(words: Mapping[str, Any], size: np.ndarray, otherwise: float, where: str) -> float:
-    """Distance of the surface's points."""
-    if "pitch" in words:
-        return checked_lengths(words["pitch"], 1, f"pitch of {where}")[0]
-    return max(otherwise, float(np.sqrt(np.prod(size) / USUAL_POINTS)))
 
 
 def _places(value: Any, where: str, least: int, size: np.ndarray) -> np.ndarray:
@@ -142,8 +133,11 @@ def _width(corners: np.ndarray) -> float:
     return 2.0 * _area(corners) / float(np.linalg.norm(corners - np.roll(corners, -1, axis=0), axis=1).sum())
 
 
-def _surface(size: np.ndarray, pitch: float, where: str) -> Texels:
-    """Points in z = 0 at the centres of equal cells, centred on the origin."""
+def _surface(size: np.ndarray, words: Mapping[str, Any], otherwise: float, where: str) -> Texels:
+    """Points in z = 0 at the centres of equal cells, centred on the origin; `otherwise` is their pitch if `words` give none."""
+    pitch = max(otherwise, float(np.sqrt(np.prod(size) / USUAL_POINTS)))
+    if "pitch" in words:
+        (pitch,) = checked_lengths(words["pitch"], 1, f"pitch of {where}")
     counts = np.maximum(np.ceil(size / pitch - 1e-9), 1.0)
     if counts.prod() > MOST_POINTS:
         raise FileError(f"{where} has {counts.prod():.3g} points: at most {MOST_POINTS} are computed; give a larger pitch.")
@@ -171,14 +165,10 @@ def _load_at_depth(places: np.ndarray, surface: Texels, depth: float) -> np.ndar
     """Share of the force at each surface point that loads a unit of area below a place, times that point's area, (p, m).
 
     The normal stress under a point load integrates to one, so that under an even pressure each place has this pressure.
+    Negligible shares are zero.
     """
     squares = ((places[:, None, :] - surface.position[None, :, :2]) ** 2).sum(axis=2)
-    kernel: np.ndarray = pressure_below_point_load(depth, squares) * surface.area
-    return kernel
-
-
-def _cut(weights: np.ndarray) -> np.ndarray:
-    """The weights without the negligible ones."""
+    weights = pressure_below_point_load(depth, squares) * surface.area
     return np.where(weights > NEGLIGIBLE * weights.max(axis=1, keepdims=True), weights, 0.0)
 
 
@@ -187,15 +177,12 @@ def _covered(corners: np.ndarray, surface: Texels) -> np.ndarray:
     x, y = surface.position[:, 0], surface.position[:, 1]
     step_x, step_y = (_spacing(values) or float(np.sqrt(surface.area[0])) for values in (x, y))
     offsets = (np.arange(SUBDIVISIONS) + 0.5) / SUBDIVISIONS - 0.5
-    covered = np.zeros(len(surface))
-    for dx in offsets * step_x:
-        for dy in offsets * step_y:
-            px, py, inside = x + dx, y + dy, np.zeros(len(surface), bool)
-            for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-                if ay != by:
-                    inside ^= ((ay > py) != (by > py)) & (px < (bx - ax) * (py - ay) / (by - ay) + ax)
-            covered += inside
-    return covered / SUBDIVISIONS**2
+    px, py = x + (offsets * step_x)[:, None, None], y + (offsets * step_y)[:, None]
+    inside = np.zeros((SUBDIVISIONS, SUBDIVISIONS, len(surface)), bool)
+    for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        if ay != by:
+            inside ^= ((ay > py) != (by > py)) & (px < (bx - ax) * (py - ay) / (by - ay) + ax)
+    return np.asarray(inside.mean(axis=(0, 1)))
 
 
 def _spacing(values: np.ndarray) -> float:

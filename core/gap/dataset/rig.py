@@ -30,18 +30,7 @@ from ...model.sensor_parameters import (
 from .column_names import FORCE, POSE, QUANTITIES, SLIDE, TURN, Column, read_column_rules, translated
 from .cover import COVER_WORDS, Cover, flat_texels, read_cover
 from .second_logger import SecondLogger, bridged, joined, with_steady_signs
-from .trial import (
-    FAULT_KINDS,
-    FREE,
-    SHARED_HEIGHT,
-    SensorHeight,
-    Trial,
-    TrialHistory,
-    TrialWords,
-    check_free_heights,
-    on_common_clocks,
-    read_history,
-)
+from .trial import FAULT_KINDS, FREE, SHARED_HEIGHT, Trial, TrialWords, check_free_heights, on_common_clocks, read_start
 
 FORMAT = "palpate-rig/1"
 LOWEST_TEMPERATURE, HIGHEST_TEMPERATURE = -273.15, 2000.0
@@ -50,8 +39,6 @@ SMALLEST_RESPONSE = 1e-30
 """Responses of a smaller magnitude, in any unit, count as zero."""
 RIG_SENSOR_WORDS = {"name", "contact_height", *COVER_WORDS}
 """Words of a [sensor] that belong to the measurement and not to the sensor."""
-COLUMNS = set(QUANTITIES) - {"texel"}
-"""Columns that mean something, beside those of texels."""
 LONGEST_STEP = 5.0
 """Seconds between samples above which the clock must be in milliseconds."""
 
@@ -171,28 +158,18 @@ def read_rig(path: str | Path) -> Rig:
     if words.get("format") != FORMAT:
         raise FileError(f"'{path.name}' is not a rig: its first line must be format = \"{FORMAT}\".")
     found = read_words(words, RigWords, f"'{path.name}'", besides=("format",))
-    folder, sensor = path.resolve().parent, found.sensor
-    texels, grid, cover = _texels(sensor, folder, path)
+    sensor = found.sensor
+    texels, grid, cover = _texels(sensor, path)
     parameters = _parameters(sensor, path)
-    probes = _probes(found.probe, folder, path)
-    height = read_words(sensor, SensorHeight, f"[sensor] of '{path.name}'", besides=sensor).contact_height
-    reader = _TrialReader(
-        path=path,
-        folder=folder,
-        texels=len(texels),
-        has_indenter=found.indenter is not None,
-        rules=read_column_rules(found.columns or {}, path, len(texels)),
-        probes=frozenset(probes),
-        height=SHARED_HEIGHT if height == FREE else height,
-    )
-    trials, warnings = _read_trials(found, reader)
+    probes = _probes(found.probe, path)
+    trials, warnings = _read_trials(found, path, len(texels), probes)
     rig = Rig(
         name=found.name or checked_name(path.stem, f"'{path.name}'"),
         texels=texels,
         parameters=parameters,
         given=frozenset(set(sensor) & set(SENSOR_PARAMETERS)),
         grid=grid,
-        indenter=None if found.indenter is None else _indenter(found.indenter, folder, path),
+        indenter=None if found.indenter is None else _indenter(found.indenter, path),
         trials=tuple(trials),
         words=sensor,
         warnings=(*warnings, *_channel_warnings(trials)),
@@ -208,23 +185,41 @@ def read_rig(path: str | Path) -> Rig:
     return rig
 
 
-def _read_trials(words: RigWords, reader: _TrialReader) -> tuple[list[Trial], list[str]]:
-    """Read the recordings that the [[trial]] tables name, and put those of one session on one clock.
-
-    Returns
-    -------
-    trials : list of Trial
-    warnings : list of str
-    """
-    path = reader.path
-    trials, histories, warnings = [], [], []
+def _read_trials(words: RigWords, path: Path, texels: int, probes: Mapping[str, Indenter]) -> tuple[list[Trial], list[str]]:
+    """Read the recordings that the [[trial]] tables name, put those of one session on one clock, and return remarks, too."""
+    stated = {word: words.sensor[word] for word in ("contact_height",) if word in words.sensor}
+    height = read_words(stated, TrialWords, f"[sensor] of '{path.name}'").contact_height or 0.0
+    rules = read_column_rules(words.columns or {}, path, texels)
+    trials, starts, warnings = [], [], []
     for number, entry in enumerate(words.trial, start=1):
-        trial, history, notes = reader.read(entry, number)
-        trials.append(trial)
-        histories.append(history)
+        where = f"Trial {number} of '{path.name}'"
+        said = read_words(entry, TrialWords, where)
+        starts.append(read_start(said.session, said.started, where))
+        own = {word: getattr(said, word) for word in ("factor", "zero", "force_zero", "contact_height")}
+        if said.specimen and FREE not in own.values():
+            raise FileError(f'{where} has a specimen and no free number: write factor = "free" or zero = "free".')
+        file = _inside(said.file, f"Trial {number}'s file", path)
+        own = {word: said.specimen or Path(said.file).stem if value == FREE else value for word, value in own.items()}
+        if said.probe is not None and said.probe not in list(probes):
+            known = ", ".join(sorted(probes)) or "none"
+            raise FileError(f"probe of {where} is {said.probe!r:.60}: write the name of a [[probe]] of the rig ({known}).")
+        if said.readings is None:
+            columns = _columns(file, rules)
+        else:
+            second = read_words(said.readings, SecondLogger, f"the readings of {where}")
+            files = file, _inside(second.file, f"Trial {number}'s readings", path)
+            first, other = (_columns(one, rules, is_part=True) for one in files)
+            columns = joined(first, other, second.late, files)
+        trial, notes = _recorded(columns, file, said.use, texels, words.indenter is not None or bool(said.probe))
         warnings += notes
+        if own["contact_height"] is None:
+            own["contact_height"] = SHARED_HEIGHT if height == FREE else height
+        if trial.stimulus == "force":
+            own["contact_height"] = 0.0  # the force is known, wherever contact begins
+        own |= {"probe": said.probe or "", "repeats": said.repeats, "tared": said.tared, "session": said.session}
+        trials.append(replace(trial, **own))
     check_free_heights(trials, path)
-    trials, notes = on_common_clocks(trials, histories, words.clock, path)
+    trials, notes = on_common_clocks(trials, starts, words.clock, path)
     names = [trial.name for trial in trials]
     for name in names:
         if names.count(name) > 1:
@@ -233,7 +228,7 @@ def _read_trials(words: RigWords, reader: _TrialReader) -> tuple[list[Trial], li
             )
     if not any(trial.use == "fit" for trial in trials):
         raise FileError(f"No trial of '{path.name}' has use = \"fit\": give at least one to fit.")
-    if not any(_responds(trial) for trial in trials):
+    if not any((np.abs(part) > SMALLEST_RESPONSE).any() for trial in trials for part in trial.responses):
         raise FileError(
             f"All responses in '{path.name}' are zero: check that the sensor was connected and the right columns exported."
         )
@@ -253,11 +248,12 @@ def _faults_to_correct(table: Mapping[str, Any], path: Path) -> tuple[str, ...]:
     return tuple(wanted)
 
 
-def _inside(name: Any, folder: Path, what: str, path: Path) -> Path:
-    """Path of a file beside the rig; a path that leads out of its folder is refused."""
+def _inside(name: Any, what: str, path: Path) -> Path:
+    """Path of a file beside the rig `path`; a path that leads out of its folder is refused."""
     if not isinstance(name, str) or not name.strip():
         raise FileError(f"{what} of '{path.name}' names no file: write the name of one beside the rig.")
     name = checked_name(name, f"{what} of '{path.name}'")
+    folder = path.resolve().parent
     found = (folder / name).resolve()
     if not found.is_relative_to(folder):
         raise FileError(f"{what} of '{path.name}' is '{name}', outside the rig's folder: move the file beside the rig.")
@@ -271,7 +267,7 @@ def _inside(name: Any, folder: Path, what: str, path: Path) -> Path:
 # --- the sensor
 
 
-def _texels(sensor: dict[str, Any], folder: Path, path: Path) -> tuple[Texels, tuple | None, Cover | None]:
+def _texels(sensor: dict[str, Any], path: Path) -> tuple[Texels, tuple | None, Cover | None]:
     """Texels of the sensor, its grid if it is given as one, and its cover if it has one."""
     has_cover = not COVER_WORDS.isdisjoint(sensor)
     if ("grid" in sensor) + ("mesh" in sensor) + has_cover != 1:
@@ -283,7 +279,7 @@ def _texels(sensor: dict[str, Any], folder: Path, path: Path) -> tuple[Texels, t
         texels, cover = read_cover(sensor, path)
         return texels, None, cover
     if "mesh" in sensor:
-        mesh = _mesh(_inside(sensor["mesh"], folder, "The sensor's mesh", path), "the sensor's mesh")
+        mesh = _mesh(_inside(sensor["mesh"], "The sensor's mesh", path), "the sensor's mesh")
         texels = texels_from_region(mesh, np.ones(len(mesh.vertices), bool), "sensor")
         if len(texels) != len(mesh.vertices):
             raise SensorError(
@@ -331,18 +327,16 @@ def _parameters(sensor: dict[str, Any], path: Path) -> SensorParameters:
     """Parameters of the sensor."""
     where = f"[sensor] of '{path.name}'"
     known_words(sensor, {*SENSOR_PARAMETERS, *SHAPE_WORDS, *RIG_SENSOR_WORDS}, where)
-    thickness = None
+    defaults: dict[str, Any] = {}
     if "thickness" in sensor:
         (thickness,) = checked_lengths(sensor["thickness"], 1, f"thickness of '{path.name}'")
         if thickness > 1.0:
             raise ParameterError(f"thickness of '{path.name}' is {thickness:g} m: give it in metres.")
+        defaults["max_penetration"] = DEPTH_PER_THICKNESS * thickness
     values = stated_parameters(sensor, where)
     if not values.get("unit", "N").strip():
         raise ParameterError(f"unit of '{path.name}' is empty: write the unit's name, \"N\" for newtons.")
-    values = with_dependent_defaults(values)
-    if thickness is not None and "max_penetration" not in values:
-        values["max_penetration"] = DEPTH_PER_THICKNESS * thickness
-    parameters = SensorParameters(**values)
+    parameters = SensorParameters(**(defaults | with_dependent_defaults(values)))
     parameters.check(f"sensor of {path.name}")
     return parameters
 
@@ -350,27 +344,28 @@ def _parameters(sensor: dict[str, Any], path: Path) -> SensorParameters:
 # --- the indenter
 
 
-def _probes(entries: list[dict[str, Any]], folder: Path, path: Path) -> dict[str, Indenter]:
+def _probes(entries: list[dict[str, Any]], path: Path) -> dict[str, Indenter]:
     """The probes that recordings may name."""
     found: dict[str, Indenter] = {}
     for number, entry in enumerate(entries, start=1):
         name = checked_name(entry.get("name", ""), f"[[probe]] {number} of '{path.name}'")
         if name in found:
             raise FileError(f"'{path.name}' has a [[probe]] {name!r} twice: give each a name of its own.")
-        found[name] = _indenter(entry, folder, path)
+        found[name] = _indenter(entry, path)
     return found
 
 
-def _indenter(words: dict[str, Any], folder: Path, path: Path) -> Indenter:
-    """The indenter."""
+def _indenter(words: dict[str, Any], path: Path) -> Indenter:
+    """The indenter, or a probe."""
     known_words(words, {"shape", "mesh", "name"}, f"[indenter] of '{path.name}'")
     if ("shape" in words) == ("mesh" in words):
         raise FileError(f"[indenter] of '{path.name}' needs either a shape or a mesh, and not both.")
     if "mesh" in words:
-        mesh = _mesh(_inside(words["mesh"], folder, "The indenter's mesh", path), "the indenter")
+        mesh = _mesh(_inside(words["mesh"], "The indenter's mesh", path), "the indenter")
         return Indenter(turned_outwards(mesh, "the indenter"))
     shape = words["shape"]
-    if not isinstance(shape, dict) or len(shape) != 1 or next(iter(shape)) not in ("sphere", "box", "cylinder"):
+    sizes = {"sphere": ("radius", 1), "box": ("size", 3), "cylinder": ("size", 2)}
+    if not isinstance(shape, dict) or len(shape) != 1 or next(iter(shape)) not in sizes:
         raise FileError(
             f"The indenter's shape of '{path.name}' is {shape!r}: write {{ sphere = radius }}, {{ box = [x, y, z] }} or "
             "{ cylinder = [radius, height] }, in metres."
@@ -378,117 +373,69 @@ def _indenter(words: dict[str, Any], folder: Path, path: Path) -> Indenter:
     import trimesh
 
     ((kind, size),) = shape.items()
-    radius: float | None = None
-    edges: tuple[float, ...] | None = None
+    what, count = sizes[kind]
+    lengths = checked_lengths(size, count, f"The {kind}'s {what} of '{path.name}'")
     if kind == "sphere":
-        (radius,) = checked_lengths(size, 1, f"The sphere's radius of '{path.name}'")
-        solid = trimesh.creation.icosphere(subdivisions=4, radius=radius)
+        solid = trimesh.creation.icosphere(subdivisions=4, radius=lengths[0])
     elif kind == "box":
-        edges = checked_lengths(size, 3, f"The box's size of '{path.name}'")
-        solid = trimesh.creation.box(edges)
+        solid = trimesh.creation.box(lengths)
     else:
-        across, height = checked_lengths(size, 2, f"The cylinder's size of '{path.name}'")
-        solid = trimesh.creation.cylinder(radius=across, height=height, sections=256)
-    return Indenter(checked_mesh(solid.vertices, solid.faces, "the indenter")[0], radius, edges)
+        solid = trimesh.creation.cylinder(radius=lengths[0], height=lengths[1], sections=256)
+    mesh = checked_mesh(solid.vertices, solid.faces, "the indenter")[0]
+    return Indenter(mesh, lengths[0] if kind == "sphere" else None, lengths if kind == "box" else None)
 
 
 # --- trials
 
 
-@dataclass(frozen=True)
-class _TrialReader:
-    """Reads the trials of one rig: its path and folder, its number of texels, the rules for its columns, its contact height."""
+def _columns(file: Path, rules: Mapping[str, Column], is_part: bool = False) -> dict[str, np.ndarray]:
+    """The columns of a trial's file; if another file has the rest of them, rules hold for those that this one has."""
+    table = read_table(file)
+    if is_part:
+        rules = {name: rule for name, rule in rules.items() if name == "texel" or rule.names[0] in table.names}
+    columns = translated(table.names, table.values, rules, file)
+    if is_part:
+        _clock(columns, file)
+    return columns
 
-    path: Path
-    folder: Path
-    texels: int
-    has_indenter: bool
-    rules: Mapping[str, Column]
-    probes: frozenset[str]
-    height: str | float
 
-    def read(self, entry: Any, number: int) -> tuple[Trial, TrialHistory, list[str]]:
-        """Return a trial from its entry in the rig and its CSV file, its place in time, and remarks about it."""
-        where = f"Trial {number}"
-        where_in_rig = f"{where} of '{self.path.name}'"
-        words = read_words(entry, TrialWords, where_in_rig)
-        history, own = read_history(words.session, words.started, where_in_rig), words.own_numbers(where_in_rig)
-        file = _inside(words.file, self.folder, f"{where}'s file", self.path)
-        if words.probe is not None and words.probe not in list(self.probes):
-            known = ", ".join(sorted(self.probes)) or "none"
-            raise FileError(
-                f"probe of {where_in_rig} is {words.probe!r:.60}: write the name of a [[probe]] of the rig ({known})."
-            )
-        second = None
-        if words.readings is not None:
-            second = read_words(words.readings, SecondLogger, f"the readings of {where_in_rig}")
-        columns = self._columns(file, second, where)
-        trial, notes = self._recorded(columns, file, words.use, self.has_indenter or bool(words.probe))
-        if own["contact_height"] is None:
-            own["contact_height"] = self.height
-        if trial.stimulus == "force":
-            own["contact_height"] = 0.0  # the force is known, wherever contact begins
-        return replace(trial, probe=words.probe or "", repeats=words.repeats, tared=words.tared, **own), history, notes
-
-    def _columns(self, file: Path, second: SecondLogger | None, where: str) -> dict[str, np.ndarray]:
-        """The columns of a trial, from its CSV file or from those of two loggers."""
-        if second is None:
-            table = read_table(file)
-            return translated(table.names, table.values, self.rules, file)
-        other = _inside(second.file, self.folder, f"{where}'s readings", self.path)
-        files = (file, other)
-        parts = []
-        for one in files:
-            table = read_table(one)  # a rule of [columns] holds in the file that has its column
-            rules = {name: rule for name, rule in self.rules.items() if name == "texel" or rule.names[0] in table.names}
-            parts.append(translated(table.names, table.values, rules, one))
-            _clock(parts[-1], one)
-        return joined(parts[0], parts[1], second.late, files)
-
-    def _recorded(self, columns: dict[str, np.ndarray], file: Path, use: str, has_indenter: bool) -> tuple[Trial, list[str]]:
-        """The trial of a CSV file with these columns, and remarks about it."""
-        time = _clock(columns, file)
-        kind = _stimulus_kind(columns, file, has_indenter)
-        reading, force = _readings(columns, self.texels, file), _vector(columns, FORCE)
-        if reading is None and force is None:
-            raise FileError(
-                f"'{file.name}' has no response: it needs texel_0 … texel_{self.texels - 1}, or force_x force_y force_z."
-            )
-        reading, force = _known(reading), _known(force)
-        if reading is None and force is None:
-            raise FileError(
-                f"Every cell of the response in '{file.name}' is empty: record the trial again, or remove its [[trial]]."
-            )
-        travel = _vector(columns, SLIDE, missing=0.0)
-        position = quaternion = level = None
-        if kind == "pose":
-            position, quaternion = _vector(columns, POSE), _turns(columns, file)
-        else:
-            level = columns[kind].copy()
-            if kind == "force" and "x" in columns:  # a known weight at a known place, wherever its z is
-                place = [columns["x"], columns["y"], np.zeros(len(time))]
-                position, quaternion = np.stack(place, axis=1), _turns(columns, file)
-        stimuli: dict[str, np.ndarray] = {}
-        for names, values in ((POSE, position), (TURN, quaternion), ((kind,), level), (SLIDE, travel)):
-            if values is not None:
-                stimuli |= zip(names, values.reshape(len(time), -1).T, strict=True)
-        unknown, notes = _gaps_filled(stimuli, time, file)
-        if quaternion is not None:
-            quaternion = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
-        strangers = [name for name in columns if name not in COLUMNS and not name.startswith("texel_")]
-        if strangers:
-            notes.append(f"'{file.name}': {', '.join(map(repr, strangers))} mean nothing here and were left out.")
-        travel = np.zeros((len(time), 2)) if travel is None else travel
-        temperature = _temperatures(columns, time, file)
-        found = Trial(file.stem, use, time, kind, position, quaternion, level, travel, reading, force, temperature=temperature)
-        if unknown.any():
-            found = found.without(unknown)
-            found = replace(found, reading=_known(found.reading), force=_known(found.force))
-        if not found.responses:
-            raise FileError(
-                f"No response in '{file.name}' has a stimulus at the same time: record both at the same time, or cut the file."
-            )
-        return found, notes
+def _recorded(columns: dict[str, np.ndarray], file: Path, use: str, texels: int, has_indenter: bool) -> tuple[Trial, list[str]]:
+    """The trial of a CSV file with these columns, and remarks about it."""
+    time = _clock(columns, file)
+    kind = _stimulus_kind(columns, file, has_indenter)
+    reading = _readings(columns, texels, file)
+    if reading is None and columns.keys().isdisjoint(FORCE):
+        raise FileError(f"'{file.name}' has no response: it needs texel_0 … texel_{texels - 1}, or force_x force_y force_z.")
+    force = _vector(columns, FORCE, np.nan)
+    if np.isnan(force).all() and (reading is None or np.isnan(reading).all()):
+        raise FileError(
+            f"Every cell of the response in '{file.name}' is empty: record the trial again, or remove its [[trial]]."
+        )
+    travel = _vector(columns, SLIDE, 0.0)
+    level = None if kind == "pose" else columns[kind].copy()
+    position = quaternion = None
+    if "x" in columns:
+        height = columns["z"] if kind == "pose" else np.zeros(len(time))  # a known weight acts wherever its z is
+        position, quaternion = np.stack([columns["x"], columns["y"], height], axis=1), _turns(columns, file)
+    stimuli: dict[str, np.ndarray] = {}
+    for names, values in ((POSE, position), (TURN, quaternion), ((kind,), level), (SLIDE, travel)):
+        if values is not None:
+            stimuli |= zip(names, values.reshape(len(time), -1).T, strict=True)
+    unknown, notes = _gaps_filled(stimuli, time, file)
+    if quaternion is not None:
+        quaternion = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
+    strangers = [name for name in columns if name not in {*QUANTITIES} - {"texel"} and not name.startswith("texel_")]
+    if strangers:
+        notes.append(f"'{file.name}': {', '.join(map(repr, strangers))} mean nothing here and were left out.")
+    temperature = _temperatures(columns, time, file)
+    found = Trial(file.stem, use, time, kind, position, quaternion, level, travel, reading, force, temperature=temperature)
+    found = found.without(unknown)
+    found = replace(found, reading=_known(found.reading), force=_known(found.force))
+    if not found.responses:
+        raise FileError(
+            f"No response in '{file.name}' has a stimulus at the same time: record both at the same time, or cut the file."
+        )
+    return found, notes
 
 
 def _temperatures(columns: Mapping[str, np.ndarray], time: np.ndarray, file: Path) -> tuple[np.ndarray, np.ndarray] | None:
@@ -561,7 +508,7 @@ def _readings(columns: Mapping[str, np.ndarray], texels: int, file: Path) -> np.
         return None
     wanted = [f"texel_{i}" for i in range(texels)]
     lost = [name for name in wanted if name not in columns]
-    if 0 < len(lost) < texels and wanted[-1] in columns:
+    if lost and wanted[-1] in columns:
         raise FileError(
             f"'{file.name}' has no column {lost[0]}{' and others' if len(lost) > 1 else ''} of the sensor's {texels} texels: "
             "export every texel; one that is not connected has empty cells."
@@ -573,10 +520,8 @@ def _readings(columns: Mapping[str, np.ndarray], texels: int, file: Path) -> np.
     return np.stack([columns[name] for name in wanted], axis=1)
 
 
-def _vector(columns: Mapping[str, np.ndarray], names: tuple[str, ...], missing: float = np.nan) -> np.ndarray | None:
-    """Columns of a vector, (T, c), with one value in those that are missing; None if all are."""
-    if not any(name in columns for name in names):
-        return None
+def _vector(columns: Mapping[str, np.ndarray], names: tuple[str, ...], missing: float) -> np.ndarray:
+    """Columns of a vector, (T, c), with one value in those that are missing."""
     otherwise = np.full(len(columns["time"]), missing)
     return np.stack([columns.get(name, otherwise) for name in names], axis=1)
 
@@ -606,14 +551,9 @@ def _turns(columns: Mapping[str, np.ndarray], file: Path) -> np.ndarray:
 
 
 def _gaps_filled(stimuli: Mapping[str, np.ndarray], time: np.ndarray, file: Path) -> tuple[np.ndarray, list[str]]:
-    """Interpolate missing values of the columns of the stimulus in place.
+    """Interpolate missing values of the columns of the stimulus in place; return remarks, too.
 
-    Returns
-    -------
-    unknown : (T,) bool
-        Samples in gaps that are too long for it: what answered there cannot be judged.
-    notes : list of str
-        Remarks.
+    The first result, (T,) bool, has the samples in gaps that are too long for it: what answered there cannot be judged.
     """
     unknown, total = np.zeros(len(time), bool), 0
     for name, column in stimuli.items():
@@ -631,12 +571,6 @@ def _gaps_filled(stimuli: Mapping[str, np.ndarray], time: np.ndarray, file: Path
             "there."
         )
     return unknown, notes
-
-
-def _responds(trial: Trial) -> bool:
-    """True if a trial has any response that is not zero but for rounding."""
-    known = (part for part in trial.responses if not np.isnan(part).all())
-    return any(np.nanmax(np.abs(part), initial=0.0) > SMALLEST_RESPONSE for part in known)
 
 
 def _channel_warnings(trials: list[Trial]) -> list[str]:

@@ -63,8 +63,7 @@ def longest_gap(time: np.ndarray, values: np.ndarray) -> float:
         lengths = time[2 * half :] - time[: -2 * half]
         share = (time[half:-half] - time[: -2 * half]) / lengths
         error = np.abs(middle - (first + share * (last - first)))
-        ends = np.stack([first, middle, last])
-        moving = np.ptp(ends, axis=0) > MOVES * span
+        moving = np.ptp([first, middle, last], axis=0) > MOVES * span
         if moving.sum() >= FEWEST and float(np.quantile(error[moving], ERROR_QUANTILE)) > MOST_ERROR * span:
             break
         longest = float(np.median(lengths))
@@ -87,36 +86,26 @@ def bridged(time: np.ndarray, values: np.ndarray) -> np.ndarray:
         NaN within gaps that are too long, and before the first and after the last known value.
     """
     known = np.isfinite(values)
-    at = np.flatnonzero(known)
-    if len(at) in (len(values), 0, 1):
+    if not known.any():
         return values
-    place = np.arange(len(values))
-    right = np.clip(np.searchsorted(at, place), 1, len(at) - 1)
-    short = time[at[right]] - time[at[right - 1]] <= longest_gap(time[known], values[known])
-    inside = ~known & (place > at[0]) & (place < at[-1]) & short
-    return np.where(inside, np.interp(time, time[known], values[known]), values)
+    times, found = time[known], values[known]
+    gap = np.diff(times, prepend=-np.inf, append=np.inf)[np.searchsorted(times, time)]
+    filled = np.interp(time, times, found, left=np.nan, right=np.nan)
+    return np.where(known | (gap > longest_gap(times, found)), values, filled)
 
 
-def peak_offset(values: np.ndarray, top: int) -> float:
-    """Return where the maximum is by a parabola through three values.
+def peak_of(values: np.ndarray) -> tuple[int, float, float]:
+    """Return the number of the largest of (n,) values, how far away from it the maximum is, in spacings, and the maximum.
 
-    Parameters
-    ----------
-    values : (n,) float
-        Agreement at each shift.
-    top : int
-        The largest of them.
-
-    Returns
-    -------
-    float
-        In spacings, from `top`; zero at the ends, where one of the three is missing.
+    Both are those of a parabola through three values, unless the largest is at an end.
     """
-    if not 0 < top < len(values) - 1:
-        return 0.0
-    before, here, after = values[top - 1 : top + 2]
-    bend = before - 2.0 * here + after
-    return float(0.5 * (before - after) / bend) if bend < 0.0 else 0.0
+    top = int(np.argmax(values))
+    away = slope = 0.0
+    if 0 < top < len(values) - 1:
+        before, here, after = values[top - 1 : top + 2]
+        bend, slope = before - 2.0 * here + after, 0.5 * (after - before)
+        away = -slope / bend if bend < 0.0 else 0.0
+    return top, float(away), float(values[top] + 0.5 * slope * away)
 
 
 LARGEST_SHIFT = 1e10
@@ -189,10 +178,5 @@ def with_steady_signs(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray
 
 
 def interpolated(time: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Return values at other times; missing within gaps that are too long to be interpolated (:mod:`.second_logger`)."""
-    values = bridged(time, values)
-    right = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
-    share = (wanted - time[right - 1]) / (time[right] - time[right - 1])
-    before, after = values[right - 1], values[right]
-    found: np.ndarray = np.where(share == 0.0, before, np.where(share == 1.0, after, (1.0 - share) * before + share * after))
-    return found
+    """Return values at other times of the recording; missing within gaps that are too long (:func:`bridged`)."""
+    return np.interp(wanted, time, bridged(time, values))

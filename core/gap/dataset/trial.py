@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -117,10 +118,19 @@ class Trial:
 
     def without(self, rows: np.ndarray) -> Trial:
         """Return the recording without its responses in some samples, (T,) bool."""
-        reading, force = (
-            None if part is None else np.where(rows[:, None], np.nan, part) for part in (self.reading, self.force)
-        )
-        return replace(self, reading=reading, force=force)
+        parts = [None if part is None else np.where(rows[:, None], np.nan, part) for part in (self.reading, self.force)]
+        return replace(self, reading=parts[0], force=parts[1])
+
+    def part(self, rows: slice) -> Trial:
+        """Return the recording with some of its samples only."""
+        names = ("time", "position", "quaternion", "level", "travel", "reading", "force")
+        parts: dict[str, Any] = {name: getattr(self, name)[rows] for name in names if getattr(self, name) is not None}
+        return replace(self, **parts)
+
+
+def columns_at(wanted: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return columns (T,) or (T, c) at other times; before the first sample and after the last one they are as these."""
+    return np.ascontiguousarray(np.apply_along_axis(lambda column: np.interp(wanted, time, column), 0, values))
 
 
 def runs(flag: np.ndarray) -> list[tuple[int, int]]:
@@ -165,27 +175,6 @@ class TrialWords:
     repeats: Name = ""
     readings: Annotated[Mapping[str, Any], wanted('write { file = "readings.csv", late = 0.0 }')] | None = None
 
-    def own_numbers(self, where: str) -> dict[str, Any]:
-        """Return the own numbers of the trial; in the place of free ones the name that the recordings of a specimen share.
-
-        Raises
-        ------
-        FileError
-            It has a specimen and no free number.
-        """
-        numbers = {word: getattr(self, word) for word in ("factor", "zero", "force_zero", "contact_height")}
-        if self.specimen and FREE not in numbers.values():
-            raise FileError(f'{where} has a specimen and no free number: write factor = "free" or zero = "free".')
-        name = self.specimen or Path(str(self.file)).stem
-        return {word: name if value == FREE else value for word, value in numbers.items()}
-
-
-@dataclass(frozen=True)
-class SensorHeight:
-    """The contact height of all recordings, from the rig's [sensor]."""
-
-    contact_height: _Free | _Height = 0.0
-
 
 def check_free_heights(trials: Sequence[Trial], path: Path) -> None:
     """Raise FileError for a contact height that is free, if none of the recordings that share it is fitted."""
@@ -198,10 +187,8 @@ def check_free_heights(trials: Sequence[Trial], path: Path) -> None:
             )
 
 
-# Sessions: recordings of one sensor in a known order, whose times are put on one clock.
-#
-# What a sensor remembers goes on from one recording of a session to the next. A rig names sessions, or its time stamps show
-# that one clock went on through all recordings.
+# Sessions: recordings of one sensor in a known order, whose times are put on one clock. What a sensor remembers goes on from
+# one recording of a session to the next. A rig names sessions, or its time stamps show that one clock went on.
 
 ONE_CLOCK = "one clock"
 """Name of the session of recordings whose time stamps go on."""
@@ -211,27 +198,12 @@ LONGEST_TIME = 1e10
 """Seconds, three centuries: largest time of the start of a recording."""
 
 
-@dataclass(frozen=True)
-class TrialHistory:
-    """Place of a recording in time, from the rig.
-
-    Attributes
-    ----------
-    session : str
-        Name of the session; empty if none is given.
-    started : float or None, s
-        When its first sample was taken.
-    has_date : bool or None
-        True if the start was given as a date rather than as seconds; None without a start.
-    """
-
-    session: str = ""
-    started: float | None = None
-    has_date: bool | None = None
+Start = float | datetime | None
+"""When the first sample of a recording was taken: seconds, a date with a zone, or unknown."""
 
 
-def read_history(session: str, started: Any, where: str) -> TrialHistory:
-    """Return session and start from the words `session` and `started` of a [[trial]]; `where` names the trial in messages.
+def read_start(session: str, started: Any, where: str) -> Start:
+    """Return the start from the words `session` and `started` of a [[trial]]; `where` names the trial in messages.
 
     Raises
     ------
@@ -239,7 +211,7 @@ def read_history(session: str, started: Any, where: str) -> TrialHistory:
         The start is no time, or there is one without a session.
     """
     if started is None:
-        return TrialHistory(session)
+        return None
     if not session:
         raise FileError(f'{where} has started and no session: write session = "NAME" on all recordings that belong together.')
     date = started
@@ -247,14 +219,14 @@ def read_history(session: str, started: Any, where: str) -> TrialHistory:
         with suppress(ValueError):
             date = datetime.fromisoformat(started.strip())
     if isinstance(date, datetime):  # without a zone it counts as that of Greenwich, because only differences matter
-        return TrialHistory(session, date.replace(tzinfo=date.tzinfo or UTC).timestamp(), True)
+        return date.replace(tzinfo=date.tzinfo or UTC)
     if not is_number(started) or abs(started) > LONGEST_TIME:
         raise FileError(f'started of {where} is {started!r:.60}: write seconds, or a date and time as "2026-05-04T09:30:00".')
-    return TrialHistory(session, float(started), False)
+    return float(started)
 
 
 def on_common_clocks(
-    trials: Sequence[Trial], histories: Sequence[TrialHistory], clock: str | None, path: Path
+    trials: Sequence[Trial], starts: Sequence[Start], clock: str | None, path: Path
 ) -> tuple[list[Trial], list[str]]:
     """Return the trials with the times of their sessions, in the given order, and remarks.
 
@@ -262,9 +234,8 @@ def on_common_clocks(
 
     Parameters
     ----------
-    trials : sequence of Trial
+    trials, starts : sequence of Trial, sequence of Start
         With the times of their files.
-    histories : sequence of TrialHistory
     clock : "absolute", "own" or None
         None: time stamps that go on are one clock.
     path : Path
@@ -275,78 +246,73 @@ def on_common_clocks(
     FileError
         The recordings of a session overlap, or only some of them say when they started.
     """
-    trials, notes = list(trials), list[str]()
-    names = list(dict.fromkeys(history.session for history in histories if history.session))
-    if not names and clock != "own" and len(trials) > 1:
-        goes_on = _go_on(trials) and not _is_mixed(trials)
-        if clock == "absolute" and not goes_on:
-            raise FileError(
-                f"'{path.name}' has clock = \"absolute\", but two of its recordings overlap in time or have "
-                'stimuli of different kinds: correct that, or write clock = "own".'
-            )
-        if goes_on:
-            began = min(float(trial.time[0]) for trial in trials)
-            if clock is None:
-                notes.append(
-                    "The time stamps go on from recording to recording, so they are one session: what the sensor remembers "
-                    'goes on, too (clock = "own" in the rig if each was recorded with a fresh sensor).'
-                )
-            return [replace(trial.later(-began), session=ONE_CLOCK) for trial in trials], notes
-    alone = [float(trial.time[0]) for trial, history in zip(trials, histories, strict=True) if not history.session]
-    for i, history in enumerate(histories):
-        if not history.session:
-            trials[i] = trials[i].later(-min(alone))
+    notes: list[str] = []
+    names = list(dict.fromkeys(trial.session for trial in trials if trial.session))
+    goes_on = not names and clock != "own" and len(trials) > 1 and _go_on(trials) and not is_mixed(trials)
+    if clock == "absolute" and not names and len(trials) > 1 and not goes_on:
+        raise FileError(
+            f"'{path.name}' has clock = \"absolute\", but two of its recordings overlap in time or have "
+            'stimuli of different kinds: correct that, or write clock = "own".'
+        )
+    if goes_on and clock is None:
+        notes.append(
+            "The time stamps go on from recording to recording, so they are one session: what the sensor remembers "
+            'goes on, too (clock = "own" in the rig if each was recorded with a fresh sensor).'
+        )
+    began = min((float(trial.time[0]) for trial in trials if not trial.session), default=0.0)
+    placed = [
+        trial if trial.session else replace(trial.later(-began), session=ONE_CLOCK if goes_on else "") for trial in trials
+    ]
     for name in names:
-        members = [i for i, history in enumerate(histories) if history.session == name]
-        if _is_mixed([trials[i] for i in members]):
+        members = [i for i, trial in enumerate(trials) if trial.session == name]
+        own = [trials[i] for i in members]
+        if is_mixed(own):
             raise FileError(
                 f"Session '{name}' of '{path.name}' has recordings with a known force and others with a depth or a pose: "
                 "give the two kinds sessions of their own."
             )
-        starts, unknown = _starts([trials[i] for i in members], [histories[i] for i in members], clock, path)
-        for i, start in zip(members, starts, strict=True):
-            trials[i] = replace(trials[i].later(-trials[i].time[0]).later(start), session=name)
+        begins, unknown = _begins(own, [starts[i] for i in members], clock, path)
+        for i, trial, begin in zip(members, own, begins, strict=True):
+            placed[i] = trial.later(-trial.time[0]).later(begin)
         if unknown and len(members) > 1:
             notes.append(
                 f"Nothing says how long the pauses of session '{name}' were: {UNKNOWN_PAUSE:g} s each were assumed; "
                 "started says when a recording began."
             )
-    return trials, notes
+    return placed, notes
 
 
 def _go_on(trials: Sequence[Trial]) -> bool:
     """True if each trial begins after the one before it ended, in order of their beginnings."""
     order = sorted(trials, key=lambda trial: float(trial.time[0]))
-    return all(after.time[0] > before.time[-1] for before, after in zip(order[:-1], order[1:], strict=True))
+    return all(after.time[0] > before.time[-1] for before, after in pairwise(order))
 
 
-def _is_mixed(trials: Sequence[Trial]) -> bool:
-    """True if forces are known in some trials and depths in others: no state of a sensor goes on between them."""
+def is_mixed(trials: Sequence[Trial]) -> bool:
+    """Return True if forces are known in some trials and depths in others: no state of a sensor goes on between them."""
     return len({trial.stimulus == "force" for trial in trials}) > 1
 
 
-def _starts(members: list[Trial], histories: list[TrialHistory], clock: str | None, path: Path) -> tuple[np.ndarray, bool]:
+def _begins(members: list[Trial], starts: list[Start], clock: str | None, path: Path) -> tuple[np.ndarray, bool]:
     """When the recordings of one session begin, in seconds since the first of them, and whether pauses were assumed."""
-    name = histories[0].session
-    given = [history.started for history in histories]
-    if any(start is not None for start in given):
-        if any(start is None for start in given) or len({history.has_date for history in histories}) > 1:
+    name = members[0].session
+    if any(start is not None for start in starts):
+        if len({type(start) for start in starts}) > 1:
             raise FileError(
                 f"Some recordings of session '{name}' in '{path.name}' have no started, or in another form: "
                 "write it on all of them, as seconds or as dates."
             )
-        starts = np.array(given, float)
-        order = np.argsort(starts, kind="stable")
-        for before, after in zip(order[:-1], order[1:], strict=True):
-            ends = starts[before] + float(np.ptp(members[before].time))
-            if starts[after] <= ends:
+        begins = np.array([start.timestamp() if isinstance(start, datetime) else start for start in starts], float)
+        for before, after in pairwise(np.argsort(begins, kind="stable")):
+            ends = begins[before] + float(np.ptp(members[before].time))
+            if begins[after] <= ends:
                 raise FileError(
-                    f"'{members[after].name}.csv' of session '{name}' starts {ends - starts[after]:.3g} s before "
+                    f"'{members[after].name}.csv' of session '{name}' starts {ends - begins[after]:.3g} s before "
                     f"'{members[before].name}.csv' has ended: correct started in '{path.name}'."
                 )
-        return starts - starts.min(), False
-    if clock != "own" and _go_on(members):
-        starts = np.array([float(trial.time[0]) for trial in members])
-        return starts - starts.min(), False
-    lengths = [float(np.ptp(trial.time)) + UNKNOWN_PAUSE for trial in members]
-    return np.concatenate([[0.0], np.cumsum(lengths)[:-1]]), True
+    elif clock != "own" and _go_on(members):
+        begins = np.array([float(trial.time[0]) for trial in members])
+    else:
+        lengths = [float(np.ptp(trial.time)) + UNKNOWN_PAUSE for trial in members]
+        return np.concatenate([[0.0], np.cumsum(lengths)[:-1]]), True
+    return begins - begins.min(), False

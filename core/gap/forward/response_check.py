@@ -84,6 +84,15 @@ def centred(load: np.ndarray, response: np.ndarray) -> tuple[np.ndarray, np.ndar
     return np.where(good, x - x.sum(axis=0) / count, 0.0), np.where(good, y - y.sum(axis=0) / count, 0.0)
 
 
+def moments(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """Return the sums (3,) of squares of loads, of products, and of squares of responses, as :func:`correlation` needs them."""
+    sums = np.zeros(3)
+    for load, response in pairs:
+        x, y = centred(load, response)
+        sums += (x * x).sum(), (x * y).sum(), (y * y).sum()
+    return sums
+
+
 def correlation(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> float:
     """Return the correlation of loads with responses, both less the mean of their channel; zero when nothing changes.
 
@@ -92,11 +101,6 @@ def correlation(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> float:
     pairs : sequence of ((T, c) float, (T, c) float)
         Load and response of each recording; missing responses are NaN.
     """
-    product = load_square = response_square = 0.0
-    for load, response in pairs:
-        x, y = centred(load, response)
-        product += float((x * y).sum())
-        load_square += float((x * x).sum())
-        response_square += float((y * y).sum())
+    load_square, product, response_square = moments(pairs).tolist()
     size = float(np.sqrt(load_square) * np.sqrt(response_square))
     return product / size if size > 0.0 else 0.0

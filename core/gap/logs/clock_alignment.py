@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..dataset.second_logger import peak_offset
+from ..dataset.second_logger import peak_of
 
 HEIGHTS = (0.0, 0.2, 0.4, 0.6, 0.8)
 """Shares of the way of the stimulus below which it may not touch."""
@@ -104,15 +104,14 @@ def _shift_of(cause: np.ndarray, answer: np.ndarray, step: float, offset: float)
         return None
     lags, correlation = _correlation(cause, answer)
     size = np.abs(correlation)
-    top = int(size.argmax())
+    top, away, _ = peak_of(size)
     if size[top] <= 0.0:
         return None
     width = _lobe(size, top)
     elsewhere = size.copy()
     elsewhere[max(0, top - width) : top + width + 1] = 0.0
-    lag = lags[top] + peak_offset(size, top)
     rival = float(elsewhere.max()) / float(size[top])
-    return ClockShift(offset + lag * step, float(size[top]), rival)
+    return ClockShift(offset + (lags[top] + away) * step, float(size[top]), rival)
 
 
 def _on_grid(times: np.ndarray, values: np.ndarray, step: float) -> np.ndarray:
