@@ -81,33 +81,11 @@ class ExperimentPlan:
     cannot_show: dict[str, str]
     experiment: PlannedExperiment | None
 
-    @property
-    def kinds(self) -> tuple[str, ...]:
-        """The kinds that the recordings could show."""
-        return tuple(dict.fromkeys(one.kind for one in self.separations))
 
-    def taken_for(self, kind: str) -> list[Separation]:
-        """Return the kinds that a kind may be taken for, the likeliest first."""
-        return sorted((one for one in self.separations if one.kind == kind and not one.is_separated), key=lambda one: one.share)
-
-
-def plan_experiment(rig: Rig, wishes: Wishes | None = None) -> Job[ExperimentPlan]:
+def plan_experiment(rig: Rig, wishes: Wishes) -> Job[ExperimentPlan]:
     """Compute which kinds the fitted recordings of a rig separate, and choose the programme that separates an open pair best.
 
     Nothing is fitted: only their stimulus, their noise and the rig's own parameters count.
-
-    Parameters
-    ----------
-    rig : Rig
-    wishes : Wishes, optional
-
-    Yields
-    ------
-    Progress
-
-    Returns
-    -------
-    ExperimentPlan
 
     Raises
     ------
@@ -116,7 +94,6 @@ def plan_experiment(rig: Rig, wishes: Wishes | None = None) -> Job[ExperimentPla
     ParameterError
         A limit or a kind that is wanted has no meaning here.
     """
-    wishes = wishes or Wishes()
     yield Progress("contacts of every trial", 0, 100)
     rig = with_starting_heights(rig)
     predictors = predictors_of(rig.trials, rig)
@@ -140,19 +117,7 @@ def plan_experiment(rig: Rig, wishes: Wishes | None = None) -> Job[ExperimentPla
 def plan_after(result: Diagnosis, wishes: Wishes | None = None) -> Job[PlannedExperiment | None]:
     """Plan the experiment that separates the kinds of a diagnosis which it leaves ambiguous.
 
-    Parameters
-    ----------
-    result : Diagnosis
-    wishes : Wishes, optional
-
-    Yields
-    ------
-    Progress
-
-    Returns
-    -------
-    PlannedExperiment or None
-        None if nothing is ambiguous, or only kinds between which no experiment can be planned.
+    It is None if nothing is ambiguous, or only kinds between which no experiment can be planned.
     """
     yield Progress("planning the next experiment", 0, 100)
     wishes, fitted = wishes or Wishes(), result.of("fit")
@@ -202,14 +167,14 @@ class _Search:
         products = signals.products(self._fitted)
         yield Progress("signals of every kind", 20, 100)
         pairs = [(kind, other) for kind in kinds for other in kinds if kind != other]
-        before = dict(zip(pairs, signals.separations(products, pairs), strict=True))
+        before = {pair: signals.separation(products, *pair) for pair in pairs}
         open_ones = {pair for pair in pairs if not choose_pair or not before[pair].is_separated}
         wanted = [pair for pair in pairs if pair in open_ones or pair[::-1] in open_ones]
         after: dict[str, dict[Pair, Separation]] = {}
         for number, (name, (_, further)) in enumerate(self._further.items() if wanted else ()):
             yield Progress(f"the programme '{name}'", 20 + 80 * number // len(self._further), 100)
-            found = signals.separations(products + signals.products([further]), wanted)
-            after[name] = dict(zip(wanted, found, strict=True))
+            joined = products + signals.products([further])
+            after[name] = {pair: signals.separation(joined, *pair) for pair in wanted}
         if not wanted:
             return None, list(before.values())
         question = _worthwhile(wanted, before, after) if choose_pair else wanted

@@ -46,7 +46,8 @@ def test_what_a_rival_leaves_is_that_of_least_squares_over_all_samples(rig):
     forms = [one for one in candidates(fitted, model) if one.label in labels]
     signals = Signals(model, free_base_parameters(model.parameters, ["k"], 1.0), forms, fitted, NOISES)
     pairs = list(itertools.permutations([label.partition("/")[0] for label in labels], 2))
-    found = {(one.kind, one.other): one for one in signals.separations(signals.products(fitted), pairs)}
+    products = signals.products(fitted)
+    found = {pair: signals.separation(products, *pair) for pair in pairs}
     scales = scales_of(fitted, model)
 
     def changes(form):
