@@ -32,6 +32,8 @@ LONG = 12
 """How many times as long as wide a grid is no picture any more."""
 Pick = Callable[[Model], np.ndarray]
 """What a model predicts of one channel."""
+Place = tuple[float, float, float, float]
+"""Left, bottom, width and height of a part of a figure, as shares of it."""
 HEADING: dict[str, Any] = {"fontsize": 8.5, "color": INK, "weight": "bold"}
 
 
@@ -49,8 +51,7 @@ def gap_bars(result: Diagnosis, errors: GapErrors) -> Figure:
         heights = [100.0 * (error[use] or 0.0) for use in uses]
         places = np.arange(len(uses)) + width * (offset - 0.5 * (len(shown) - 1))
         bars = axes.bar(places, heights, 0.95 * width, color=colour, label=label)
-        for bar, height in zip(bars, heights, strict=True):
-            axes.text(bar.get_x() + 0.475 * width, height, f"{height:.2f}", ha="center", va="bottom", fontsize=8, color=INK)
+        axes.bar_label(bars, fmt="%.2f", fontsize=8, color=INK)
     floor = 100.0 * errors.noise_floor
     axes.axhline(floor, color=INK, lw=0.9, ls=(0, (4, 3)), label=f"noise floor {floor:.2f} %")
     names = {"fit": "fitted trials", "check": "check trials,\nnever fitted"}
@@ -121,18 +122,9 @@ def _worst_channel(result: Diagnosis, predictor: Predictor, stimulus: np.ndarray
 
 def error_map(result: Diagnosis) -> Figure:
     """Root mean square error of each texel, base and amended, on one scale."""
-    row = _is_row(result)
-    figure = new_figure(WIDTHS["single"], 2.5 if row else 2.9)
-    if row:
-        _draw_error_line(figure.add_axes((0.15, 0.2, 0.82, 0.62)), result)
-    else:
-        _draw_error_maps(figure, (0.02, 0.04, 0.96, 0.84), result)
+    figure = new_figure(WIDTHS["single"], 2.5 if _is_row(result) else 2.9)
+    _draw_errors(figure, result, (0.15, 0.2, 0.82, 0.62), (0.02, 0.04, 0.96, 0.84))
     return figure
-
-
-def _maps(result: Diagnosis) -> list[tuple[str, np.ndarray]]:
-    """Error of each texel, in the unit of :data:`.ERROR`, by the name of the model."""
-    return [(label, ERROR.values(rms_by_texel(result, model), result.rig.texels)) for label, model, _ in _models(result)]
 
 
 def _is_row(result: Diagnosis) -> bool:
@@ -141,43 +133,41 @@ def _is_row(result: Diagnosis) -> bool:
     return isinstance(layout, GridLayout) and LONG * min(layout.mask().shape) < max(layout.mask().shape)
 
 
-def _draw_error_maps(figure: Figure, place: tuple[float, float, float, float], result: Diagnosis) -> None:
-    """Draw the maps and their colour bar into a part of a figure: left, bottom, width and height, as shares of it."""
-    maps, texels = _maps(result), result.rig.texels
-    layout, position = texels.layout, texels.position
-    scale = error_scale(max(float(values.max()) for _, values in maps))
+def _draw_errors(figure: Figure, result: Diagnosis, line: Place, maps: Place) -> None:
+    """Draw the error of each texel into a part of a figure: as a `line` where texels form a long row, else as `maps`."""
+    texels = result.rig.texels
+    errors = [(name, ERROR.values(rms_by_texel(result, model), texels), colour) for name, model, colour in _models(result)]
+    if _is_row(result):
+        axes = figure.add_axes(line)
+        for label, values, colour in errors:
+            axes.stairs(values, np.arange(len(values) + 1) - 0.5, baseline=None, color=colour, lw=0.9, label=label)
+        axes.set_xlabel("texel")
+        axes.locator_params("x", integer=True)
+        axes.set_ylabel("error (% of range)")
+        axes.margins(x=0)
+        tidy_axes(axes)
+        axes.legend(frameon=False, fontsize=8, loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2)
+        return
+    scale = error_scale(max(float(values.max()) for _, values, _ in errors))
     colours: dict[str, Any] = {"cmap": color_maps.matplotlib_colormap(scale.colour_map), "vmin": scale.low, "vmax": scale.high}
-    left, bottom, width, height = place
+    left, bottom, width, height = maps
     image: Any = None
-    for i, (label, values) in enumerate(maps):
-        start = left + width * 0.42 * (i + 0.5 * (2 - len(maps)))
+    for i, (label, values, _) in enumerate(errors):
+        start = left + width * 0.42 * (i + 0.5 * (2 - len(errors)))
         axes = figure.add_axes((start, bottom, 0.375 * width, height))
-        if isinstance(layout, GridLayout):
-            picture: Any = np.ma.masked_array(layout.image(values), ~layout.mask())
+        if isinstance(texels.layout, GridLayout):
+            picture: Any = np.ma.masked_array(texels.layout.image(values), ~texels.layout.mask())
             image = axes.imshow(picture, origin="lower", interpolation="nearest", **colours)
         else:
-            image = axes.scatter(position[:, 0], position[:, 1], c=values, s=14, **colours)
+            image = axes.scatter(*texels.position.T[:2], c=values, s=14, **colours)
             axes.set_aspect("equal")
         axes.set_title(label, fontsize=8.5, color=INK)
         axes.set_xticks([])
         axes.set_yticks([])
-    bar = figure.colorbar(
-        image, cax=figure.add_axes((left + 0.835 * width, bottom + 0.095 * height, 0.0365 * width, 0.81 * height))
-    )
+    beside = (left + 0.835 * width, bottom + 0.095 * height, 0.0365 * width, 0.81 * height)
+    bar = figure.colorbar(image, cax=figure.add_axes(beside))
     bar.ax.tick_params(labelsize=8, colors=INK)
     bar.set_label(f"{scale.quantity.label[0]} ({scale.unit})", fontsize=8.5, color=INK)
-
-
-def _draw_error_line(axes: Axes, result: Diagnosis) -> None:
-    """Draw the errors of texels in a long row."""
-    for (label, values), colour in zip(_maps(result), (BEFORE, AFTER), strict=False):
-        axes.stairs(values, np.arange(len(values) + 1) - 0.5, baseline=None, color=colour, lw=0.9, label=label)
-    axes.set_xlabel("texel")
-    axes.locator_params("x", integer=True)
-    axes.set_ylabel("error (% of range)")
-    axes.margins(x=0)
-    tidy_axes(axes)
-    axes.legend(frameon=False, fontsize=8, loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2)
 
 
 def overview(result: Diagnosis, errors: GapErrors) -> Figure:
@@ -188,10 +178,7 @@ def overview(result: Diagnosis, errors: GapErrors) -> Figure:
     bottom, top = 0.5 / height, 1.0 - 0.55 / height
     if len(result.rig.texels) > 1:
         figure.text(0.015, 1.0 - 0.06 / height, "Where: error of each texel", va="top", **HEADING)
-        if _is_row(result):
-            _draw_error_line(figure.add_axes((0.08, bottom, 0.32, top - bottom)), result)
-        else:
-            _draw_error_maps(figure, (0.015, 0.1 / height, 0.4, top - 0.1 / height), result)
+        _draw_errors(figure, result, (0.08, bottom, 0.32, top - bottom), (0.015, 0.1 / height, 0.4, top - 0.1 / height))
     left = 0.7 if len(result.rig.texels) > 1 else 0.3
     figure.text(left - 0.2, 1.0 - 0.06 / height, "What: error without and with each effect", va="top", **HEADING)
     _draw_stages(figure.add_axes((left, bottom, 0.985 - left, 1.0 - 0.3 / height - bottom)), result, errors)
@@ -213,10 +200,9 @@ def _draw_stages(axes: Axes, result: Diagnosis, errors: GapErrors) -> None:
         rows += [("check trials, amended", errors.amended["check"], AFTER)] if count > 1 else []
     places = [-float(i) - 0.5 * (i >= count) for i in range(len(rows))]
     values = [100.0 * (error or 0.0) for _, error, _ in rows]
-    axes.barh(places, values, 0.72, color=[colour for *_, colour in rows])
-    for place, value in zip(places, values, strict=True):
-        text = axes.text(value, place, f" {value:.2f}", ha="left", va="center", fontsize=8, color=INK)
-        text.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 0.0})  # the line of the noise floor does not cross it
+    bars = axes.barh(places, values, 0.72, color=[colour for *_, colour in rows])
+    behind = {"facecolor": "white", "edgecolor": "none", "pad": 0.0}  # the line of the noise floor does not cross the numbers
+    axes.bar_label(bars, fmt=" %.2f", fontsize=8, color=INK, bbox=behind)
     floor = 100.0 * errors.noise_floor
     axes.axvline(floor, color=INK, lw=0.9, ls=(0, (4, 3)))
     axes.text(floor, 0.25 - count, f" noise floor {floor:.2f}", ha="left", va="center", fontsize=8, color=INK)
@@ -233,19 +219,14 @@ def phase_bars(result: Diagnosis, errors: GapErrors) -> Figure:
     """Squared error by phase of base and amended model, as shares of that of the base model."""
     figure = new_figure(WIDTHS["single"], 2.3)
     axes = figure.add_axes((0.17, 0.27, 0.8, 0.6))
-    base = errors.stages[0] or 1.0
-    for offset, (label, model, colour) in enumerate(_models(result)):
-        error = errors.stages[0] if model is result.base.model else errors.amended["fit"]
+    models, base = _models(result), errors.stages[0] or 1.0
+    for offset, ((label, model, colour), error) in enumerate(
+        zip(models, (errors.stages[0], errors.amended["fit"]), strict=False)
+    ):
         left = ((error or 0.0) / base) ** 2
-        shares = {entry["phase"]: entry["share"] for entry in error_location(result, model) if "phase" in entry}
-        heights = [100.0 * left * shares[phase] for phase in PHASES]
-        axes.bar(
-            np.arange(len(PHASES)) + 0.36 * (offset - 0.5 * (len(_models(result)) - 1)),
-            heights,
-            0.34,
-            color=colour,
-            label=label,
-        )
+        heights = [100.0 * left * entry["share"] for entry in error_location(result, model) if "phase" in entry]
+        places = np.arange(len(PHASES)) + 0.36 * (offset - 0.5 * (len(models) - 1))
+        axes.bar(places, heights, 0.34, color=colour, label=label)
     axes.set_xticks(np.arange(len(PHASES)), PHASES, rotation=25, ha="right", rotation_mode="anchor")
     axes.set_ylabel("squared error\n(% of that of the base)")
     tidy_axes(axes)
@@ -257,11 +238,10 @@ def loops(result: Diagnosis) -> Figure:
     """Reading over depth (or load, or travel) of the texel with the largest error: what an effect's signature looks like."""
     predictor = max(result.of("fit"), key=lambda p: float(squared_errors(p, result.base.model, result).sum()))
     s, trial = predictor.stimulus, predictor.trial
-    name, measured, pick = _worst_channel(result, predictor, s.depth if s.force_share is None else s.force_share)
-    if "texel" in name:
-        texel = int(name.split()[1])
-        x = s.force_share[:, texel] if s.force_share is not None else 1e3 * s.depth[:, texel]
-        label = "load (N)" if s.force_share is not None else "depth (mm)"
+    over, label = (1e3 * s.depth, "depth (mm)") if s.force_share is None else (s.force_share, "load (N)")
+    name, measured, pick = _worst_channel(result, predictor, over)
+    if name.startswith("texel"):
+        x = over[:, int(name.split()[1])]
     elif s.slide_speed.any():
         travel = trial.travel if trial.travel.any() else trial.position[:, :2] if trial.position is not None else trial.travel
         x, label = 1e3 * travel[:, int(np.argmax(np.ptp(travel, axis=0)))], "travel (mm)"
@@ -297,9 +277,8 @@ FILE_TYPES = ("png", "pdf")
 def picture(name: str, result: Diagnosis, errors: GapErrors) -> Figure:
     """Draw the picture of this name (see :data:`CAPTIONS`)."""
     without_errors = {"curves": curves, "loops": loops, "map": error_map}
-    if name in without_errors:
-        return without_errors[name](result)
-    return {"overview": overview, "gap": gap_bars, "phases": phase_bars}[name](result, errors)
+    with_errors = {"overview": overview, "gap": gap_bars, "phases": phase_bars}
+    return without_errors[name](result) if name in without_errors else with_errors[name](result, errors)
 
 
 def draw(result: Diagnosis, errors: GapErrors, folder: Path) -> Job[list[str]]:
