@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 
 from ..forward.contact_phases import PHASES, phase_indices, relative_load
 from ..forward.predictor import Model, Predictor
+from ..selection.check_recordings import CheckedRecording
 from ..selection.findings import Diagnosis
 
 RANGE_PARTS = 5
@@ -47,38 +49,26 @@ class GapErrors:
 
 def gap_errors(result: Diagnosis) -> GapErrors:
     """Compute the errors of all models of a diagnosis, once for summary, sentences and pictures."""
-
-    def by_use(one: Diagnosis, model: Model) -> dict[str, float | None]:
-        return {use: nrmse(one.of(use), model, one.full) for use in USES}
-
     before = result.alike or result
     return GapErrors(
-        base=by_use(before, before.base.model),
-        amended=by_use(result, result.best.model),
+        base=_by_use(before, before.base.model),
+        amended=_by_use(result, result.best.model),
         stages=[nrmse(result.of("fit"), model, result.full) for model in result.stages],
         frictionless=frictionless_nrmse(result),
         noise_floor=noise_floor_nrmse(result),
     )
 
 
+def _by_use(result: Diagnosis, model: Model) -> dict[str, float | None]:
+    return {use: nrmse(result.of(use), model, result.full) for use in USES}
+
+
 def nrmse(predictors: Sequence[Predictor], model: Model, full: tuple[float, float]) -> float | None:
     """Return the normalised root mean square error: that of measured minus predicted, as a share of the measured range.
 
-    The mean is over all samples, texels and force components that were measured in these trials. Readings are divided by the
-    range of all readings of the rig (largest minus smallest, all trials and texels together), forces by that of all forces.
-    The error contains the noise: :func:`noise_floor_nrmse` is the error of a perfect model.
-
-    Parameters
-    ----------
-    predictors : sequence of Predictor
-    model : Model
-    full : (float, float)
-        Range of readings and of forces.
-
-    Returns
-    -------
-    float or None
-        None without trials.
+    The mean is over all samples, texels and force components that were measured in these trials; None without trials. Readings
+    are divided by the range of all readings of the rig (largest minus smallest, all trials and texels together), forces by that
+    of all forces: `full` holds the two. The error contains the noise: :func:`noise_floor_nrmse` is that of a perfect model.
     """
     square, count = 0.0, 0
     for predictor in predictors:
@@ -102,16 +92,19 @@ def closed_share(errors: GapErrors, use: str) -> float | None:
 
 def recording_errors(result: Diagnosis, use: str) -> list[dict[str, Any]]:
     """Return the NRMSE of base and amended model in each recording of one use, as under ``fitted`` in gap.json."""
-    before = result.alike or result
-    pairs = zip(before.of(use), result.of(use), strict=True)
+    plain = result.alike or result
+    befores = (nrmse([one], plain.base.model, result.full) for one in plain.of(use))
+    afters = (nrmse([one], result.best.model, result.full) for one in result.of(use))
+    names = (one.trial.name for one in result.of(use))
     return [
-        {
-            "trial": own.trial.name,
-            "before": nrmse([plain], before.base.model, result.full),
-            "after": nrmse([own], result.best.model, result.full),
-        }
-        for plain, own in pairs
+        {"trial": name, "before": before, "after": after} for name, before, after in zip(names, befores, afters, strict=True)
     ]
+
+
+def check_errors(result: Diagnosis, one: CheckedRecording, quantity: int) -> list[float]:
+    """Return errors in a check recording as shares of the range: before, after, and after in the fitted recordings."""
+    share = result.noise[quantity].deviation / result.full[quantity]
+    return [float(square[quantity]) ** 0.5 * share for square in (one.before, one.after, one.fitted)]
 
 
 def frictionless_nrmse(result: Diagnosis) -> dict[str, float | None] | None:
@@ -123,7 +116,7 @@ def frictionless_nrmse(result: Diagnosis) -> dict[str, float | None] | None:
         return None
     base = result.base.model
     frictionless = replace(base, parameters=replace(base.parameters, mus=0.0, mud=0.0, ct=0.0))
-    return {use: nrmse(result.of(use), frictionless, result.full) for use in USES}
+    return _by_use(result, frictionless)
 
 
 def noise_floor_nrmse(result: Diagnosis) -> float:
@@ -156,18 +149,15 @@ def error_location(result: Diagnosis, model: Model) -> list[dict[str, Any]]:
         by_range += np.bincount(part.ravel(), square.ravel(), RANGE_PARTS + 1)
         by_texel += square.sum(axis=0)
     total = max(float(by_phase.sum()), 1e-300)
-    entries: list[dict[str, Any]] = [
-        {"phase": name, "share": round(float(share / total), 4)} for name, share in zip(PHASES, by_phase, strict=True)
-    ]
     limits = [100 * i // RANGE_PARTS for i in range(RANGE_PARTS + 1)]
-    names = ["no load", *(f"{a}–{b} % of the largest load" for a, b in zip(limits[:-1], limits[1:], strict=True))]
-    entries += [{"range": name, "share": round(float(share / total), 4)} for name, share in zip(names, by_range, strict=True)]
+    ranges = ["no load", *(f"{a}–{b} % of the largest load" for a, b in itertools.pairwise(limits))]
+    found: list[tuple[str, Any, float]] = [("phase", *one) for one in zip(PHASES, by_phase, strict=True)]
+    found += [("range", *one) for one in zip(ranges, by_range, strict=True)]
     if n > 1:
-        worst = np.argsort(by_texel)[::-1]
-        count = int(np.searchsorted(np.cumsum(by_texel[worst]) / total, WORST_TEXELS_SHARE)) + 1
-        share = float(by_texel[worst[:count]].sum() / total)
-        entries.append({"texels": sorted(int(i) for i in worst[:count]), "share": round(share, 4)})
-    return entries
+        order = np.argsort(by_texel)[::-1]
+        worst = order[: int(np.searchsorted(np.cumsum(by_texel[order]) / total, WORST_TEXELS_SHARE)) + 1]
+        found.append(("texels", sorted(worst.tolist()), by_texel[worst].sum()))
+    return [{key: value, "share": round(float(square / total), 4)} for key, value, square in found]
 
 
 def squared_errors(predictor: Predictor, model: Model, result: Diagnosis) -> np.ndarray:

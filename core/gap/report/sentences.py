@@ -6,6 +6,7 @@ from __future__ import annotations
 from ...effects.engine.registry import kind_of
 from ...effects.engine.specification import SCATTER
 from ..base.quantities import FORCES, READINGS, friction_kinds
+from ..base.recording_differences import OddRecording
 from ..candidates.silenced_texels import silenced_texels
 from ..dataset.trial import FAULT_KINDS
 from ..fitting.identifiability import LEAST_CYCLES
@@ -14,7 +15,7 @@ from ..fitting.residual_tests import LEAST_STRUCTURE
 from ..forward.contact_phases import FEATURES
 from ..selection.findings import Diagnosis, Finding
 from ..selection.rule_numbers import SURE
-from .comparison import LEAST_GAIN, LEAST_LEVEL, GapErrors, nrmse, recording_differences
+from .comparison import LEAST_GAIN, LEAST_LEVEL, GapErrors, check_errors, nrmse, recording_differences
 
 LOUD_NOISE = 0.05
 """Noise, as a share of the range, above which it hides the smaller effects."""
@@ -45,29 +46,18 @@ SLIDING_HINTS = {
 def next_experiment(result: Diagnosis) -> str:
     """Return the recommended next recording, in one sentence; empty if no question is open."""
     if result.ambiguous:
-        return _experiment_between_rivals(result)
+        pairs = [f"{names[0]} from {' and '.join(names[1:])}" for names in result.ambiguous]
+        parts = dict.fromkeys(kind_of(name).experiment for names in result.ambiguous for name in names)
+        return f"To distinguish {', and '.join(pairs)}: {'; and '.join(parts)}."
+    is_unexplained = result.verdict == "unexplained"
     if result.coverage.slides and all(p.trial.reading is None for p in result.predictors):
-        return _sliding_experiment(result)
+        hint = SLIDING_HINTS.get(result.structure.strongest, REPEAT)
+        said = f"To find the cause: {hint}; slide under two other loads, and record the normal force."
+        return said if is_unexplained else ""
     lacking = _lacking(result)
-    if result.verdict == "unexplained":
+    if is_unexplained:
         return f"To find the cause: {'; '.join([_hint(result), *lacking])}."
     return f"To complete the recordings: {'; '.join(lacking)}." if lacking else ""
-
-
-def _experiment_between_rivals(result: Diagnosis) -> str:
-    """Return the experiment that distinguishes the kinds of effects that these recordings leave as rivals."""
-    pairs = [f"{names[0]} from {' and '.join(names[1:])}" for names in result.ambiguous]
-    involved = list(dict.fromkeys(name for names in result.ambiguous for name in names))
-    parts = [kind_of(name).experiment for name in involved]
-    return f"To distinguish {', and '.join(pairs)}: {'; and '.join(dict.fromkeys(parts))}."
-
-
-def _sliding_experiment(result: Diagnosis) -> str:
-    """Return the recommended recording if only net forces were measured while a surface slid."""
-    if result.verdict != "unexplained":
-        return ""
-    hint = SLIDING_HINTS.get(result.structure.strongest, REPEAT)
-    return f"To find the cause: {hint}; slide under two other loads, and record the normal force."
 
 
 def _hint(result: Diagnosis) -> str:
@@ -115,13 +105,12 @@ FRICTION_MATTERS = 1.5
 
 def headline(result: Diagnosis, errors: GapErrors) -> str:
     """Return the result in one sentence, after a sentence on faults of the data that were not put right."""
-    faults = result.misleading_faults
+    outcome, faults = _outcome(result, errors), {fault.kind: FAULT_KINDS[fault.kind] for fault in result.misleading_faults}
     if not faults:
-        return _outcome(result, errors)
-    kinds = _listed(list(dict.fromkeys(FAULT_KINDS[fault.kind] for fault in faults)))
-    correct = ", ".join(f'"{kind}"' for kind in dict.fromkeys(fault.kind for fault in faults))
-    outcome = _outcome(result, errors)
-    return f"The data have {kinds}; put that right first (correct = [{correct}] in [data]). As they are: {outcome}"
+        return outcome
+    correct = ", ".join(f'"{kind}"' for kind in faults)
+    said = f"The data have {_listed([*faults.values()])}; put that right first (correct = [{correct}] in [data])."
+    return f"{said} As they are: {outcome}"
 
 
 def _outcome(result: Diagnosis, errors: GapErrors) -> str:
@@ -132,13 +121,12 @@ def _outcome(result: Diagnosis, errors: GapErrors) -> str:
         return _effects(result, errors)
     own, after = result.between, errors.amended["fit"] or 0.0
     said = f"Recordings differ by a gain and a level of their own; the error shrinks from {own.before:.2%} to {after:.2%} "
-    said += f"of the range.{_odd_one(result)} Name their session to learn more."
+    said += f"of the range.{_odd_one(own.odd_recording(result.full[READINGS]))} Name their session to learn more."
     return f"{said} Also: {_effects(result, errors)}" if result.findings or result.verdict == "unexplained" else said
 
 
-def _odd_one(result: Diagnosis) -> str:
+def _odd_one(odd: OddRecording | None) -> str:
     """A sentence on the recording that alone differs from all others; empty if there is none."""
-    odd = result.between.odd_recording(result.full[READINGS]) if result.between is not None else None
     if odd is None:
         return ""
     said = []
@@ -204,22 +192,12 @@ def check_failure(result: Diagnosis) -> str:
     if worst is None or all(map(_is_noise, result.findings)):
         return ""
     quantity = next(q for q in (READINGS, FORCES) if result.check.refutes(q) and worst.count[q])
-    before, after, fitted = (
-        (float(x[quantity]) ** 0.5) * _noise_share(result, quantity) for x in (worst.before, worst.after, worst.fitted)
-    )
+    before, after, fitted = check_errors(result, worst, quantity)
     what = "" if quantity == READINGS else " of the net force"
-    said = f"in the check recording '{worst.name}' the error{what} "
-    said += (
-        f"rises from {before:.2%} to {after:.2%} of the range"
-        if after > before
-        else f"is {after:.2%} of the range, not {fitted:.2%}"
-    )
-    return f"{said}; {'; '.join(recording_differences(result, worst.name))}"
-
-
-def _noise_share(result: Diagnosis, quantity: int) -> float:
-    """Deviation of the noise as a share of the range."""
-    return result.noise[quantity].deviation / result.full[quantity]
+    rises = f"rises from {before:.2%} to {after:.2%} of the range"
+    said = rises if after > before else f"is {after:.2%} of the range, not {fitted:.2%}"
+    differs = "; ".join(recording_differences(result, worst.name))
+    return f"in the check recording '{worst.name}' the error{what} {said}; {differs}"
 
 
 def caution(result: Diagnosis) -> str:
@@ -272,9 +250,8 @@ def _friction(result: Diagnosis, errors: GapErrors) -> str:
     It does not say that no friction is missing: an open gap of the net forces may be friction of another law.
     """
     frictionless = (errors.frictionless or {}).get("fit") or 0.0
-    if any(one.name in friction_kinds() for one in result.findings):
-        return ""
-    if frictionless < FRICTION_MATTERS * (errors.base["fit"] or 0.0):
+    is_found = any(one.name in friction_kinds() for one in result.findings)
+    if is_found or frictionless < FRICTION_MATTERS * (errors.base["fit"] or 0.0):
         return ""
     return f" The base model has friction; without it the error would be {frictionless:.2%}."
 
@@ -307,15 +284,10 @@ def evidence(result: Diagnosis, errors: GapErrors) -> list[str]:
 
 
 def noise_sentence(share: float, left: float | None) -> str:
-    """Return sentences about loud noise.
+    """Return sentences about loud noise: `share` is the deviation of the readings without load, as a share of the range.
 
-    Parameters
-    ----------
-    share : float
-        Standard deviation of the readings without load, as a share of the range.
-    left : float or None
-        Error of the amended model on the fitted recordings, likewise. It contains the noise. Where it is less than half of
-        `share`, the readings without load were no noise: they had load, and the rig says otherwise.
+    `left` is the error of the amended model on the fitted recordings, likewise, which contains the noise. Where it is less than
+    half of `share`, the readings without load were no noise: they had load, and the rig says otherwise.
     """
     if left is not None and left < 0.5 * share:
         return (

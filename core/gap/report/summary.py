@@ -20,7 +20,7 @@ from ..planning.experiment_plan import PlannedExperiment, plan_after
 from ..selection.check_recordings import CheckedRecording
 from ..selection.findings import Diagnosis, Finding
 from .amended_sensor import amended_sensor, with_mean_gain_moved
-from .comparison import USES, GapErrors, closed_share, error_location, recording_differences, recording_errors
+from .comparison import USES, GapErrors, check_errors, closed_share, error_location, recording_differences, recording_errors
 from .html_report import html_report
 from .plan_files import NEXT_TRAJECTORY, experiment_words, write_trajectory
 from .plots import FILE_TYPES, draw
@@ -78,11 +78,9 @@ def summary(
 
 def _between(result: Diagnosis) -> dict[str, Any] | None:
     """How the recordings differ, by levels and gains of their own; None if they need none."""
-    own = result.between
-    one = result.carried_over
-    if one is not None:
+    if (one := result.carried_over) is not None:
         return {"effect": one.name, "form": "one session in the order of the rig", "confidence": one.confidence}
-    if own is None:
+    if (own := result.between) is None:
         return None
     return {
         "effect": None,
@@ -117,11 +115,8 @@ def _closed(result: Diagnosis, errors: GapErrors) -> dict[str, Any] | None:
 
 def _checked(one: CheckedRecording, result: Diagnosis) -> dict[str, Any]:
     """One entry under ``check`` in gap.json: errors of one check recording, and what differs if it speaks against the model."""
-    errors = {}
-    for quantity, name in ((READINGS, "readings"), (FORCES, "forces")):
-        if one.count[quantity]:
-            share = result.noise[quantity].deviation / result.full[quantity]
-            errors[name] = [float(x[quantity]) ** 0.5 * share for x in (one.before, one.after)]
+    names = {"readings": READINGS, "forces": FORCES}
+    errors = {name: check_errors(result, one, quantity)[:2] for name, quantity in names.items() if one.count[quantity]}
     against = one.is_worse(READINGS) or one.is_worse(FORCES)
     differs = recording_differences(result, one.name) if against and result.findings else []
     return {"trial": one.name, "errors": errors, "worse": against, "differs": differs}
@@ -148,17 +143,6 @@ def _found(one: Finding, model: Model, result: Diagnosis, errors: GapErrors) -> 
 
 def write_report(result: Diagnosis, folder: Path, errors: GapErrors) -> Job[None]:
     """Write everything into a folder. All files of an earlier report there are replaced together (:class:`.FileList`).
-
-    Parameters
-    ----------
-    result : Diagnosis
-    folder : Path
-    errors : GapErrors
-        Of the result.
-
-    Yields
-    ------
-    Progress
 
     Raises
     ------
