@@ -31,18 +31,9 @@ Pair = tuple[str, str]
 
 @dataclass(frozen=True)
 class PlannedExperiment:
-    """A further recording that separates kinds of effects.
+    """A further recording that separates kinds of effects, along the trajectory of the programme that was chosen.
 
-    Attributes
-    ----------
-    kinds : tuple of str
-        What it is to separate.
-    programme : str
-        Name of the programme that was chosen.
-    trajectory : Trajectory
-    before, after : tuple of Separation
-        Of each kind and each other one, by the recordings alone and with the further one.
-    limits : Limits
+    `before` and `after` separate each kind and each other one, by the recordings alone and with the further one.
     """
 
     kinds: tuple[str, ...]
@@ -65,16 +56,10 @@ class PlannedExperiment:
 
 @dataclass(frozen=True)
 class ExperimentPlan:
-    """Kinds that recordings separate, and the next experiment.
+    """Separations of each kind that the recordings could show from each other kind, and the next experiment.
 
-    Attributes
-    ----------
-    separations : tuple of Separation
-        For each kind that the recordings could show and each other kind.
-    cannot_show : dict of str to str
-        Kinds that these recordings cannot show, each with the reason.
-    experiment : PlannedExperiment or None
-        None if the recordings separate all kinds.
+    `cannot_show` has the kinds that these recordings cannot show, each with the reason. The experiment is None if recordings
+    separate all kinds.
     """
 
     separations: tuple[Separation, ...]
@@ -109,7 +94,12 @@ def plan_experiment(rig: Rig, wishes: Wishes) -> Job[ExperimentPlan]:
     free = [*free_base_parameters(start.parameters, names, full), *recording_numbers(rig, fitted, full)]
     search = _Search(ground, fitted, start, free, noise)
     shown = [kind for kind in search.kinds if kind not in cannot_show]
-    _check_kinds(wishes.between, search.kinds)
+    for name in wishes.between:
+        if name not in search.kinds:
+            problem = "No trajectory is planned for" if name in library() else "There is no effect"
+            raise ParameterError(f"{problem} '{name}': choose from {', '.join(sorted(search.kinds))}.")
+    if len(set(wishes.between)) == 1:
+        raise ParameterError(f"'{wishes.between[0]}' stands alone: name another effect to separate it from.")
     experiment, separations = yield from search.run(wishes.between or tuple(shown), choose_pair=not wishes.between)
     return ExperimentPlan(tuple(one for one in separations if one.kind in shown), cannot_show, experiment)
 
@@ -143,9 +133,8 @@ class _Search:
         noise: tuple[ChannelNoise, ChannelNoise],
     ):
         self._ground, self._fitted, self._model, self._free, self._noise = ground, list(fitted), model, free, noise
-        has_readings, has_forces = (
-            any(getattr(p.trial, part) is not None for p in self._fitted) for part in ("reading", "force")
-        )
+        has_readings = any(p.trial.reading is not None for p in self._fitted)
+        has_forces = any(p.trial.force is not None for p in self._fitted)
         self._further: dict[str, tuple[Trajectory, Predictor]] = {}
         for name, programme in ground.programmes().items():
             trajectory = ground.trajectory(programme)
@@ -212,14 +201,3 @@ def _worthwhile(wanted: Sequence[Pair], before: dict[Pair, Separation], after: d
 def _fitted_kinds(predictors: Sequence[Predictor], model: Model) -> list[Candidate]:
     """Candidates of the kinds that are found by a fit."""
     return [one for one in candidates(predictors, model) if one.kind.found_by == FIT]
-
-
-def _check_kinds(names: Sequence[str], possible: Sequence[str]) -> None:
-    """Raise if no experiment can be planned for some of the kinds."""
-    for name in names:
-        if name not in library():
-            raise ParameterError(f"There is no effect '{name}': choose from {', '.join(sorted(possible))}.")
-        if name not in possible:
-            raise ParameterError(f"No trajectory is planned for '{name}': choose from {', '.join(sorted(possible))}.")
-    if len(set(names)) == 1:
-        raise ParameterError(f"'{names[0]}' stands alone: name another effect to separate it from.")

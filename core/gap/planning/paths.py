@@ -311,53 +311,40 @@ class Ground:
         """The trajectory through knots. Slides are raised where the surface between their places stands out."""
         time, place, depth = (np.array(column) for column in zip(*knots, strict=True))
         planned = self._through(time, place, depth)
-        if self.track:
-            excess = float(stimulus_of(planned.trial, self.rig).load.max()) - self.limits.depth
-            if excess > 0.0:
-                planned = self._through(time, place, np.where(depth > 0.0, depth - 1.01 * excess, depth))
+        if self.track and (excess := float(stimulus_of(planned.trial, self.rig).load.max()) - self.limits.depth) > 0.0:
+            planned = self._through(time, place, np.where(depth > 0.0, depth - 1.01 * excess, depth))
         return planned
 
     def _through(self, time: np.ndarray, place: np.ndarray, depth: np.ndarray) -> Trajectory:
         """The trajectory through knots at times, places and depths."""
-        step, position, way, turns = self.like.step, None, None, None
+        step, position, way = self.like.step, None, None
         samples = np.arange(round(float(time[-1]) / step) + 1) * step
         if self.quaternion is not None:
             position = self._position(place, depth if self.track else 0.0)
             way = np.stack([np.interp(samples, time, axis) for axis in position.T], axis=1)
-            turns = np.tile(self.quaternion, (len(samples), 1))
-        planned = replace(
-            self.like,
-            name="planned",
-            use="fit",
-            time=samples,
-            position=way,
-            quaternion=turns,
-            level=None if self.track else np.interp(samples, time, depth),
-            travel=np.zeros((len(samples), 2)),
-            reading=None,
-            force=None,
-            session="",
-            repeats="",
-            temperature=None,
-        )
-        return Trajectory(time, position, planned)
+        level = None if self.track else np.interp(samples, time, depth)
+        return Trajectory(time, position, self._recording(samples, way, level))
+
+    def _recording(self, time: np.ndarray, position: np.ndarray | None, level: np.ndarray | None = None) -> Trial:
+        """A recording along positions of the probe, or depths or forces, at times, without responses."""
+        turns = None if self.quaternion is None else np.tile(self.quaternion, (len(time), 1))
+        planned = replace(self.like, name="planned", use="fit", time=time, position=position, quaternion=turns, level=level)
+        planned = replace(planned, reading=None, force=None, session="", repeats="", temperature=None)
+        return replace(planned, travel=np.zeros((len(time), 2)))
 
     def _touching_heights(self) -> np.ndarray:
         """Height over each place at which the probe touches: from above in steps, then by halving."""
-        rig, count = self.rig, len(self.places)
-        reach = rig.parameters.max_penetration
+        rig, reach = self.rig, self.rig.parameters.max_penetration
         indenter = rig.indenter_of(self.like)
         assert indenter is not None
         size = float(np.linalg.norm(indenter.mesh.vertices, axis=1).max())
         along = rig.texels.position @ self.up
-        high = float(along.max()) + size - self.places @ self.up + reach
-        low = high.copy()
-        waiting = np.ones(count, bool)
+        low = float(along.max()) + size - self.places @ self.up + reach
         for _ in range(int(np.ceil((float(np.ptp(along)) + 2.0 * size) / reach)) + 3):
-            low = np.where(waiting, low - reach, low)
-            waiting &= ~self._touches(low)
-            if not waiting.any():
+            touches = self._touches(low)
+            if touches.all():
                 break
+            low = np.where(touches, low, low - reach)
         high = low + reach
         for _ in range(BISECTIONS):
             middle = 0.5 * (low + high)
@@ -367,26 +354,21 @@ class Ground:
 
     def _touches(self, heights: np.ndarray) -> np.ndarray:
         """True if the probe touches at heights over its places, (m,) bool."""
-        count, position = len(self.places), self.places + heights[:, None] * self.up
-        assert self.quaternion is not None
-        turns, nothing = np.tile(self.quaternion, (count, 1)), np.zeros((count, 2))
-        time = np.arange(float(count))
-        trial = replace(self.like, time=time, position=position, quaternion=turns, travel=nothing, reading=None, force=None)
+        position = self.places + heights[:, None] * self.up
+        trial = self._recording(np.arange(float(len(position))), position)
         return (stimulus_of(trial, self.rig).load > 0.0).any(axis=1)
 
 
 def _places(rig: Rig, limits: Limits) -> np.ndarray:
     """Texels that are spread over the area, the most central one first, (m, 3) m."""
-    texels = rig.texels
-    inside = np.flatnonzero(limits.holds(texels.position))
+    inside = rig.texels.position[limits.holds(rig.texels.position)]
     if not len(inside):
         raise ParameterError("No texel lies inside the area that is allowed: give it in metres, in the sensor's frame.")
-    centre = texels.position[inside].mean(axis=0)
-    picked = [int(inside[np.argmin(np.linalg.norm(texels.position[inside] - centre, axis=1))])]
+    picked = [int(np.argmin(np.linalg.norm(inside - inside.mean(axis=0), axis=1)))]
     while len(picked) < min(MOST_PLACES, len(inside)):  # each the farthest one from all before
-        apart = np.linalg.norm(texels.position[inside][:, None] - texels.position[picked][None], axis=2).min(axis=1)
-        picked.append(int(inside[np.argmax(apart)]))
-    return np.asarray(texels.position[picked])
+        apart = np.linalg.norm(inside[:, None] - inside[picked], axis=2).min(axis=1)
+        picked.append(int(np.argmax(apart)))
+    return inside[picked]
 
 
 def _track(rig: Rig, limits: Limits, middle: np.ndarray) -> np.ndarray:

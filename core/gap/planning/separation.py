@@ -95,19 +95,9 @@ class Products:
 
 
 class Signals:
-    """The signals of kinds of effects about a base model.
+    """The signals of kinds of effects about a base model with its free parameters, in recordings that are fitted.
 
-    Parameters
-    ----------
-    model : Model
-        The base model.
-    free : sequence of FreeParameter
-        Its free parameters.
-    candidates : sequence of Candidate
-    fitted : sequence of Predictor
-        The recordings.
-    noise : (ChannelNoise, ChannelNoise)
-        Of readings and net forces.
+    `noise` is that of readings and of net forces.
     """
 
     def __init__(

@@ -35,7 +35,8 @@ class GapErrors:
     stages : list of float or None
         Of the models of `Diagnosis.stages` on the fitted trials. The first one, the base model, has the levels and gains.
     frictionless : dict of str to (float or None), or None
-        Of the base model without friction; None if nothing slides or no net force was measured.
+        Of the base model without its own friction, which is part of every other error and no missing effect; None if nothing
+        slides or no net force was measured.
     noise_floor : float
         That of noise alone, on the fitted trials.
     """
@@ -49,18 +50,20 @@ class GapErrors:
 
 def gap_errors(result: Diagnosis) -> GapErrors:
     """Compute the errors of all models of a diagnosis, once for summary, sentences and pictures."""
-    before = result.alike or result
+
+    def by_use(one: Diagnosis, model: Model) -> dict[str, float | None]:
+        return {use: nrmse(one.of(use), model, one.full) for use in USES}
+
+    plain, base = result.alike or result, result.base.model
+    is_rubbed = any(p.trial.force is not None and p.stimulus.slide_speed.any() for p in result.predictors)
+    frictionless = replace(base, parameters=replace(base.parameters, mus=0.0, mud=0.0, ct=0.0))
     return GapErrors(
-        base=_by_use(before, before.base.model),
-        amended=_by_use(result, result.best.model),
+        base=by_use(plain, plain.base.model),
+        amended=by_use(result, result.best.model),
         stages=[nrmse(result.of("fit"), model, result.full) for model in result.stages],
-        frictionless=frictionless_nrmse(result),
+        frictionless=by_use(result, frictionless) if is_rubbed else None,
         noise_floor=noise_floor_nrmse(result),
     )
-
-
-def _by_use(result: Diagnosis, model: Model) -> dict[str, float | None]:
-    return {use: nrmse(result.of(use), model, result.full) for use in USES}
 
 
 def nrmse(predictors: Sequence[Predictor], model: Model, full: tuple[float, float]) -> float | None:
@@ -107,18 +110,6 @@ def check_errors(result: Diagnosis, one: CheckedRecording, quantity: int) -> lis
     return [float(square[quantity]) ** 0.5 * share for square in (one.before, one.after, one.fitted)]
 
 
-def frictionless_nrmse(result: Diagnosis) -> dict[str, float | None] | None:
-    """Return the NRMSE of the base model without friction, by use; None if nothing slides or no net force was measured.
-
-    The base model has friction of its own. It is part of every reported error and is no missing effect.
-    """
-    if not any(p.trial.force is not None and p.stimulus.slide_speed.any() for p in result.predictors):
-        return None
-    base = result.base.model
-    frictionless = replace(base, parameters=replace(base.parameters, mus=0.0, mud=0.0, ct=0.0))
-    return _by_use(result, frictionless)
-
-
 def noise_floor_nrmse(result: Diagnosis) -> float:
     """Return the NRMSE of noise alone on the fitted trials."""
     square = count = 0.0
@@ -134,10 +125,7 @@ def noise_floor_nrmse(result: Diagnosis) -> float:
 def error_location(result: Diagnosis, model: Model) -> list[dict[str, Any]]:
     """Return shares of the squared error on the fitted trials: by phase, by part of the load's range, and of the worst texels.
 
-    Returns
-    -------
-    list of dict
-        As under ``where`` in gap.json: each entry has a ``share`` and one of ``phase``, ``range`` and ``texels``.
+    As under ``where`` in gap.json: each entry has a ``share`` and one of ``phase``, ``range`` and ``texels``.
     """
     n = len(result.rig.texels)
     by_phase, by_range, by_texel = np.zeros(len(PHASES)), np.zeros(RANGE_PARTS + 1), np.zeros(n)
@@ -240,22 +228,14 @@ def _loading(predictor: Predictor) -> dict[str, float]:
 
 
 def recording_differences(result: Diagnosis, name: str) -> list[str]:
-    """Return in words what differs between a check recording and the fitted ones.
-
-    Parameters
-    ----------
-    result : Diagnosis
-    name : str
-        Of the check recording.
-    """
+    """Return in words what differs between the check recording of this name and the fitted ones."""
     other, fitted = next(p for p in result.of("check") if p.trial.name == name), result.of("fit")
     own, *others = (_level_and_gain(p, result.best.model, result.full) for p in (other, *fitted))
     level, gain = (_outside(values, value) for value, values in zip(own, zip(*others, strict=True), strict=True))
     said = []
     if abs(level) > LEAST_LEVEL:
-        said.append(
-            f"without load it reads {abs(level):.1%} of the range {'more' if level > 0 else 'less'} than any fitted one"
-        )
+        more = "more" if level > 0 else "less"
+        said.append(f"without load it reads {abs(level):.1%} of the range {more} than any fitted one")
     if abs(gain) > LEAST_GAIN:
         said.append(f"under the same load it reads {abs(gain):.0%} {'more' if gain > 0 else 'less'} than any fitted one")
     loading, loadings = _loading(other), [_loading(p) for p in fitted]

@@ -130,9 +130,8 @@ def _open_questions(found: dict[str, Any]) -> list[str]:
     """Rivals, the next experiment with its file, and warnings."""
     lines = [f"These recordings do not distinguish {' from '.join(names)}." for names in found["ambiguous"]]
     planned = found["planned_experiment"]
-    return [line for line in (*lines, found["next_experiment"], planned and planned_sentence(planned)) if line] + found[
-        "warnings"
-    ]
+    lines += [found["next_experiment"], planned_sentence(planned) if planned else ""]
+    return [*filter(None, lines), *found["warnings"]]
 
 
 def _structure_table(found: dict[str, Any]) -> Table:

@@ -192,8 +192,7 @@ def _draw_stages(axes: Axes, result: Diagnosis, errors: GapErrors) -> None:
         rows.append(("+ level and gain\nof each recording", errors.stages[0], AFTER))
     for one in sorted(result.findings, key=lambda one: one.effect):
         name = " or ".join(kind_of(kind).title.lower() for kind in (one.name, *one.rivals))
-        left = errors.stages[min(one.effect + 1, len(errors.stages) - 1)]
-        rows.append((f"+ {name}\n(confidence {said_confidence(one.confidence)})", left, AFTER))
+        rows.append((f"+ {name}\n(confidence {said_confidence(one.confidence)})", errors.stages[one.effect + 1], AFTER))
     count = len(rows)
     if result.of("check"):
         rows.append(("check trials, base", errors.base["check"], BEFORE))

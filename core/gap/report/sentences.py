@@ -73,20 +73,18 @@ def _hint(result: Diagnosis) -> str:
 
 def _lacking(result: Diagnosis) -> list[str]:
     """Return the features that the trials lack."""
-    coverage, lacking = result.coverage, []
-    if result.noise[0].deviation > LOUD_NOISE * result.full[0]:
-        lacking.append("press harder, or repeat a trial exactly and average, until the noise is below a hundredth of the range")
-    if coverage.touched_share < ALL_TEXELS:
-        lacking.append(f"touch the {1.0 - coverage.touched_share:.0%} of the texels that no trial reaches")
-    if coverage.cycles < LEAST_CYCLES:
-        lacking.append("repeat the cycle at least three times in one trial")
-    if coverage.longest_hold < LEAST_HOLD:
-        lacking.append("hold one depth for some ten seconds")
-    if coverage.speed_ratio < LEAST_SPEED_RATIO:
-        lacking.append("press at speeds at least tenfold apart")
-    if not coverage.unloading:
-        lacking.append("record the unloading too")
-    return lacking
+    coverage, is_loud = result.coverage, result.noise[0].deviation > LOUD_NOISE * result.full[0]
+    quieter = "press harder, or repeat a trial exactly and average, until the noise is below a hundredth of the range"
+    everywhere = f"touch the {1.0 - coverage.touched_share:.0%} of the texels that no trial reaches"
+    features = [
+        (is_loud, quieter),
+        (coverage.touched_share < ALL_TEXELS, everywhere),
+        (coverage.cycles < LEAST_CYCLES, "repeat the cycle at least three times in one trial"),
+        (coverage.longest_hold < LEAST_HOLD, "hold one depth for some ten seconds"),
+        (coverage.speed_ratio < LEAST_SPEED_RATIO, "press at speeds at least tenfold apart"),
+        (not coverage.unloading, "record the unloading too"),
+    ]
+    return [text for is_lacking, text in features if is_lacking]
 
 
 MOST_SAID = 0.99
@@ -144,8 +142,12 @@ def _effects(result: Diagnosis, errors: GapErrors) -> str:
     sure = [one for one in findings if one.confidence >= SURE]
     if result.verdict == "no gap":
         return f"No gap: the base model with its own parameters refitted leaves {before:.2%} of the range, which is noise."
-    shrink = f"the error shrinks from {before:.2%} to {after:.2%} of the range{_closed_of_forces(result)}"
-    stays = _what_stays(result, errors)
+    shrink, share = f"the error shrinks from {before:.2%} to {after:.2%} of the range", result.closed.least(FORCES)
+    if share is not None and _has_friction(result):  # it changes no reading
+        shrink += f", and {max(share, 0.0):.0%} of the squared gap of the net forces closes"
+    left, stays = errors.amended["check"], ""
+    if left is not None and left >= MANY_FLOORS * errors.noise_floor and not any(map(_is_noise, findings)):
+        stays = f" In the check recordings {left:.2%} of the range remains, {left / errors.noise_floor:.0f} times the noise."
     with_rivals = {names[0]: " or ".join(names) for names in result.ambiguous}
     if not sure and findings and all(one.name in with_rivals for one in findings) and not result.check.is_refuted:
         choices = "; ".join(with_rivals[one.name] for one in findings)
@@ -160,12 +162,9 @@ def _effects(result: Diagnosis, errors: GapErrors) -> str:
     return f"Missing: {_listed([one.name for one in sure])}{besides}; {shrink}.{stays}"
 
 
-def _closed_of_forces(result: Diagnosis) -> str:
-    """The share of the net forces' gap that closes, if friction is among the findings: it changes no reading."""
-    share = result.closed.least(FORCES)
-    if share is None or not any(one.name in friction_kinds() for one in result.findings):
-        return ""
-    return f", and {max(share, 0.0):.0%} of the squared gap of the net forces closes"
+def _has_friction(result: Diagnosis) -> bool:
+    """True if an effect on friction is among the findings."""
+    return any(one.name in friction_kinds() for one in result.findings)
 
 
 def by_share_closed(result: Diagnosis) -> list[Finding]:
@@ -176,14 +175,6 @@ def by_share_closed(result: Diagnosis) -> list[Finding]:
 def _is_noise(finding: Finding) -> bool:
     """True if a finding is noise, of which no model predicts a sample."""
     return kind_of(finding.name).found_by == SCATTER
-
-
-def _what_stays(result: Diagnosis, errors: GapErrors) -> str:
-    """A sentence on the error of the check recordings if it is many times the noise; empty otherwise."""
-    left = errors.amended["check"]
-    if left is None or left < MANY_FLOORS * errors.noise_floor or any(map(_is_noise, result.findings)):
-        return ""
-    return f" In the check recordings {left:.2%} of the range remains, {left / errors.noise_floor:.0f} times the noise."
 
 
 def check_failure(result: Diagnosis) -> str:
@@ -240,20 +231,11 @@ def _unexplained(result: Diagnosis, errors: GapErrors, sure: list[Finding]) -> s
         said = f"the residual ({after:.2%} of the range) does not correlate with any measured quantity"
     else:
         said = f"the residual ({after:.2%} of the range) varies most with {FEATURES[structure.strongest]}"
-    return f"Unexplained: {said}.{part}{_friction(result, errors)}"
-
-
-def _friction(result: Diagnosis, errors: GapErrors) -> str:
-    """A sentence on how much of the error the base model's own friction removes; empty if that is little, or if an effect on
-    friction was found.
-
-    It does not say that no friction is missing: an open gap of the net forces may be friction of another law.
-    """
     frictionless = (errors.frictionless or {}).get("fit") or 0.0
-    is_found = any(one.name in friction_kinds() for one in result.findings)
-    if is_found or frictionless < FRICTION_MATTERS * (errors.base["fit"] or 0.0):
-        return ""
-    return f" The base model has friction; without it the error would be {frictionless:.2%}."
+    if not _has_friction(result) and frictionless >= FRICTION_MATTERS * (errors.base["fit"] or 0.0):
+        # It does not say that no friction is missing: an open gap of the net forces may be friction of another law.
+        part += f" The base model has friction; without it the error would be {frictionless:.2%}."
+    return f"Unexplained: {said}.{part}"
 
 
 def said_confidence(confidence: float) -> str:
@@ -267,7 +249,7 @@ def evidence(result: Diagnosis, errors: GapErrors) -> list[str]:
     said = []
     for one in by_share_closed(result):
         rivals = f"; it could also be {' or '.join(one.rivals)}" if one.rivals else ""
-        before, after = left[one.effect], left[min(one.effect + 1, len(left) - 1)]
+        before, after = left[one.effect], left[one.effect + 1]
         confidence = said_confidence(one.confidence)
         said.append(f"{one.name} ({one.form}): {before:.2%} → {after:.2%}, confidence {confidence}{rivals}")
         so = "so its number is in doubt and its name is not" if one.confidence >= SURE else "so its name is in doubt"
@@ -277,9 +259,8 @@ def evidence(result: Diagnosis, errors: GapErrors) -> list[str]:
         said.append(f"check recordings, never fitted: {before:.2%} → {after:.2%}; noise alone is {errors.noise_floor:.2%}")
     least = [share for share in map(result.closed.least, (READINGS, FORCES)) if share is not None]
     if least and result.findings:
-        said.append(
-            f"{max(min(least), 0.0):.0%} of the squared gap is closed (the least of fitted, left-out and check recordings)"
-        )
+        closed = f"{max(min(least), 0.0):.0%} of the squared gap is closed"
+        said.append(f"{closed} (the least of fitted, left-out and check recordings)")
     return said
 
 

@@ -34,9 +34,8 @@ def summary(
 ) -> dict[str, Any]:
     """Return the contents of gap.json, with notes among its warnings."""
     model = with_mean_gain_moved(result)
-    base_free = [item for item in result.base.free if item.effect == BASE]
-    base = [one for one in result.intervals if one.effect == BASE]
-    recordings = [one for one in result.intervals if one.effect == RECORDING]
+    base = _intervals(result, BASE)
+    without_effects = [item.name for item in result.base.free if item.effect == BASE]
     return {
         "format": FORMAT,
         "name": result.rig.name,
@@ -44,15 +43,12 @@ def summary(
         "found": [_found(one, model, result, errors) for one in result.findings],
         "between_recordings": _between(result),
         "base": {
-            "parameters": {one.name: getattr(model.parameters, one.name) for one in base},
-            "intervals": {one.name: [one.low, one.high] for one in base},
-            "without_effects": {item.name: getattr(result.base.model.parameters, item.name) for item in base_free},
+            "parameters": {name: getattr(model.parameters, name) for name in base},
+            "intervals": base,
+            "without_effects": {name: getattr(result.base.model.parameters, name) for name in without_effects},
             "gap_without_friction": errors.frictionless,
         },
-        "recordings": {
-            "numbers": dict(model.recordings),
-            "intervals": {one.name: [one.low, one.high] for one in recordings},
-        },
+        "recordings": {"numbers": dict(model.recordings), "intervals": _intervals(result, RECORDING)},
         "gap": {
             "before": errors.base,
             "after": errors.amended,
@@ -74,6 +70,11 @@ def summary(
         ],
         "warnings": [*result.rig.warnings, *warnings(result), *notes],
     }
+
+
+def _intervals(result: Diagnosis, effect: int) -> dict[str, list[float]]:
+    """Ends of the intervals of an effect's parameters, or of those of the base model or the recordings, by name."""
+    return {one.name: [one.low, one.high] for one in result.intervals if one.effect == effect}
 
 
 def _between(result: Diagnosis) -> dict[str, Any] | None:
@@ -125,18 +126,17 @@ def _checked(one: CheckedRecording, result: Diagnosis) -> dict[str, Any]:
 def _found(one: Finding, model: Model, result: Diagnosis, errors: GapErrors) -> dict[str, Any]:
     """One entry under ``found`` in gap.json."""
     effect = model.effects[one.effect]
-    intervals = [interval for interval in result.intervals if interval.effect == one.effect]
     return {
         "effect": one.name,
         "form": one.form,
         "parameters": {key: list(value) if isinstance(value, tuple) else value for key, value in effect.values.items()},
-        "intervals": {interval.name: [interval.low, interval.high] for interval in intervals},
+        "intervals": _intervals(result, one.effect),
         "confidence": one.confidence,
         "closes": one.closes,
         "unsettled": list(one.unsettled),
         "doubts": list(one.doubts),
         "gap_before": errors.stages[one.effect],
-        "gap_after": errors.stages[min(one.effect + 1, len(errors.stages) - 1)],
+        "gap_after": errors.stages[one.effect + 1],
         "next_best": {"effect": one.next_best, "leaves": round(one.leaves, 3)} if one.next_best else None,
     }
 
