@@ -36,22 +36,11 @@ class PlannedExperiment:
     `before` and `after` separate each kind and each other one, by the recordings alone and with the further one.
     """
 
-    kinds: tuple[str, ...]
     programme: str
     trajectory: Trajectory
     before: tuple[Separation, ...]
     after: tuple[Separation, ...]
     limits: Limits
-
-    @property
-    def separation_before(self) -> float:
-        """The least separated pair by the recordings alone, in standard deviations of the noise."""
-        return min(one.deviations for one in self.before)
-
-    @property
-    def separation_after(self) -> float:
-        """The least separated pair with the further recording, in standard deviations of the noise."""
-        return min(one.deviations for one in self.after)
 
 
 @dataclass(frozen=True)
@@ -116,7 +105,7 @@ def plan_after(result: Diagnosis, wishes: Wishes | None = None) -> Job[PlannedEx
     except ParameterError:
         return None  # the sentence says what to record; a limit that nobody gave is no reason to fail
     search = _Search(ground, fitted, result.base.model, result.base.free, result.noise)
-    groups = [tuple(name for name in group if name in search.kinds) for group in (wishes.between, *result.ambiguous)]
+    groups = [tuple(name for name in group if name in search.kinds) for group in result.ambiguous]
     kinds = next((group for group in groups if len(group) > 1), ())
     return (yield from search.run(kinds, choose_pair=False))[0] if kinds else None
 
@@ -167,9 +156,10 @@ class _Search:
         if not wanted:
             return None, list(before.values())
         question = _worthwhile(wanted, before, after) if choose_pair else wanted
-        best = max(after, key=lambda name: _value(after[name], question))
+        # The mean logarithm of the separations counts, not the least one, because no programme may separate one of the pairs.
+        worth = {name: np.mean([np.log(max(own[pair].deviations, 1e-3)) for pair in question]) for name, own in after.items()}
+        best = max(worth, key=lambda name: worth[name])
         experiment = PlannedExperiment(
-            tuple(dict.fromkeys(kind for kind, _ in question)),
             best,
             self._further[best][0],
             tuple(before[pair] for pair in question),
@@ -177,11 +167,6 @@ class _Search:
             self._ground.limits,
         )
         return experiment, list(before.values())
-
-
-def _value(after: dict[Pair, Separation], question: Sequence[Pair]) -> float:
-    """The mean logarithm of the separations: not the least one, because no programme may separate one of the pairs."""
-    return float(np.mean([np.log(max(after[pair].deviations, 1e-3)) for pair in question]))
 
 
 def _worthwhile(wanted: Sequence[Pair], before: dict[Pair, Separation], after: dict[str, dict[Pair, Separation]]) -> list[Pair]:

@@ -116,17 +116,9 @@ QUICK, SLOW = 0.7, 0.05
 
 
 class Move(NamedTuple):
-    """A straight motion, and a rest at its end.
+    """A straight motion to a depth and a place, and a rest of `hold` seconds at its end; the probe changes place at its depth.
 
-    Attributes
-    ----------
-    depth : float or None
-        Share of the limit; None is clear of the sensor.
-    speed : float
-        Share of the limit.
-    hold : float, s
-    place : int
-        Index of the place; the probe moves there at the depth that it has.
+    Depth and speed are shares of the limits. A depth of None is clear of the sensor. The place is an index.
     """
 
     depth: float | None
@@ -235,7 +227,9 @@ class Ground:
             self.places = _places(self.rig, limits)
             self.touch, clear = np.full(len(self.places), self.like.position[deepest, 2]), np.zeros(len(self.places))
             if self.like.stimulus == "pose":
-                way = _track(self.rig, limits, self.places[0])
+                pitch, share = float(np.sqrt(np.median(self.rig.texels.area))), np.linspace(-0.5, 0.5, TRACK_PLACES)[:, None]
+                way = self.places[0] + share * TRACK_PITCHES * pitch * self.rig.texels.tangent[0]
+                way = way[limits.holds(way)]
                 self.track = tuple(range(len(self.places), len(self.places) + len(way)))
                 self.places = np.concatenate([self.places, way])
                 self.touch = self._touching_heights()
@@ -369,11 +363,3 @@ def _places(rig: Rig, limits: Limits) -> np.ndarray:
         apart = np.linalg.norm(inside[:, None] - inside[picked], axis=2).min(axis=1)
         picked.append(int(np.argmax(apart)))
     return inside[picked]
-
-
-def _track(rig: Rig, limits: Limits, middle: np.ndarray) -> np.ndarray:
-    """Places along a straight slide through a place, along the texels' first tangent, inside the area, (m, 3) m."""
-    pitch = float(np.sqrt(np.median(rig.texels.area)))
-    share = np.linspace(-0.5, 0.5, TRACK_PLACES)[:, None]
-    way = middle + share * TRACK_PITCHES * pitch * rig.texels.tangent[0]
-    return way[limits.holds(way)]

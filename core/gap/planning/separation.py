@@ -45,12 +45,10 @@ RANK = 1e-9
 
 @dataclass(frozen=True)
 class Separation:
-    """How well recordings separate a kind that acts from a rival.
+    """How well recordings separate a kind that acts from another one, a rival that imitates it.
 
     Attributes
     ----------
-    kind, other : str
-        The kind that acts, and the rival that imitates it.
     share : float
         Median share of the square of the kind's signals, beside the base model, that the rival cannot imitate: 0 to 1.
     deviations : float

@@ -179,13 +179,6 @@ OUTSIDE = 1.25
 """Depth, speed, length and number of loads are mentioned from this many times the largest of the fitted recordings on."""
 LEAST_NEW_LOAD = 0.05
 """Share of the load on texels that no fitted recording touches, from which on it is mentioned."""
-LOADINGS = {
-    "depth": "is loaded {:.3g} times as much",
-    "speed": "is loaded {:.3g} times as fast",
-    "seconds": "lasts {:.3g} times as long",
-    "loads": "is loaded {:.3g} times as often",
-}
-"""Words for a quantity of :func:`_loading` that is so many times the largest of the fitted recordings."""
 FAST = 0.95
 """Quantile of the rates of loading that counts as a recording's speed."""
 
@@ -198,13 +191,13 @@ def _level_and_gain(predictor: Predictor, model: Model, full: tuple[float, float
     trial, predicted = predictor.trial, predictor.predict(model)
     if trial.reading is not None:
         measured, expected, size, zero = trial.reading, predicted.reading, full[0], model.parameters.zero
-        idle = predictor.stimulus.load <= 0
+        load = predictor.stimulus.load
     else:
         assert trial.force is not None and predicted.force is not None
         axis = int(np.argmax(np.nansum(trial.force**2, axis=0)))
         measured, expected, size, zero = trial.force[:, axis : axis + 1], predicted.force[:, axis : axis + 1], full[1], 0.0
-        idle = ~(predictor.stimulus.load > 0).any(axis=1, keepdims=True)
-    known = np.isfinite(measured)
+        load = predictor.stimulus.load.max(axis=1, keepdims=True)
+    known, idle = np.isfinite(measured), load <= 0
     rest = known & idle
     level = float((measured - expected)[rest].mean()) / size if rest.any() else float("nan")
     shift = level * size if np.isfinite(level) else 0.0
@@ -214,16 +207,16 @@ def _level_and_gain(predictor: Predictor, model: Model, full: tuple[float, float
 
 
 def _loading(predictor: Predictor) -> dict[str, float]:
-    """Largest load, fast rate of loading, length of a recording, and number of times that it is loaded."""
+    """Largest load, fast rate of loading, length, and number of loads of a recording, by the words that compare them."""
     time, load = predictor.trial.time, predictor.stimulus.load.max(axis=1)
     rate = np.gradient(load, time)
     quick = rate[rate > 0]
     half = load > 0.5 * max(float(load.max(initial=0.0)), 1e-300)
     return {
-        "depth": float(load.max(initial=0.0)),
-        "speed": float(np.quantile(quick, FAST)) if len(quick) else 0.0,
-        "seconds": float(time[-1] - time[0]),
-        "loads": float(np.count_nonzero(half[1:] & ~half[:-1])),
+        "is loaded {:.3g} times as much": float(load.max(initial=0.0)),
+        "is loaded {:.3g} times as fast": float(np.quantile(quick, FAST)) if len(quick) else 0.0,
+        "lasts {:.3g} times as long": float(time[-1] - time[0]),
+        "is loaded {:.3g} times as often": float(np.count_nonzero(half[1:] & ~half[:-1])),
     }
 
 
@@ -238,11 +231,11 @@ def recording_differences(result: Diagnosis, name: str) -> list[str]:
         said.append(f"without load it reads {abs(level):.1%} of the range {more} than any fitted one")
     if abs(gain) > LEAST_GAIN:
         said.append(f"under the same load it reads {abs(gain):.0%} {'more' if gain > 0 else 'less'} than any fitted one")
-    loading, loadings = _loading(other), [_loading(p) for p in fitted]
-    for quantity, words in LOADINGS.items():
-        most = max(one[quantity] for one in loadings)
-        if loading[quantity] > OUTSIDE * most > 0.0:
-            said.append(f"it {words.format(loading[quantity] / most)} as any fitted one")
+    loadings = [_loading(p) for p in fitted]
+    for words, value in _loading(other).items():
+        most = max(one[words] for one in loadings)
+        if value > OUTSIDE * most > 0.0:
+            said.append(f"it {words.format(value / most)} as any fitted one")
     load, known = other.stimulus.load.sum(axis=0), np.any([(p.stimulus.load > 0).any(axis=0) for p in fitted], axis=0)
     share = float(load[~known].sum()) / max(float(load.sum()), 1e-300)
     if share > LEAST_NEW_LOAD:

@@ -136,11 +136,8 @@ def _open_questions(found: dict[str, Any]) -> list[str]:
 
 def _structure_table(found: dict[str, Any]) -> Table:
     """Features on which the residual depends, before and after."""
-    before, after = found["varies_with"], found["left_varies_with"]
-    rows = [
-        [FEATURES.get(key, key), f"{before[key]:.1%}", f"{after.get(key, 0.0):.1%}"]
-        for key in sorted(before, key=lambda key: -before[key])
-    ]
+    shares, after = sorted(found["varies_with"].items(), key=lambda item: -item[1]), found["left_varies_with"]
+    rows = [[FEATURES[key], f"{share:.1%}", f"{after.get(key, 0.0):.1%}"] for key, share in shares]
     return Table(["", "base", "amended"], rows, {1, 2})
 
 

@@ -53,13 +53,13 @@ def planned_sentence(words: Mapping[str, Any]) -> str:
 
 
 def experiment_words(experiment: PlannedExperiment, file: str) -> dict[str, Any]:
-    """Return a planned experiment for JSON."""
+    """Return a planned experiment for JSON: its separations are those of the least separated pair."""
     return {
         "file": file,
         "programme": experiment.programme,
-        "between": list(experiment.kinds),
-        "separation_before": round(experiment.separation_before, 3),
-        "separation_after": round(experiment.separation_after, 3),
+        "between": list(dict.fromkeys(one.kind for one in experiment.before)),
+        "separation_before": round(min(one.deviations for one in experiment.before), 3),
+        "separation_after": round(min(one.deviations for one in experiment.after), 3),
         "limits": asdict(experiment.limits),
         "before": _pairs(experiment.before),
         "after": _pairs(experiment.after),

@@ -41,7 +41,8 @@ def gap_bars(result: Diagnosis, errors: GapErrors) -> Figure:
     """NRMSE of base and amended model on fitted and on check trials, with the noise floor."""
     figure = new_figure(WIDTHS["single"], 2.5)
     axes = figure.add_axes((0.15, 0.18, 0.82, 0.58))
-    uses = [use for use in ("fit", "check") if result.of(use)]
+    names = {"fit": "fitted trials", "check": "check trials,\nnever fitted"}
+    uses = [use for use in names if result.of(use)]
     by_label = {"without friction": (errors.frictionless, GREY), "base model": (errors.base, BEFORE)}
     if result.best.model.effects:
         by_label["amended"] = (errors.amended, AFTER)
@@ -54,7 +55,6 @@ def gap_bars(result: Diagnosis, errors: GapErrors) -> Figure:
         axes.bar_label(bars, fmt="%.2f", fontsize=8, color=INK)
     floor = 100.0 * errors.noise_floor
     axes.axhline(floor, color=INK, lw=0.9, ls=(0, (4, 3)), label=f"noise floor {floor:.2f} %")
-    names = {"fit": "fitted trials", "check": "check trials,\nnever fitted"}
     axes.set_xticks(np.arange(len(uses)), [names[use] for use in uses])
     axes.set_ylabel("error (% of range)")
     axes.margins(y=0.18)
@@ -159,7 +159,7 @@ def _draw_errors(figure: Figure, result: Diagnosis, line: Place, maps: Place) ->
             picture: Any = np.ma.masked_array(texels.layout.image(values), ~texels.layout.mask())
             image = axes.imshow(picture, origin="lower", interpolation="nearest", **colours)
         else:
-            image = axes.scatter(*texels.position.T[:2], c=values, s=14, **colours)
+            image = axes.scatter(texels.position[:, 0], texels.position[:, 1], c=values, s=14, **colours)
             axes.set_aspect("equal")
         axes.set_title(label, fontsize=8.5, color=INK)
         axes.set_xticks([])

@@ -193,8 +193,7 @@ def check_failure(result: Diagnosis) -> str:
 
 def caution(result: Diagnosis) -> str:
     """Return a warning about the use of the amended sensor; empty if there is none."""
-    failure = check_failure(result)
-    if failure:
+    if failure := check_failure(result):
         return f"The amended sensor fails on the check recordings: {failure}."
     with_rivals = {group[0] for group in result.ambiguous}
     if result.findings and all(one.name in with_rivals for one in result.findings):
