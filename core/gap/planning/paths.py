@@ -56,9 +56,7 @@ class Limits:
 
     def holds(self, places: np.ndarray) -> np.ndarray:
         """Return which of some places (m, 3), in metres, lie inside the area, (m,) bool."""
-        if self.area is None:
-            return np.ones(len(places), bool)
-        low, high = np.reshape(self.area, (2, 2)).T
+        low, high = np.reshape(self.area or (-np.inf, np.inf, -np.inf, np.inf), (2, 2)).T
         return ((places[:, :2] >= low - PLACE_MARGIN) & (places[:, :2] <= high + PLACE_MARGIN)).all(axis=1)
 
 
@@ -187,16 +185,10 @@ class Trajectory:
 class Ground:
     """Where a probe can press, and at which height it touches.
 
-    Parameters
-    ----------
-    predictors : sequence of Predictor
-        Of the recordings. The first of the fitted ones that touches says how the probe is turned.
-    limits : Limits
+    The first recording that touches says how the probe is turned; planned ones are `like` it.
 
     Attributes
     ----------
-    like : Trial
-        The recording that planned ones are like.
     places : (m, 3) float, m
         On the sensor, those of the track last; one row without meaning where depths or forces are known.
     track : tuple of int

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 BEFORE, AFTER = SHEAR_COLOUR, NORMAL_COLOUR
-MEASURED = INK
 LONG = 12
 """How many times as long as wide a grid is no picture any more."""
 Pick = Callable[[Model], np.ndarray]
@@ -75,12 +74,12 @@ def curves(result: Diagnosis) -> Figure:
     figure = new_figure(WIDTHS["double"], 1.75 * len(trials) + 0.5)
     grid = figure.subplots(len(trials), 1, squeeze=False)[:, 0]
     for axes, predictor in zip(grid, trials, strict=True):
-        name, measured, pick = _worst_channel(result, predictor)
+        _, name, quantity, measured, pick = _worst_channel(result, predictor)
         time = predictor.trial.time
-        axes.plot(time, measured, color=MEASURED, lw=width_below(1), label="measured")
+        axes.plot(time, measured, color=INK, lw=width_below(1), label="measured")
         _draw_models(axes, result, time, measured, pick, lw=1.0)
         axes.set_title(f"{predictor.trial.name} ({predictor.trial.use}): {name}", loc="left", fontsize=8.5, color=INK)
-        axes.set_ylabel(_quantity(result, name))
+        axes.set_ylabel(quantity)
         axes.margins(x=0)
         tidy_axes(axes)
     grid[0].legend(frameon=False, fontsize=8, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0)
@@ -97,16 +96,10 @@ def _draw_models(axes: Axes, result: Diagnosis, x: np.ndarray, measured: np.ndar
         axes.plot(x, shown, color=colour, ls="--" if label == "base model" else "-", label=label, **style)
 
 
-def _quantity(result: Diagnosis, channel: str) -> str:
-    """Quantity of a channel, with its unit."""
-    if not channel.startswith("texel"):
-        return f"{channel} (N)"
-    unit = result.rig.parameters.unit
-    return "normal force (N)" if unit == "N" else f"reading ({unit})"
-
-
-def _worst_channel(result: Diagnosis, predictor: Predictor, stimulus: np.ndarray | None = None) -> tuple[str, np.ndarray, Pick]:
-    """The channel with the largest error: its name, what was measured, and what a model predicts.
+def _worst_channel(
+    result: Diagnosis, predictor: Predictor, stimulus: np.ndarray | None = None
+) -> tuple[int, str, str, np.ndarray, Pick]:
+    """The channel with the largest error: its index, name and quantity, what was measured, and what a model predicts.
 
     With the `stimulus` of each texel (samples, n), those whose stimulus changes come first.
     """
@@ -116,8 +109,9 @@ def _worst_channel(result: Diagnosis, predictor: Predictor, stimulus: np.ndarray
     if part == "reading" and stimulus is not None and (changes := np.ptp(stimulus, axis=0) > 0.0).any():
         miss[~changes] = 0.0
     channel = int(np.argmax(miss))
-    name = f"texel {channel}" if part == "reading" else f"force {'xyz'[channel]}"
-    return name, measured[:, channel], lambda model: getattr(predictor.predict(model), part)[:, channel]
+    unit, name = result.rig.parameters.unit, f"texel {channel}" if part == "reading" else f"force {'xyz'[channel]}"
+    quantity = f"{name} (N)" if part == "force" else "normal force (N)" if unit == "N" else f"reading ({unit})"
+    return channel, name, quantity, measured[:, channel], lambda model: getattr(predictor.predict(model), part)[:, channel]
 
 
 def error_map(result: Diagnosis) -> Figure:
@@ -238,9 +232,9 @@ def loops(result: Diagnosis) -> Figure:
     predictor = max(result.of("fit"), key=lambda p: float(squared_errors(p, result.base.model, result).sum()))
     s, trial = predictor.stimulus, predictor.trial
     over, label = (1e3 * s.depth, "depth (mm)") if s.force_share is None else (s.force_share, "load (N)")
-    name, measured, pick = _worst_channel(result, predictor, over)
-    if name.startswith("texel"):
-        x = over[:, int(name.split()[1])]
+    channel, name, quantity, measured, pick = _worst_channel(result, predictor, over)
+    if trial.reading is not None:
+        x = over[:, channel]
     elif s.slide_speed.any():
         travel = trial.travel if trial.travel.any() else trial.position[:, :2] if trial.position is not None else trial.travel
         x, label = 1e3 * travel[:, int(np.argmax(np.ptp(travel, axis=0)))], "travel (mm)"
@@ -248,10 +242,10 @@ def loops(result: Diagnosis) -> Figure:
         x, label = 1e3 * s.depth.max(axis=1), "depth (mm)"
     figure = new_figure(WIDTHS["single"], 2.5)
     axes = figure.add_axes((0.21, 0.18, 0.76, 0.62))
-    axes.plot(x, measured, ".", ms=4.0, mew=0, color=MEASURED, alpha=0.55, zorder=3, label="measured")
+    axes.plot(x, measured, ".", ms=4.0, mew=0, color=INK, alpha=0.55, zorder=3, label="measured")
     _draw_models(axes, result, x, measured, pick, lw=0.8, zorder=4)  # above the samples, which hide a line that fits them
     axes.set_xlabel(label)
-    axes.set_ylabel(_quantity(result, name))
+    axes.set_ylabel(quantity)
     axes.set_title(f"{trial.name}: {name}", loc="left", fontsize=8.5, color=INK, pad=18)
     tidy_axes(axes)
     place = {"loc": "lower right", "bbox_to_anchor": (1.02, 0.98), "borderaxespad": 0.2}
@@ -281,13 +275,7 @@ def picture(name: str, result: Diagnosis, errors: GapErrors) -> Figure:
 
 
 def draw(result: Diagnosis, errors: GapErrors, folder: Path) -> Job[list[str]]:
-    """Write every picture that makes sense for a rig as PNG and PDF; return their names.
-
-    Yields
-    ------
-    Progress
-        Before each picture; its total is the number of pictures.
-    """
+    """Write every picture that makes sense for a rig as PNG and PDF; return their names. The progress counts pictures."""
     names = [name for name in CAPTIONS if name != "map" or len(result.rig.texels) > 1]
     for done, name in enumerate(names):
         yield Progress("drawing", done, len(names))

@@ -213,8 +213,7 @@ def _unexplained(result: Diagnosis, errors: GapErrors, sure: list[Finding]) -> s
         fitted = _listed([one.name for one in by_share_closed(result)])
         many = len(result.findings) > 1
         return f"Unexplained: {fitted} {'fit' if many else 'fits'} the fitted recordings, but {failure}.{part}"
-    is_quiet = result.structure.total < LEAST_STRUCTURE and result.line is None
-    apart = result.check.worst
+    apart, is_quiet = result.check.worst, result.structure.total < LEAST_STRUCTURE and result.line is None
     if apart is not None and not result.findings and result.between is None and is_quiet:
         left, other = errors.base["fit"] or 0.0, errors.base["check"] or 0.0
         return (

@@ -104,7 +104,7 @@ def _closed(result: Diagnosis, errors: GapErrors) -> dict[str, Any] | None:
         shares = {use: closed_share(errors, use) for use in USES}
         known = [share for share in shares.values() if share is not None]
         return {"fit": shares["fit"], "left_out": None, "check": shares["check"], "least": min(known)} if known else None
-    only_friction = bool(result.findings) and all(one.name in friction_kinds() for one in result.findings)
+    only_friction = all(one.name in friction_kinds() for one in result.findings)
     order = (FORCES, READINGS) if only_friction else (READINGS, FORCES)
     quantity = next((q for q in order if result.closed.least(q) is not None), None)
     if quantity is None or not result.findings:
