@@ -15,7 +15,7 @@ from ...jobs import Job, Progress
 from ..base.base_model import base_parameters_to_search, prepared, recording_numbers, start_model, with_recording_numbers
 from ..base.contact_heights import with_starting_heights
 from ..base.quantities import friction_kinds
-from ..candidates.candidates import DIRECTLY_ESTIMATED, NOT_FITTED, Candidate, candidates, scales_of
+from ..candidates.candidates import DIRECTLY_ESTIMATED, NOT_FITTED, candidates, scales_of
 from ..dataset.rig import Rig
 from ..fitting.identifiability import unidentifiable
 from ..fitting.least_squares import FreeParameter, free_base_parameters
@@ -132,9 +132,9 @@ class _Search:
             force = np.zeros((samples, 3)) if has_forces else None
             trial = replace(trajectory.trial, reading=reading, force=force)
             self._further[name] = trajectory, Predictor(trial, ground.rig)
-        found = _fitted_kinds(self._fitted, model)
+        every = [*self._fitted, *(further for _, further in self._further.values())]
+        found, more = ([one for one in candidates(seen, model) if one.kind.found_by == FIT] for seen in (self._fitted, every))
         names = {one.name for one in found}
-        more = _fitted_kinds([*self._fitted, *(further for _, further in self._further.values())], model)
         self._candidates = [*found, *(one for one in more if one.name not in names)]
         self.kinds = tuple(dict.fromkeys(one.name for one in self._candidates))
 
@@ -159,13 +159,8 @@ class _Search:
         # The mean logarithm of the separations counts, not the least one, because no programme may separate one of the pairs.
         worth = {name: np.mean([np.log(max(own[pair].deviations, 1e-3)) for pair in question]) for name, own in after.items()}
         best = max(worth, key=lambda name: worth[name])
-        experiment = PlannedExperiment(
-            best,
-            self._further[best][0],
-            tuple(before[pair] for pair in question),
-            tuple(after[best][pair] for pair in question),
-            self._ground.limits,
-        )
+        alone, together = (tuple(found[pair] for pair in question) for found in (before, after[best]))
+        experiment = PlannedExperiment(best, self._further[best][0], alone, together, self._ground.limits)
         return experiment, list(before.values())
 
 
@@ -181,8 +176,3 @@ def _worthwhile(wanted: Sequence[Pair], before: dict[Pair, Separation], after: d
     nearest = max(wanted, key=lambda pair: (best[pair], pair))
     chosen = min(can, key=lambda pair: (both(before, pair)[1], pair)) if can else nearest
     return [chosen, chosen[::-1]]
-
-
-def _fitted_kinds(predictors: Sequence[Predictor], model: Model) -> list[Candidate]:
-    """Candidates of the kinds that are found by a fit."""
-    return [one for one in candidates(predictors, model) if one.kind.found_by == FIT]

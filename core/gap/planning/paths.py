@@ -207,17 +207,17 @@ class Ground:
     def __init__(self, predictors: Sequence[Predictor], limits: Limits):
         touching = [p for p in predictors if (p.stimulus.load > 0.0).any()] or list(predictors)
         self.like, self.rig, self.limits = touching[0].trial, touching[0].rig, limits
-        self.up = self.rig.texels.normal.sum(axis=0)
-        self.up = self.up / max(float(np.linalg.norm(self.up)), 1e-12)
+        up = self.rig.texels.normal.sum(axis=0)
+        self.up = up / max(float(np.linalg.norm(up)), 1e-12)
         self.quaternion: np.ndarray | None = None
         self.places, self.touch = np.zeros((1, 3)), np.zeros(1)
         self.track: tuple[int, ...] = ()
-        clear = np.zeros(1)
+        self._clear = np.zeros(1)  # depth of the probe while it travels, negative above the sensor
         if self.like.position is not None and self.like.quaternion is not None:
             deepest = int(np.argmax(touching[0].stimulus.load.max(axis=1)))
             self.quaternion = self.like.quaternion[deepest]
             self.places = _places(self.rig, limits)
-            self.touch, clear = np.full(len(self.places), self.like.position[deepest, 2]), np.zeros(len(self.places))
+            self.touch, self._clear = np.full(len(self.places), self.like.position[deepest, 2]), np.zeros(len(self.places))
             if self.like.stimulus == "pose":
                 pitch, share = float(np.sqrt(np.median(self.rig.texels.area))), np.linspace(-0.5, 0.5, TRACK_PLACES)[:, None]
                 way = self.places[0] + share * TRACK_PITCHES * pitch * self.rig.texels.tangent[0]
@@ -226,8 +226,7 @@ class Ground:
                 self.places = np.concatenate([self.places, way])
                 self.touch = self._touching_heights()
                 heights = self.places @ self.up + self.touch
-                clear = heights - float(heights.max()) - CLEARANCE * limits.depth
-        self._clear = clear  # depth of the probe while it travels, negative above the sensor
+                self._clear = heights - float(heights.max()) - CLEARANCE * limits.depth
         needed = FIRST_REST + limits.depth / limits.speed * 2.0 + FIRST_REST
         if needed > limits.duration:
             raise ParameterError(
@@ -275,7 +274,12 @@ class Ground:
             elif len(knots) > 2:
                 break
         knots.append((self.limits.duration, *knots[-1][1:]))
-        return self._no_deeper(knots)
+        time, place, depth = (np.array(column) for column in zip(*knots, strict=True))
+        planned = self._through(time, place, depth)
+        if self.track and (excess := float(stimulus_of(planned.trial, self.rig).load.max()) - self.limits.depth) > 0.0:
+            # The surface between the places of a slide stands out.
+            planned = self._through(time, place, np.where(depth > 0.0, depth - 1.01 * excess, depth))
+        return planned
 
     def _move(self, knots: list[Knot], move: Move) -> None:
         """Add the knots of a move."""
@@ -292,14 +296,6 @@ class Ground:
     def _position(self, place: int | np.ndarray, depth: float | np.ndarray) -> np.ndarray:
         """Where the probe is at a depth at a place, (3,) m, or at some depths at some places, (k, 3) m."""
         return self.places[place] + np.multiply.outer(self.touch[place] - depth, self.up)
-
-    def _no_deeper(self, knots: list[Knot]) -> Trajectory:
-        """The trajectory through knots. Slides are raised where the surface between their places stands out."""
-        time, place, depth = (np.array(column) for column in zip(*knots, strict=True))
-        planned = self._through(time, place, depth)
-        if self.track and (excess := float(stimulus_of(planned.trial, self.rig).load.max()) - self.limits.depth) > 0.0:
-            planned = self._through(time, place, np.where(depth > 0.0, depth - 1.01 * excess, depth))
-        return planned
 
     def _through(self, time: np.ndarray, place: np.ndarray, depth: np.ndarray) -> Trajectory:
         """The trajectory through knots at times, places and depths."""

@@ -28,17 +28,10 @@ USES = ("fit", "check")
 class GapErrors:
     """NRMSE (see :func:`nrmse`) of the models of a diagnosis, by use of the trials; None without trials of that use.
 
-    Attributes
-    ----------
-    base, amended : dict of str to (float or None)
-        If recordings have levels and gains of their own, the base model is the one without them.
-    stages : list of float or None
-        Of the models of `Diagnosis.stages` on the fitted trials. The first one, the base model, has the levels and gains.
-    frictionless : dict of str to (float or None), or None
-        Of the base model without its own friction, which is part of every other error and no missing effect; None if nothing
-        slides or no net force was measured.
-    noise_floor : float
-        That of noise alone, on the fitted trials.
+    If recordings have levels and gains of their own, `base` is that without them. `stages` are those of `Diagnosis.stages` on
+    the fitted trials, the first one with the levels and gains. `frictionless` is that of the base model without its own
+    friction, which is part of every other error and no missing effect; None if nothing slides or no net force was measured.
+    The noise floor is that of noise alone, on the fitted trials.
     """
 
     base: dict[str, float | None]

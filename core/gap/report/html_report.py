@@ -20,8 +20,6 @@ from .plan_files import planned_sentence
 from .plots import CAPTIONS
 from .sentences import NOT_IDENTIFIABLE, interval_ends, said_confidence
 
-TEMPLATE = Path(__file__).parent / "templates" / "report.html"
-
 CLOSED_FROM = 0.2
 """A closed share is shown if the gap, noise removed, is at least this share of the noise floor. Which effects join is decided
 in :mod:`..selection.search`."""
@@ -43,7 +41,7 @@ class Table:
 def html_report(result: Diagnosis, found: dict[str, Any], headline: str, pictures: list[str], folder: Path) -> str:
     """Return report.html of a diagnosis, from the contents of its gap.json and the pictures that were drawn into `folder`."""
     return render_html(
-        TEMPLATE,
+        Path(__file__).parent / "templates" / "report.html",
         name=result.rig.name,
         extent=_extent(result),
         headline=headline,

@@ -199,9 +199,8 @@ def caution(result: Diagnosis) -> str:
     if result.findings and all(one.name in with_rivals for one in result.findings):
         said = "The amended sensor has one of several effects that these recordings do not distinguish"
         return f"{said}: under other loads it may be wrong."
-    if result.verdict == "unexplained" and result.findings:
-        return "The amended sensor explains only a part of the gap."
-    return ""
+    is_part = result.verdict == "unexplained" and result.findings
+    return "The amended sensor explains only a part of the gap." if is_part else ""
 
 
 def _unexplained(result: Diagnosis, errors: GapErrors, sure: list[Finding]) -> str:

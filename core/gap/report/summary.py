@@ -34,7 +34,7 @@ def summary(
 ) -> dict[str, Any]:
     """Return the contents of gap.json, with notes among its warnings."""
     model = with_mean_gain_moved(result)
-    base = _intervals(result, BASE)
+    base, closed = _intervals(result, BASE), _closed(result, errors)
     without_effects = [item.name for item in result.base.free if item.effect == BASE]
     return {
         "format": FORMAT,
@@ -49,12 +49,7 @@ def summary(
             "gap_without_friction": errors.frictionless,
         },
         "recordings": {"numbers": dict(model.recordings), "intervals": _intervals(result, RECORDING)},
-        "gap": {
-            "before": errors.base,
-            "after": errors.amended,
-            "noise_floor": errors.noise_floor,
-            "closed": _closed(result, errors),
-        },
+        "gap": {"before": errors.base, "after": errors.amended, "noise_floor": errors.noise_floor, "closed": closed},
         "fitted": recording_errors(result, "fit"),
         "check": [_checked(one, result) for one in result.check.recordings],
         "where": error_location(result, result.base.model),
