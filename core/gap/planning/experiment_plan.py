@@ -45,10 +45,16 @@ class PlannedExperiment:
 
 @dataclass(frozen=True)
 class ExperimentPlan:
-    """Separations of each kind that the recordings could show from each other kind, and the next experiment.
+    """Kinds that recordings separate, and the next experiment.
 
-    `cannot_show` has the kinds that these recordings cannot show, each with the reason. The experiment is None if recordings
-    separate all kinds.
+    Attributes
+    ----------
+    separations : tuple of Separation
+        For each kind that the recordings could show and each other kind.
+    cannot_show : dict of str to str
+        Kinds that these recordings cannot show, each with the reason.
+    experiment : PlannedExperiment or None
+        None if the recordings separate all kinds.
     """
 
     separations: tuple[Separation, ...]
@@ -60,6 +66,19 @@ def plan_experiment(rig: Rig, wishes: Wishes) -> Job[ExperimentPlan]:
     """Compute which kinds the fitted recordings of a rig separate, and choose the programme that separates an open pair best.
 
     Nothing is fitted: only their stimulus, their noise and the rig's own parameters count.
+
+    Parameters
+    ----------
+    rig : Rig
+    wishes : Wishes, optional
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    ExperimentPlan
 
     Raises
     ------
@@ -96,7 +115,19 @@ def plan_experiment(rig: Rig, wishes: Wishes) -> Job[ExperimentPlan]:
 def plan_after(result: Diagnosis, wishes: Wishes | None = None) -> Job[PlannedExperiment | None]:
     """Plan the experiment that separates the kinds of a diagnosis which it leaves ambiguous.
 
-    It is None if nothing is ambiguous, or only kinds between which no experiment can be planned.
+    Parameters
+    ----------
+    result : Diagnosis
+    wishes : Wishes, optional
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    PlannedExperiment or None
+        None if nothing is ambiguous, or only kinds between which no experiment can be planned.
     """
     yield Progress("planning the next experiment", 0, 100)
     wishes, fitted = wishes or Wishes(), result.of("fit")

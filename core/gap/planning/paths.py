@@ -62,9 +62,15 @@ class Limits:
 
 @dataclass(frozen=True)
 class Wishes:
-    """The user's requirements of an experiment: the kinds that it is to separate, and its limits (see :class:`Limits`).
+    """The user's requirements of an experiment; None and empty are decided from the recordings.
 
-    None and empty are decided from the recordings.
+    Attributes
+    ----------
+    between : tuple of str
+        Kinds that it is to separate.
+    depth, speed, duration : float or None
+        See :class:`Limits`, as for the area.
+    area : (float, float, float, float) or None
     """
 
     between: tuple[str, ...] = ()
@@ -114,9 +120,17 @@ QUICK, SLOW = 0.7, 0.05
 
 
 class Move(NamedTuple):
-    """A straight motion to a depth and a place, and a rest of `hold` seconds at its end; the probe changes place at its depth.
+    """A straight motion, and a rest at its end.
 
-    Depth and speed are shares of the limits. A depth of None is clear of the sensor. The place is an index.
+    Attributes
+    ----------
+    depth : float or None
+        Share of the limit; None is clear of the sensor.
+    speed : float
+        Share of the limit.
+    hold : float, s
+    place : int
+        Index of the place; the probe moves there at the depth that it has.
     """
 
     depth: float | None
@@ -185,10 +199,16 @@ class Trajectory:
 class Ground:
     """Where a probe can press, and at which height it touches.
 
-    The first recording that touches says how the probe is turned; planned ones are `like` it.
+    Parameters
+    ----------
+    predictors : sequence of Predictor
+        Of the recordings. The first of the fitted ones that touches says how the probe is turned.
+    limits : Limits
 
     Attributes
     ----------
+    like : Trial
+        The recording that planned ones are like.
     places : (m, 3) float, m
         On the sensor, those of the track last; one row without meaning where depths or forces are known.
     track : tuple of int

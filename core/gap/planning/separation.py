@@ -45,10 +45,12 @@ RANK = 1e-9
 
 @dataclass(frozen=True)
 class Separation:
-    """How well recordings separate a kind that acts from another one, a rival that imitates it.
+    """How well recordings separate a kind that acts from a rival.
 
     Attributes
     ----------
+    kind, other : str
+        The kind that acts, and the rival that imitates it.
     share : float
         Median share of the square of the kind's signals, beside the base model, that the rival cannot imitate: 0 to 1.
     deviations : float
@@ -93,9 +95,19 @@ class Products:
 
 
 class Signals:
-    """The signals of kinds of effects about a base model with its free parameters, in recordings that are fitted.
+    """The signals of kinds of effects about a base model.
 
-    `noise` is that of readings and of net forces.
+    Parameters
+    ----------
+    model : Model
+        The base model.
+    free : sequence of FreeParameter
+        Its free parameters.
+    candidates : sequence of Candidate
+    fitted : sequence of Predictor
+        The recordings.
+    noise : (ChannelNoise, ChannelNoise)
+        Of readings and net forces.
     """
 
     def __init__(

@@ -28,10 +28,16 @@ USES = ("fit", "check")
 class GapErrors:
     """NRMSE (see :func:`nrmse`) of the models of a diagnosis, by use of the trials; None without trials of that use.
 
-    If recordings have levels and gains of their own, `base` is that without them. `stages` are those of `Diagnosis.stages` on
-    the fitted trials, the first one with the levels and gains. `frictionless` is that of the base model without its own
-    friction, which is part of every other error and no missing effect; None if nothing slides or no net force was measured.
-    The noise floor is that of noise alone, on the fitted trials.
+    Attributes
+    ----------
+    base, amended : dict of str to (float or None)
+        If recordings have levels and gains of their own, the base model is the one without them.
+    stages : list of float or None
+        Of the models of `Diagnosis.stages` on the fitted trials. The first one, the base model, has the levels and gains.
+    frictionless : dict of str to (float or None), or None
+        Of the base model without friction; None if nothing slides or no net force was measured.
+    noise_floor : float
+        That of noise alone, on the fitted trials.
     """
 
     base: dict[str, float | None]
@@ -62,9 +68,21 @@ def gap_errors(result: Diagnosis) -> GapErrors:
 def nrmse(predictors: Sequence[Predictor], model: Model, full: tuple[float, float]) -> float | None:
     """Return the normalised root mean square error: that of measured minus predicted, as a share of the measured range.
 
-    The mean is over all samples, texels and force components that were measured in these trials; None without trials. Readings
-    are divided by the range of all readings of the rig (largest minus smallest, all trials and texels together), forces by that
-    of all forces: `full` holds the two. The error contains the noise: :func:`noise_floor_nrmse` is that of a perfect model.
+    The mean is over all samples, texels and force components that were measured in these trials. Readings are divided by the
+    range of all readings of the rig (largest minus smallest, all trials and texels together), forces by that of all forces.
+    The error contains the noise: :func:`noise_floor_nrmse` is the error of a perfect model.
+
+    Parameters
+    ----------
+    predictors : sequence of Predictor
+    model : Model
+    full : (float, float)
+        Range of readings and of forces.
+
+    Returns
+    -------
+    float or None
+        None without trials.
     """
     square, count = 0.0, 0
     for predictor in predictors:
@@ -118,7 +136,10 @@ def noise_floor_nrmse(result: Diagnosis) -> float:
 def error_location(result: Diagnosis, model: Model) -> list[dict[str, Any]]:
     """Return shares of the squared error on the fitted trials: by phase, by part of the load's range, and of the worst texels.
 
-    As under ``where`` in gap.json: each entry has a ``share`` and one of ``phase``, ``range`` and ``texels``.
+    Returns
+    -------
+    list of dict
+        As under ``where`` in gap.json: each entry has a ``share`` and one of ``phase``, ``range`` and ``texels``.
     """
     n = len(result.rig.texels)
     by_phase, by_range, by_texel = np.zeros(len(PHASES)), np.zeros(RANGE_PARTS + 1), np.zeros(n)
@@ -214,7 +235,14 @@ def _loading(predictor: Predictor) -> dict[str, float]:
 
 
 def recording_differences(result: Diagnosis, name: str) -> list[str]:
-    """Return in words what differs between the check recording of this name and the fitted ones."""
+    """Return in words what differs between a check recording and the fitted ones.
+
+    Parameters
+    ----------
+    result : Diagnosis
+    name : str
+        Of the check recording.
+    """
     other, fitted = next(p for p in result.of("check") if p.trial.name == name), result.of("fit")
     own, *others = (_level_and_gain(p, result.best.model, result.full) for p in (other, *fitted))
     level, gain = (_outside(values, value) for value, values in zip(own, zip(*others, strict=True), strict=True))

@@ -24,9 +24,17 @@ LARGEST_TABLE = 1 << 20
 
 @dataclass(frozen=True)
 class TableRow:
-    """One rig: errors on its check recordings as shares of the range of all readings (see :func:`.comparison.nrmse`).
+    """One rig.
 
-    That of a model made by hand is None if none is known. `said` names the effects with their confidences, or the verdict.
+    Attributes
+    ----------
+    name : str
+    base, amended : float
+        Error on the check recordings as a share of the range of all readings (see :func:`.comparison.nrmse`).
+    by_hand : float or None
+        That of a model made by hand; None if none is known.
+    said : str
+        The names of the effects with their confidences, or the verdict.
     """
 
     name: str

@@ -39,7 +39,19 @@ class Table:
 
 
 def html_report(result: Diagnosis, found: dict[str, Any], headline: str, pictures: list[str], folder: Path) -> str:
-    """Return report.html of a diagnosis, from the contents of its gap.json and the pictures that were drawn into `folder`."""
+    """Return report.html.
+
+    Parameters
+    ----------
+    result : Diagnosis
+    found : dict
+        Contents of gap.json.
+    headline : str
+        The result in one sentence.
+    pictures : list of str
+        Names of the pictures that were drawn into `folder`.
+    folder : Path
+    """
     return render_html(
         Path(__file__).parent / "templates" / "report.html",
         name=result.rig.name,

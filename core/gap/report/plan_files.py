@@ -80,9 +80,13 @@ def _pairs(separations: Sequence[Separation]) -> list[dict[str, Any]]:
 
 
 def write_plan(plan: ExperimentPlan, folder: Path) -> list[Path]:
-    """Write what recordings tell into `plan.json`, and the next experiment into `plan.csv` if there is one; return the files.
+    """Write what recordings tell into `plan.json`, and the next experiment into `plan.csv` if there is one.
 
     Files of an earlier plan in the folder are replaced.
+
+    Returns
+    -------
+    list of Path
 
     Raises
     ------

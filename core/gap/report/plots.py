@@ -275,7 +275,13 @@ def picture(name: str, result: Diagnosis, errors: GapErrors) -> Figure:
 
 
 def draw(result: Diagnosis, errors: GapErrors, folder: Path) -> Job[list[str]]:
-    """Write every picture that makes sense for a rig as PNG and PDF; return their names. The progress counts pictures."""
+    """Write every picture that makes sense for a rig as PNG and PDF; return their names.
+
+    Yields
+    ------
+    Progress
+        Before each picture; its total is the number of pictures.
+    """
     names = [name for name in CAPTIONS if name != "map" or len(result.rig.texels) > 1]
     for done, name in enumerate(names):
         yield Progress("drawing", done, len(names))

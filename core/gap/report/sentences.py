@@ -262,10 +262,15 @@ def evidence(result: Diagnosis, errors: GapErrors) -> list[str]:
 
 
 def noise_sentence(share: float, left: float | None) -> str:
-    """Return sentences about loud noise: `share` is the deviation of the readings without load, as a share of the range.
+    """Return sentences about loud noise.
 
-    `left` is the error of the amended model on the fitted recordings, likewise, which contains the noise. Where it is less than
-    half of `share`, the readings without load were no noise: they had load, and the rig says otherwise.
+    Parameters
+    ----------
+    share : float
+        Standard deviation of the readings without load, as a share of the range.
+    left : float or None
+        Error of the amended model on the fitted recordings, likewise. It contains the noise. Where it is less than half of
+        `share`, the readings without load were no noise: they had load, and the rig says otherwise.
     """
     if left is not None and left < 0.5 * share:
         return (

@@ -139,6 +139,17 @@ def _found(one: Finding, model: Model, result: Diagnosis, errors: GapErrors) -> 
 def write_report(result: Diagnosis, folder: Path, errors: GapErrors) -> Job[None]:
     """Write everything into a folder. All files of an earlier report there are replaced together (:class:`.FileList`).
 
+    Parameters
+    ----------
+    result : Diagnosis
+    folder : Path
+    errors : GapErrors
+        Of the result.
+
+    Yields
+    ------
+    Progress
+
     Raises
     ------
     FileError
