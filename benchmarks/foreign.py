@@ -45,6 +45,7 @@ def run() -> Iterator[dict]:
     """Yield, for each set, the error on check recordings by the amended model over that by the model made by hand."""
     from palpate.core.gap.dataset.rig import read_rig
     from palpate.core.gap.report import gap_table
+    from palpate.core.gap.report.comparison import gap_errors
     from palpate.core.gap.selection.diagnosis import diagnose
     from palpate.core.jobs import run_job
 
@@ -54,7 +55,7 @@ def run() -> Iterator[dict]:
         if os.environ.get("PALPATE_FOREIGN_BY_HAND"):
             continue
         result = run_job(diagnose(read_rig(recording.write(HOUSE / "build" / "foreign" / name / "rig"))))
-        row = gap_table.row_of(result, by_hand)
+        row = gap_table.row_of(result, gap_errors(result), by_hand)
         rows.append(row)
         yield {"name": f"foreign.{name}.amended_over_by_hand", "value": row.ratio, "unit": "error / error", "goal": GOAL}
     if rows:

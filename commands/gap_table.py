@@ -45,7 +45,8 @@ def run(arguments: argparse.Namespace) -> int:
     rows = []
     for rig in rigs:
         with console.Interrupt.raised_at_once(), console.shown_progress(rig.name) as show:
-            rows.append(gap_table.row_of(find_gap(rig, show).diagnosis, by_hand.get(rig.name)))
+            gap = find_gap(rig, show)
+            rows.append(gap_table.row_of(gap.diagnosis, gap.errors, by_hand.get(rig.name)))
     print(console.text_table(gap_table.cells(rows), "<>>>><"))
     if arguments.out:
         with atomic_write(arguments.out) as path:

@@ -15,7 +15,7 @@ from ...jobs import Job, Progress
 from ..base.base_model import free_parameters, prepared, start_model
 from ..base.contact_heights import with_starting_heights
 from ..base.quantities import friction_kinds
-from ..candidates.candidates import DIRECTLY_ESTIMATED, NOT_FITTED, Candidate, candidates, scales_of
+from ..candidates.candidates import DIRECTLY_ESTIMATED, NOT_FITTED, candidates, scales_of
 from ..dataset.rig import Rig
 from ..fitting.identifiability import unidentifiable
 from ..fitting.least_squares import FreeParameter
@@ -31,36 +31,16 @@ Pair = tuple[str, str]
 
 @dataclass(frozen=True)
 class PlannedExperiment:
-    """A further recording that separates kinds of effects.
+    """A further recording that separates kinds of effects, along the trajectory of the programme that was chosen.
 
-    Attributes
-    ----------
-    kinds : tuple of str
-        What it is to separate.
-    programme : str
-        Name of the programme that was chosen.
-    trajectory : Trajectory
-    before, after : tuple of Separation
-        Of each kind and each other one, by the recordings alone and with the further one.
-    limits : Limits
+    `before` and `after` separate each kind and each other one, by the recordings alone and with the further one.
     """
 
-    kinds: tuple[str, ...]
     programme: str
     trajectory: Trajectory
     before: tuple[Separation, ...]
     after: tuple[Separation, ...]
     limits: Limits
-
-    @property
-    def separation_before(self) -> float:
-        """The least separated pair by the recordings alone, in standard deviations of the noise."""
-        return min(one.deviations for one in self.before)
-
-    @property
-    def separation_after(self) -> float:
-        """The least separated pair with the further recording, in standard deviations of the noise."""
-        return min(one.deviations for one in self.after)
 
 
 @dataclass(frozen=True)
@@ -81,17 +61,8 @@ class ExperimentPlan:
     cannot_show: dict[str, str]
     experiment: PlannedExperiment | None
 
-    @property
-    def kinds(self) -> tuple[str, ...]:
-        """The kinds that the recordings could show."""
-        return tuple(dict.fromkeys(one.kind for one in self.separations))
 
-    def taken_for(self, kind: str) -> list[Separation]:
-        """Return the kinds that a kind may be taken for, the likeliest first."""
-        return sorted((one for one in self.separations if one.kind == kind and not one.is_separated), key=lambda one: one.share)
-
-
-def plan_experiment(rig: Rig, wishes: Wishes | None = None) -> Job[ExperimentPlan]:
+def plan_experiment(rig: Rig, wishes: Wishes) -> Job[ExperimentPlan]:
     """Compute which kinds the fitted recordings of a rig separate, and choose the programme that separates an open pair best.
 
     Nothing is fitted: only their stimulus, their noise and the rig's own parameters count.
@@ -116,7 +87,6 @@ def plan_experiment(rig: Rig, wishes: Wishes | None = None) -> Job[ExperimentPla
     ParameterError
         A limit or a kind that is wanted has no meaning here.
     """
-    wishes = wishes or Wishes()
     yield Progress("contacts of every trial", 0, 100)
     rig = with_starting_heights(rig)
     predictors = predictors_of(rig.trials, rig)
@@ -130,7 +100,12 @@ def plan_experiment(rig: Rig, wishes: Wishes | None = None) -> Job[ExperimentPla
     full = scales_of(fitted, start).reading
     search = _Search(ground, fitted, start, free_parameters(rig, fitted, start, full), noise)
     shown = [kind for kind in search.kinds if kind not in cannot_show]
-    _check_kinds(wishes.between, search.kinds)
+    for name in wishes.between:
+        if name not in search.kinds:
+            problem = "No trajectory is planned for" if name in library() else "There is no effect"
+            raise ParameterError(f"{problem} '{name}': choose from {', '.join(sorted(search.kinds))}.")
+    if len(set(wishes.between)) == 1:
+        raise ParameterError(f"'{wishes.between[0]}' stands alone: name another effect to separate it from.")
     experiment, separations = yield from search.run(wishes.between or tuple(shown), choose_pair=not wishes.between)
     return ExperimentPlan(tuple(one for one in separations if one.kind in shown), cannot_show, experiment)
 
@@ -159,7 +134,7 @@ def plan_after(result: Diagnosis, wishes: Wishes | None = None) -> Job[PlannedEx
     except ParameterError:
         return None  # the sentence says what to record; a limit that nobody gave is no reason to fail
     search = _Search(ground, fitted, result.base.model, result.base.free, result.noise)
-    groups = [tuple(name for name in group if name in search.kinds) for group in (wishes.between, *result.ambiguous)]
+    groups = [tuple(name for name in group if name in search.kinds) for group in result.ambiguous]
     kinds = next((group for group in groups if len(group) > 1), ())
     return (yield from search.run(kinds, choose_pair=False))[0] if kinds else None
 
@@ -176,9 +151,8 @@ class _Search:
         noise: tuple[ChannelNoise, ChannelNoise],
     ):
         self._ground, self._fitted, self._model, self._free, self._noise = ground, list(fitted), model, free, noise
-        has_readings, has_forces = (
-            any(getattr(p.trial, part) is not None for p in self._fitted) for part in ("reading", "force")
-        )
+        has_readings = any(p.trial.reading is not None for p in self._fitted)
+        has_forces = any(p.trial.force is not None for p in self._fitted)
         self._further: dict[str, tuple[Trajectory, Predictor]] = {}
         for name, programme in ground.programmes().items():
             trajectory = ground.trajectory(programme)
@@ -187,9 +161,9 @@ class _Search:
             force = np.zeros((samples, 3)) if has_forces else None
             trial = replace(trajectory.trial, reading=reading, force=force)
             self._further[name] = trajectory, Predictor(trial, ground.rig)
-        found = _fitted_kinds(self._fitted, model)
+        every = [*self._fitted, *(further for _, further in self._further.values())]
+        found, more = ([one for one in candidates(seen, model) if one.kind.found_by == FIT] for seen in (self._fitted, every))
         names = {one.name for one in found}
-        more = _fitted_kinds([*self._fitted, *(further for _, further in self._further.values())], model)
         self._candidates = [*found, *(one for one in more if one.name not in names)]
         self.kinds = tuple(dict.fromkeys(one.name for one in self._candidates))
 
@@ -200,32 +174,23 @@ class _Search:
         products = signals.products(self._fitted)
         yield Progress("signals of every kind", 20, 100)
         pairs = [(kind, other) for kind in kinds for other in kinds if kind != other]
-        before = dict(zip(pairs, signals.separations(products, pairs), strict=True))
+        before = {pair: signals.separation(products, *pair) for pair in pairs}
         open_ones = {pair for pair in pairs if not choose_pair or not before[pair].is_separated}
         wanted = [pair for pair in pairs if pair in open_ones or pair[::-1] in open_ones]
         after: dict[str, dict[Pair, Separation]] = {}
         for number, (name, (_, further)) in enumerate(self._further.items() if wanted else ()):
             yield Progress(f"the programme '{name}'", 20 + 80 * number // len(self._further), 100)
-            found = signals.separations(products + signals.products([further]), wanted)
-            after[name] = dict(zip(wanted, found, strict=True))
+            joined = products + signals.products([further])
+            after[name] = {pair: signals.separation(joined, *pair) for pair in wanted}
         if not wanted:
             return None, list(before.values())
         question = _worthwhile(wanted, before, after) if choose_pair else wanted
-        best = max(after, key=lambda name: _value(after[name], question))
-        experiment = PlannedExperiment(
-            tuple(dict.fromkeys(kind for kind, _ in question)),
-            best,
-            self._further[best][0],
-            tuple(before[pair] for pair in question),
-            tuple(after[best][pair] for pair in question),
-            self._ground.limits,
-        )
+        # The mean logarithm of the separations counts, not the least one, because no programme may separate one of the pairs.
+        worth = {name: np.mean([np.log(max(own[pair].deviations, 1e-3)) for pair in question]) for name, own in after.items()}
+        best = max(worth, key=lambda name: worth[name])
+        alone, together = (tuple(found[pair] for pair in question) for found in (before, after[best]))
+        experiment = PlannedExperiment(best, self._further[best][0], alone, together, self._ground.limits)
         return experiment, list(before.values())
-
-
-def _value(after: dict[Pair, Separation], question: Sequence[Pair]) -> float:
-    """The mean logarithm of the separations: not the least one, because no programme may separate one of the pairs."""
-    return float(np.mean([np.log(max(after[pair].deviations, 1e-3)) for pair in question]))
 
 
 def _worthwhile(wanted: Sequence[Pair], before: dict[Pair, Separation], after: dict[str, dict[Pair, Separation]]) -> list[Pair]:
@@ -240,19 +205,3 @@ def _worthwhile(wanted: Sequence[Pair], before: dict[Pair, Separation], after: d
     nearest = max(wanted, key=lambda pair: (best[pair], pair))
     chosen = min(can, key=lambda pair: (both(before, pair)[1], pair)) if can else nearest
     return [chosen, chosen[::-1]]
-
-
-def _fitted_kinds(predictors: Sequence[Predictor], model: Model) -> list[Candidate]:
-    """Candidates of the kinds that are found by a fit."""
-    return [one for one in candidates(predictors, model) if one.kind.found_by == FIT]
-
-
-def _check_kinds(names: Sequence[str], possible: Sequence[str]) -> None:
-    """Raise if no experiment can be planned for some of the kinds."""
-    for name in names:
-        if name not in library():
-            raise ParameterError(f"There is no effect '{name}': choose from {', '.join(sorted(possible))}.")
-        if name not in possible:
-            raise ParameterError(f"No trajectory is planned for '{name}': choose from {', '.join(sorted(possible))}.")
-    if len(set(names)) == 1:
-        raise ParameterError(f"'{names[0]}' stands alone: name another effect to separate it from.")

@@ -6,7 +6,6 @@ The probe keeps the orientation of the recordings, travels clear of the sensor a
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -57,12 +56,8 @@ class Limits:
 
     def holds(self, places: np.ndarray) -> np.ndarray:
         """Return which of some places (m, 3), in metres, lie inside the area, (m,) bool."""
-        if self.area is None:
-            return np.ones(len(places), bool)
-        x0, x1, y0, y1 = self.area
-        low, high = np.array([x0, y0]) - PLACE_MARGIN, np.array([x1, y1]) + PLACE_MARGIN
-        inside: np.ndarray = ((places[:, :2] >= low) & (places[:, :2] <= high)).all(axis=1)
-        return inside
+        low, high = np.reshape(self.area or (-np.inf, np.inf, -np.inf, np.inf), (2, 2)).T
+        return ((places[:, :2] >= low - PLACE_MARGIN) & (places[:, :2] <= high + PLACE_MARGIN)).all(axis=1)
 
 
 @dataclass(frozen=True)
@@ -102,16 +97,11 @@ class Wishes:
             if first.trial.stimulus == "force":
                 depth = max(float(np.max(p.trial.level)) for p in predictors if p.trial.level is not None)
         if speed is None:
-            speed = max(*map(_speed, alike), depth / LONGEST_PRESS, _extent(first) / LONGEST_TRAVEL)
+            extent = float(np.ptp(first.rig.texels.position, axis=0).max()) if first.trial.stimulus == "pose" else 0.0
+            speed = max(*map(_speed, alike), depth / LONGEST_PRESS, extent / LONGEST_TRAVEL)
         if duration is None:
             duration = max(float(np.ptp(p.trial.time)) for p in predictors)
         return Limits(depth, speed, duration, self.area)
-
-
-def _extent(predictor: Predictor) -> float:
-    """Length of the sensor, m; 0 where no place is known."""
-    place = predictor.rig.texels.position
-    return float(np.ptp(place, axis=0).max()) if predictor.trial.stimulus == "pose" else 0.0
 
 
 def _speed(predictor: Predictor) -> float:
@@ -163,43 +153,9 @@ def _through(depths: tuple[float, ...], speed: float, hold: float, place: int = 
     return (*(Move(depth, speed, hold, place) for depth in depths), Move(None, QUICK, 0.5, place))
 
 
-def programmes(seconds: float, places: int, track: tuple[int, ...]) -> dict[str, Programme]:
-    """Return the programmes by name.
-
-    Parameters
-    ----------
-    seconds : float
-        Length of the recording. Shorter programmes are repeated.
-    places : int
-        Number of places at which the probe may press.
-    track : tuple of int
-        Places along which it may slide, from end to end; empty if it cannot.
-    """
-    long, step, last = 0.3 * seconds, seconds / 16.0, places - 1
-    stairs = (0.25, 0.5, 0.75, 1.0, 0.75, 0.5, 0.25)
-    found: dict[str, Programme] = {
-        "press and hold": (_press(1.0, hold=long, rest=0.6 * long), _press(0.4, hold=0.5 * long)),
-        "slow press and quick release": ((Move(1.0, SLOW), Move(None, 1.0, long)),),
-        "cycles at two speeds": (_press(1.0, 1.0), _press(1.0, SLOW), _press(1.0, 1.0), _press(1.0, 0.2)),
-        "growing cycles": tuple(_press(depth) for depth in (0.4, 0.4, 0.7, 0.7, 1.0, 1.0, 0.4)),
-        "partial unloading": (_through((1.0, 0.3, 0.9, 0.2, 0.7, 0.1, 1.0), 2.0 * SLOW, 0.0),),
-        "stairs": (_through(stairs, QUICK, step),),
-        "equal presses with rests": (_press(0.5, hold=0.5, rest=0.15 * seconds),),
-        "two loads held": (_press(1.0, hold=long), _press(0.3, hold=long)),
-    }
-    if places > 1:
-        found["two places"] = (_press(1.0, hold=1.0, place=0), _press(1.0, hold=1.0, place=last))
-        found["stairs at two places"] = (_through(stairs, QUICK, 0.5 * step), _through(stairs, QUICK, 0.5 * step, last))
-        found["every place"] = tuple(_press(1.0, hold=0.2, rest=0.2, place=place) for place in range(places))
-    if track:
-        quick, slow = (tuple(Move(0.6, speed, 0.0, place) for place in track[1:]) for speed in (1.0, 2.0 * SLOW))
-        light, heavy = (tuple(Move(depth, QUICK, 0.0, place) for place in track[1:]) for depth in (0.3, 1.0))
-        clear = Move(None, QUICK, 0.3, track[-1])
-        found["slides at two speeds"] = tuple((Move(0.6, QUICK, 0.5, track[0]), *way, clear) for way in (quick, slow))
-        found["slides under two loads"] = tuple(
-            (Move(depth, QUICK, 0.5, track[0]), *way, clear) for depth, way in ((0.3, light), (1.0, heavy))
-        )
-    return found
+def _slide(depth: float, speed: float, track: tuple[int, ...]) -> Press:
+    way = (Move(depth, speed, 0.0, place) for place in track[1:])
+    return Move(depth, QUICK, 0.5, track[0]), *way, Move(None, QUICK, 0.3, track[-1])
 
 
 Knot = tuple[float, int, float]
@@ -271,25 +227,26 @@ class Ground:
     def __init__(self, predictors: Sequence[Predictor], limits: Limits):
         touching = [p for p in predictors if (p.stimulus.load > 0.0).any()] or list(predictors)
         self.like, self.rig, self.limits = touching[0].trial, touching[0].rig, limits
-        self.up = self.rig.texels.normal.sum(axis=0)
-        self.up = self.up / max(float(np.linalg.norm(self.up)), 1e-12)
+        up = self.rig.texels.normal.sum(axis=0)
+        self.up = up / max(float(np.linalg.norm(up)), 1e-12)
         self.quaternion: np.ndarray | None = None
         self.places, self.touch = np.zeros((1, 3)), np.zeros(1)
         self.track: tuple[int, ...] = ()
-        clear = np.zeros(1)
+        self._clear = np.zeros(1)  # depth of the probe while it travels, negative above the sensor
         if self.like.position is not None and self.like.quaternion is not None:
             deepest = int(np.argmax(touching[0].stimulus.load.max(axis=1)))
             self.quaternion = self.like.quaternion[deepest]
             self.places = _places(self.rig, limits)
-            self.touch, clear = np.full(len(self.places), self.like.position[deepest, 2]), np.zeros(len(self.places))
+            self.touch, self._clear = np.full(len(self.places), self.like.position[deepest, 2]), np.zeros(len(self.places))
             if self.like.stimulus == "pose":
-                way = _track(self.rig, limits, self.places[0])
+                pitch, share = float(np.sqrt(np.median(self.rig.texels.area))), np.linspace(-0.5, 0.5, TRACK_PLACES)[:, None]
+                way = self.places[0] + share * TRACK_PITCHES * pitch * self.rig.texels.tangent[0]
+                way = way[limits.holds(way)]
                 self.track = tuple(range(len(self.places), len(self.places) + len(way)))
                 self.places = np.concatenate([self.places, way])
                 self.touch = self._touching_heights()
                 heights = self.places @ self.up + self.touch
-                clear = heights - float(heights.max()) - CLEARANCE * limits.depth
-        self._clear = clear  # depth of the probe while it travels, negative above the sensor
+                self._clear = heights - float(heights.max()) - CLEARANCE * limits.depth
         needed = FIRST_REST + limits.depth / limits.speed * 2.0 + FIRST_REST
         if needed > limits.duration:
             raise ParameterError(
@@ -298,15 +255,35 @@ class Ground:
             )
 
     def programmes(self) -> dict[str, Programme]:
-        """Return the programmes that this probe can carry out."""
-        return programmes(self.limits.duration, len(self.places) - len(self.track), self.track)
+        """Return the programmes that this probe can carry out, by name; short ones are repeated."""
+        seconds, places, track = self.limits.duration, len(self.places) - len(self.track), self.track
+        long, step, last = 0.3 * seconds, seconds / 16.0, places - 1
+        stairs = (0.25, 0.5, 0.75, 1.0, 0.75, 0.5, 0.25)
+        found: dict[str, Programme] = {
+            "press and hold": (_press(1.0, hold=long, rest=0.6 * long), _press(0.4, hold=0.5 * long)),
+            "slow press and quick release": ((Move(1.0, SLOW), Move(None, 1.0, long)),),
+            "cycles at two speeds": (_press(1.0, 1.0), _press(1.0, SLOW), _press(1.0, 1.0), _press(1.0, 0.2)),
+            "growing cycles": tuple(_press(depth) for depth in (0.4, 0.4, 0.7, 0.7, 1.0, 1.0, 0.4)),
+            "partial unloading": (_through((1.0, 0.3, 0.9, 0.2, 0.7, 0.1, 1.0), 2.0 * SLOW, 0.0),),
+            "stairs": (_through(stairs, QUICK, step),),
+            "equal presses with rests": (_press(0.5, hold=0.5, rest=0.15 * seconds),),
+            "two loads held": (_press(1.0, hold=long), _press(0.3, hold=long)),
+        }
+        if places > 1:
+            found["two places"] = (_press(1.0, hold=1.0, place=0), _press(1.0, hold=1.0, place=last))
+            found["stairs at two places"] = (_through(stairs, QUICK, 0.5 * step), _through(stairs, QUICK, 0.5 * step, last))
+            found["every place"] = tuple(_press(1.0, hold=0.2, rest=0.2, place=place) for place in range(places))
+        if track:
+            found["slides at two speeds"] = (_slide(0.6, 1.0, track), _slide(0.6, 2.0 * SLOW, track))
+            found["slides under two loads"] = (_slide(0.3, QUICK, track), _slide(1.0, QUICK, track))
+        return found
 
     def trajectory(self, programme: Programme) -> Trajectory:
         """Return the trajectory of as many presses of a programme as there is time for."""
         start = programme[0][0].place
         knots = [(0.0, start, self._clear[start]), (FIRST_REST, start, self._clear[start])]
         fallback = Move(1.0, 1.0, 0.0, start), Move(None, 1.0, 0.0, start)
-        for press in (*itertools.chain.from_iterable(itertools.repeat(programme, MOST_REPEATS)), fallback):
+        for press in (*programme * MOST_REPEATS, fallback):
             longer = [*knots]
             if press[0].place != knots[-1][1]:
                 self._move(longer, Move(None, 1.0, 0.0, press[0].place))
@@ -317,7 +294,12 @@ class Ground:
             elif len(knots) > 2:
                 break
         knots.append((self.limits.duration, *knots[-1][1:]))
-        return self._no_deeper(knots)
+        time, place, depth = (np.array(column) for column in zip(*knots, strict=True))
+        planned = self._through(time, place, depth)
+        if self.track and (excess := float(stimulus_of(planned.trial, self.rig).load.max()) - self.limits.depth) > 0.0:
+            # The surface between the places of a slide stands out.
+            planned = self._through(time, place, np.where(depth > 0.0, depth - 1.01 * excess, depth))
+        return planned
 
     def _move(self, knots: list[Knot], move: Move) -> None:
         """Add the knots of a move."""
@@ -331,62 +313,40 @@ class Ground:
         if move.hold > SHORTEST_SEGMENT:
             knots.append((time + move.hold, move.place, wanted))
 
-    def _position(self, place: int, depth: float) -> np.ndarray:
-        """Where the probe is at a depth at a place, (3,) m."""
-        found: np.ndarray = self.places[place] + (self.touch[place] - depth) * self.up
-        return found
-
-    def _no_deeper(self, knots: list[Knot]) -> Trajectory:
-        """The trajectory through knots. Slides are raised where the surface between their places stands out."""
-        time, place, depth = (np.array(column) for column in zip(*knots, strict=True))
-        planned = self._through(time, place, depth)
-        if self.track:
-            excess = float(stimulus_of(planned.trial, self.rig).load.max()) - self.limits.depth
-            if excess > 0.0:
-                planned = self._through(time, place, np.where(depth > 0.0, depth - 1.01 * excess, depth))
-        return planned
+    def _position(self, place: int | np.ndarray, depth: float | np.ndarray) -> np.ndarray:
+        """Where the probe is at a depth at a place, (3,) m, or at some depths at some places, (k, 3) m."""
+        return self.places[place] + np.multiply.outer(self.touch[place] - depth, self.up)
 
     def _through(self, time: np.ndarray, place: np.ndarray, depth: np.ndarray) -> Trajectory:
         """The trajectory through knots at times, places and depths."""
-        step, position, turns = self.like.step, None, None
+        step, position, way = self.like.step, None, None
         samples = np.arange(round(float(time[-1]) / step) + 1) * step
         if self.quaternion is not None:
-            height = self.touch[place] - depth if self.track else self.touch[place]
-            position = self.places[place] + height[:, None] * self.up
-            turns = np.tile(self.quaternion, (len(samples), 1))
-        planned = replace(
-            self.like,
-            name="planned",
-            use="fit",
-            time=samples,
-            position=None if position is None else np.stack([np.interp(samples, time, axis) for axis in position.T], axis=1),
-            quaternion=turns,
-            level=None if self.track else np.interp(samples, time, depth),
-            travel=np.zeros((len(samples), 2)),
-            reading=None,
-            force=None,
-            session="",
-            repeats="",
-            temperature=None,
-        )
-        return Trajectory(time, position, planned)
+            position = self._position(place, depth if self.track else 0.0)
+            way = np.stack([np.interp(samples, time, axis) for axis in position.T], axis=1)
+        level = None if self.track else np.interp(samples, time, depth)
+        return Trajectory(time, position, self._recording(samples, way, level))
+
+    def _recording(self, time: np.ndarray, position: np.ndarray | None, level: np.ndarray | None = None) -> Trial:
+        """A recording along positions of the probe, or depths or forces, at times, without responses."""
+        turns = None if self.quaternion is None else np.tile(self.quaternion, (len(time), 1))
+        planned = replace(self.like, name="planned", use="fit", time=time, position=position, quaternion=turns, level=level)
+        planned = replace(planned, reading=None, force=None, session="", repeats="", temperature=None)
+        return replace(planned, travel=np.zeros((len(time), 2)))
 
     def _touching_heights(self) -> np.ndarray:
         """Height over each place at which the probe touches: from above in steps, then by halving."""
-        rig, count = self.rig, len(self.places)
-        reach = rig.parameters.max_penetration
+        rig, reach = self.rig, self.rig.parameters.max_penetration
         indenter = rig.indenter_of(self.like)
         assert indenter is not None
         size = float(np.linalg.norm(indenter.mesh.vertices, axis=1).max())
         along = rig.texels.position @ self.up
-        high = float(along.max()) + size - self.places @ self.up + reach
-        low = high.copy()
-        waiting = np.ones(count, bool)
+        low = float(along.max()) + size - self.places @ self.up + reach
         for _ in range(int(np.ceil((float(np.ptp(along)) + 2.0 * size) / reach)) + 3):
-            low = np.where(waiting, low - reach, low)
-            waiting &= ~self._touches(low)
-            if not waiting.any():
+            touches = self._touches(low)
+            if touches.all():
                 break
+            low = np.where(touches, low, low - reach)
         high = low + reach
         for _ in range(BISECTIONS):
             middle = 0.5 * (low + high)
@@ -396,35 +356,18 @@ class Ground:
 
     def _touches(self, heights: np.ndarray) -> np.ndarray:
         """True if the probe touches at heights over its places, (m,) bool."""
-        count = len(self.places)
         position = self.places + heights[:, None] * self.up
-        nothing = np.zeros((count, 2))
-        assert self.quaternion is not None
-        trial = replace(
-            self.like, time=np.arange(float(count)), position=position, quaternion=np.tile(self.quaternion, (count, 1)),
-            travel=nothing, reading=None, force=None,
-        )  # fmt: skip
-        touched: np.ndarray = (stimulus_of(trial, self.rig).load > 0.0).any(axis=1)
-        return touched
+        trial = self._recording(np.arange(float(len(position))), position)
+        return (stimulus_of(trial, self.rig).load > 0.0).any(axis=1)
 
 
 def _places(rig: Rig, limits: Limits) -> np.ndarray:
     """Texels that are spread over the area, the most central one first, (m, 3) m."""
-    texels = rig.texels
-    inside = np.flatnonzero(limits.holds(texels.position))
+    inside = rig.texels.position[limits.holds(rig.texels.position)]
     if not len(inside):
         raise ParameterError("No texel lies inside the area that is allowed: give it in metres, in the sensor's frame.")
-    centre = texels.position[inside].mean(axis=0)
-    picked = [int(inside[np.argmin(np.linalg.norm(texels.position[inside] - centre, axis=1))])]
+    picked = [int(np.argmin(np.linalg.norm(inside - inside.mean(axis=0), axis=1)))]
     while len(picked) < min(MOST_PLACES, len(inside)):  # each the farthest one from all before
-        apart = np.linalg.norm(texels.position[inside][:, None] - texels.position[picked][None], axis=2).min(axis=1)
-        picked.append(int(inside[np.argmax(apart)]))
-    return np.asarray(texels.position[picked])
-
-
-def _track(rig: Rig, limits: Limits, middle: np.ndarray) -> np.ndarray:
-    """Places along a straight slide through a place, along the texels' first tangent, inside the area, (m, 3) m."""
-    pitch = float(np.sqrt(np.median(rig.texels.area)))
-    share = np.linspace(-0.5, 0.5, TRACK_PLACES)[:, None]
-    way = middle + share * TRACK_PITCHES * pitch * rig.texels.tangent[0]
-    return way[limits.holds(way)]
+        apart = np.linalg.norm(inside[:, None] - inside[picked], axis=2).min(axis=1)
+        picked.append(int(np.argmax(apart)))
+    return inside[picked]

@@ -91,8 +91,7 @@ class Products:
 
     def __add__(self, other: Products) -> Products:
         """Return the sums over two sets of recordings."""
-        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
-        return Products(*(one + another for one, another in pairs))
+        return Products(*(one + another for one, another in zip(vars(self).values(), vars(other).values(), strict=True)))
 
 
 class Signals:
@@ -140,7 +139,7 @@ class Signals:
 
     def products(self, predictors: Sequence[Predictor]) -> Products:
         """Return the sums of products over recordings. What is not recorded yet counts where it is not None."""
-        first, *others = [self._of_recording(predictor) for predictor in predictors]
+        first, *others = map(self._of_recording, predictors)
         return sum(others, first)
 
     def _of_recording(self, predictor: Predictor) -> Products:
@@ -182,11 +181,8 @@ class Signals:
             float(loaded + pressed) / max(self._noise[0].correlation_time / stride, 1.0),
         )
 
-    def separations(self, products: Products, pairs: Sequence[tuple[str, str]]) -> list[Separation]:
-        """Return how well each pair of a kind that acts and a rival is separated."""
-        return [self._separation(products, kind, other) for kind, other in pairs]
-
-    def _separation(self, products: Products, kind: str, other: str) -> Separation:
+    def separation(self, products: Products, kind: str, other: str) -> Separation:
+        """Return how well a kind that acts is separated from a rival."""
         base, signals = range(len(self._free)), [column for common, _ in self._forms[kind] for column in common]
         whole, alone = np.diagonal(products.common)[signals], _residuals(products, base, (), signals)
         left = np.min([_residuals(products, (*base, *common), texel, signals) for common, texel in self._forms[other]], axis=0)

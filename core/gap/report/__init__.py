@@ -4,12 +4,4 @@
 Nothing is fitted here.
 """
 
-__all__ = [
-    "amended_sensor",
-    "comparison",
-    "gap_table",
-    "plan_files",
-    "plots",
-    "sentences",
-    "summary",
-]
+__all__ = ["amended_sensor", "comparison", "gap_table", "plan_files", "plots", "sentences", "summary"]

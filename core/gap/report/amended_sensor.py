@@ -20,26 +20,22 @@ def with_mean_gain_moved(result: Diagnosis) -> Model:
     The gains of the touched texels then have mean one.
     """
     model = result.best.model
-    touched = np.zeros(len(result.rig.texels), bool)
-    for predictor in result.of("fit"):
-        touched |= (predictor.stimulus.load > 0).any(axis=0)
-    for index, effect in enumerate(model.effects):
-        if not kind_of(effect.name).is_gain_of_texels or "factor" not in effect.values or not touched.any():
-            continue
-        factor = np.asarray(effect.values["factor"], float)
-        mean = float(factor[touched].mean())
-        if mean <= 0 or any(other.name != effect.name for other in model.effects):
-            continue  # beside other effects a common factor is not the same as a stiffer sensor
-        factor = np.where(touched, factor / mean, 1.0)
-        p = model.parameters
-        if p.unit == "N" and any(predictor.trial.stimulus != "force" for predictor in result.of("fit")):
-            p = replace(p, k=p.k * mean, cn=p.cn * mean)
-        else:
-            p = replace(p, gain=p.gain * mean)
-        effects = list(model.effects)
-        effects[index] = replace(effect, values={**effect.values, "factor": tuple(factor.tolist())})
-        model = replace(model, parameters=p, effects=tuple(effects))
-    return model
+    if len(model.effects) != 1:  # beside other effects a common factor is not the same as a stiffer sensor
+        return model
+    (effect,), p = model.effects, model.parameters
+    touched = np.any([(predictor.stimulus.load > 0).any(axis=0) for predictor in result.of("fit")], axis=0)
+    if not kind_of(effect.name).is_gain_of_texels or "factor" not in effect.values or not touched.any():
+        return model
+    factor = np.asarray(effect.values["factor"], float)
+    mean = float(factor[touched].mean())
+    if mean <= 0:
+        return model
+    if p.unit == "N" and any(predictor.trial.stimulus != "force" for predictor in result.of("fit")):
+        p = replace(p, k=p.k * mean, cn=p.cn * mean)
+    else:
+        p = replace(p, gain=p.gain * mean)
+    values = {**effect.values, "factor": tuple(np.where(touched, factor / mean, 1.0).tolist())}
+    return replace(model, parameters=p, effects=(replace(effect, values=values),))
 
 
 def amended_sensor(result: Diagnosis) -> SensorModel:

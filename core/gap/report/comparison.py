@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 
 from ..forward.contact_phases import PHASES, phase_indices, relative_load
 from ..forward.predictor import Model, Predictor
+from ..selection.check_recordings import CheckedRecording
 from ..selection.findings import Diagnosis
 
 RANGE_PARTS = 5
@@ -51,12 +53,14 @@ def gap_errors(result: Diagnosis) -> GapErrors:
     def by_use(one: Diagnosis, model: Model) -> dict[str, float | None]:
         return {use: nrmse(one.of(use), model, one.full) for use in USES}
 
-    before = result.alike or result
+    plain, base = result.alike or result, result.base.model
+    is_rubbed = any(p.trial.force is not None and p.stimulus.slide_speed.any() for p in result.predictors)
+    frictionless = replace(base, parameters=replace(base.parameters, mus=0.0, mud=0.0, ct=0.0))
     return GapErrors(
-        base=by_use(before, before.base.model),
+        base=by_use(plain, plain.base.model),
         amended=by_use(result, result.best.model),
         stages=[nrmse(result.of("fit"), model, result.full) for model in result.stages],
-        frictionless=frictionless_nrmse(result),
+        frictionless=by_use(result, frictionless) if is_rubbed else None,
         noise_floor=noise_floor_nrmse(result),
     )
 
@@ -102,28 +106,19 @@ def closed_share(errors: GapErrors, use: str) -> float | None:
 
 def recording_errors(result: Diagnosis, use: str) -> list[dict[str, Any]]:
     """Return the NRMSE of base and amended model in each recording of one use, as under ``fitted`` in gap.json."""
-    before = result.alike or result
-    pairs = zip(before.of(use), result.of(use), strict=True)
+    plain = result.alike or result
+    befores = (nrmse([one], plain.base.model, result.full) for one in plain.of(use))
+    afters = (nrmse([one], result.best.model, result.full) for one in result.of(use))
+    names = (one.trial.name for one in result.of(use))
     return [
-        {
-            "trial": own.trial.name,
-            "before": nrmse([plain], before.base.model, result.full),
-            "after": nrmse([own], result.best.model, result.full),
-        }
-        for plain, own in pairs
+        {"trial": name, "before": before, "after": after} for name, before, after in zip(names, befores, afters, strict=True)
     ]
 
 
-def frictionless_nrmse(result: Diagnosis) -> dict[str, float | None] | None:
-    """Return the NRMSE of the base model without friction, by use; None if nothing slides or no net force was measured.
-
-    The base model has friction of its own. It is part of every reported error and is no missing effect.
-    """
-    if not any(p.trial.force is not None and p.stimulus.slide_speed.any() for p in result.predictors):
-        return None
-    base = result.base.model
-    frictionless = replace(base, parameters=replace(base.parameters, mus=0.0, mud=0.0, ct=0.0))
-    return {use: nrmse(result.of(use), frictionless, result.full) for use in USES}
+def check_errors(result: Diagnosis, one: CheckedRecording, quantity: int) -> list[float]:
+    """Return errors in a check recording as shares of the range: before, after, and after in the fitted recordings."""
+    share = result.noise[quantity].deviation / result.full[quantity]
+    return [float(square[quantity]) ** 0.5 * share for square in (one.before, one.after, one.fitted)]
 
 
 def noise_floor_nrmse(result: Diagnosis) -> float:
@@ -156,18 +151,15 @@ def error_location(result: Diagnosis, model: Model) -> list[dict[str, Any]]:
         by_range += np.bincount(part.ravel(), square.ravel(), RANGE_PARTS + 1)
         by_texel += square.sum(axis=0)
     total = max(float(by_phase.sum()), 1e-300)
-    entries: list[dict[str, Any]] = [
-        {"phase": name, "share": round(float(share / total), 4)} for name, share in zip(PHASES, by_phase, strict=True)
-    ]
     limits = [100 * i // RANGE_PARTS for i in range(RANGE_PARTS + 1)]
-    names = ["no load", *(f"{a}–{b} % of the largest load" for a, b in zip(limits[:-1], limits[1:], strict=True))]
-    entries += [{"range": name, "share": round(float(share / total), 4)} for name, share in zip(names, by_range, strict=True)]
+    ranges = ["no load", *(f"{a}–{b} % of the largest load" for a, b in itertools.pairwise(limits))]
+    found: list[tuple[str, Any, float]] = [("phase", *one) for one in zip(PHASES, by_phase, strict=True)]
+    found += [("range", *one) for one in zip(ranges, by_range, strict=True)]
     if n > 1:
-        worst = np.argsort(by_texel)[::-1]
-        count = int(np.searchsorted(np.cumsum(by_texel[worst]) / total, WORST_TEXELS_SHARE)) + 1
-        share = float(by_texel[worst[:count]].sum() / total)
-        entries.append({"texels": sorted(int(i) for i in worst[:count]), "share": round(share, 4)})
-    return entries
+        order = np.argsort(by_texel)[::-1]
+        worst = order[: int(np.searchsorted(np.cumsum(by_texel[order]) / total, WORST_TEXELS_SHARE)) + 1]
+        found.append(("texels", sorted(worst.tolist()), by_texel[worst].sum()))
+    return [{key: value, "share": round(float(square / total), 4)} for key, value, square in found]
 
 
 def squared_errors(predictor: Predictor, model: Model, result: Diagnosis) -> np.ndarray:
@@ -201,13 +193,6 @@ OUTSIDE = 1.25
 """Depth, speed, length and number of loads are mentioned from this many times the largest of the fitted recordings on."""
 LEAST_NEW_LOAD = 0.05
 """Share of the load on texels that no fitted recording touches, from which on it is mentioned."""
-LOADINGS = {
-    "depth": "is loaded {:.3g} times as much",
-    "speed": "is loaded {:.3g} times as fast",
-    "seconds": "lasts {:.3g} times as long",
-    "loads": "is loaded {:.3g} times as often",
-}
-"""Words for a quantity of :func:`_loading` that is so many times the largest of the fitted recordings."""
 FAST = 0.95
 """Quantile of the rates of loading that counts as a recording's speed."""
 
@@ -220,13 +205,13 @@ def _level_and_gain(predictor: Predictor, model: Model, full: tuple[float, float
     trial, predicted = predictor.trial, predictor.predict(model)
     if trial.reading is not None:
         measured, expected, size, zero = trial.reading, predicted.reading, full[0], model.parameters.zero
-        idle = predictor.stimulus.load <= 0
+        load = predictor.stimulus.load
     else:
         assert trial.force is not None and predicted.force is not None
         axis = int(np.argmax(np.nansum(trial.force**2, axis=0)))
         measured, expected, size, zero = trial.force[:, axis : axis + 1], predicted.force[:, axis : axis + 1], full[1], 0.0
-        idle = ~(predictor.stimulus.load > 0).any(axis=1, keepdims=True)
-    known = np.isfinite(measured)
+        load = predictor.stimulus.load.max(axis=1, keepdims=True)
+    known, idle = np.isfinite(measured), load <= 0
     rest = known & idle
     level = float((measured - expected)[rest].mean()) / size if rest.any() else float("nan")
     shift = level * size if np.isfinite(level) else 0.0
@@ -236,16 +221,16 @@ def _level_and_gain(predictor: Predictor, model: Model, full: tuple[float, float
 
 
 def _loading(predictor: Predictor) -> dict[str, float]:
-    """Largest load, fast rate of loading, length of a recording, and number of times that it is loaded."""
+    """Largest load, fast rate of loading, length, and number of loads of a recording, by the words that compare them."""
     time, load = predictor.trial.time, predictor.stimulus.load.max(axis=1)
     rate = np.gradient(load, time)
     quick = rate[rate > 0]
     half = load > 0.5 * max(float(load.max(initial=0.0)), 1e-300)
     return {
-        "depth": float(load.max(initial=0.0)),
-        "speed": float(np.quantile(quick, FAST)) if len(quick) else 0.0,
-        "seconds": float(time[-1] - time[0]),
-        "loads": float(np.count_nonzero(half[1:] & ~half[:-1])),
+        "is loaded {:.3g} times as much": float(load.max(initial=0.0)),
+        "is loaded {:.3g} times as fast": float(np.quantile(quick, FAST)) if len(quick) else 0.0,
+        "lasts {:.3g} times as long": float(time[-1] - time[0]),
+        "is loaded {:.3g} times as often": float(np.count_nonzero(half[1:] & ~half[:-1])),
     }
 
 
@@ -263,16 +248,15 @@ def recording_differences(result: Diagnosis, name: str) -> list[str]:
     level, gain = (_outside(values, value) for value, values in zip(own, zip(*others, strict=True), strict=True))
     said = []
     if abs(level) > LEAST_LEVEL:
-        said.append(
-            f"without load it reads {abs(level):.1%} of the range {'more' if level > 0 else 'less'} than any fitted one"
-        )
+        more = "more" if level > 0 else "less"
+        said.append(f"without load it reads {abs(level):.1%} of the range {more} than any fitted one")
     if abs(gain) > LEAST_GAIN:
         said.append(f"under the same load it reads {abs(gain):.0%} {'more' if gain > 0 else 'less'} than any fitted one")
-    loading, loadings = _loading(other), [_loading(p) for p in fitted]
-    for quantity, words in LOADINGS.items():
-        most = max(one[quantity] for one in loadings)
-        if loading[quantity] > OUTSIDE * most > 0.0:
-            said.append(f"it {words.format(loading[quantity] / most)} as any fitted one")
+    loadings = [_loading(p) for p in fitted]
+    for words, value in _loading(other).items():
+        most = max(one[words] for one in loadings)
+        if value > OUTSIDE * most > 0.0:
+            said.append(f"it {words.format(value / most)} as any fitted one")
     load, known = other.stimulus.load.sum(axis=0), np.any([(p.stimulus.load > 0).any(axis=0) for p in fitted], axis=0)
     share = float(load[~known].sum()) / max(float(load.sum()), 1e-300)
     if share > LEAST_NEW_LOAD:

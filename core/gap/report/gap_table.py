@@ -15,7 +15,7 @@ from ...errors import FileError, read_errors_said
 from ...io.input_files import read_bounded
 from ..dataset.rig import Rig
 from ..selection.findings import Diagnosis
-from .comparison import nrmse
+from .comparison import GapErrors
 
 HEADER = ("rig", "base", "Palpate", "by hand", "Palpate / by hand", "named, with confidence")
 LARGEST_TABLE = 1 << 20
@@ -55,11 +55,9 @@ def require_check(rig: Rig) -> None:
         raise FileError(f"Rig '{rig.name}' has no recording with use = \"check\": give it one, by which the table can judge.")
 
 
-def row_of(result: Diagnosis, by_hand: float | None = None) -> TableRow:
+def row_of(result: Diagnosis, errors: GapErrors, by_hand: float | None = None) -> TableRow:
     """Return the row of a diagnosis whose rig has check recordings."""
-    plain = result.alike or result
-    before = nrmse(plain.of("check"), plain.base.model, plain.full)
-    after = nrmse(result.of("check"), result.best.model, result.full)
+    before, after = errors.base["check"], errors.amended["check"]
     assert before is not None and after is not None  # require_check
     said = ", ".join(f"`{found.name}` {found.confidence:.2f}" for found in result.findings) or result.verdict
     return TableRow(result.rig.name, before, after, by_hand, said)

@@ -20,8 +20,6 @@ from .plan_files import planned_sentence
 from .plots import CAPTIONS
 from .sentences import NOT_IDENTIFIABLE, interval_ends, said_confidence
 
-TEMPLATE = Path(__file__).parent / "templates" / "report.html"
-
 CLOSED_FROM = 0.2
 """A closed share is shown if the gap, noise removed, is at least this share of the noise floor. Which effects join is decided
 in :mod:`..selection.search`."""
@@ -54,15 +52,16 @@ def html_report(result: Diagnosis, found: dict[str, Any], headline: str, picture
         Names of the pictures that were drawn into `folder`.
     folder : Path
     """
-    encoded = {name: base64.b64encode((folder / f"{name}.png").read_bytes()).decode() for name in pictures}
     return render_html(
-        TEMPLATE,
+        Path(__file__).parent / "templates" / "report.html",
         name=result.rig.name,
         extent=_extent(result),
         headline=headline,
-        pictures={name: {"caption": CAPTIONS[name], "data": data} for name, data in encoded.items()},
+        captions=CAPTIONS,
+        pictures={name: base64.b64encode((folder / f"{name}.png").read_bytes()).decode() for name in pictures},
         gap=_gap_table(found),
-        effects=[_effect(one) for one in found["found"]],
+        effects=[(kind_of(one["effect"]), form_of(one["effect"], one["form"]), one) for one in found["found"]],
+        said_confidence=said_confidence,
         evidence=_evidence_table(found),
         parameters=_parameter_table(result, found),
         questions=_open_questions(found),
@@ -84,34 +83,17 @@ def _extent(result: Diagnosis) -> str:
 def _gap_table(found: dict[str, Any]) -> Table:
     """Errors of the models on fitted and on check trials."""
     gap, frictionless, floor = found["gap"], found["base"]["gap_without_friction"], found["gap"]["noise_floor"]
-    rows = []
+    rows, without = [], [] if frictionless is None else ["base without its friction"]
+    head = ["NRMSE, share of the range", *without, "base", "amended", "noise floor", "squared gap closed, noise removed"]
     for use, words in (("fit", "fitted trials"), ("check", "check trials, never fitted")):
         before, after = gap["before"][use], gap["after"][use]
         if before is None:
             continue
         left = [max(value**2 - floor**2, 0.0) for value in (before, after)]
         closed = f"{1.0 - left[1] / left[0]:.0%}" if left[0] > (CLOSED_FROM * floor) ** 2 else "–"
-        row = [words, f"{before:.3%}", f"{after:.3%}" if found["found"] else "–", f"{floor:.3%}"]
-        rows.append([*row, closed if found["found"] else "–"])
-        if frictionless is not None:
-            rows[-1].insert(1, f"{frictionless[use]:.3%}")
-    head = ["NRMSE, share of the range", "base", "amended", "noise floor", "squared gap closed, noise removed"]
-    if frictionless is not None:
-        head.insert(1, "base without its friction")
+        amended = [f"{after:.3%}", f"{floor:.3%}", closed] if found["found"] else ["–", f"{floor:.3%}", "–"]
+        rows.append([words, *(f"{frictionless[use]:.3%}" for _ in without), f"{before:.3%}", *amended])
     return Table(head, rows, set(range(1, len(head))))
-
-
-def _effect(one: dict[str, Any]) -> dict[str, str]:
-    """Section of the page on an effect that was found."""
-    kind, form = kind_of(one["effect"]), form_of(one["effect"], one["form"])
-    return {
-        "title": kind.title,
-        "form": one["form"],
-        "confidence": said_confidence(one["confidence"]),
-        "text": kind.text,
-        "formula": form.formula,
-        "reference": form.reference,
-    }
 
 
 def _evidence_table(found: dict[str, Any]) -> Table:
@@ -139,14 +121,13 @@ def _parameter_table(result: Diagnosis, found: dict[str, Any]) -> Table:
     for index, one in zip((finding.effect for finding in result.findings), found["found"], strict=True):
         for parameter in form_of(one["effect"], one["form"]).parameters:
             value = one["parameters"].get(parameter.name)
-            own = parameter.unit_of(unit)
+            if value is None:
+                continue
             if isinstance(value, list):
-                span = f"{len(value)} numbers, {min(value):.3g} … {max(value):.3g}"
-                rows.append([one["effect"], parameter.name, span, "", own])
-            elif value is not None:
-                rows.append(
-                    [one["effect"], parameter.name, *_value_and_ends(value, ends.get((index, parameter.name), "")), own]
-                )
+                said = f"{len(value)} numbers, {min(value):.3g} … {max(value):.3g}", ""
+            else:
+                said = _value_and_ends(value, ends.get((index, parameter.name), ""))
+            rows.append([one["effect"], parameter.name, *said, parameter.unit_of(unit)])
     return Table(["", "parameter", "value", "95 % interval", "unit"], rows, {2, 3})
 
 
@@ -158,21 +139,15 @@ def _value_and_ends(value: float, ends: str) -> tuple[str, str]:
 def _open_questions(found: dict[str, Any]) -> list[str]:
     """Rivals, the next experiment with its file, and warnings."""
     lines = [f"These recordings do not distinguish {' from '.join(names)}." for names in found["ambiguous"]]
-    if found["next_experiment"]:
-        lines.append(found["next_experiment"])
     planned = found["planned_experiment"]
-    if planned:
-        lines.append(planned_sentence(planned))
-    return lines + found["warnings"]
+    lines += [found["next_experiment"], planned_sentence(planned) if planned else ""]
+    return [*filter(None, lines), *found["warnings"]]
 
 
 def _structure_table(found: dict[str, Any]) -> Table:
     """Features on which the residual depends, before and after."""
-    before, after = found["varies_with"], found["left_varies_with"]
-    rows = [
-        [FEATURES.get(key, key), f"{before[key]:.1%}", f"{after.get(key, 0.0):.1%}"]
-        for key in sorted(before, key=lambda key: -before[key])
-    ]
+    shares, after = sorted(found["varies_with"].items(), key=lambda item: -item[1]), found["left_varies_with"]
+    rows = [[FEATURES[key], f"{share:.1%}", f"{after.get(key, 0.0):.1%}"] for key, share in shares]
     return Table(["", "base", "amended"], rows, {1, 2})
 
 

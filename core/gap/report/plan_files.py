@@ -5,8 +5,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from ...io.file_writing import atomic_write
 from ...io.hidden_folder import FileList
@@ -25,16 +28,13 @@ LEAST_GAIN = 1.2
 
 def table_rows(plan: ExperimentPlan) -> list[tuple[str, str]]:
     """Return for each kind with which others it may be confused, and how much of it these leave."""
-    rows = []
-    for kind in plan.kinds:
-        words = ", ".join(f"{one.other} ({_confusion(one)})" for one in plan.taken_for(kind))
-        rows.append((kind, words or "distinguishable from all others"))
-    return rows + [(kind, why) for kind, why in plan.cannot_show.items()]
-
-
-def _confusion(one: Separation) -> str:
-    """Why a kind may be taken for another one."""
-    return f"{one.share:.0%} left" if one.share < LEAST_SHARE else "if it is small"
+    others: dict[str, list[str]] = {one.kind: [] for one in plan.separations}
+    for one in sorted(plan.separations, key=lambda one: one.share):
+        if not one.is_separated:
+            why = f"{one.share:.0%} left" if one.share < LEAST_SHARE else "if it is small"
+            others[one.kind].append(f"{one.other} ({why})")
+    rows = [(kind, ", ".join(words) or "distinguishable from all others") for kind, words in others.items()]
+    return [*rows, *plan.cannot_show.items()]
 
 
 def planned_sentence(words: Mapping[str, Any]) -> str:
@@ -53,20 +53,14 @@ def planned_sentence(words: Mapping[str, Any]) -> str:
 
 
 def experiment_words(experiment: PlannedExperiment, file: str) -> dict[str, Any]:
-    """Return a planned experiment for JSON."""
-    limits = experiment.limits
+    """Return a planned experiment for JSON: its separations are those of the least separated pair."""
     return {
         "file": file,
         "programme": experiment.programme,
-        "between": list(experiment.kinds),
-        "separation_before": round(experiment.separation_before, 3),
-        "separation_after": round(experiment.separation_after, 3),
-        "limits": {
-            "depth": limits.depth,
-            "speed": limits.speed,
-            "duration": limits.duration,
-            "area": None if limits.area is None else list(limits.area),
-        },
+        "between": list(dict.fromkeys(one.kind for one in experiment.before)),
+        "separation_before": round(min(one.deviations for one in experiment.before), 3),
+        "separation_after": round(min(one.deviations for one in experiment.after), 3),
+        "limits": asdict(experiment.limits),
         "before": _pairs(experiment.before),
         "after": _pairs(experiment.after),
     }
@@ -113,8 +107,7 @@ def write_plan(plan: ExperimentPlan, folder: Path) -> list[Path]:
             made.append(new / TRAJECTORY)
         with atomic_write(new / PLAN) as temporary:
             temporary.write_text(json.dumps(words, indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
-        files.replace(new, {"plan": made})
-    return [folder / path.name for path in made]
+        return files.replace(new, {"plan": made})
 
 
 def write_trajectory(trajectory: Trajectory, path: Path) -> None:
@@ -127,7 +120,6 @@ def write_trajectory(trajectory: Trajectory, path: Path) -> None:
         columns |= dict(zip(("qw", "qx", "qy", "qz"), trial.quaternion.T, strict=True))
     if trial.level is not None:
         columns[trial.stimulus] = trial.level
-    rows = zip(*columns.values(), strict=True)
+    rows = np.stack([*columns.values()], axis=1)
     with atomic_write(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(",".join(columns) + "\n")
-        file.writelines(",".join(f"{value:.9g}" for value in row) + "\n" for row in rows)
+        np.savetxt(file, rows, "%.9g", ",", header=",".join(columns), comments="")

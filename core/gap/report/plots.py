@@ -27,11 +27,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 BEFORE, AFTER = SHEAR_COLOUR, NORMAL_COLOUR
-MEASURED = INK
 LONG = 12
 """How many times as long as wide a grid is no picture any more."""
 Pick = Callable[[Model], np.ndarray]
 """What a model predicts of one channel."""
+Place = tuple[float, float, float, float]
+"""Left, bottom, width and height of a part of a figure, as shares of it."""
 HEADING: dict[str, Any] = {"fontsize": 8.5, "color": INK, "weight": "bold"}
 
 
@@ -39,7 +40,8 @@ def gap_bars(result: Diagnosis, errors: GapErrors) -> Figure:
     """NRMSE of base and amended model on fitted and on check trials, with the noise floor."""
     figure = new_figure(WIDTHS["single"], 2.5)
     axes = figure.add_axes((0.15, 0.18, 0.82, 0.58))
-    uses = [use for use in ("fit", "check") if result.of(use)]
+    names = {"fit": "fitted trials", "check": "check trials,\nnever fitted"}
+    uses = [use for use in names if result.of(use)]
     by_label = {"without friction": (errors.frictionless, GREY), "base model": (errors.base, BEFORE)}
     if result.best.model.effects:
         by_label["amended"] = (errors.amended, AFTER)
@@ -49,11 +51,9 @@ def gap_bars(result: Diagnosis, errors: GapErrors) -> Figure:
         heights = [100.0 * (error[use] or 0.0) for use in uses]
         places = np.arange(len(uses)) + width * (offset - 0.5 * (len(shown) - 1))
         bars = axes.bar(places, heights, 0.95 * width, color=colour, label=label)
-        for bar, height in zip(bars, heights, strict=True):
-            axes.text(bar.get_x() + 0.475 * width, height, f"{height:.2f}", ha="center", va="bottom", fontsize=8, color=INK)
+        axes.bar_label(bars, fmt="%.2f", fontsize=8, color=INK)
     floor = 100.0 * errors.noise_floor
     axes.axhline(floor, color=INK, lw=0.9, ls=(0, (4, 3)), label=f"noise floor {floor:.2f} %")
-    names = {"fit": "fitted trials", "check": "check trials,\nnever fitted"}
     axes.set_xticks(np.arange(len(uses)), [names[use] for use in uses])
     axes.set_ylabel("error (% of range)")
     axes.margins(y=0.18)
@@ -74,12 +74,12 @@ def curves(result: Diagnosis) -> Figure:
     figure = new_figure(WIDTHS["double"], 1.75 * len(trials) + 0.5)
     grid = figure.subplots(len(trials), 1, squeeze=False)[:, 0]
     for axes, predictor in zip(grid, trials, strict=True):
-        name, measured, pick = _worst_channel(result, predictor)
+        _, name, quantity, measured, pick = _worst_channel(result, predictor)
         time = predictor.trial.time
-        axes.plot(time, measured, color=MEASURED, lw=width_below(1), label="measured")
+        axes.plot(time, measured, color=INK, lw=width_below(1), label="measured")
         _draw_models(axes, result, time, measured, pick, lw=1.0)
         axes.set_title(f"{predictor.trial.name} ({predictor.trial.use}): {name}", loc="left", fontsize=8.5, color=INK)
-        axes.set_ylabel(_quantity(result, name))
+        axes.set_ylabel(quantity)
         axes.margins(x=0)
         tidy_axes(axes)
     grid[0].legend(frameon=False, fontsize=8, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0)
@@ -96,16 +96,10 @@ def _draw_models(axes: Axes, result: Diagnosis, x: np.ndarray, measured: np.ndar
         axes.plot(x, shown, color=colour, ls="--" if label == "base model" else "-", label=label, **style)
 
 
-def _quantity(result: Diagnosis, channel: str) -> str:
-    """Quantity of a channel, with its unit."""
-    if not channel.startswith("texel"):
-        return f"{channel} (N)"
-    unit = result.rig.parameters.unit
-    return "normal force (N)" if unit == "N" else f"reading ({unit})"
-
-
-def _worst_channel(result: Diagnosis, predictor: Predictor, stimulus: np.ndarray | None = None) -> tuple[str, np.ndarray, Pick]:
-    """The channel with the largest error: its name, what was measured, and what a model predicts.
+def _worst_channel(
+    result: Diagnosis, predictor: Predictor, stimulus: np.ndarray | None = None
+) -> tuple[int, str, str, np.ndarray, Pick]:
+    """The channel with the largest error: its index, name and quantity, what was measured, and what a model predicts.
 
     With the `stimulus` of each texel (samples, n), those whose stimulus changes come first.
     """
@@ -115,24 +109,16 @@ def _worst_channel(result: Diagnosis, predictor: Predictor, stimulus: np.ndarray
     if part == "reading" and stimulus is not None and (changes := np.ptp(stimulus, axis=0) > 0.0).any():
         miss[~changes] = 0.0
     channel = int(np.argmax(miss))
-    name = f"texel {channel}" if part == "reading" else f"force {'xyz'[channel]}"
-    return name, measured[:, channel], lambda model: getattr(predictor.predict(model), part)[:, channel]
+    unit, name = result.rig.parameters.unit, f"texel {channel}" if part == "reading" else f"force {'xyz'[channel]}"
+    quantity = f"{name} (N)" if part == "force" else "normal force (N)" if unit == "N" else f"reading ({unit})"
+    return channel, name, quantity, measured[:, channel], lambda model: getattr(predictor.predict(model), part)[:, channel]
 
 
 def error_map(result: Diagnosis) -> Figure:
     """Root mean square error of each texel, base and amended, on one scale."""
-    row = _is_row(result)
-    figure = new_figure(WIDTHS["single"], 2.5 if row else 2.9)
-    if row:
-        _draw_error_line(figure.add_axes((0.15, 0.2, 0.82, 0.62)), result)
-    else:
-        _draw_error_maps(figure, (0.02, 0.04, 0.96, 0.84), result)
+    figure = new_figure(WIDTHS["single"], 2.5 if _is_row(result) else 2.9)
+    _draw_errors(figure, result, (0.15, 0.2, 0.82, 0.62), (0.02, 0.04, 0.96, 0.84))
     return figure
-
-
-def _maps(result: Diagnosis) -> list[tuple[str, np.ndarray]]:
-    """Error of each texel, in the unit of :data:`.ERROR`, by the name of the model."""
-    return [(label, ERROR.values(rms_by_texel(result, model), result.rig.texels)) for label, model, _ in _models(result)]
 
 
 def _is_row(result: Diagnosis) -> bool:
@@ -141,43 +127,41 @@ def _is_row(result: Diagnosis) -> bool:
     return isinstance(layout, GridLayout) and LONG * min(layout.mask().shape) < max(layout.mask().shape)
 
 
-def _draw_error_maps(figure: Figure, place: tuple[float, float, float, float], result: Diagnosis) -> None:
-    """Draw the maps and their colour bar into a part of a figure: left, bottom, width and height, as shares of it."""
-    maps, texels = _maps(result), result.rig.texels
-    layout, position = texels.layout, texels.position
-    scale = error_scale(max(float(values.max()) for _, values in maps))
+def _draw_errors(figure: Figure, result: Diagnosis, line: Place, maps: Place) -> None:
+    """Draw the error of each texel into a part of a figure: as a `line` where texels form a long row, else as `maps`."""
+    texels = result.rig.texels
+    errors = [(name, ERROR.values(rms_by_texel(result, model), texels), colour) for name, model, colour in _models(result)]
+    if _is_row(result):
+        axes = figure.add_axes(line)
+        for label, values, colour in errors:
+            axes.stairs(values, np.arange(len(values) + 1) - 0.5, baseline=None, color=colour, lw=0.9, label=label)
+        axes.set_xlabel("texel")
+        axes.locator_params("x", integer=True)
+        axes.set_ylabel("error (% of range)")
+        axes.margins(x=0)
+        tidy_axes(axes)
+        axes.legend(frameon=False, fontsize=8, loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2)
+        return
+    scale = error_scale(max(float(values.max()) for _, values, _ in errors))
     colours: dict[str, Any] = {"cmap": color_maps.matplotlib_colormap(scale.colour_map), "vmin": scale.low, "vmax": scale.high}
-    left, bottom, width, height = place
+    left, bottom, width, height = maps
     image: Any = None
-    for i, (label, values) in enumerate(maps):
-        start = left + width * 0.42 * (i + 0.5 * (2 - len(maps)))
+    for i, (label, values, _) in enumerate(errors):
+        start = left + width * 0.42 * (i + 0.5 * (2 - len(errors)))
         axes = figure.add_axes((start, bottom, 0.375 * width, height))
-        if isinstance(layout, GridLayout):
-            picture: Any = np.ma.masked_array(layout.image(values), ~layout.mask())
+        if isinstance(texels.layout, GridLayout):
+            picture: Any = np.ma.masked_array(texels.layout.image(values), ~texels.layout.mask())
             image = axes.imshow(picture, origin="lower", interpolation="nearest", **colours)
         else:
-            image = axes.scatter(position[:, 0], position[:, 1], c=values, s=14, **colours)
+            image = axes.scatter(texels.position[:, 0], texels.position[:, 1], c=values, s=14, **colours)
             axes.set_aspect("equal")
         axes.set_title(label, fontsize=8.5, color=INK)
         axes.set_xticks([])
         axes.set_yticks([])
-    bar = figure.colorbar(
-        image, cax=figure.add_axes((left + 0.835 * width, bottom + 0.095 * height, 0.0365 * width, 0.81 * height))
-    )
+    beside = (left + 0.835 * width, bottom + 0.095 * height, 0.0365 * width, 0.81 * height)
+    bar = figure.colorbar(image, cax=figure.add_axes(beside))
     bar.ax.tick_params(labelsize=8, colors=INK)
     bar.set_label(f"{scale.quantity.label[0]} ({scale.unit})", fontsize=8.5, color=INK)
-
-
-def _draw_error_line(axes: Axes, result: Diagnosis) -> None:
-    """Draw the errors of texels in a long row."""
-    for (label, values), colour in zip(_maps(result), (BEFORE, AFTER), strict=False):
-        axes.stairs(values, np.arange(len(values) + 1) - 0.5, baseline=None, color=colour, lw=0.9, label=label)
-    axes.set_xlabel("texel")
-    axes.locator_params("x", integer=True)
-    axes.set_ylabel("error (% of range)")
-    axes.margins(x=0)
-    tidy_axes(axes)
-    axes.legend(frameon=False, fontsize=8, loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2)
 
 
 def overview(result: Diagnosis, errors: GapErrors) -> Figure:
@@ -188,10 +172,7 @@ def overview(result: Diagnosis, errors: GapErrors) -> Figure:
     bottom, top = 0.5 / height, 1.0 - 0.55 / height
     if len(result.rig.texels) > 1:
         figure.text(0.015, 1.0 - 0.06 / height, "Where: error of each texel", va="top", **HEADING)
-        if _is_row(result):
-            _draw_error_line(figure.add_axes((0.08, bottom, 0.32, top - bottom)), result)
-        else:
-            _draw_error_maps(figure, (0.015, 0.1 / height, 0.4, top - 0.1 / height), result)
+        _draw_errors(figure, result, (0.08, bottom, 0.32, top - bottom), (0.015, 0.1 / height, 0.4, top - 0.1 / height))
     left = 0.7 if len(result.rig.texels) > 1 else 0.3
     figure.text(left - 0.2, 1.0 - 0.06 / height, "What: error without and with each effect", va="top", **HEADING)
     _draw_stages(figure.add_axes((left, bottom, 0.985 - left, 1.0 - 0.3 / height - bottom)), result, errors)
@@ -205,18 +186,16 @@ def _draw_stages(axes: Axes, result: Diagnosis, errors: GapErrors) -> None:
         rows.append(("+ level and gain\nof each recording", errors.stages[0], AFTER))
     for one in sorted(result.findings, key=lambda one: one.effect):
         name = " or ".join(kind_of(kind).title.lower() for kind in (one.name, *one.rivals))
-        left = errors.stages[min(one.effect + 1, len(errors.stages) - 1)]
-        rows.append((f"+ {name}\n(confidence {said_confidence(one.confidence)})", left, AFTER))
+        rows.append((f"+ {name}\n(confidence {said_confidence(one.confidence)})", errors.stages[one.effect + 1], AFTER))
     count = len(rows)
     if result.of("check"):
         rows.append(("check trials, base", errors.base["check"], BEFORE))
         rows += [("check trials, amended", errors.amended["check"], AFTER)] if count > 1 else []
     places = [-float(i) - 0.5 * (i >= count) for i in range(len(rows))]
     values = [100.0 * (error or 0.0) for _, error, _ in rows]
-    axes.barh(places, values, 0.72, color=[colour for *_, colour in rows])
-    for place, value in zip(places, values, strict=True):
-        text = axes.text(value, place, f" {value:.2f}", ha="left", va="center", fontsize=8, color=INK)
-        text.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 0.0})  # the line of the noise floor does not cross it
+    bars = axes.barh(places, values, 0.72, color=[colour for *_, colour in rows])
+    behind = {"facecolor": "white", "edgecolor": "none", "pad": 0.0}  # the line of the noise floor does not cross the numbers
+    axes.bar_label(bars, fmt=" %.2f", fontsize=8, color=INK, bbox=behind)
     floor = 100.0 * errors.noise_floor
     axes.axvline(floor, color=INK, lw=0.9, ls=(0, (4, 3)))
     axes.text(floor, 0.25 - count, f" noise floor {floor:.2f}", ha="left", va="center", fontsize=8, color=INK)
@@ -233,19 +212,14 @@ def phase_bars(result: Diagnosis, errors: GapErrors) -> Figure:
     """Squared error by phase of base and amended model, as shares of that of the base model."""
     figure = new_figure(WIDTHS["single"], 2.3)
     axes = figure.add_axes((0.17, 0.27, 0.8, 0.6))
-    base = errors.stages[0] or 1.0
-    for offset, (label, model, colour) in enumerate(_models(result)):
-        error = errors.stages[0] if model is result.base.model else errors.amended["fit"]
+    models, base = _models(result), errors.stages[0] or 1.0
+    for offset, ((label, model, colour), error) in enumerate(
+        zip(models, (errors.stages[0], errors.amended["fit"]), strict=False)
+    ):
         left = ((error or 0.0) / base) ** 2
-        shares = {entry["phase"]: entry["share"] for entry in error_location(result, model) if "phase" in entry}
-        heights = [100.0 * left * shares[phase] for phase in PHASES]
-        axes.bar(
-            np.arange(len(PHASES)) + 0.36 * (offset - 0.5 * (len(_models(result)) - 1)),
-            heights,
-            0.34,
-            color=colour,
-            label=label,
-        )
+        heights = [100.0 * left * entry["share"] for entry in error_location(result, model) if "phase" in entry]
+        places = np.arange(len(PHASES)) + 0.36 * (offset - 0.5 * (len(models) - 1))
+        axes.bar(places, heights, 0.34, color=colour, label=label)
     axes.set_xticks(np.arange(len(PHASES)), PHASES, rotation=25, ha="right", rotation_mode="anchor")
     axes.set_ylabel("squared error\n(% of that of the base)")
     tidy_axes(axes)
@@ -257,11 +231,10 @@ def loops(result: Diagnosis) -> Figure:
     """Reading over depth (or load, or travel) of the texel with the largest error: what an effect's signature looks like."""
     predictor = max(result.of("fit"), key=lambda p: float(squared_errors(p, result.base.model, result).sum()))
     s, trial = predictor.stimulus, predictor.trial
-    name, measured, pick = _worst_channel(result, predictor, s.depth if s.force_share is None else s.force_share)
-    if "texel" in name:
-        texel = int(name.split()[1])
-        x = s.force_share[:, texel] if s.force_share is not None else 1e3 * s.depth[:, texel]
-        label = "load (N)" if s.force_share is not None else "depth (mm)"
+    over, label = (1e3 * s.depth, "depth (mm)") if s.force_share is None else (s.force_share, "load (N)")
+    channel, name, quantity, measured, pick = _worst_channel(result, predictor, over)
+    if trial.reading is not None:
+        x = over[:, channel]
     elif s.slide_speed.any():
         travel = trial.travel if trial.travel.any() else trial.position[:, :2] if trial.position is not None else trial.travel
         x, label = 1e3 * travel[:, int(np.argmax(np.ptp(travel, axis=0)))], "travel (mm)"
@@ -269,10 +242,10 @@ def loops(result: Diagnosis) -> Figure:
         x, label = 1e3 * s.depth.max(axis=1), "depth (mm)"
     figure = new_figure(WIDTHS["single"], 2.5)
     axes = figure.add_axes((0.21, 0.18, 0.76, 0.62))
-    axes.plot(x, measured, ".", ms=4.0, mew=0, color=MEASURED, alpha=0.55, zorder=3, label="measured")
+    axes.plot(x, measured, ".", ms=4.0, mew=0, color=INK, alpha=0.55, zorder=3, label="measured")
     _draw_models(axes, result, x, measured, pick, lw=0.8, zorder=4)  # above the samples, which hide a line that fits them
     axes.set_xlabel(label)
-    axes.set_ylabel(_quantity(result, name))
+    axes.set_ylabel(quantity)
     axes.set_title(f"{trial.name}: {name}", loc="left", fontsize=8.5, color=INK, pad=18)
     tidy_axes(axes)
     place = {"loc": "lower right", "bbox_to_anchor": (1.02, 0.98), "borderaxespad": 0.2}
@@ -297,9 +270,8 @@ FILE_TYPES = ("png", "pdf")
 def picture(name: str, result: Diagnosis, errors: GapErrors) -> Figure:
     """Draw the picture of this name (see :data:`CAPTIONS`)."""
     without_errors = {"curves": curves, "loops": loops, "map": error_map}
-    if name in without_errors:
-        return without_errors[name](result)
-    return {"overview": overview, "gap": gap_bars, "phases": phase_bars}[name](result, errors)
+    with_errors = {"overview": overview, "gap": gap_bars, "phases": phase_bars}
+    return without_errors[name](result) if name in without_errors else with_errors[name](result, errors)
 
 
 def draw(result: Diagnosis, errors: GapErrors, folder: Path) -> Job[list[str]]:

@@ -6,6 +6,7 @@ from __future__ import annotations
 from ...effects.engine.registry import kind_of
 from ...effects.engine.specification import SCATTER
 from ..base.quantities import FORCES, READINGS, friction_kinds
+from ..base.recording_differences import OddRecording
 from ..candidates.silenced_texels import silenced_texels
 from ..dataset.trial import FAULT_KINDS
 from ..fitting.identifiability import LEAST_CYCLES
@@ -14,7 +15,7 @@ from ..fitting.residual_tests import LEAST_STRUCTURE
 from ..forward.contact_phases import FEATURES
 from ..selection.findings import Diagnosis, Finding
 from ..selection.rule_numbers import SURE
-from .comparison import LEAST_GAIN, LEAST_LEVEL, GapErrors, nrmse, recording_differences
+from .comparison import LEAST_GAIN, LEAST_LEVEL, GapErrors, check_errors, nrmse, recording_differences
 
 LOUD_NOISE = 0.05
 """Noise, as a share of the range, above which it hides the smaller effects."""
@@ -45,29 +46,18 @@ SLIDING_HINTS = {
 def next_experiment(result: Diagnosis) -> str:
     """Return the recommended next recording, in one sentence; empty if no question is open."""
     if result.ambiguous:
-        return _experiment_between_rivals(result)
+        pairs = [f"{names[0]} from {' and '.join(names[1:])}" for names in result.ambiguous]
+        parts = dict.fromkeys(kind_of(name).experiment for names in result.ambiguous for name in names)
+        return f"To distinguish {', and '.join(pairs)}: {'; and '.join(parts)}."
+    is_unexplained = result.verdict == "unexplained"
     if result.coverage.slides and all(p.trial.reading is None for p in result.predictors):
-        return _sliding_experiment(result)
+        hint = SLIDING_HINTS.get(result.structure.strongest, REPEAT)
+        said = f"To find the cause: {hint}; slide under two other loads, and record the normal force."
+        return said if is_unexplained else ""
     lacking = _lacking(result)
-    if result.verdict == "unexplained":
+    if is_unexplained:
         return f"To find the cause: {'; '.join([_hint(result), *lacking])}."
     return f"To complete the recordings: {'; '.join(lacking)}." if lacking else ""
-
-
-def _experiment_between_rivals(result: Diagnosis) -> str:
-    """Return the experiment that distinguishes the kinds of effects that these recordings leave as rivals."""
-    pairs = [f"{names[0]} from {' and '.join(names[1:])}" for names in result.ambiguous]
-    involved = list(dict.fromkeys(name for names in result.ambiguous for name in names))
-    parts = [kind_of(name).experiment for name in involved]
-    return f"To distinguish {', and '.join(pairs)}: {'; and '.join(dict.fromkeys(parts))}."
-
-
-def _sliding_experiment(result: Diagnosis) -> str:
-    """Return the recommended recording if only net forces were measured while a surface slid."""
-    if result.verdict != "unexplained":
-        return ""
-    hint = SLIDING_HINTS.get(result.structure.strongest, REPEAT)
-    return f"To find the cause: {hint}; slide under two other loads, and record the normal force."
 
 
 def _hint(result: Diagnosis) -> str:
@@ -83,20 +73,18 @@ def _hint(result: Diagnosis) -> str:
 
 def _lacking(result: Diagnosis) -> list[str]:
     """Return the features that the trials lack."""
-    coverage, lacking = result.coverage, []
-    if result.noise[0].deviation > LOUD_NOISE * result.full[0]:
-        lacking.append("press harder, or repeat a trial exactly and average, until the noise is below a hundredth of the range")
-    if coverage.touched_share < ALL_TEXELS:
-        lacking.append(f"touch the {1.0 - coverage.touched_share:.0%} of the texels that no trial reaches")
-    if coverage.cycles < LEAST_CYCLES:
-        lacking.append("repeat the cycle at least three times in one trial")
-    if coverage.longest_hold < LEAST_HOLD:
-        lacking.append("hold one depth for some ten seconds")
-    if coverage.speed_ratio < LEAST_SPEED_RATIO:
-        lacking.append("press at speeds at least tenfold apart")
-    if not coverage.unloading:
-        lacking.append("record the unloading too")
-    return lacking
+    coverage, is_loud = result.coverage, result.noise[0].deviation > LOUD_NOISE * result.full[0]
+    quieter = "press harder, or repeat a trial exactly and average, until the noise is below a hundredth of the range"
+    everywhere = f"touch the {1.0 - coverage.touched_share:.0%} of the texels that no trial reaches"
+    features = [
+        (is_loud, quieter),
+        (coverage.touched_share < ALL_TEXELS, everywhere),
+        (coverage.cycles < LEAST_CYCLES, "repeat the cycle at least three times in one trial"),
+        (coverage.longest_hold < LEAST_HOLD, "hold one depth for some ten seconds"),
+        (coverage.speed_ratio < LEAST_SPEED_RATIO, "press at speeds at least tenfold apart"),
+        (not coverage.unloading, "record the unloading too"),
+    ]
+    return [text for is_lacking, text in features if is_lacking]
 
 
 MOST_SAID = 0.99
@@ -115,13 +103,12 @@ FRICTION_MATTERS = 1.5
 
 def headline(result: Diagnosis, errors: GapErrors) -> str:
     """Return the result in one sentence, after a sentence on faults of the data that were not put right."""
-    faults = result.misleading_faults
+    outcome, faults = _outcome(result, errors), {fault.kind: FAULT_KINDS[fault.kind] for fault in result.misleading_faults}
     if not faults:
-        return _outcome(result, errors)
-    kinds = _listed(list(dict.fromkeys(FAULT_KINDS[fault.kind] for fault in faults)))
-    correct = ", ".join(f'"{kind}"' for kind in dict.fromkeys(fault.kind for fault in faults))
-    outcome = _outcome(result, errors)
-    return f"The data have {kinds}; put that right first (correct = [{correct}] in [data]). As they are: {outcome}"
+        return outcome
+    correct = ", ".join(f'"{kind}"' for kind in faults)
+    said = f"The data have {_listed([*faults.values()])}; put that right first (correct = [{correct}] in [data])."
+    return f"{said} As they are: {outcome}"
 
 
 def _outcome(result: Diagnosis, errors: GapErrors) -> str:
@@ -132,13 +119,12 @@ def _outcome(result: Diagnosis, errors: GapErrors) -> str:
         return _effects(result, errors)
     own, after = result.between, errors.amended["fit"] or 0.0
     said = f"Recordings differ by a gain and a level of their own; the error shrinks from {own.before:.2%} to {after:.2%} "
-    said += f"of the range.{_odd_one(result)} Name their session to learn more."
+    said += f"of the range.{_odd_one(own.odd_recording(result.full[READINGS]))} Name their session to learn more."
     return f"{said} Also: {_effects(result, errors)}" if result.findings or result.verdict == "unexplained" else said
 
 
-def _odd_one(result: Diagnosis) -> str:
+def _odd_one(odd: OddRecording | None) -> str:
     """A sentence on the recording that alone differs from all others; empty if there is none."""
-    odd = result.between.odd_recording(result.full[READINGS]) if result.between is not None else None
     if odd is None:
         return ""
     (name, gain, level), said = odd, []
@@ -156,8 +142,12 @@ def _effects(result: Diagnosis, errors: GapErrors) -> str:
     sure = [one for one in findings if one.confidence >= SURE]
     if result.verdict == "no gap":
         return f"No gap: the base model with its own parameters refitted leaves {before:.2%} of the range, which is noise."
-    shrink = f"the error shrinks from {before:.2%} to {after:.2%} of the range{_closed_of_forces(result)}"
-    stays = _what_stays(result, errors)
+    shrink, share = f"the error shrinks from {before:.2%} to {after:.2%} of the range", result.closed.least(FORCES)
+    if share is not None and _has_friction(result):  # it changes no reading
+        shrink += f", and {max(share, 0.0):.0%} of the squared gap of the net forces closes"
+    left, stays = errors.amended["check"], ""
+    if left is not None and left >= MANY_FLOORS * errors.noise_floor and not any(map(_is_noise, findings)):
+        stays = f" In the check recordings {left:.2%} of the range remains, {left / errors.noise_floor:.0f} times the noise."
     with_rivals = {names[0]: " or ".join(names) for names in result.ambiguous}
     if not sure and findings and all(one.name in with_rivals for one in findings) and not result.check.is_refuted:
         choices = "; ".join(with_rivals[one.name] for one in findings)
@@ -172,12 +162,9 @@ def _effects(result: Diagnosis, errors: GapErrors) -> str:
     return f"Missing: {_listed([one.name for one in sure])}{besides}; {shrink}.{stays}"
 
 
-def _closed_of_forces(result: Diagnosis) -> str:
-    """The share of the net forces' gap that closes, if friction is among the findings: it changes no reading."""
-    share = result.closed.least(FORCES)
-    if share is None or not any(one.name in friction_kinds() for one in result.findings):
-        return ""
-    return f", and {max(share, 0.0):.0%} of the squared gap of the net forces closes"
+def _has_friction(result: Diagnosis) -> bool:
+    """True if an effect on friction is among the findings."""
+    return any(one.name in friction_kinds() for one in result.findings)
 
 
 def by_share_closed(result: Diagnosis) -> list[Finding]:
@@ -190,50 +177,30 @@ def _is_noise(finding: Finding) -> bool:
     return kind_of(finding.name).found_by == SCATTER
 
 
-def _what_stays(result: Diagnosis, errors: GapErrors) -> str:
-    """A sentence on the error of the check recordings if it is many times the noise; empty otherwise."""
-    left = errors.amended["check"]
-    if left is None or left < MANY_FLOORS * errors.noise_floor or any(map(_is_noise, result.findings)):
-        return ""
-    return f" In the check recordings {left:.2%} of the range remains, {left / errors.noise_floor:.0f} times the noise."
-
-
 def check_failure(result: Diagnosis) -> str:
     """Return in a sentence why the amended model fails on the check recordings; empty if it does not."""
     worst = result.check.worst
     if worst is None or all(map(_is_noise, result.findings)):
         return ""
     quantity = next(q for q in (READINGS, FORCES) if result.check.refutes(q) and worst.count[q])
-    before, after, fitted = (
-        (float(x[quantity]) ** 0.5) * _noise_share(result, quantity) for x in (worst.before, worst.after, worst.fitted)
-    )
+    before, after, fitted = check_errors(result, worst, quantity)
     what = "" if quantity == READINGS else " of the net force"
-    said = f"in the check recording '{worst.name}' the error{what} "
-    said += (
-        f"rises from {before:.2%} to {after:.2%} of the range"
-        if after > before
-        else f"is {after:.2%} of the range, not {fitted:.2%}"
-    )
-    return f"{said}; {'; '.join(recording_differences(result, worst.name))}"
-
-
-def _noise_share(result: Diagnosis, quantity: int) -> float:
-    """Deviation of the noise as a share of the range."""
-    return result.noise[quantity].deviation / result.full[quantity]
+    rises = f"rises from {before:.2%} to {after:.2%} of the range"
+    said = rises if after > before else f"is {after:.2%} of the range, not {fitted:.2%}"
+    differs = "; ".join(recording_differences(result, worst.name))
+    return f"in the check recording '{worst.name}' the error{what} {said}; {differs}"
 
 
 def caution(result: Diagnosis) -> str:
     """Return a warning about the use of the amended sensor; empty if there is none."""
-    failure = check_failure(result)
-    if failure:
+    if failure := check_failure(result):
         return f"The amended sensor fails on the check recordings: {failure}."
     with_rivals = {group[0] for group in result.ambiguous}
     if result.findings and all(one.name in with_rivals for one in result.findings):
         said = "The amended sensor has one of several effects that these recordings do not distinguish"
         return f"{said}: under other loads it may be wrong."
-    if result.verdict == "unexplained" and result.findings:
-        return "The amended sensor explains only a part of the gap."
-    return ""
+    is_part = result.verdict == "unexplained" and result.findings
+    return "The amended sensor explains only a part of the gap." if is_part else ""
 
 
 def _unexplained(result: Diagnosis, errors: GapErrors, sure: list[Finding]) -> str:
@@ -245,8 +212,7 @@ def _unexplained(result: Diagnosis, errors: GapErrors, sure: list[Finding]) -> s
         fitted = _listed([one.name for one in by_share_closed(result)])
         many = len(result.findings) > 1
         return f"Unexplained: {fitted} {'fit' if many else 'fits'} the fitted recordings, but {failure}.{part}"
-    is_quiet = result.structure.total < LEAST_STRUCTURE and result.line is None
-    apart = result.check.worst
+    apart, is_quiet = result.check.worst, result.structure.total < LEAST_STRUCTURE and result.line is None
     if apart is not None and not result.findings and result.between is None and is_quiet:
         left, other = errors.base["fit"] or 0.0, errors.base["check"] or 0.0
         return (
@@ -262,21 +228,11 @@ def _unexplained(result: Diagnosis, errors: GapErrors, sure: list[Finding]) -> s
         said = f"the residual ({after:.2%} of the range) does not correlate with any measured quantity"
     else:
         said = f"the residual ({after:.2%} of the range) varies most with {FEATURES[structure.strongest]}"
-    return f"Unexplained: {said}.{part}{_friction(result, errors)}"
-
-
-def _friction(result: Diagnosis, errors: GapErrors) -> str:
-    """A sentence on how much of the error the base model's own friction removes; empty if that is little, or if an effect on
-    friction was found.
-
-    It does not say that no friction is missing: an open gap of the net forces may be friction of another law.
-    """
     frictionless = (errors.frictionless or {}).get("fit") or 0.0
-    if any(one.name in friction_kinds() for one in result.findings):
-        return ""
-    if frictionless < FRICTION_MATTERS * (errors.base["fit"] or 0.0):
-        return ""
-    return f" The base model has friction; without it the error would be {frictionless:.2%}."
+    if not _has_friction(result) and frictionless >= FRICTION_MATTERS * (errors.base["fit"] or 0.0):
+        # It does not say that no friction is missing: an open gap of the net forces may be friction of another law.
+        part += f" The base model has friction; without it the error would be {frictionless:.2%}."
+    return f"Unexplained: {said}.{part}"
 
 
 def said_confidence(confidence: float) -> str:
@@ -290,7 +246,7 @@ def evidence(result: Diagnosis, errors: GapErrors) -> list[str]:
     said = []
     for one in by_share_closed(result):
         rivals = f"; it could also be {' or '.join(one.rivals)}" if one.rivals else ""
-        before, after = left[one.effect], left[min(one.effect + 1, len(left) - 1)]
+        before, after = left[one.effect], left[one.effect + 1]
         confidence = said_confidence(one.confidence)
         said.append(f"{one.name} ({one.form}): {before:.2%} → {after:.2%}, confidence {confidence}{rivals}")
         so = "so its number is in doubt and its name is not" if one.confidence >= SURE else "so its name is in doubt"
@@ -300,9 +256,8 @@ def evidence(result: Diagnosis, errors: GapErrors) -> list[str]:
         said.append(f"check recordings, never fitted: {before:.2%} → {after:.2%}; noise alone is {errors.noise_floor:.2%}")
     least = [share for share in map(result.closed.least, (READINGS, FORCES)) if share is not None]
     if least and result.findings:
-        said.append(
-            f"{max(min(least), 0.0):.0%} of the squared gap is closed (the least of fitted, left-out and check recordings)"
-        )
+        closed = f"{max(min(least), 0.0):.0%} of the squared gap is closed"
+        said.append(f"{closed} (the least of fitted, left-out and check recordings)")
     return said
 
 

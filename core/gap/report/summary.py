@@ -20,7 +20,7 @@ from ..planning.experiment_plan import PlannedExperiment, plan_after
 from ..selection.check_recordings import CheckedRecording
 from ..selection.findings import Diagnosis, Finding
 from .amended_sensor import amended_sensor, with_mean_gain_moved
-from .comparison import USES, GapErrors, closed_share, error_location, recording_differences, recording_errors
+from .comparison import USES, GapErrors, check_errors, closed_share, error_location, recording_differences, recording_errors
 from .html_report import html_report
 from .plan_files import NEXT_TRAJECTORY, experiment_words, write_trajectory
 from .plots import FILE_TYPES, draw
@@ -34,9 +34,8 @@ def summary(
 ) -> dict[str, Any]:
     """Return the contents of gap.json, with notes among its warnings."""
     model = with_mean_gain_moved(result)
-    base_free = [item for item in result.base.free if item.effect == BASE]
-    base = [one for one in result.intervals if one.effect == BASE]
-    recordings = [one for one in result.intervals if one.effect == RECORDING]
+    base, closed = _intervals(result, BASE), _closed(result, errors)
+    without_effects = [item.name for item in result.base.free if item.effect == BASE]
     return {
         "format": FORMAT,
         "name": result.rig.name,
@@ -44,21 +43,13 @@ def summary(
         "found": [_found(one, model, result, errors) for one in result.findings],
         "between_recordings": _between(result),
         "base": {
-            "parameters": {one.name: getattr(model.parameters, one.name) for one in base},
-            "intervals": {one.name: [one.low, one.high] for one in base},
-            "without_effects": {item.name: getattr(result.base.model.parameters, item.name) for item in base_free},
+            "parameters": {name: getattr(model.parameters, name) for name in base},
+            "intervals": base,
+            "without_effects": {name: getattr(result.base.model.parameters, name) for name in without_effects},
             "gap_without_friction": errors.frictionless,
         },
-        "recordings": {
-            "numbers": dict(model.recordings),
-            "intervals": {one.name: [one.low, one.high] for one in recordings},
-        },
-        "gap": {
-            "before": errors.base,
-            "after": errors.amended,
-            "noise_floor": errors.noise_floor,
-            "closed": _closed(result, errors),
-        },
+        "recordings": {"numbers": dict(model.recordings), "intervals": _intervals(result, RECORDING)},
+        "gap": {"before": errors.base, "after": errors.amended, "noise_floor": errors.noise_floor, "closed": closed},
         "fitted": recording_errors(result, "fit"),
         "check": [_checked(one, result) for one in result.check.recordings],
         "where": error_location(result, result.base.model),
@@ -76,13 +67,16 @@ def summary(
     }
 
 
+def _intervals(result: Diagnosis, effect: int) -> dict[str, list[float]]:
+    """Ends of the intervals of an effect's parameters, or of those of the base model or the recordings, by name."""
+    return {one.name: [one.low, one.high] for one in result.intervals if one.effect == effect}
+
+
 def _between(result: Diagnosis) -> dict[str, Any] | None:
     """How the recordings differ, by levels and gains of their own; None if they need none."""
-    own = result.between
-    one = result.carried_over
-    if one is not None:
+    if (one := result.carried_over) is not None:
         return {"effect": one.name, "form": "one session in the order of the rig", "confidence": one.confidence}
-    if own is None:
+    if (own := result.between) is None:
         return None
     return {
         "effect": None,
@@ -105,7 +99,7 @@ def _closed(result: Diagnosis, errors: GapErrors) -> dict[str, Any] | None:
         shares = {use: closed_share(errors, use) for use in USES}
         known = [share for share in shares.values() if share is not None]
         return {"fit": shares["fit"], "left_out": None, "check": shares["check"], "least": min(known)} if known else None
-    only_friction = bool(result.findings) and all(one.name in friction_kinds() for one in result.findings)
+    only_friction = all(one.name in friction_kinds() for one in result.findings)
     order = (FORCES, READINGS) if only_friction else (READINGS, FORCES)
     quantity = next((q for q in order if result.closed.least(q) is not None), None)
     if quantity is None or not result.findings:
@@ -117,11 +111,8 @@ def _closed(result: Diagnosis, errors: GapErrors) -> dict[str, Any] | None:
 
 def _checked(one: CheckedRecording, result: Diagnosis) -> dict[str, Any]:
     """One entry under ``check`` in gap.json: errors of one check recording, and what differs if it speaks against the model."""
-    errors = {}
-    for quantity, name in ((READINGS, "readings"), (FORCES, "forces")):
-        if one.count[quantity]:
-            share = result.noise[quantity].deviation / result.full[quantity]
-            errors[name] = [float(x[quantity]) ** 0.5 * share for x in (one.before, one.after)]
+    names = {"readings": READINGS, "forces": FORCES}
+    errors = {name: check_errors(result, one, quantity)[:2] for name, quantity in names.items() if one.count[quantity]}
     against = one.is_worse(READINGS) or one.is_worse(FORCES)
     differs = recording_differences(result, one.name) if against and result.findings else []
     return {"trial": one.name, "errors": errors, "worse": against, "differs": differs}
@@ -130,18 +121,17 @@ def _checked(one: CheckedRecording, result: Diagnosis) -> dict[str, Any]:
 def _found(one: Finding, model: Model, result: Diagnosis, errors: GapErrors) -> dict[str, Any]:
     """One entry under ``found`` in gap.json."""
     effect = model.effects[one.effect]
-    intervals = [interval for interval in result.intervals if interval.effect == one.effect]
     return {
         "effect": one.name,
         "form": one.form,
         "parameters": {key: list(value) if isinstance(value, tuple) else value for key, value in effect.values.items()},
-        "intervals": {interval.name: [interval.low, interval.high] for interval in intervals},
+        "intervals": _intervals(result, one.effect),
         "confidence": one.confidence,
         "closes": one.closes,
         "unsettled": list(one.unsettled),
         "doubts": list(one.doubts),
         "gap_before": errors.stages[one.effect],
-        "gap_after": errors.stages[min(one.effect + 1, len(errors.stages) - 1)],
+        "gap_after": errors.stages[one.effect + 1],
         "next_best": {"effect": one.next_best, "leaves": round(one.leaves, 3)} if one.next_best else None,
     }
 

@@ -21,7 +21,7 @@ from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.planning.experiment_plan import plan_experiment
 from palpate.core.gap.planning.paths import Wishes
 from palpate.core.gap.planning.separation import STARTS, Signals
-from palpate.core.gap.report.plan_files import planned_sentence, table_rows, write_plan
+from palpate.core.gap.report.plan_files import experiment_words, planned_sentence, table_rows, write_plan
 from palpate.core.jobs import run_job
 
 NOISES = ChannelNoise(0.005, 1.0, "given"), ChannelNoise(0.05, 1.0, "given")
@@ -46,7 +46,8 @@ def test_what_a_rival_leaves_is_that_of_least_squares_over_all_samples(rig):
     forms = [one for one in candidates(fitted, model) if one.label in labels]
     signals = Signals(model, free_base_parameters(model.parameters, ["k"], 1.0), forms, fitted, NOISES)
     pairs = list(itertools.permutations([label.partition("/")[0] for label in labels], 2))
-    found = {(one.kind, one.other): one for one in signals.separations(signals.products(fitted), pairs)}
+    products = signals.products(fitted)
+    found = {pair: signals.separation(products, *pair) for pair in pairs}
     scales = scales_of(fitted, model)
 
     def changes(form):
@@ -74,8 +75,9 @@ def test_what_a_rival_leaves_is_that_of_least_squares_over_all_samples(rig):
 def test_a_plan_names_a_programme_and_writes_a_recording_that_a_rig_can_have(rig, tmp_path):
     plan = run_job(plan_experiment(rig, Wishes(between=("creep", "saturation"), duration=6.0)))
     one = plan.experiment
-    assert set(one.kinds) == {"creep", "saturation"} and one.limits.duration == 6.0
-    assert one.separation_after > 2.0 * one.separation_before
+    planned = experiment_words(one, "plan.csv")
+    assert set(planned["between"]) == {"creep", "saturation"} and one.limits.duration == 6.0
+    assert planned["separation_after"] > 2.0 * planned["separation_before"]
     rows = dict(table_rows(plan))
     assert "hysteresis" in plan.cannot_show and rows["hysteresis"] == plan.cannot_show["hysteresis"]
     path, out = cases.write(rig, tmp_path), tmp_path / "plan"
@@ -95,7 +97,8 @@ def test_what_is_known_by_unloading_is_planned_with_unloading(rig):
     plan = run_job(plan_experiment(rig, Wishes(between=("hysteresis", "stiffening"))))
     depth = cases.RADIUS - plan.experiment.trajectory.trial.position[:, 2]
     assert "hysteresis" in plan.cannot_show and (np.diff(depth) < 0.0).any()
-    assert plan.experiment.separation_after > 2.0 * plan.experiment.separation_before
+    words = experiment_words(plan.experiment, "plan.csv")
+    assert words["separation_after"] > 2.0 * words["separation_before"]
 
 
 def test_a_programme_that_separates_no_more_is_not_recommended():
