@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Iterator
-from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from ....errors import FileError, imported
 from ....io.input_files import open_regular
-from ..log_table import FEWEST_ROWS, LARGEST_FILE, LogFile, LogTable, cleaned, require_size
+from ..log_table import FEWEST_ROWS, LogFile, LogTable, cleaned, require_size
 from .damaged_file import damage_said
 
 _NUMBERS = "iufb"
@@ -31,12 +31,10 @@ def read_npz(path: Path) -> LogFile:
     """Read an NPZ file."""
     arrays: Arrays = {}
     notes, total = [], 0
-    with open_regular(path) as file, ExitStack() as stack:
-        with damage_said(path, "NPZ"):
-            archive = stack.enter_context(zipfile.ZipFile(file))
+    with open_regular(path) as file, damage_said(path, "NPZ"), zipfile.ZipFile(file) as archive:
         for info in archive.infolist():
             name = info.filename.removesuffix(".npy")
-            with damage_said(path, "NPZ"), archive.open(info) as member:
+            with archive.open(info) as member:
                 version = np.lib.format.read_magic(member)
                 read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
                 shape, is_fortran, kind = read(member)
@@ -103,45 +101,40 @@ def read_hdf5(path: Path, kind: str = "HDF5") -> LogFile:
     h5py = imported("h5py", f"'{path.name}'")
     arrays: Arrays = {}
     notes, total = [], 0
-    with open_regular(path) as plain, ExitStack() as stack:
-        with damage_said(path, kind):
-            file = stack.enter_context(h5py.File(plain, "r"))
-            found: list[tuple[str, Any]] = []
-            file.visititems(lambda name, item: found.append((name, item)) if isinstance(item, h5py.Dataset) else None)
+    with open_regular(path) as plain, damage_said(path, kind), h5py.File(plain, "r") as file:
+        found: list[tuple[str, Any]] = []
+        file.visititems(lambda name, item: found.append((name, item)) if isinstance(item, h5py.Dataset) else None)
         for name, item in found:
-            with damage_said(path, kind):
-                if name.startswith("#refs#") or item.dtype.kind not in _NUMBERS or not item.shape:
-                    continue
-                if item.external or item.is_virtual:
-                    notes.append(f"'{path.name}': '{name}' lies in another file and was left out.")
-                    continue
-                total += int(np.prod(item.shape, dtype=object))
-                require_size(total, 0, path)
-                unit = item.attrs.get("unit", item.attrs.get("units", ""))
-                arrays[name] = item[()], _text(unit)
+            if name.startswith("#refs#") or item.dtype.kind not in _NUMBERS or not item.shape:
+                continue
+            if item.external or item.is_virtual:
+                notes.append(f"'{path.name}': '{name}' lies in another file and was left out.")
+                continue
+            total += int(np.prod(item.shape, dtype=object))
+            require_size(total, 0, path)
+            unit = item.attrs.get("unit", item.attrs.get("units", ""))
+            unit = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else unit
+            arrays[name] = item[()], unit if isinstance(unit, str) else ""
     return _log(path, kind, arrays, notes)
 
 
-def _text(value: Any) -> str:
-    if isinstance(value, bytes):
-        return value.decode("utf-8", "replace")
-    return value if isinstance(value, str) else ""
-
-
 def _log(path: Path, kind: str, arrays: Arrays, notes: list[str]) -> LogFile:
-    """Return the tables of some arrays; what is too short to be recorded is left out."""
-    arrays = {name: (np.squeeze(values), unit) for name, (values, unit) in arrays.items() if np.squeeze(values).ndim}
-    lengths = [max(values.shape) for values, _ in arrays.values() if values.ndim <= 3 and max(values.shape) >= FEWEST_ROWS]
-    if not lengths:
+    """Return the tables of some arrays; what is too short to be recorded is left out.
+
+    The samples of an array lie along the axis whose length most arrays have.
+    """
+    squeezed = {name: (np.squeeze(values), unit) for name, (values, unit) in arrays.items()}
+    kept = {n: (v, unit) for n, (v, unit) in squeezed.items() if 0 < v.ndim <= 3 and max(v.shape) >= FEWEST_ROWS}
+    if not kept:
         objects = any("object of MATLAB's" in note for note in notes)
         what = ", only objects of MATLAB's: save their arrays" if objects else ": give a file with recordings in arrays"
         raise FileError(f"'{path.name}' holds no array of at least {FEWEST_ROWS} numbers{what}.")
+    lengths = [max(values.shape) for values, _ in kept.values()]
     tables: dict[tuple[str, int], LogTable] = {}
-    for name, (values, unit) in arrays.items():
+    for name, (values, unit) in kept.items():
         group, _, short = name.rpartition("/")
-        placed = _samples_first(values, lengths)
-        if placed is None:
-            continue
+        axis = max(range(values.ndim), key=lambda i: (lengths.count(values.shape[i]), values.shape[i], -i))
+        placed = np.moveaxis(values, axis, 0)
         table = tables.setdefault((group, len(placed)), LogTable(group, {}))
         flat = placed.reshape(len(placed), -1)
         names = [short] if placed.ndim == 1 else [f"{short}_{i}" for i in range(flat.shape[1])]
@@ -152,22 +145,7 @@ def _log(path: Path, kind: str, arrays: Arrays, notes: list[str]) -> LogFile:
             if unit:
                 table.units[column] = unit
         require_size(0, len(table.columns), path)
-    return LogFile(path, kind, tuple(_named_apart(list(tables.values()))), tuple(notes))
-
-
-def _samples_first(values: np.ndarray, lengths: list[int]) -> np.ndarray | None:
-    """Return an array with its samples along the first axis: the axis whose length most arrays have."""
-    if values.ndim > 3 or max(values.shape) < FEWEST_ROWS:
-        return None
-    axis = max(range(values.ndim), key=lambda i: (lengths.count(values.shape[i]), values.shape[i], -i))
-    placed: np.ndarray = np.moveaxis(values, axis, 0)
-    return placed if len(placed) >= FEWEST_ROWS and placed[0].size <= LARGEST_FILE else None
-
-
-def _named_apart(tables: list[LogTable]) -> list[LogTable]:
-    """Return tables with different names: those of one group differ in their number of samples, the longest has its name."""
-    longest = {table.name: max(other.sample_count for other in tables if other.name == table.name) for table in tables}
-    return [
-        t if t.sample_count == longest[t.name] else LogTable(f"{t.name}[{t.sample_count}]", t.columns, t.units, t.grids)
-        for t in tables
-    ]
+    for (group, count), table in tables.items():  # of one group the longest table has its name
+        if count < max(other for name, other in tables if name == group):
+            tables[group, count] = replace(table, name=f"{group}[{count}]")
+    return LogFile(path, kind, tuple(tables.values()), tuple(notes))

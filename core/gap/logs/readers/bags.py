@@ -11,7 +11,7 @@ from typing import Any
 
 from ....errors import FileError, imported
 from ....io.input_files import open_regular, require_regular
-from ..log_table import LARGEST_FILE, LogFile, LogTable
+from ..log_table import LARGEST_FILE, LogFile
 from .damaged_file import damage_said, read_by
 from .message_columns import TopicColumns, is_picture
 
@@ -32,41 +32,29 @@ def read_mcap(path: Path) -> LogFile:
     try:
         with open_regular(path) as file:
             for topic, kind, time, content, decode in _messages(file, path, known):
-                if decode is None or is_picture(kind):
+                if decode is None:
                     left_out.setdefault(topic, kind)
                     continue
                 with damage_said(path, "MCAP"):
                     message = decode(content)
                 topics.setdefault(topic, TopicColumns(topic, path)).add(message, time)
     except exceptions.EndOfFile as error:
-        raise FileError(f"'{path.name}' is cut off{_until(topics)}: copy it again, or mend it with `mcap recover`.") from error
+        rows = sum(table.sample_count for table, _ in (topic.table() for topic in topics.values()) if table is not None)
+        until = f" after {rows} messages" if rows else ""
+        raise FileError(f"'{path.name}' is cut off{until}: copy it again, or mend it with `mcap recover`.") from error
     except stream_reader.CRCValidationError as error:
         raise FileError(f"'{path.name}' is damaged (a checksum is wrong): copy it again.") from error
-    return log_of(path, "MCAP", topics, left_out)
+    return _log(path, "MCAP", topics, left_out)
 
 
-def _until(topics: dict[str, TopicColumns]) -> str:
-    rows = [table.sample_count for table, _ in (topic.table() for topic in topics.values()) if table is not None]
-    return f" after {sum(rows)} messages" if rows else ""
-
-
-def log_of(path: Path, kind: str, topics: dict[str, TopicColumns], left_out: dict[str, str]) -> LogFile:
-    """Return the log of some topics.
-
-    Raises
-    ------
-    FileError
-        No topic has enough messages with numbers.
-    """
-    tables: list[LogTable] = []
-    notes = [f"'{path.name}': {topic} ({kind or 'no type'}) is not read." for topic, kind in left_out.items()]
-    for topic in topics.values():
-        table, said = topic.table()
-        tables += [] if table is None else [table]
-        notes += [said] if said else []
+def _log(path: Path, kind: str, topics: dict[str, TopicColumns], left_out: dict[str, str]) -> LogFile:
+    """Return the log of some topics; raise FileError if none has enough messages with numbers."""
+    made = [topic.table() for topic in topics.values()]
+    tables = tuple(table for table, _ in made if table is not None)
     if not tables:
         raise FileError(f"'{path.name}' has no topic with numbers in eight messages or more: give a log of measurements.")
-    return LogFile(path, kind, tuple(tables), tuple(notes))
+    notes = [f"'{path.name}': {topic} ({kind or 'no type'}) is not read." for topic, kind in left_out.items()]
+    return LogFile(path, kind, tables, (*notes, *(said for _, said in made if said)))
 
 
 def _messages(
@@ -88,9 +76,9 @@ def _messages(
             if channel is None:
                 raise FileError(f"'{path.name}' is damaged (a message of channel {record.channel_id}, unknown): copy it again.")
             schema = schemas.get(channel.schema_id)
-            if channel.id not in decoders:
-                decoders[channel.id] = _decoder_of(channel, schema, path)
             kind = schema.name if schema else channel.message_encoding
+            if channel.id not in decoders:
+                decoders[channel.id] = None if is_picture(kind) else _decoder_of(channel, schema, path)
             yield channel.topic, kind, record.log_time, record.data, decoders[channel.id]
 
 
@@ -113,7 +101,7 @@ def _decoder_of(channel: Any, schema: Any, path: Path) -> Decoder | None:
     """Return the decoder of a channel's messages; None if they are not read."""
     if channel.message_encoding == "json":
         return json.loads
-    if schema is None or schema.encoding not in ("ros2msg", "ros1msg") or is_picture(schema.name):
+    if schema is None or schema.encoding not in ("ros2msg", "ros1msg"):
         return None
     typesys = imported("rosbags.typesys", f"'{path.name}'", INSTALL)
     store, name = typesys.get_typestore(typesys.Stores.EMPTY), schema.name
@@ -150,15 +138,14 @@ def _read_with_rosbags(path: Path) -> LogFile:
     highlevel, typesys = (imported(f"rosbags.{one}", f"'{path.name}'", INSTALL) for one in ("highlevel", "typesys"))
     topics: dict[str, TopicColumns] = {}
     left_out: dict[str, str] = {}
+    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
     with ExitStack() as stack:
         with damage_said(path, "a bag"):
-            reader = stack.enter_context(
-                highlevel.AnyReader([path], default_typestore=typesys.get_typestore(typesys.Stores.ROS2_HUMBLE))
-            )
+            reader = stack.enter_context(highlevel.AnyReader([path], default_typestore=store))
         known = [one for one in reader.connections if not is_picture(one.msgtype) and one.msgtype in reader.typestore.fielddefs]
         left_out |= {one.topic: one.msgtype for one in reader.connections if one not in known}
         for connection, time, content in read_by(reader.messages(connections=known), path, "a bag") if known else ():
             with damage_said(path, "a bag"):
                 message = reader.deserialize(content, connection.msgtype)
             topics.setdefault(connection.topic, TopicColumns(connection.topic, path)).add(message, time)
-    return log_of(path, "ROS 1 bag" if path.suffix == ".bag" else "ROS 2 bag", topics, left_out)
+    return _log(path, "ROS 1 bag" if path.suffix == ".bag" else "ROS 2 bag", topics, left_out)
