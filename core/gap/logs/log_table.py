@@ -79,6 +79,11 @@ class LogFile:
     label: str = ""
 
     @property
+    def columns(self) -> dict[str, np.ndarray]:
+        """Values of all columns, by the names that no other table of the file has."""
+        return {table.full_name(name): values for table in self.tables for name, values in table.columns.items()}
+
+    @property
     def name(self) -> str:
         """Name by which answers know the file."""
         return self.label or self.path.name
