@@ -35,14 +35,8 @@ the correlation cannot tell whose files they are."""
 class ClockShift:
     """The shift of two clocks.
 
-    Attributes
-    ----------
-    late : float, s
-        The second clock's time of an event minus the first one's.
-    correlation : float
-        Of the changes with this shift.
-    rival : float
-        Largest correlation at any other shift, as a share of it.
+    `late` is the second clock's time of an event minus the first one's, in seconds; `correlation` that of the changes with this
+    shift, and `rival` the largest one at any other shift, as a share of it.
     """
 
     late: float
@@ -66,17 +60,12 @@ class ClockShift:
 
 
 def clock_shift(first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.ndarray]) -> ClockShift | None:
-    """Return how late the second clock is.
+    """Return how late the second clock is; None if one of the recordings does not change.
 
     Parameters
     ----------
     first, second : (times (T,) s, values (T,))
         What drove the sensor, and what answered, each by its own clock.
-
-    Returns
-    -------
-    ClockShift or None
-        None if one of them does not change.
     """
     spans = [float(np.ptp(times)) for times, _ in (first, second)]
     steps = [float(np.median(np.diff(times))) for times, _ in (first, second)]
@@ -107,12 +96,13 @@ def _shift_of(cause: np.ndarray, answer: np.ndarray, step: float, offset: float)
     top = int(size.argmax())
     if size[top] <= 0.0:
         return None
-    width = _lobe(size, top)
+    # the peak ends twice as far away as it first falls below half of its height
+    below = np.flatnonzero(size < 0.5 * size[top])
+    width = 2 * max(3, int(np.abs(below - top).min(initial=len(size))))
     elsewhere = size.copy()
     elsewhere[max(0, top - width) : top + width + 1] = 0.0
     lag = lags[top] + peak_offset(size, top)
-    rival = float(elsewhere.max()) / float(size[top])
-    return ClockShift(offset + lag * step, float(size[top]), rival)
+    return ClockShift(offset + lag * step, float(size[top]), float(elsewhere.max()) / float(size[top]))
 
 
 def _on_grid(times: np.ndarray, values: np.ndarray, step: float) -> np.ndarray:
@@ -129,8 +119,7 @@ def _changes(values: np.ndarray, width: int) -> np.ndarray:
     half = max(1, width // 2)
     means = (total[half:] - total[:-half]) / half
     change = means[half:] - means[:-half]
-    found: np.ndarray = change - change.mean()
-    return found
+    return change - change.mean()
 
 
 def _correlation(cause: np.ndarray, answer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -146,10 +135,3 @@ def _correlation(cause: np.ndarray, answer: np.ndarray) -> tuple[np.ndarray, np.
     with np.errstate(divide="ignore", invalid="ignore"):
         found = np.where(enough, product / np.sqrt(shared_cause * shared_answer), 0.0)
     return lags, np.nan_to_num(found)
-
-
-def _lobe(size: np.ndarray, top: int) -> int:
-    """Return half the width of the peak, in samples: to where it falls below half of its height, and twice as far."""
-    right = np.flatnonzero(size[top:] < 0.5 * size[top])
-    left = np.flatnonzero(size[top::-1] < 0.5 * size[top])
-    return 2 * max(3, int(min(right[0] if len(right) else len(size), left[0] if len(left) else len(size))))

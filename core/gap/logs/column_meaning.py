@@ -15,27 +15,29 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..dataset.column_names import LOG_UNITS, PRESSURES, QUANTITIES
+from .column_behaviour import finite
 
-KNOWN_UNITS = {unit for units in LOG_UNITS.values() for unit in units} | set(PRESSURES)
-KNOWN_UNITS |= set(
-    ["counts", "count", "V", "mV", "ohm", "kohm", "Ohm", "kOhm", "Ω", "kΩ", "F", "pF", "raw", "LSB", "ADC", "deg", "rad", "%"]
-)
+KNOWN_UNITS = {unit for units in (*LOG_UNITS.values(), PRESSURES) for unit in units}
+KNOWN_UNITS |= {"counts", "count", "raw", "LSB", "ADC", "V", "mV", "ohm", "kohm", "Ohm", "kOhm", "Ω", "kΩ", "F", "pF"}
+KNOWN_UNITS |= {"deg", "rad", "%"}
 TEXEL_WORDS = {
     *("texel", "taxel", "tactel", "cell", "sensor", "tactile", "tac", "tactip", "ch", "channel", "hall"),
     *("pressure", "resistance", "capacitance", "voltage", "adc", "raw", "signal", "reading", "readings", "value", "values"),
     *("r", "c", "s", "p", "v"),
 }
 """Words in the names of columns that hold the sensor's response."""
+_MOTIONS = {"acceleration", "accel", "acc", "jerk", "gyro", "angular", "twist", "twists"}
 _AXIS_WORDS = {
-    "position": [
-        *("position", "pos", "pose", "translation", "motion", "p"),
-        *("tcp", "tip", "probe", "indenter", "tool", "ee", "robot"),
-    ],
-    "force": ["force", "f", "wrench", "load", "ft"],
-    "torque": ["torque", "moment", "t", "m", "tau"],
-    "rotation": ["orientation", "rotation", "quaternion", "quat", "q", "rot"],
-    "velocity": ["velocity", "vel", "v", "speed", "acceleration", "accel", "acc", "jerk", "gyro", "angular", "twist", "twists"],
+    "velocity": {"velocity", "vel", "v", "speed"} | _MOTIONS,
+    "rotation": {"orientation", "rotation", "quaternion", "quat", "q", "rot"},
+    "force": {"force", "f", "wrench", "load", "ft"},
+    "torque": {"torque", "moment", "t", "m", "tau"},
+    "position": {"position", "pos", "pose", "translation", "motion", "p"}
+    | {"tcp", "tip", "probe", "indenter", "tool", "ee", "robot"},
 }
+"""Words beside the letter of an axis; the first kind of which a name has a word counts."""
+_JOINED = {"f": "force", "force": "force", "p": "position", "pos": "position", "position": "position", "q": "rotation"}
+"""What is written together with the letter of an axis."""
 _TIME_WORDS = {"time", "t", "timestamp", "stamp", "sec", "secs", "seconds", "elapsed", "clock", "tim", "tim2", "zeit"}
 _SINGLE = {
     "force": {"force", "load", "weight", "mass", "normal_force", "fn", "loadcell", "scale", "futek"},
@@ -61,16 +63,8 @@ _RATE = re.compile(r"/\s*(ms|s|sec|min|h)$")
 
 @dataclass(frozen=True)
 class Meaning:
-    """Meaning of a name.
-
-    Attributes
-    ----------
-    quantity : str
-        One of :data:`..dataset.column_names.QUANTITIES`, or empty.
-    unit : str
-        Empty if the name has none.
-    weight : int
-        How sure the name is: 3 for a full word, 2 for a letter with an axis, 1 for a single letter.
+    """Meaning of a name: one of :data:`..dataset.column_names.QUANTITIES` or empty, the unit that the name has or empty, and
+    how sure it is: 3 for a full word, 2 for a letter with an axis, 1 for a single letter.
     """
 
     quantity: str
@@ -84,11 +78,9 @@ def name_and_unit(column: str) -> tuple[str, str]:
     if found:
         return found["name"], found["unit"]
     stem, mark, last = re.match(r"^(.*?)([_ .]?)([^_ .]*)$", column).groups()  # type: ignore[union-attr]
-    if mark and stem and last in KNOWN_UNITS - {"m", "s", "g", "V", "F", "N", "in", "C", "K"}:
-        return stem, last
-    if mark == "_" and stem and last in {"m", "s", "g", "N", "V"} and len(stem) > 1:
-        return stem, last
-    return column, ""
+    is_unit = last in KNOWN_UNITS - {"m", "s", "g", "V", "F", "N", "in", "C", "K"}
+    is_letter = mark == "_" and len(stem) > 1 and last in {"m", "s", "g", "N", "V"}
+    return (stem, last) if mark and stem and (is_unit or is_letter) else (column, "")
 
 
 def meaning_of(column: str) -> Meaning:
@@ -96,25 +88,18 @@ def meaning_of(column: str) -> Meaning:
     plain, unit = name_and_unit(column)
     if plain.lower() in QUANTITIES and plain.lower() != "texel":
         return Meaning(plain.lower(), unit, 3)
-    words = [word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", plain)]
+    words = _words(plain)
     if not words:
         return Meaning("")
-    has = {kind: bool(set(words) & set(names)) for kind, names in _AXIS_WORDS.items()}
+    kind = next((kind for kind, names in _AXIS_WORDS.items() if names & set(words)), "")
     last = words[-1]
-    joined = re.fullmatch(r"(f|force|p|pos|position|q|t|m|v|a|slide)([xyzw])", last)
-    if joined and len(words[-1]) > 1:
-        kind = {"f": "force", "force": "force", "p": "position", "pos": "position", "position": "position", "q": "rotation"}
-        if joined[1] == "slide":
-            return Meaning(f"slide_{joined[2]}", unit, 3) if joined[2] in "xy" else Meaning("")
-        return _of_axis(kind.get(joined[1], ""), joined[2], unit, 2)
+    if joined := re.fullmatch(r"(f|force|p|pos|position|q|t|m|v|a|slide)([xyzw])", last):
+        is_slide = joined[1] == "slide"
+        return _of_axis("slide" if is_slide else _JOINED.get(joined[1], ""), joined[2], unit, 3 if is_slide else 2)
     if last in ("x", "y", "z", "w"):
-        if has["velocity"] or "torque" in words:
-            return Meaning("")
-        kind_of = next((kind for kind in ("rotation", "force", "torque", "position") if has[kind]), "")
-        if kind_of == "" and len(words) == 1:
-            return Meaning(last, unit, 1) if last in "xyz" else Meaning("")
-        return _of_axis(kind_of, last, unit, 3 if kind_of else 0)
-    if set(words) & _TIME_WORDS and not has["velocity"]:
+        is_alone = not kind and len(words) == 1
+        return _of_axis("position" if is_alone else "" if "torque" in words else kind, last, unit, 1 if is_alone else 3)
+    if set(words) & _TIME_WORDS and kind != "velocity":
         return Meaning("time", unit, 3 if words[0] in _TIME_WORDS else 2)
     if unit in PRESSURES and {"pressure", "stress"} & set(words) and not any(word.isdigit() for word in words):
         return Meaning("force", unit, 2)
@@ -129,28 +114,22 @@ def is_rate(unit: str) -> bool:
     return _RATE.search(unit) is not None
 
 
+def _words(text: str) -> list[str]:
+    return [word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", text)]
+
+
 def _of_axis(kind: str, axis: str, unit: str, weight: int) -> Meaning:
-    if kind == "force" and axis in "xyz":
-        return Meaning(f"force_{axis}", unit, weight)
-    if kind == "position" and axis in "xyz":
-        return Meaning(axis, unit, weight)
-    if kind == "rotation":
-        return Meaning(f"q{axis}", unit, weight)
-    return Meaning("")
+    before = {"force": "force_", "position": "", "rotation": "q", "slide": "slide_"}
+    quantity = before[kind] + axis if kind in before else ""
+    return Meaning(quantity, unit, weight) if quantity in QUANTITIES else Meaning("")
 
 
 @dataclass(frozen=True)
 class Family:
-    """Columns that differ by their numbers alone.
+    """Columns that differ by their numbers alone, in the order of these.
 
-    Attributes
-    ----------
-    columns : tuple of str
-        In the order of their numbers.
-    is_named : bool
-        True if the name is a word for readings.
-    follows : float
-        Median correlation of the columns with what pressed; 0 if nothing is known to press.
+    `is_named` if the name is a word for readings; `follows` is the median correlation of the columns with what pressed, 0 if
+    nothing is known to press.
     """
 
     columns: tuple[str, ...]
@@ -161,11 +140,7 @@ class Family:
 def families(columns: Sequence[str], follows: Callable[[str], float]) -> list[Family]:
     """Return the columns that may be texels, the likeliest first: what follows the load, then what is named so, then the most.
 
-    Parameters
-    ----------
-    columns : sequence of str
-    follows : callable
-        Correlation of a column with what pressed, 0 to 1.
+    `follows` gives the correlation of a column with what pressed, 0 to 1.
     """
     groups: dict[str, list[tuple[tuple[int, ...], str]]] = {}
     for column in columns:
@@ -179,11 +154,9 @@ def families(columns: Sequence[str], follows: Callable[[str], float]) -> list[Fa
         is_whole = all(one[-1] - one[0] == len(one) - 1 for one in ranges)
         if not is_whole or len({numbers for numbers, _ in members}) != len(members) != math.prod(map(len, ranges)):
             continue
-        if len(members) == 1:
-            continue
-        words = {word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", key)}
-        is_named = bool(words & TEXEL_WORDS) and not words & set(_AXIS_WORDS["velocity"][4:])
-        if is_named or len(members) > 2:
+        words = set(_words(key))
+        is_named = bool(words & TEXEL_WORDS) and not words & _MOTIONS
+        if len(members) > (1 if is_named else 2):
             own = tuple(column for _, column in sorted(members))
             found.append(Family(own, is_named, float(np.median([follows(one) for one in own]))))
     if not found:
@@ -198,7 +171,7 @@ def time_unit(values: np.ndarray, stated: str) -> tuple[str, str, bool]:
     """Return the unit of time stamps, why, and whether it only seems so."""
     if stated in LOG_UNITS["s"]:
         return stated, "the file says so", False
-    known = values[np.isfinite(values)]
+    known = finite(values)
     steps = np.diff(known)
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
     size = float(np.abs(known).max()) if len(known) else 0.0
@@ -207,27 +180,19 @@ def time_unit(values: np.ndarray, stated: str) -> tuple[str, str, bool]:
             return unit, "such numbers count from 1970", False
     if 0.0 < step <= 0.5:
         return "s", f"samples are {step:.3g} s apart", False
-    if step <= 500.0:
-        return "ms", f"samples are {step:.4g} apart", True
-    return "us", f"samples are {step:.4g} apart", True
+    return "ms" if step <= 500.0 else "us", f"samples are {step:.4g} apart", True
 
 
 def is_since_1970(values: np.ndarray, unit: str) -> bool:
     """Return True if all time stamps in a unit are so large that they must count from 1970."""
-    known = values[np.isfinite(values)]
+    known = finite(values)
     return len(known) > 0 and float(known.min()) * LOG_UNITS["s"][unit] > SINCE_1970
 
 
 def unit_of(kind: str, stated: str, size: float) -> tuple[str, str, bool]:
     """Return the unit of a length (``m``), a force (``N``) or a temperature (``°C``), why, and whether it only seems so.
 
-    Parameters
-    ----------
-    kind : str
-    stated : str
-        By the file; empty if it states none.
-    size : float
-        How far the values span, or what a temperature is.
+    `stated` is that of the file, empty if it states none; `size` is how far the values span, or what a temperature is.
     """
     if stated in LOG_UNITS[kind] or kind == "N" and stated in PRESSURES:
         return stated, "the file says so", False

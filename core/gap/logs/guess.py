@@ -19,23 +19,12 @@ UNKNOWN = "?"
 
 @dataclass(frozen=True)
 class Guess:
-    """One line of the answers.
+    """One line of the answers: a word of a table, its value and the reason.
 
-    Attributes
-    ----------
-    table : str
-        Of the file of answers: empty, ``sensor``, ``indenter``, ``logger``, ``logger.columns`` or ``recording``.
-    word : str
-        In that table.
-    value : object
-        As TOML writes it; what is not known in it is :data:`UNKNOWN`.
-    reason : str
-    is_thin : bool
-        True if it only seems so, and a person has to confirm it; else the file states it, or its numbers show it.
-    number : int
-        Of the ``[[logger]]`` or ``[[recording]]``, from zero on.
-    of : str
-        The file that it is about, if it is about one.
+    `table` is empty, ``sensor``, ``indenter``, ``logger``, ``logger.columns`` or ``recording``; of ``[[logger]]`` and
+    ``[[recording]]`` it is that of this `number`, from zero on. What is not known in the value is :data:`UNKNOWN`. `is_thin` if
+    it only seems so, and a person has to confirm it; else the file states it, or its numbers show it. `of` is the file that it
+    is about, if it is about one.
     """
 
     table: str
@@ -104,10 +93,8 @@ class Proposal:
     @property
     def text(self) -> str:
         """The file of answers."""
-        lines = [
-            f'format = "{FORMAT}"',
-            '# What the logs seem to be. Replace each "?", check what is marked CHECK, and give the file with --answers.',
-        ]
+        what = '# What the logs seem to be. Replace each "?", check what is marked CHECK, and give the file with --answers.'
+        lines = [f'format = "{FORMAT}"', what]
         place = None
         for guess in self.guesses:
             if place != (guess.table, guess.number):
@@ -138,9 +125,9 @@ class Proposal:
 
 def has_unknown(value: Any) -> bool:
     """Return True if a value is, or holds, :data:`UNKNOWN`."""
-    if isinstance(value, Mapping):
-        return any(has_unknown(one) for one in value.values())
-    return any(has_unknown(one) for one in value) if isinstance(value, list | tuple) else value == UNKNOWN
+    if isinstance(value, Mapping | list | tuple):
+        return any(map(has_unknown, value.values() if isinstance(value, Mapping) else value))
+    return value == UNKNOWN
 
 
 def toml_value(value: Any) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...figures.figure_canvas import new_figure
 from ...io.file_writing import atomic_write
 from ..dataset.rig import Rig
 from .log_table import LogFile
@@ -45,24 +46,17 @@ def _ends(least: float, largest: float) -> tuple[str, str]:
 
 
 def plot_rig(rig: Rig, path: str | Path) -> None:
-    """Write a picture of the recordings of a rig: what drove the sensor, and what answered, over time.
-
-    Parameters
-    ----------
-    rig : Rig
-    path : path of the PNG file
+    """Write a picture of the recordings of a rig as PNG: what drove the sensor, and what answered, over time.
 
     Raises
     ------
     FileError
         The file cannot be written.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     trials = rig.trials[:MOST_TRIALS]
-    figure = Figure(figsize=(10.0, 2.4 * len(trials)), layout="constrained")
-    axes = np.atleast_2d(figure.subplots(len(trials), 2, squeeze=False))
+    figure = new_figure(10.0, 2.4 * len(trials))
+    figure.set_layout_engine("constrained")
+    axes = figure.subplots(len(trials), 2, squeeze=False)
     for row, trial in zip(axes, trials, strict=True):
         driven: dict[str, np.ndarray] = {}
         answered: dict[str, np.ndarray] = {}
@@ -80,7 +74,6 @@ def plot_rig(rig: Rig, path: str | Path) -> None:
         row[0].set_ylabel(f"{trial.name} ({trial.use})")
     for axis in axes[-1]:
         axis.set_xlabel("time (s)")
-    FigureCanvasAgg(figure)
     with atomic_write(path) as temporary:
         figure.savefig(temporary, format="png", dpi=100, metadata={"Software": "Palpate"})
 

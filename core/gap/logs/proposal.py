@@ -58,14 +58,7 @@ CHECK_EVERY = 3
 
 
 def propose(logs: Sequence[LogFile], name: str = "rig") -> Proposal:
-    """Return the proposal for some logs.
-
-    Parameters
-    ----------
-    logs : sequence of LogFile
-        The files of one measurement; several become trials.
-    name : str
-        Of the rig.
+    """Return the proposal for the files of one measurement, of which several become trials, and the name of a rig.
 
     Raises
     ------
@@ -508,27 +501,27 @@ def _say_what_lacks(loggers: Sequence[_Logger]) -> None:
 
 def _sensor(loggers: Sequence[_Logger]) -> list[Guess]:
     """Return the guesses about [sensor] and [indenter]."""
-    texels = next((one.found["texel"] for one in loggers if "texel" in one.found), None)
-    is_pose = any(set(POSE) <= set(one.found) for one in loggers)
+    found = [one.found for one in loggers]
+    texels = next((own["texel"] for own in found if "texel" in own), None)
+    is_pose = any(set(POSE) <= set(own) for own in found)
     count = len(texels.columns) if texels else 1
     shapes = [shape for one in loggers for table in one.tables for shape in table.grids.values()]
-    rows, columns = next((shape for shape in shapes if shape[0] * shape[1] == count), (0, 0))
-    grid: dict[str, Any] = {"rows": rows, "columns": columns}
-    reason = f"the array has {rows} rows and {columns} columns"
-    if not rows:
-        is_one = count == 1
-        grid = dict.fromkeys(("rows", "columns"), 1 if is_one else UNKNOWN)
-        reason = "one texel" if is_one else f"{count} texels; their rows and columns"
+    shape = next((shape for shape in shapes if shape[0] * shape[1] == count), None)
+    if shape is None:
+        rows, columns = (1, 1) if count == 1 else (UNKNOWN, UNKNOWN)
+        reason = "one texel" if count == 1 else f"{count} texels; their rows and columns"
+    else:
+        rows, columns = shape
+        reason = f"the array has {rows} rows and {columns} columns"
     is_free = not is_pose and count == 1
-    grid["pitch"] = [ONE_TEXEL_PITCH if is_free else UNKNOWN] * 2
+    grid = {"rows": rows, "columns": columns, "pitch": [ONE_TEXEL_PITCH if is_free else UNKNOWN] * 2}
     reason += "; its size has no influence here" if is_free else ", and the pitch along x and y in metres"
     guesses = [Guess("sensor", "grid", grid, reason)]
     if texels is not None:
         unit = texels.value.get("unit", "")
         why = "of the readings" if unit else "no unit is stated; any name will do"
         guesses.append(Guess("sensor", "unit", "N" if unit in READING_UNITS else unit or "counts", why))
-    is_from_start = any("depth" in own and "zero" in own["depth"].value for own in (one.found for one in loggers))
-    if is_from_start or any("x" in one.found and one.found["x"].value == 0.0 for one in loggers):
+    if any("depth" in own and "zero" in own["depth"].value or "x" in own and own["x"].value == 0.0 for own in found):
         why = "where contact begins is fitted, because the motion only tells where it began"
         guesses.append(Guess("sensor", "contact_height", "free", why))
     if is_pose:

@@ -21,21 +21,15 @@ SMALL_FILE = 2**26
 
 @contextmanager
 def damage_said(path: Path, kind: str, *passing: type[Exception]) -> Iterator[None]:
-    """Turn what a library raises on a damaged file into one sentence.
+    """Turn what a library raises on a damaged file into one sentence, which names the kind that it should be, as "MCAP".
 
-    Parameters
-    ----------
-    path : Path
-    kind : str
-        What the file should be, as in "MCAP".
-    *passing
-        Errors that the caller knows how to explain.
+    Errors that the caller knows how to explain are `passing`. What the system says of files keeps its own sentence, and so does
+    too little memory for a large file.
 
     Raises
     ------
     FileError
-        The library raised an error. What the system says of files keeps its own sentence, and so does too little memory for a
-        large file.
+        The library raised another error.
     """
     try:
         yield
