@@ -3,9 +3,6 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
-
 import numpy as np
 
 ZERO, RESTS, BELOW = 0.02, 0.05, 0.05
@@ -29,11 +26,6 @@ APART = 1.0
 def finite(values: np.ndarray) -> np.ndarray:
     """Return the values that are known."""
     return values[np.isfinite(values)]
-
-
-def is_unnamed(names: Sequence[str]) -> bool:
-    """Return True if the columns of a table have no names but numbers."""
-    return all(re.fullmatch(r"column_\d+", name) for name in names)
 
 
 def is_clock(values: np.ndarray, strictly: bool = False) -> bool:

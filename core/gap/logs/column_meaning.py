@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -107,6 +107,14 @@ def meaning_of(column: str) -> Meaning:
         if set(words) & known or "_".join(words) in known:
             return Meaning(quantity, unit, 2)
     return Meaning("", unit)
+
+
+def meaning_in(table: str, column: str, stated: str) -> Meaning:
+    """Return the meaning of a column, whose topic or group may say more than its name, in the unit that the file states."""
+    found = meaning_of(column)
+    longer = meaning_of(f"{table.rpartition('/')[2]} {column}") if table and found.weight <= 1 else found
+    best = max(found, longer, key=lambda one: one.weight)
+    return replace(best, unit=stated or best.unit)
 
 
 def is_rate(unit: str) -> bool:

@@ -220,9 +220,7 @@ def _on_one_clock(parts: list[dict[str, np.ndarray]], log: LogFile, notes: list[
     if len(texels) > 1:
         raise FileError(f"The texels of '{log.name}' are in {len(texels)} tables: give those of one table.")
     base = texels[0] if texels else min(parts, key=lambda part: len(part["time"]))
-    begin = max(part["time"][0] for part in parts)
-    end = min(part["time"][-1] for part in parts)
-    inside = (base["time"] >= begin) & (base["time"] <= end)
+    inside = np.all([(base["time"] >= part["time"][0]) & (base["time"] <= part["time"][-1]) for part in parts], axis=0)
     if inside.sum() < 8:
         raise FileError(f"The topics of '{log.name}' have less than eight samples at the same time: record them together.")
     found = {name: column[inside] for name, column in base.items()}

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,28 +12,8 @@ import numpy as np
 
 from ...errors import FileError
 from ..dataset.column_names import FORCE, POSE, PRESSURES, QUANTITIES, READING_UNITS, SLIDE, TURN
-from .column_behaviour import (
-    LEAST_CONTACT,
-    contact_of,
-    correlation,
-    finite,
-    is_clock,
-    is_force,
-    is_unnamed,
-    is_unordered,
-    missing_code,
-)
-from .column_meaning import (
-    Family,
-    Meaning,
-    families,
-    is_rate,
-    is_since_1970,
-    meaning_of,
-    name_and_unit,
-    time_unit,
-    unit_of,
-)
+from .column_behaviour import LEAST_CONTACT, contact_of, correlation, finite, is_clock, is_force, is_unordered, missing_code
+from .column_meaning import Family, families, is_rate, is_since_1970, meaning_in, meaning_of, name_and_unit, time_unit, unit_of
 from .guess import UNKNOWN, Guess, Proposal
 from .log_table import FEWEST_ROWS, FRAMES, LogFile, LogTable, with_distinct_names
 
@@ -97,7 +77,7 @@ def _groups(logs: Sequence[LogFile]) -> list[list[LogFile]]:
         own = set(log.columns)
         for group in found:
             other = set(group[0].columns)
-            least = 1.0 if is_unnamed([*own, *other]) else SAME_COLUMNS  # numbers of columns are no names that two files share
+            least = 1.0 if _is_unnamed(own | other) else SAME_COLUMNS  # numbers of columns are no names that two files share
             if len(own & other) >= least * len(own | other):
                 group.append(log)
                 break
@@ -139,6 +119,11 @@ def _partner(log: LogFile, others: Sequence[LogFile], is_alone: bool) -> tuple[s
 # --- which column is what
 
 
+def _is_unnamed(names: Iterable[str]) -> bool:
+    """Return True if the columns of a table have no names but numbers."""
+    return all(re.fullmatch(r"column_\d+", name) for name in names)
+
+
 class _Logger:
     """The columns of one logger: their names over all tables, their values in all of its files, and what they seem to be.
 
@@ -150,18 +135,18 @@ class _Logger:
         self._files = [log.columns for log in logs]
         self.tables = self._with_clocks()
         self.names = [table.full_name(name) for table in self.tables for name in table.columns]
+        units = {table.full_name(name): unit for table in self.tables for name, unit in table.units.items()}
+        self.meanings = {}
         self.missing: dict[str, float] = {}
-        self.meanings: dict[str, Meaning] = {}
         self.candidates: dict[str, list[str]] = {}
-        for table in self.tables:
-            for short in table.columns:
-                name = table.full_name(short)
-                codes = (code for values in self.parts(name) if (code := missing_code(values)) is not None)
-                if (code := next(codes, None)) is not None:
-                    self.missing[name] = code
-                self.meanings[name] = meaning = _meaning(name, table.units.get(short, ""))
-                if meaning.quantity and (self.span(name) > 0.0 or meaning.quantity in (*POSE, *TURN, *FORCE)):
-                    self.candidates.setdefault(meaning.quantity, []).append(name)
+        for name in self.names:
+            table, _, short = name.rpartition("/")
+            self.meanings[name] = meaning = meaning_in(table, short, units.get(name, ""))
+            codes = (code for values in self.parts(name) if (code := missing_code(values)) is not None)
+            if (code := next(codes, None)) is not None:
+                self.missing[name] = code
+            if meaning.quantity and (self.span(name) > 0.0 or meaning.quantity in (*POSE, *TURN, *FORCE)):
+                self.candidates.setdefault(meaning.quantity, []).append(name)
         self.found = self._columns()
 
     def _with_clocks(self) -> tuple[LogTable, ...]:
@@ -349,7 +334,7 @@ class _Logger:
 
     def described(self) -> str:
         """Return the columns for a question; how far those without a name reach is all that tells them apart."""
-        if not is_unnamed(self.names):
+        if not _is_unnamed(self.names):
             return listed(self.names)
         found = []
         for name in self.names[:MOST_NAMED]:
@@ -357,15 +342,6 @@ class _Logger:
             code = f", missing = {self.missing[name]}" if name in self.missing else ""
             found.append(f"{name}: {low:.4g} to {high:.4g}{code}" if low < high else f"{name}: {low:.4g}{code}")
         return ", ".join(found)
-
-
-def _meaning(full: str, unit: str) -> Meaning:
-    """Return the meaning of a column, for which the file may state a unit; its topic or group may say more than its name."""
-    table, _, short = full.rpartition("/")
-    found = meaning_of(short)
-    longer = meaning_of(f"{table.rpartition('/')[2]} {short}") if table and found.weight <= 1 else found
-    best = max(found, longer, key=lambda one: one.weight)
-    return replace(best, unit=unit or best.unit)
 
 
 def _texel_words(names: tuple[str, ...]) -> dict[str, Any]:
@@ -383,7 +359,7 @@ def _texel_words(names: tuple[str, ...]) -> dict[str, Any]:
 
 def _keep_one_sensor(loggers: Sequence[_Logger]) -> None:
     """Of two loggers without names of columns the one with more of them has the texels."""
-    if len(loggers) == 2 and all("texel" in one.found and is_unnamed(one.names) for one in loggers):
+    if len(loggers) == 2 and all("texel" in one.found and _is_unnamed(one.names) for one in loggers):
         del min(loggers, key=lambda one: len(one.names)).found["texel"]
 
 

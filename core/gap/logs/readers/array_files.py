@@ -7,6 +7,7 @@ links to them are left out.
 
 from __future__ import annotations
 
+import math
 import zipfile
 from collections.abc import Iterator
 from dataclasses import replace
@@ -23,14 +24,11 @@ from .damaged_file import damage_said
 _NUMBERS = "iufb"
 _LARGEST_UNLISTED = 200 * 2**20
 """Bytes of a MAT file whose arrays cannot be listed before they are read."""
-Arrays = dict[str, tuple[np.ndarray, str]]
-"""Arrays with their units, by their names; a slash ends the name of the group."""
 
 
 def read_npz(path: Path) -> LogFile:
     """Read an NPZ file."""
-    arrays: Arrays = {}
-    notes, total = [], 0
+    arrays, notes, total = {}, [], 0
     with open_regular(path) as file, damage_said(path, "NPZ"), zipfile.ZipFile(file) as archive:
         for info in archive.infolist():
             name = info.filename.removesuffix(".npy")
@@ -41,11 +39,11 @@ def read_npz(path: Path) -> LogFile:
                 if kind.hasobject or kind.kind not in _NUMBERS:
                     notes.append(f"'{path.name}': '{name}' holds no plain numbers and was left out.")
                     continue
-                total += int(np.prod(shape, dtype=object)) if shape else 1
+                total += (count := math.prod(shape))
                 require_size(total, 0, path)
-                values = np.frombuffer(member.read(), kind, count=int(np.prod(shape)))
-                arrays[name] = (values.reshape(shape, order="F" if is_fortran else "C"), "")
-    return _log(path, "NPZ", arrays, notes)
+                values = np.frombuffer(member.read(), kind, count)
+                arrays[name] = values.reshape(shape, order="F" if is_fortran else "C")
+    return _log(path, "NPZ", arrays, {}, notes)
 
 
 def read_mat(path: Path) -> LogFile:
@@ -58,48 +56,41 @@ def read_mat(path: Path) -> LogFile:
 
     import scipy.io
 
-    arrays: Arrays = {}
+    arrays: dict[str, np.ndarray] = {}
     notes: list[str] = []
     with open_regular(path) as file, warnings.catch_warnings(), damage_said(path, "MAT"):
         warnings.simplefilter("ignore")  # about names that are there twice
-        require_size(_mat_size(file, path), 0, path)
+        try:
+            require_size(sum(math.prod(shape) for _, shape, _ in scipy.io.whosmat(file)), 0, path)
+        except TypeError:  # SciPy lists no files with objects of MATLAB's, as timetables
+            if path.stat().st_size > _LARGEST_UNLISTED:
+                raise FileError(
+                    f"'{path.name}' has objects of MATLAB's and more than {_LARGEST_UNLISTED >> 20} MB: save the arrays alone."
+                ) from None
         file.seek(0)
         found = scipy.io.loadmat(file, squeeze_me=True, struct_as_record=False)
     for name, value in found.items():
         if not name.startswith("__"):
-            arrays |= dict(_members(name, value))
+            arrays |= _members(name, value)
             if type(value).__name__ == "MatlabOpaque" or (isinstance(value, np.ndarray) and value.dtype.names):
                 notes.append(f"'{path.name}': '{name}' is an object of MATLAB's (a timetable or a class) and was left out.")
-    return _log(path, "MAT", arrays, notes)
+    return _log(path, "MAT", arrays, {}, notes)
 
 
-def _mat_size(file: Any, path: Path) -> int:
-    """Return how many numbers a MAT file says that it holds."""
-    import scipy.io
-
-    try:
-        return sum(int(np.prod(shape, dtype=object)) for _, shape, _ in scipy.io.whosmat(file))
-    except TypeError:  # SciPy lists no files with objects of MATLAB's, as timetables
-        if path.stat().st_size > _LARGEST_UNLISTED:
-            raise FileError(
-                f"'{path.name}' has objects of MATLAB's and more than {_LARGEST_UNLISTED >> 20} MB: save the arrays alone."
-            ) from None
-        return 0
-
-
-def _members(name: str, value: Any) -> Iterator[tuple[str, tuple[np.ndarray, str]]]:
+def _members(name: str, value: Any) -> Iterator[tuple[str, np.ndarray]]:
     """Yield the arrays of a variable; the fields of a structure are named after it."""
     if hasattr(value, "_fieldnames"):
         for field in value._fieldnames:  # noqa: SLF001
             yield from _members(f"{name}/{field}", getattr(value, field))
     elif isinstance(value, np.ndarray) and value.dtype.kind in _NUMBERS:
-        yield name, (value, "")
+        yield name, value
 
 
 def read_hdf5(path: Path, kind: str = "HDF5") -> LogFile:
     """Read an HDF5 file, or a MAT file of version 7.3, which is one."""
     h5py = imported("h5py", f"'{path.name}'")
-    arrays: Arrays = {}
+    arrays: dict[str, np.ndarray] = {}
+    units: dict[str, str] = {}
     notes, total = [], 0
     with open_regular(path) as plain, damage_said(path, kind), h5py.File(plain, "r") as file:
         found: list[tuple[str, Any]] = []
@@ -110,28 +101,28 @@ def read_hdf5(path: Path, kind: str = "HDF5") -> LogFile:
             if item.external or item.is_virtual:
                 notes.append(f"'{path.name}': '{name}' lies in another file and was left out.")
                 continue
-            total += int(np.prod(item.shape, dtype=object))
+            total += math.prod(item.shape)
             require_size(total, 0, path)
+            arrays[name] = item[()]
             unit = item.attrs.get("unit", item.attrs.get("units", ""))
-            unit = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else unit
-            arrays[name] = item[()], unit if isinstance(unit, str) else ""
-    return _log(path, kind, arrays, notes)
+            units[name] = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else unit
+    return _log(path, kind, arrays, {name: unit for name, unit in units.items() if isinstance(unit, str) and unit}, notes)
 
 
-def _log(path: Path, kind: str, arrays: Arrays, notes: list[str]) -> LogFile:
-    """Return the tables of some arrays; what is too short to be recorded is left out.
+def _log(path: Path, kind: str, arrays: dict[str, np.ndarray], units: dict[str, str], notes: list[str]) -> LogFile:
+    """Return the tables of some arrays, whose names have that of a group before a slash; what is too short is left out.
 
     The samples of an array lie along the axis whose length most arrays have.
     """
-    squeezed = {name: (np.squeeze(values), unit) for name, (values, unit) in arrays.items()}
-    kept = {n: (v, unit) for n, (v, unit) in squeezed.items() if 0 < v.ndim <= 3 and max(v.shape) >= FEWEST_ROWS}
+    squeezed = {name: np.squeeze(values) for name, values in arrays.items()}
+    kept = {name: values for name, values in squeezed.items() if 0 < values.ndim <= 3 and max(values.shape) >= FEWEST_ROWS}
     if not kept:
         objects = any("object of MATLAB's" in note for note in notes)
         what = ", only objects of MATLAB's: save their arrays" if objects else ": give a file with recordings in arrays"
         raise FileError(f"'{path.name}' holds no array of at least {FEWEST_ROWS} numbers{what}.")
-    lengths = [max(values.shape) for values, _ in kept.values()]
+    lengths = [max(values.shape) for values in kept.values()]
     tables: dict[tuple[str, int], LogTable] = {}
-    for name, (values, unit) in kept.items():
+    for name, values in kept.items():
         group, _, short = name.rpartition("/")
         axis = max(range(values.ndim), key=lambda i: (lengths.count(values.shape[i]), values.shape[i], -i))
         placed = np.moveaxis(values, axis, 0)
@@ -142,8 +133,8 @@ def _log(path: Path, kind: str, arrays: Arrays, notes: list[str]) -> LogFile:
             table.grids[short] = (placed.shape[1], placed.shape[2])
         for column, numbers in zip(names, flat.T, strict=True):
             table.columns[column] = cleaned(numbers)
-            if unit:
-                table.units[column] = unit
+            if name in units:
+                table.units[column] = units[name]
         require_size(0, len(table.columns), path)
     for (group, count), table in tables.items():  # of one group the longest table has its name
         if count < max(other for name, other in tables if name == group):

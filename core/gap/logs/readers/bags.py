@@ -131,19 +131,14 @@ def read_bag(path: Path) -> LogFile:
             return LogFile(path, "ROS 2 bag", found.tables, found.notes)
         if not logs and not any(file.suffix == ".db3" for file in files):
             raise FileError(f"'{path}' holds no bag: give a folder with metadata.yaml and a .db3 or .mcap file.")
-    return _read_with_rosbags(path)
-
-
-def _read_with_rosbags(path: Path) -> LogFile:
     highlevel, typesys = (imported(f"rosbags.{one}", f"'{path.name}'", INSTALL) for one in ("highlevel", "typesys"))
     topics: dict[str, TopicColumns] = {}
-    left_out: dict[str, str] = {}
     store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
     with ExitStack() as stack:
         with damage_said(path, "a bag"):
             reader = stack.enter_context(highlevel.AnyReader([path], default_typestore=store))
         known = [one for one in reader.connections if not is_picture(one.msgtype) and one.msgtype in reader.typestore.fielddefs]
-        left_out |= {one.topic: one.msgtype for one in reader.connections if one not in known}
+        left_out = {one.topic: one.msgtype for one in reader.connections if one not in known}
         for connection, time, content in read_by(reader.messages(connections=known), path, "a bag") if known else ():
             with damage_said(path, "a bag"):
                 message = reader.deserialize(content, connection.msgtype)

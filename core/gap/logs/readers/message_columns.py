@@ -71,23 +71,19 @@ class TopicColumns:
             return None, ""
         require_size(count * len(names), len(names), self._path)
         values = np.full((count, len(names)), np.nan)
-        rows = np.repeat(np.arange(count), np.diff(np.frombuffer(self._starts, np.uint64)).astype(np.int64))
-        values[rows, np.frombuffer(self._places, np.uint64)] = np.frombuffer(self._values, float)
-        time, said = self._times()
+        rows = np.repeat(np.arange(count), np.diff(np.array(self._starts)).astype(np.int64))
+        values[rows, np.array(self._places)] = np.array(self._values)
+        time, stamps, said = np.array(self._recorded), np.array(self._stamps), ""
+        if np.isfinite(stamps).all() and np.ptp(stamps) > 0.0:
+            difference = float(np.abs((stamps - stamps[0]) - (time - time[0])).max())
+            if difference > _LARGEST_DIFFERENCE:
+                said = (
+                    f"'{self._path.name}': the times in the headers of {self._topic} differ by up to {difference:.3g} s from "
+                    "those of the recorder, which were taken."
+                )
+            time = time if said else stamps
         columns = {TIME: time, **{name: column for name, column in zip(names, cleaned(values).T) if name != TIME}}
         return LogTable(self._topic, columns, {TIME: "s"}), said
-
-    def _times(self) -> tuple[np.ndarray, str]:
-        recorded, stamps = np.frombuffer(self._recorded, float), np.frombuffer(self._stamps, float)
-        if not np.isfinite(stamps).all() or not np.ptp(stamps) > 0.0:
-            return recorded.copy(), ""
-        difference = float(np.abs((stamps - stamps[0]) - (recorded - recorded[0])).max())
-        if difference > _LARGEST_DIFFERENCE:
-            return recorded.copy(), (
-                f"'{self._path.name}': the times in the headers of {self._topic} differ by up to {difference:.3g} s from those "
-                "of the recorder, which were taken."
-            )
-        return stamps.copy(), ""
 
 
 def _stamp(message: Any) -> float | None:
