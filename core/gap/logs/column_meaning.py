@@ -184,7 +184,7 @@ def time_unit(values: np.ndarray, stated: str) -> tuple[str, str, bool]:
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
     size = float(np.abs(known).max()) if len(known) else 0.0
     for unit, seconds in (("ns", 1e-9), ("us", 1e-6), ("ms", 1e-3), ("s", 1.0)):
-        if 1e9 <= size * seconds < 3e9 and step * seconds < 10.0:
+        if SINCE_1970 <= size * seconds < 3.0 * SINCE_1970 and step * seconds < 10.0:
             return unit, "such numbers count from 1970", False
     if 0.0 < step <= 0.5:
         return "s", f"samples are {step:.3g} s apart", False

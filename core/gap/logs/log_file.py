@@ -12,14 +12,14 @@ import numpy as np
 from ...errors import FileError, counted, read_errors_said
 from ...io.input_files import open_regular
 from ...io.text_table import MISSING, read_text_table
-from .log_table import LARGEST_FILE, MOST_VALUES, LogFile, LogTable, require_size
+from .log_table import LARGEST_FILE, LogFile, LogTable, require_size
 from .readers.array_files import read_hdf5, read_mat, read_npz
 from .readers.bags import read_bag, read_mcap
 
 
 def read_text(path: Path) -> LogFile:
     """Read a table of text; raise FileError if it is none."""
-    found = read_text_table(path, MOST_VALUES)
+    found = read_text_table(path)
     rows, columns = found.values.shape
     require_size(rows * columns, columns, path)
     notes, kept, text = list(found.notes), {}, 0

@@ -12,12 +12,11 @@ import numpy as np
 
 from ...errors import FileError
 from ...io.csv_table import LARGEST_NUMBER
+from ...io.text_table import MOST_VALUES
 from .column_behaviour import is_clock
 
 LARGEST_FILE = 2 * 2**30
 """Bytes of a log."""
-MOST_VALUES = 100_000_000
-"""Numbers of a log that are read: 0.8 GB, far more than a fit can use."""
 MOST_COLUMNS = 5000
 FEWEST_ROWS = 8
 """Samples of a trial, see :mod:`..dataset.rig`; shorter arrays are settings and no recordings."""

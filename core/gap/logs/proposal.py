@@ -217,7 +217,8 @@ class _Logger:
         if texels:
             found["texel"] = self._texel(*texels)
         for quantity, guess in found.items():
-            for code in [self.missing[name] for name in guess.columns if name in self.missing][:1]:
+            if coded := [name for name in guess.columns if name in self.missing]:
+                code = self.missing[coded[0]]
                 why = f"{code:g} is where a value is missing, because its neighbours are far away"
                 found[quantity] = guess.but(why, missing=code)
         return found

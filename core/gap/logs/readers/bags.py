@@ -25,25 +25,16 @@ Decoder = Callable[[bytes], Any]
 
 def read_mcap(path: Path) -> LogFile:
     """Read an MCAP file."""
-    exceptions, stream_reader = (imported(f"mcap.{one}", f"'{path.name}'", INSTALL) for one in ("exceptions", "stream_reader"))
     topics: dict[str, TopicColumns] = {}
     left_out: dict[str, str] = {}
-    known = (exceptions.EndOfFile, stream_reader.CRCValidationError)
-    try:
-        with open_regular(path) as file:
-            for topic, kind, time, content, decode in _messages(file, path, known):
-                if decode is None:
-                    left_out.setdefault(topic, kind)
-                    continue
-                with damage_said(path, "MCAP"):
-                    message = decode(content)
-                topics.setdefault(topic, TopicColumns(topic, path)).add(message, time)
-    except exceptions.EndOfFile as error:
-        rows = sum(table.sample_count for table, _ in (topic.table() for topic in topics.values()) if table is not None)
-        until = f" after {rows} messages" if rows else ""
-        raise FileError(f"'{path.name}' is cut off{until}: copy it again, or mend it with `mcap recover`.") from error
-    except stream_reader.CRCValidationError as error:
-        raise FileError(f"'{path.name}' is damaged (a checksum is wrong): copy it again.") from error
+    with open_regular(path) as file:
+        for topic, kind, time, content, decode in _messages(file, path, topics):
+            if decode is None:
+                left_out.setdefault(topic, kind)
+                continue
+            with damage_said(path, "MCAP"):
+                message = decode(content)
+            topics.setdefault(topic, TopicColumns(topic, path)).add(message, time)
     return _log(path, "MCAP", topics, left_out)
 
 
@@ -57,21 +48,18 @@ def _log(path: Path, kind: str, topics: dict[str, TopicColumns], left_out: dict[
     return LogFile(path, kind, tables, (*notes, *(said for _, said in made if said)))
 
 
-def _messages(
-    file: Any, path: Path, known: tuple[type[Exception], ...]
-) -> Iterator[tuple[str, str, int, bytes, Decoder | None]]:
-    """Yield topic, type, time, content and decoder of each message."""
-    from mcap.records import Channel, Message, Schema
-
+def _messages(file: Any, path: Path, topics: dict[str, TopicColumns]) -> Iterator[tuple[str, str, int, bytes, Decoder | None]]:
+    """Yield topic, type, time, content and decoder of each message; `topics` are those that were read so far."""
+    records = imported("mcap.records", f"'{path.name}'", INSTALL)
     schemas: dict[int, Any] = {}
     channels: dict[int, Any] = {}
     decoders: dict[int, Decoder | None] = {}
-    for record in read_by(_records(file, path), path, "MCAP", *known):
-        if isinstance(record, Schema):
+    for record in read_by(_records(file, path, topics), path, "MCAP"):
+        if isinstance(record, records.Schema):
             schemas[record.id] = record
-        elif isinstance(record, Channel):
+        elif isinstance(record, records.Channel):
             channels[record.id] = record
-        elif isinstance(record, Message):
+        elif isinstance(record, records.Message):
             channel = channels.get(record.channel_id)
             if channel is None:
                 raise FileError(f"'{path.name}' is damaged (a message of channel {record.channel_id}, unknown): copy it again.")
@@ -82,19 +70,23 @@ def _messages(
             yield channel.topic, kind, record.log_time, record.data, decoders[channel.id]
 
 
-def _records(file: Any, path: Path) -> Iterator[Any]:
+def _records(file: Any, path: Path, topics: dict[str, TopicColumns]) -> Iterator[Any]:
     """Yield what the library reads; sizes are checked before anything is unpacked."""
+    from mcap.exceptions import EndOfFile
     from mcap.records import Chunk
-    from mcap.stream_reader import StreamReader, breakup_chunk
+    from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 
-    reader = StreamReader(file, emit_chunks=True, validate_crcs=True, record_size_limit=LARGEST_RECORD)
-    for outer in reader.records:
-        if isinstance(outer, Chunk):
-            if outer.uncompressed_size > LARGEST_RECORD:
+    try:
+        for outer in StreamReader(file, emit_chunks=True, validate_crcs=True, record_size_limit=LARGEST_RECORD).records:
+            if isinstance(outer, Chunk) and outer.uncompressed_size > LARGEST_RECORD:
                 raise FileError(f"'{path.name}' has a chunk of {outer.uncompressed_size:,} bytes: it is damaged, or not a log.")
-            yield from breakup_chunk(outer, validate_crc=True)
-        else:
-            yield outer
+            yield from breakup_chunk(outer, validate_crc=True) if isinstance(outer, Chunk) else [outer]
+    except EndOfFile as error:
+        rows = sum(table.sample_count for table, _ in (topic.table() for topic in topics.values()) if table is not None)
+        until = f" after {rows} messages" if rows else ""
+        raise FileError(f"'{path.name}' is cut off{until}: copy it again, or mend it with `mcap recover`.") from error
+    except CRCValidationError as error:
+        raise FileError(f"'{path.name}' is damaged (a checksum is wrong): copy it again.") from error
 
 
 def _decoder_of(channel: Any, schema: Any, path: Path) -> Decoder | None:
