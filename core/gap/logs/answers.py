@@ -84,12 +84,8 @@ def answers_of(proposal: Proposal) -> Answers:
 def answers_or_template(proposal: Proposal, folder: str | os.PathLike, advice: str) -> Answers:
     """Write what is proposed and what is asked, so that whatever is refused can be corrected there, and return the answers.
 
-    `advice` is what to do with the file where questions are open.
-
-    Raises
-    ------
-    FileError
-        A question is open, or the file is there already and would be lost, or it cannot be written.
+    `advice` is what to do with the file where questions are open. FileError is raised if there are any, or the file is there
+    already and would be lost, or it cannot be written.
     """
     path = Path(folder) / ANSWERS_NAME
     questions = proposal.questions

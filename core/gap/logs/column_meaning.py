@@ -36,7 +36,8 @@ _AXIS_WORDS = {
     | {"tcp", "tip", "probe", "indenter", "tool", "ee", "robot"},
 }
 """Words beside the letter of an axis; the first kind of which a name has a word counts."""
-_JOINED = {"f": "force", "force": "force", "p": "position", "pos": "position", "position": "position", "q": "rotation"}
+_JOINED = {"f": "force", "p": "position", "pos": "position", "q": "rotation"}
+_JOINED |= {kind: kind for kind in ("force", "position", "slide")}
 """What is written together with the letter of an axis."""
 _TIME_WORDS = {"time", "t", "timestamp", "stamp", "sec", "secs", "seconds", "elapsed", "clock", "tim", "tim2", "zeit"}
 _SINGLE = {
@@ -94,8 +95,7 @@ def meaning_of(column: str) -> Meaning:
     kind = next((kind for kind, names in _AXIS_WORDS.items() if names & set(words)), "")
     last = words[-1]
     if joined := re.fullmatch(r"(f|force|p|pos|position|q|t|m|v|a|slide)([xyzw])", last):
-        is_slide = joined[1] == "slide"
-        return _of_axis("slide" if is_slide else _JOINED.get(joined[1], ""), joined[2], unit, 3 if is_slide else 2)
+        return _of_axis(_JOINED.get(joined[1], ""), joined[2], unit, 3 if joined[1] == "slide" else 2)
     if last in ("x", "y", "z", "w"):
         is_alone = not kind and len(words) == 1
         return _of_axis("position" if is_alone else "" if "torque" in words else kind, last, unit, 1 if is_alone else 3)

@@ -80,12 +80,7 @@ class LogFile:
 def with_distinct_names(logs: Sequence[LogFile], named: Sequence[str] = ()) -> list[LogFile]:
     """Return logs of which those in several folders with the same name are called ``FOLDER/NAME``; frames are one log.
 
-    Frames stay files of their own if one of these is `named` in answers.
-
-    Raises
-    ------
-    FileError
-        Two are still called the same.
+    Frames stay files of their own if one of these is `named` in answers. FileError is raised if two are still called the same.
     """
     found = list(logs)
     if not {log.path.name for log in found} & set(named):

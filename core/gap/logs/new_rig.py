@@ -317,8 +317,7 @@ def _response(table: Mapping[str, np.ndarray]) -> np.ndarray | None:
     names = [name for name in table if name.startswith("texel_")]
     if not names:
         return table.get("force_z")
-    values = np.stack([table[name] for name in names], axis=1)
-    values = values - np.nanmedian(values, axis=0)
+    values = np.stack([table[name] - np.nanmedian(table[name]) for name in names], axis=1)
     low, high = np.nanmin(values, axis=0), np.nanmax(values, axis=0)
     return np.nanmean(values * np.where(-low > high, -1.0, 1.0), axis=1)
 

@@ -35,24 +35,17 @@ def preview_rows(logs: Sequence[LogFile]) -> list[tuple[str, ...]]:
                     rows.append((log.name, f"{table.full_name('')}… {len(table.columns) - i} more", "", "", "", ""))
                     break
                 known = finite(values)
-                ends = _ends(float(known.min()), float(known.max())) if len(known) else ("", "")
+                ends = [f"{end:.6g}" for end in (known.min(), known.max())] if len(known) else ["", ""]
+                if len(known) and ends[0] == ends[1]:  # as of clocks that count from 1970
+                    ends = [f"{end:.14g}" for end in (known.min(), known.max())]
                 rows.append((log.name, table.full_name(name), table.units.get(name, ""), str(len(known)), *ends))
     return rows
-
-
-def _ends(least: float, largest: float) -> tuple[str, str]:
-    """Write the ends of a range with six digits, and with more where these are the same, as of clocks that count from 1970."""
-    short = f"{least:.6g}", f"{largest:.6g}"
-    return short if short[0] != short[1] else (f"{least:.14g}", f"{largest:.14g}")
 
 
 def plot_rig(rig: Rig, path: str | Path) -> None:
     """Write a picture of the recordings of a rig as PNG: what drove the sensor, and what answered, over time.
 
-    Raises
-    ------
-    FileError
-        The file cannot be written.
+    FileError is raised if it cannot be written.
     """
     trials = rig.trials[:MOST_TRIALS]
     figure = new_figure(10.0, 2.4 * len(trials))

@@ -40,10 +40,8 @@ CHECK_EVERY = 3
 def propose(logs: Sequence[LogFile], name: str = "rig") -> Proposal:
     """Return the proposal for the files of one measurement, of which several become trials, and the name of a rig.
 
-    Raises
-    ------
-    FileError
-        There are no logs, two have the same name, one is shorter than a recording, or there are files of more than two kinds.
+    FileError is raised if there are no logs, two have the same name, one is shorter than a recording, or there are more than two
+    kinds of files.
     """
     if not logs:
         raise FileError("No logs are given: name at least one file.")
@@ -54,7 +52,9 @@ def propose(logs: Sequence[LogFile], name: str = "rig") -> Proposal:
                 f"'{log.path.name}' has less than {FEWEST_ROWS} samples, and a recording needs as many: leave it out."
             )
     loggers = [_Logger(group, number) for number, group in enumerate(_groups(logs))]
-    _keep_one_sensor(loggers)
+    if len(loggers) == 2 and all("texel" in one.found and _is_unnamed(one.names) for one in loggers):
+        # of two loggers without names of columns the one with more of them has the texels
+        del min(loggers, key=lambda one: len(one.names)).found["texel"]
     _choose_stimulus(loggers)
     _say_what_lacks(loggers)
     guesses = [Guess("", "name", name), *_sensor(loggers)]
@@ -245,9 +245,8 @@ class _Logger:
 
     def _time(self) -> Guess:
         named = self.candidates.pop("time", [])
-        rising = [name for name in named if self._rises(name)] or [
-            name for name in self.names if self._rises(name, strictly=True)
-        ]
+        rising = [name for name in named if self._rises(name)]
+        rising = rising or [name for name in self.names if self._rises(name, strictly=True)]
         if not rising and named:
             unit = time_unit(self.parts(named[0])[0], self.meanings[named[0]].unit)[0]
             reason = "of its name, but it falls: cut the file where the clock was reset, or name another column"
@@ -295,21 +294,16 @@ class _Logger:
             return {}
         best = max(moving, key=lambda own: (len(own), sum(self.meanings[name].weight for name in own.values())))
         found = {quantity: self._one(quantity, [best[quantity]]) for quantity in group if quantity in best}
-        for other in moving:
-            if other is not best and len(other) == len(best):
-                why = f"'{next(iter(other.values()))}' could be meant as well"
-                return {quantity: one.but(why, is_thin=True) for quantity, one in found.items()}
-        return found
+        rivals = [next(iter(own.values())) for own in moving if own is not best and len(own) == len(best)]
+        return {quantity: _with_rivals(one, rivals) for quantity, one in found.items()}
 
     def _one(self, quantity: str, names: Sequence[str]) -> Guess:
         """Return a quantity of a single column, with its unit."""
         name = max(names, key=lambda one: self.meanings[one].weight)
         stated, weight, kind = self.meanings[name].unit, self.meanings[name].weight, QUANTITIES[quantity]
-        size = self.span(name)
-        if quantity in POSE:
-            size = max(self.span(one) for axis in POSE for one in self.candidates.get(axis, []))
-        elif quantity == "temperature":
-            size = float(np.nanmedian(self.parts(name)[0]))
+        group = [one for axis in POSE for one in self.candidates.get(axis, [])] if quantity in POSE else [name]
+        is_heat = quantity == "temperature"
+        size = float(np.nanmedian(self.parts(name)[0])) if is_heat else max(map(self.span, group))
         is_ros = name.startswith("/") and self.logs[0].kind != "table of text" and not stated
         if not kind:
             unit, reason, is_thin = "", "of its name", False
@@ -319,8 +313,7 @@ class _Logger:
             unit, reason, is_thin = unit_of(kind, stated, size)
         is_thin = is_thin or weight == 1 and not set(POSE) <= set(self.candidates)
         found = self.guess(quantity, {"name": name, **({"unit": unit} if unit else {})}, reason, is_thin)
-        others = [one for one in names if one != name]
-        return found.but(f"'{others[0]}' could be meant as well", is_thin=True) if others else found
+        return _with_rivals(found, [one for one in names if one != name])
 
     def _texel(self, best: Family, *others: Family) -> Guess:
         units = {self.meanings[name].unit for name in best.columns}
@@ -345,6 +338,10 @@ class _Logger:
         return ", ".join(found)
 
 
+def _with_rivals(own: Guess, rivals: Sequence[str]) -> Guess:
+    return own.but(f"'{rivals[0]}' could be meant as well", is_thin=True) if rivals else own
+
+
 def _texel_words(names: tuple[str, ...]) -> dict[str, Any]:
     """Return the names of texels as a pattern with a number, where they are one."""
     first, last = names[0], names[-1]
@@ -356,12 +353,6 @@ def _texel_words(names: tuple[str, ...]) -> dict[str, Any]:
 
 
 # --- what drove the sensor, and what answered
-
-
-def _keep_one_sensor(loggers: Sequence[_Logger]) -> None:
-    """Of two loggers without names of columns the one with more of them has the texels."""
-    if len(loggers) == 2 and all("texel" in one.found and _is_unnamed(one.names) for one in loggers):
-        del min(loggers, key=lambda one: len(one.names)).found["texel"]
 
 
 def _owners(loggers: Sequence[_Logger]) -> dict[str, _Logger]:
