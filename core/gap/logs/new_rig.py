@@ -16,7 +16,7 @@ from ...io.csv_table import LARGEST_NUMBER
 from ...io.file_writing import atomic_write, writable_folder
 from ...io.hidden_folder import FileList
 from ...jobs import Job, Progress
-from ..dataset.column_names import FORCE, POSE, SLIDE, Column
+from ..dataset.column_names import POSE, QUANTITIES, Column
 from ..dataset.rig import FORMAT, Rig, read_rig
 from ..dataset.second_logger import at_times
 from .answers import Answers, RecordingAnswer
@@ -324,20 +324,17 @@ def _response(table: Mapping[str, np.ndarray]) -> np.ndarray | None:
 
 def _check_sizes(table: Mapping[str, np.ndarray], name: str) -> None:
     """Refuse values whose unit must be wrong."""
+    wrong = "its unit in the answers must be wrong"
     known = {quantity: finite(column) for quantity, column in table.items() if np.isfinite(column).any()}
     for quantity, values in known.items():
-        span, size = float(np.ptp(values)), float(np.abs(values).max())
-        if quantity in (*POSE, "depth", *SLIDE) and span > LARGEST_MOTION:
-            raise FileError(
-                f"{quantity} of '{name}' moves by {span:.4g} m: its unit in the answers must be wrong, write mm or um."
-            )
-        if quantity in ("force", *FORCE) and size > LARGEST_FORCE:
-            raise FileError(
-                f"{quantity} of '{name}' reaches {size:.4g} N: its unit in the answers must be wrong, write mN or g."
-            )
+        span, size, kind = float(np.ptp(values)), float(np.abs(values).max()), QUANTITIES.get(quantity)
+        if kind == "m" and span > LARGEST_MOTION:
+            raise FileError(f"{quantity} of '{name}' moves by {span:.4g} m: {wrong}, write mm or um.")
+        if kind == "N" and size > LARGEST_FORCE:
+            raise FileError(f"{quantity} of '{name}' reaches {size:.4g} N: {wrong}, write mN or g.")
     motion = max((np.ptp(values) for quantity, values in known.items() if quantity in (*POSE, "depth")), default=0.0)
     if 0.0 < motion < SMALLEST_MOTION:
-        raise FileError(f"The motion of '{name}' spans {motion:.3g} m: its unit in the answers must be wrong, write mm or m.")
+        raise FileError(f"The motion of '{name}' spans {motion:.3g} m: {wrong}, write mm or m.")
     step = _step(table)
     if not 1e-6 <= step <= 5.0:
         raise FileError(f"The samples of '{name}' are {step:.3g} s apart: the unit of time in the answers must be wrong.")

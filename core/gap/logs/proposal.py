@@ -40,8 +40,8 @@ CHECK_EVERY = 3
 def propose(logs: Sequence[LogFile], name: str = "rig") -> Proposal:
     """Return the proposal for the files of one measurement, of which several become trials, and the name of a rig.
 
-    FileError is raised if there are no logs, two have the same name, one is shorter than a recording, or there are more than two
-    kinds of files.
+    FileError is raised if there are no logs, two have the same name, one is shorter than a recording, or there are files of
+    more than two kinds.
     """
     if not logs:
         raise FileError("No logs are given: name at least one file.")
@@ -365,15 +365,15 @@ def _choose_stimulus(loggers: Sequence[_Logger]) -> None:
     owner = _owners(loggers)
     if set(POSE) <= set(owner):
         _drop(loggers, ("depth",))
-        _force_is_response(loggers)
     elif "depth" in owner or "z" in owner:
         _motion(loggers, "depth" if "depth" in owner else "z")
-        _force_is_response(loggers)
     elif "texel" in owner and ("force" in owner or "force_z" in owner):
         word = "force" if "force" in owner else "force_z"
         own = owner[word].found[word]
         _drop(loggers, (*POSE, *TURN, *FORCE))
         owner[word].found["force"] = _load(owner[word], replace(own, word="force"))
+    if owner.keys() & {"depth", "z"}:
+        _force_is_response(loggers)
     for one in loggers:
         if "texel" in one.found and (unit := one.found["texel"].value.get("unit")) in READING_UNITS:
             one.found["texel"] = one.found["texel"].but(f"{unit} becomes newtons")
