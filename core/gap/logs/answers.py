@@ -40,8 +40,15 @@ class LoggerAnswer:
 class RecordingAnswer:
     """One trial: a file, or one of each of two loggers.
 
-    `late` is how much later the clock of the second logger shows the same event, in seconds; None: as the correlation says.
-    `begin` and `end` are what is used of the file that has what drove the sensor, in seconds from its first sample.
+    Attributes
+    ----------
+    name : str
+    files : tuple of str
+    use : str
+    late : float or None, s
+        How much later the clock of the second logger shows the same event. None: as the correlation says.
+    begin, end : float or None, s
+        What is used of the file that has what drove the sensor, counted from its first sample. None: all of it.
     """
 
     name: Name
@@ -56,8 +63,16 @@ class RecordingAnswer:
 class Answers:
     """All of it.
 
-    `sensor` and `indenter` are the words of these tables of the rig, empty if there is no indenter; `text` is the file of
-    answers, with its reasons.
+    Attributes
+    ----------
+    name : str
+    sensor : dict
+        The words of the rig's [sensor].
+    indenter : dict
+        Those of its [indenter]; empty if there is none.
+    loggers, recordings : tuple
+    text : str
+        The file of answers, with its reasons.
     """
 
     name: str
@@ -69,13 +84,25 @@ class Answers:
 
 
 def read_answers(path: str | Path) -> Answers:
-    """Read a file of answers; raise FileError if it cannot be read, or something in it is not valid or not answered yet."""
+    """Read a file of answers.
+
+    Raises
+    ------
+    FileError
+        It cannot be read, or a word or a value in it is not valid, or something in it is not answered yet.
+    """
     path = Path(path)
     return _answers(read_toml(path, "file of answers"), path.name, path.read_text(encoding="utf-8"))
 
 
 def answers_of(proposal: Proposal) -> Answers:
-    """Return the answers that a proposal gives; raise FileError if a question is open, or a reply to one is not valid."""
+    """Return the answers that a proposal gives.
+
+    Raises
+    ------
+    FileError
+        A question is open, or what was replied to one is not valid.
+    """
     if questions := proposal.questions:
         raise FileError(f"{questions[0][:-1]}: answer it before the rig is written.")
     return _answers(tomllib.loads(proposal.text), "the proposal", proposal.text)
@@ -84,8 +111,17 @@ def answers_of(proposal: Proposal) -> Answers:
 def answers_or_template(proposal: Proposal, folder: str | os.PathLike, advice: str) -> Answers:
     """Write what is proposed and what is asked, so that whatever is refused can be corrected there, and return the answers.
 
-    `advice` is what to do with the file where questions are open. FileError is raised if there are any, or the file is there
-    already and would be lost, or it cannot be written.
+    Parameters
+    ----------
+    proposal : Proposal
+    folder : path
+    advice : str
+        What to do with the file where questions are open.
+
+    Raises
+    ------
+    FileError
+        A question is open, or the file is there already and would be lost, or it cannot be written.
     """
     path = Path(folder) / ANSWERS_NAME
     questions = proposal.questions

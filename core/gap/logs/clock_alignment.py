@@ -35,8 +35,14 @@ the correlation cannot tell whose files they are."""
 class ClockShift:
     """The shift of two clocks.
 
-    `late` is the second clock's time of an event minus the first one's, in seconds; `correlation` that of the changes with this
-    shift, and `rival` the largest one at any other shift, as a share of it.
+    Attributes
+    ----------
+    late : float, s
+        The second clock's time of an event minus the first one's.
+    correlation : float
+        Of the changes with this shift.
+    rival : float
+        Largest correlation at any other shift, as a share of it.
     """
 
     late: float
@@ -60,12 +66,17 @@ class ClockShift:
 
 
 def clock_shift(first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.ndarray]) -> ClockShift | None:
-    """Return how late the second clock is; None if one of the recordings does not change.
+    """Return how late the second clock is.
 
     Parameters
     ----------
     first, second : (times (T,) s, values (T,))
         What drove the sensor, and what answered, each by its own clock.
+
+    Returns
+    -------
+    ClockShift or None
+        None if one of them does not change.
     """
     spans = [float(np.ptp(times)) for times, _ in (first, second)]
     steps = [float(np.median(np.diff(times))) for times, _ in (first, second)]

@@ -67,7 +67,12 @@ def contact_of(values: np.ndarray) -> float:
 
 
 def missing_code(values: np.ndarray) -> float | None:
-    """Return the number that stands for a missing value in a column, (T,) float; None if there is none."""
+    """Return the number that stands for a missing value in a column, None if there is none.
+
+    Parameters
+    ----------
+    values : (T,) float
+    """
     known = finite(values)
     if len(known) < FEWEST:
         return None

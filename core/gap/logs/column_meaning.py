@@ -64,8 +64,16 @@ _RATE = re.compile(r"/\s*(ms|s|sec|min|h)$")
 
 @dataclass(frozen=True)
 class Meaning:
-    """Meaning of a name: one of :data:`..dataset.column_names.QUANTITIES` or empty, the unit that the name has or empty, and
-    how sure it is: 3 for a full word, 2 for a letter with an axis, 1 for a single letter.
+    """Meaning of a name.
+
+    Attributes
+    ----------
+    quantity : str
+        One of :data:`..dataset.column_names.QUANTITIES`, or empty.
+    unit : str
+        Empty if the name has none.
+    weight : int
+        How sure the name is: 3 for a full word, 2 for a letter with an axis, 1 for a single letter.
     """
 
     quantity: str
@@ -134,10 +142,16 @@ def _of_axis(kind: str, axis: str, unit: str, weight: int) -> Meaning:
 
 @dataclass(frozen=True)
 class Family:
-    """Columns that differ by their numbers alone, in the order of these.
+    """Columns that differ by their numbers alone.
 
-    `is_named` if the name is a word for readings; `follows` is the median correlation of the columns with what pressed, 0 if
-    nothing is known to press.
+    Attributes
+    ----------
+    columns : tuple of str
+        In the order of their numbers.
+    is_named : bool
+        True if the name is a word for readings.
+    follows : float
+        Median correlation of the columns with what pressed; 0 if nothing is known to press.
     """
 
     columns: tuple[str, ...]
@@ -148,7 +162,11 @@ class Family:
 def families(columns: Sequence[str], follows: Callable[[str], float]) -> list[Family]:
     """Return the columns that may be texels, the likeliest first: what follows the load, then what is named so, then the most.
 
-    `follows` gives the correlation of a column with what pressed, 0 to 1.
+    Parameters
+    ----------
+    columns : sequence of str
+    follows : callable
+        Correlation of a column with what pressed, 0 to 1.
     """
     groups: dict[str, list[tuple[tuple[int, ...], str]]] = {}
     for column in columns:
@@ -200,7 +218,13 @@ def is_since_1970(values: np.ndarray, unit: str) -> bool:
 def unit_of(kind: str, stated: str, size: float) -> tuple[str, str, bool]:
     """Return the unit of a length (``m``), a force (``N``) or a temperature (``°C``), why, and whether it only seems so.
 
-    `stated` is that of the file, empty if it states none; `size` is how far the values span, or what a temperature is.
+    Parameters
+    ----------
+    kind : str
+    stated : str
+        By the file; empty if it states none.
+    size : float
+        How far the values span, or what a temperature is.
     """
     if stated in LOG_UNITS[kind] or kind == "N" and stated in PRESSURES:
         return stated, "the file says so", False

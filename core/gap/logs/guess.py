@@ -20,12 +20,23 @@ UNKNOWN = "?"
 
 @dataclass(frozen=True)
 class Guess:
-    """One line of the answers: a word of a table, its value and the reason.
+    """One line of the answers.
 
-    `table` is empty, ``sensor``, ``indenter``, ``logger``, ``logger.columns`` or ``recording``; of ``[[logger]]`` and
-    ``[[recording]]`` it is that of this `number`, from zero on. What is not known in the value is :data:`UNKNOWN`. `is_thin` if
-    it only seems so, and a person has to confirm it; else the file states it, or its numbers show it. `of` is the file that it
-    is about, if it is about one.
+    Attributes
+    ----------
+    table : str
+        Of the file of answers: empty, ``sensor``, ``indenter``, ``logger``, ``logger.columns`` or ``recording``.
+    word : str
+        In that table.
+    value : object
+        As TOML writes it; what is not known in it is :data:`UNKNOWN`.
+    reason : str
+    is_thin : bool
+        True if it only seems so, and a person has to confirm it; else the file states it, or its numbers show it.
+    number : int
+        Of the ``[[logger]]`` or ``[[recording]]``, from zero on.
+    of : str
+        The file that it is about, if it is about one.
     """
 
     table: str

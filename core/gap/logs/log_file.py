@@ -48,7 +48,10 @@ READERS: dict[str, Callable[[Path], LogFile]] = {
 def read_log(path: str | os.PathLike) -> LogFile:
     """Read a log: a file, or the folder of a ROS 2 bag.
 
-    FileError is raised if there is no such file, it is none of the known formats, it is damaged, or too large.
+    Raises
+    ------
+    FileError
+        There is no such file, it is none of the known formats, it is damaged, or too large.
     """
     path = Path(path)
     with read_errors_said(path):

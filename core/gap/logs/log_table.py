@@ -26,10 +26,18 @@ FRAMES, MOST_FRAME_ROWS = "frames", 512
 
 @dataclass(frozen=True)
 class LogTable:
-    """Columns of equal length, (T,) float, by their names in the file; NaN where a value is missing.
+    """Columns of equal length.
 
-    `name` is the topic of a bag or the group of an HDF5 file, empty where a file has one table. `units` are those that the file
-    states. `grids` are the rows and columns of arrays of pictures by their names; their columns are ``NAME_0``, ``NAME_1``, …
+    Attributes
+    ----------
+    name : str
+        Topic of a bag, group of an HDF5 file; empty where a file has one table.
+    columns : dict of str to (T,) float
+        By their names in the file; NaN where a value is missing.
+    units : dict of str to str
+        Of the columns for which the file states one.
+    grids : dict of str to (int, int)
+        Rows and columns of arrays of pictures, by the name of the array; its columns are ``NAME_0``, ``NAME_1``, …
     """
 
     name: str
@@ -51,8 +59,16 @@ class LogTable:
 class LogFile:
     """A log.
 
-    `kind` is that of the file, as "NPZ"; `notes` say what was left out, one sentence each; `label` is the name by which answers
-    know it, where the name of the file alone is not enough.
+    Attributes
+    ----------
+    path : Path
+    kind : str
+        Of the file, as "CSV".
+    tables : tuple of LogTable
+    notes : tuple of str
+        What was left out, one sentence each.
+    label : str
+        Name by which answers know it, where the name of the file alone is not enough.
     """
 
     path: Path
@@ -80,7 +96,16 @@ class LogFile:
 def with_distinct_names(logs: Sequence[LogFile], named: Sequence[str] = ()) -> list[LogFile]:
     """Return logs of which those in several folders with the same name are called ``FOLDER/NAME``; frames are one log.
 
-    Frames stay files of their own if one of these is `named` in answers. FileError is raised if two are still called the same.
+    Parameters
+    ----------
+    logs : sequence of LogFile
+    named : sequence of str
+        What answers name; frames stay files of their own if it is one of these.
+
+    Raises
+    ------
+    FileError
+        Two are still called the same.
     """
     found = list(logs)
     if not {log.path.name for log in found} & set(named):

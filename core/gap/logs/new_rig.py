@@ -39,7 +39,17 @@ DIGITS = 10
 
 @dataclass(frozen=True)
 class NewRig:
-    """The file of a new rig, the rig as read from it, and remarks for the user, which stand in it as comments, too."""
+    """Files of a new rig.
+
+    Attributes
+    ----------
+    path : Path
+        Of the rig.
+    rig : Rig
+        As read from that file.
+    notes : tuple of str
+        Remarks for the user, a sentence each; they stand in the rig as comments, too.
+    """
 
     path: Path
     rig: Rig
@@ -47,7 +57,14 @@ class NewRig:
 
 
 def write_rig(logs: Sequence[LogFile], answers: Answers, folder: str | os.PathLike) -> Job[NewRig]:
-    """Write a rig into a folder, which is created if it is missing; the rig of an earlier call in it is replaced.
+    """Write a rig.
+
+    Parameters
+    ----------
+    logs : sequence of LogFile
+    answers : Answers
+    folder : path
+        Created if it is missing. The rig of an earlier call in it is replaced.
 
     Yields
     ------

@@ -43,9 +43,17 @@ def preview_rows(logs: Sequence[LogFile]) -> list[tuple[str, ...]]:
 
 
 def plot_rig(rig: Rig, path: str | Path) -> None:
-    """Write a picture of the recordings of a rig as PNG: what drove the sensor, and what answered, over time.
+    """Write a picture of the recordings of a rig: what drove the sensor, and what answered, over time.
 
-    FileError is raised if it cannot be written.
+    Parameters
+    ----------
+    rig : Rig
+    path : path of the PNG file
+
+    Raises
+    ------
+    FileError
+        The file cannot be written.
     """
     trials = rig.trials[:MOST_TRIALS]
     figure = new_figure(10.0, 2.4 * len(trials))

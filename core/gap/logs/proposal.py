@@ -38,10 +38,19 @@ CHECK_EVERY = 3
 
 
 def propose(logs: Sequence[LogFile], name: str = "rig") -> Proposal:
-    """Return the proposal for the files of one measurement, of which several become trials, and the name of a rig.
+    """Return the proposal for some logs.
 
-    FileError is raised if there are no logs, two have the same name, one is shorter than a recording, or there are files of
-    more than two kinds.
+    Parameters
+    ----------
+    logs : sequence of LogFile
+        The files of one measurement; several become trials.
+    name : str
+        Of the rig.
+
+    Raises
+    ------
+    FileError
+        There are no logs, two have the same name, one is shorter than a recording, or there are files of more than two kinds.
     """
     if not logs:
         raise FileError("No logs are given: name at least one file.")

@@ -21,14 +21,21 @@ SMALL_FILE = 2**26
 
 @contextmanager
 def damage_said(path: Path, kind: str) -> Iterator[None]:
-    """Turn what a library raises on a damaged file into one sentence, which names the kind that it should be, as "MCAP".
+    """Turn what a library raises on a damaged file into one sentence.
 
-    What the system says of files keeps its own sentence, and so does too little memory for a large file.
+    Parameters
+    ----------
+    path : Path
+    kind : str
+        What the file should be, as in "MCAP".
+    *passing
+        Errors that the caller knows how to explain.
 
     Raises
     ------
     FileError
-        The library raised another error.
+        The library raised an error. What the system says of files keeps its own sentence, and so does too little memory for a
+        large file.
     """
     try:
         yield

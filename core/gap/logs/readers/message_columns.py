@@ -40,7 +40,14 @@ def is_picture(kind: str) -> bool:
 
 
 class TopicColumns:
-    """Collects the numbers of the messages of one topic; the path of the log is for messages."""
+    """Collects the numbers of the messages of one topic.
+
+    Parameters
+    ----------
+    topic : str
+    path : Path
+        Of the log, for messages.
+    """
 
     def __init__(self, topic: str, path: Path):
         self._topic, self._path = topic, path
