@@ -24,6 +24,8 @@ from .csv_table import LARGEST_NUMBER, UNITS, open_table
 
 LONGEST_LINE = 1 << 20
 """Characters."""
+MOST_VALUES = 100_000_000
+"""Numbers that are read: 0.8 GB, far more than a fit can use."""
 SAMPLE = 400
 """Lines within which the table has to begin, and from which its form is judged."""
 FIRST_RUN = 8
@@ -63,14 +65,8 @@ class TextTable:
     notes: tuple[str, ...] = ()
 
 
-def read_text_table(path: str | os.PathLike, most_values: int = 100_000_000) -> TextTable:
+def read_text_table(path: str | os.PathLike) -> TextTable:
     """Read a table of text.
-
-    Parameters
-    ----------
-    path : path
-    most_values : int
-        Numbers that are read at most.
 
     Raises
     ------
@@ -85,10 +81,10 @@ def read_text_table(path: str | os.PathLike, most_values: int = 100_000_000) -> 
     form, first = _form([text for _, text in lines[:SAMPLE]], path)
     head = [form.cells(text) for _, text in lines[:first]]
     names, units, notes = _header(head, comments, form, [form.cells(text) for _, text in lines[first : first + SAMPLE]], path)
-    if (len(lines) - first) * len(names) > most_values:
+    if (len(lines) - first) * len(names) > MOST_VALUES:
         raise FileError(
             f"'{path.name}' holds {(len(lines) - first) * len(names):,} numbers in {len(names):,} columns and at most "
-            f"{most_values:,} are read: cut it into several files, or keep fewer samples per second."
+            f"{MOST_VALUES:,} are read: cut it into several files, or keep fewer samples per second."
         )
     values, wrong = _values(lines[first:], names, form)
     numbers = np.array([number for number, _ in lines[first:]])

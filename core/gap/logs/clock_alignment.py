@@ -107,7 +107,9 @@ def _shift_of(cause: np.ndarray, answer: np.ndarray, step: float, offset: float)
     top, away, _ = peak_of(size)
     if size[top] <= 0.0:
         return None
-    width = _lobe(size, top)
+    # the peak ends twice as far away as it first falls below half of its height
+    below = np.flatnonzero(size < 0.5 * size[top])
+    width = 2 * max(3, int(np.abs(below - top).min(initial=len(size))))
     elsewhere = size.copy()
     elsewhere[max(0, top - width) : top + width + 1] = 0.0
     rival = float(elsewhere.max()) / float(size[top])
@@ -128,8 +130,7 @@ def _changes(values: np.ndarray, width: int) -> np.ndarray:
     half = max(1, width // 2)
     means = (total[half:] - total[:-half]) / half
     change = means[half:] - means[:-half]
-    found: np.ndarray = change - change.mean()
-    return found
+    return change - change.mean()
 
 
 def _correlation(cause: np.ndarray, answer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -145,10 +146,3 @@ def _correlation(cause: np.ndarray, answer: np.ndarray) -> tuple[np.ndarray, np.
     with np.errstate(divide="ignore", invalid="ignore"):
         found = np.where(enough, product / np.sqrt(shared_cause * shared_answer), 0.0)
     return lags, np.nan_to_num(found)
-
-
-def _lobe(size: np.ndarray, top: int) -> int:
-    """Return half the width of the peak, in samples: to where it falls below half of its height, and twice as far."""
-    right = np.flatnonzero(size[top:] < 0.5 * size[top])
-    left = np.flatnonzero(size[top::-1] < 0.5 * size[top])
-    return 2 * max(3, int(min(right[0] if len(right) else len(size), left[0] if len(left) else len(size))))

@@ -3,9 +3,6 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
-
 import numpy as np
 
 ZERO, RESTS, BELOW = 0.02, 0.05, 0.05
@@ -26,20 +23,20 @@ APART = 1.0
 """Ranges of all other values by which a code is apart from them, where it is not the only negative number."""
 
 
-def is_unnamed(names: Sequence[str]) -> bool:
-    """Return True if the columns of a table have no names but numbers."""
-    return all(re.fullmatch(r"column_\d+", name) for name in names)
+def finite(values: np.ndarray) -> np.ndarray:
+    """Return the values that are known."""
+    return values[np.isfinite(values)]
 
 
 def is_clock(values: np.ndarray, strictly: bool = False) -> bool:
     """Return True if values rise like a clock; strictly: with few that repeat."""
-    steps = np.diff(values[np.isfinite(values)])
+    steps = np.diff(finite(values))
     return len(steps) >= 7 and not (steps < 0).any() and bool(steps.any()) and not (strictly and (steps == 0).mean() > 0.3)
 
 
 def is_force(values: np.ndarray) -> bool:
     """Return True if values behave as a force of contact."""
-    known = values[np.isfinite(values)]
+    known = finite(values)
     low, high = np.percentile(known, [0.1, 99.9])
     span = float(high - low)
     return bool(span > 0.0 and low > -BELOW * span and (np.abs(known) < ZERO * span).mean() > RESTS)
@@ -55,13 +52,13 @@ def correlation(one: np.ndarray, other: np.ndarray) -> float:
 
 def is_unordered(load: np.ndarray) -> bool:
     """Return True if a load jumps from sample to sample, as in a table of calibration points."""
-    known = load[np.isfinite(load)]
+    known = finite(load)
     return len(known) >= 16 and float(np.ptp(known)) > 0.0 and float(np.corrcoef(known[:-1], known[1:])[0, 1]) < ORDERED
 
 
 def contact_of(values: np.ndarray) -> float:
     """Return how far values, averaged over five samples, leave their noise from sample to sample, in units of that."""
-    known = values[np.isfinite(values)]
+    known = finite(values)
     if len(known) < 8:
         return 0.0
     noise = 1.4826 * float(np.median(np.abs(np.diff(known)))) / np.sqrt(2.0)
@@ -76,7 +73,7 @@ def missing_code(values: np.ndarray) -> float | None:
     ----------
     values : (T,) float
     """
-    known = values[np.isfinite(values)]
+    known = finite(values)
     if len(known) < FEWEST:
         return None
     for code in (float(known.min()), float(known.max())):

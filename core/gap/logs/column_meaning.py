@@ -10,32 +10,35 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..dataset.column_names import LOG_UNITS, PRESSURES, QUANTITIES
+from .column_behaviour import finite
 
-KNOWN_UNITS = {unit for units in LOG_UNITS.values() for unit in units} | set(PRESSURES)
-KNOWN_UNITS |= set(
-    ["counts", "count", "V", "mV", "ohm", "kohm", "Ohm", "kOhm", "Ω", "kΩ", "F", "pF", "raw", "LSB", "ADC", "deg", "rad", "%"]
-)
+KNOWN_UNITS = {unit for units in (*LOG_UNITS.values(), PRESSURES) for unit in units}
+KNOWN_UNITS |= {"counts", "count", "raw", "LSB", "ADC", "V", "mV", "ohm", "kohm", "Ohm", "kOhm", "Ω", "kΩ", "F", "pF"}
+KNOWN_UNITS |= {"deg", "rad", "%"}
 TEXEL_WORDS = {
     *("texel", "taxel", "tactel", "cell", "sensor", "tactile", "tac", "tactip", "ch", "channel", "hall"),
     *("pressure", "resistance", "capacitance", "voltage", "adc", "raw", "signal", "reading", "readings", "value", "values"),
     *("r", "c", "s", "p", "v"),
 }
 """Words in the names of columns that hold the sensor's response."""
+_MOTIONS = {"acceleration", "accel", "acc", "jerk", "gyro", "angular", "twist", "twists"}
 _AXIS_WORDS = {
-    "position": [
-        *("position", "pos", "pose", "translation", "motion", "p"),
-        *("tcp", "tip", "probe", "indenter", "tool", "ee", "robot"),
-    ],
-    "force": ["force", "f", "wrench", "load", "ft"],
-    "torque": ["torque", "moment", "t", "m", "tau"],
-    "rotation": ["orientation", "rotation", "quaternion", "quat", "q", "rot"],
-    "velocity": ["velocity", "vel", "v", "speed", "acceleration", "accel", "acc", "jerk", "gyro", "angular", "twist", "twists"],
+    "velocity": {"velocity", "vel", "v", "speed"} | _MOTIONS,
+    "rotation": {"orientation", "rotation", "quaternion", "quat", "q", "rot"},
+    "force": {"force", "f", "wrench", "load", "ft"},
+    "torque": {"torque", "moment", "t", "m", "tau"},
+    "position": {"position", "pos", "pose", "translation", "motion", "p"}
+    | {"tcp", "tip", "probe", "indenter", "tool", "ee", "robot"},
 }
+"""Words beside the letter of an axis; the first kind of which a name has a word counts."""
+_JOINED = {"f": "force", "p": "position", "pos": "position", "q": "rotation"}
+_JOINED |= {kind: kind for kind in ("force", "position", "slide")}
+"""What is written together with the letter of an axis."""
 _TIME_WORDS = {"time", "t", "timestamp", "stamp", "sec", "secs", "seconds", "elapsed", "clock", "tim", "tim2", "zeit"}
 _SINGLE = {
     "force": {"force", "load", "weight", "mass", "normal_force", "fn", "loadcell", "scale", "futek"},
@@ -84,11 +87,9 @@ def name_and_unit(column: str) -> tuple[str, str]:
     if found:
         return found["name"], found["unit"]
     stem, mark, last = re.match(r"^(.*?)([_ .]?)([^_ .]*)$", column).groups()  # type: ignore[union-attr]
-    if mark and stem and last in KNOWN_UNITS - {"m", "s", "g", "V", "F", "N", "in", "C", "K"}:
-        return stem, last
-    if mark == "_" and stem and last in {"m", "s", "g", "N", "V"} and len(stem) > 1:
-        return stem, last
-    return column, ""
+    is_unit = last in KNOWN_UNITS - {"m", "s", "g", "V", "F", "N", "in", "C", "K"}
+    is_letter = mark == "_" and len(stem) > 1 and last in {"m", "s", "g", "N", "V"}
+    return (stem, last) if mark and stem and (is_unit or is_letter) else (column, "")
 
 
 def meaning_of(column: str) -> Meaning:
@@ -96,25 +97,17 @@ def meaning_of(column: str) -> Meaning:
     plain, unit = name_and_unit(column)
     if plain.lower() in QUANTITIES and plain.lower() != "texel":
         return Meaning(plain.lower(), unit, 3)
-    words = [word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", plain)]
+    words = _words(plain)
     if not words:
         return Meaning("")
-    has = {kind: bool(set(words) & set(names)) for kind, names in _AXIS_WORDS.items()}
+    kind = next((kind for kind, names in _AXIS_WORDS.items() if names & set(words)), "")
     last = words[-1]
-    joined = re.fullmatch(r"(f|force|p|pos|position|q|t|m|v|a|slide)([xyzw])", last)
-    if joined and len(words[-1]) > 1:
-        kind = {"f": "force", "force": "force", "p": "position", "pos": "position", "position": "position", "q": "rotation"}
-        if joined[1] == "slide":
-            return Meaning(f"slide_{joined[2]}", unit, 3) if joined[2] in "xy" else Meaning("")
-        return _of_axis(kind.get(joined[1], ""), joined[2], unit, 2)
+    if joined := re.fullmatch(r"(f|force|p|pos|position|q|t|m|v|a|slide)([xyzw])", last):
+        return _of_axis(_JOINED.get(joined[1], ""), joined[2], unit, 3 if joined[1] == "slide" else 2)
     if last in ("x", "y", "z", "w"):
-        if has["velocity"] or "torque" in words:
-            return Meaning("")
-        kind_of = next((kind for kind in ("rotation", "force", "torque", "position") if has[kind]), "")
-        if kind_of == "" and len(words) == 1:
-            return Meaning(last, unit, 1) if last in "xyz" else Meaning("")
-        return _of_axis(kind_of, last, unit, 3 if kind_of else 0)
-    if set(words) & _TIME_WORDS and not has["velocity"]:
+        is_alone = not kind and len(words) == 1
+        return _of_axis("position" if is_alone else "" if "torque" in words else kind, last, unit, 1 if is_alone else 3)
+    if set(words) & _TIME_WORDS and kind != "velocity":
         return Meaning("time", unit, 3 if words[0] in _TIME_WORDS else 2)
     if unit in PRESSURES and {"pressure", "stress"} & set(words) and not any(word.isdigit() for word in words):
         return Meaning("force", unit, 2)
@@ -124,19 +117,27 @@ def meaning_of(column: str) -> Meaning:
     return Meaning("", unit)
 
 
+def meaning_in(table: str, column: str, stated: str) -> Meaning:
+    """Return the meaning of a column, whose topic or group may say more than its name, in the unit that the file states."""
+    found = meaning_of(column)
+    longer = meaning_of(f"{table.rpartition('/')[2]} {column}") if table and found.weight <= 1 else found
+    best = max(found, longer, key=lambda one: one.weight)
+    return replace(best, unit=stated or best.unit)
+
+
 def is_rate(unit: str) -> bool:
     """Return True if a unit is that of something per time."""
     return _RATE.search(unit) is not None
 
 
+def _words(text: str) -> list[str]:
+    return [word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", text)]
+
+
 def _of_axis(kind: str, axis: str, unit: str, weight: int) -> Meaning:
-    if kind == "force" and axis in "xyz":
-        return Meaning(f"force_{axis}", unit, weight)
-    if kind == "position" and axis in "xyz":
-        return Meaning(axis, unit, weight)
-    if kind == "rotation":
-        return Meaning(f"q{axis}", unit, weight)
-    return Meaning("")
+    before = {"force": "force_", "position": "", "rotation": "q", "slide": "slide_"}
+    quantity = before[kind] + axis if kind in before else ""
+    return Meaning(quantity, unit, weight) if quantity in QUANTITIES else Meaning("")
 
 
 @dataclass(frozen=True)
@@ -179,11 +180,9 @@ def families(columns: Sequence[str], follows: Callable[[str], float]) -> list[Fa
         is_whole = all(one[-1] - one[0] == len(one) - 1 for one in ranges)
         if not is_whole or len({numbers for numbers, _ in members}) != len(members) != math.prod(map(len, ranges)):
             continue
-        if len(members) == 1:
-            continue
-        words = {word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", key)}
-        is_named = bool(words & TEXEL_WORDS) and not words & set(_AXIS_WORDS["velocity"][4:])
-        if is_named or len(members) > 2:
+        words = set(_words(key))
+        is_named = bool(words & TEXEL_WORDS) and not words & _MOTIONS
+        if len(members) > (1 if is_named else 2):
             own = tuple(column for _, column in sorted(members))
             found.append(Family(own, is_named, float(np.median([follows(one) for one in own]))))
     if not found:
@@ -198,23 +197,21 @@ def time_unit(values: np.ndarray, stated: str) -> tuple[str, str, bool]:
     """Return the unit of time stamps, why, and whether it only seems so."""
     if stated in LOG_UNITS["s"]:
         return stated, "the file says so", False
-    known = values[np.isfinite(values)]
+    known = finite(values)
     steps = np.diff(known)
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
     size = float(np.abs(known).max()) if len(known) else 0.0
     for unit, seconds in (("ns", 1e-9), ("us", 1e-6), ("ms", 1e-3), ("s", 1.0)):
-        if 1e9 <= size * seconds < 3e9 and step * seconds < 10.0:
+        if SINCE_1970 <= size * seconds < 3.0 * SINCE_1970 and step * seconds < 10.0:
             return unit, "such numbers count from 1970", False
     if 0.0 < step <= 0.5:
         return "s", f"samples are {step:.3g} s apart", False
-    if step <= 500.0:
-        return "ms", f"samples are {step:.4g} apart", True
-    return "us", f"samples are {step:.4g} apart", True
+    return "ms" if step <= 500.0 else "us", f"samples are {step:.4g} apart", True
 
 
 def is_since_1970(values: np.ndarray, unit: str) -> bool:
     """Return True if all time stamps in a unit are so large that they must count from 1970."""
-    known = values[np.isfinite(values)]
+    known = finite(values)
     return len(known) > 0 and float(known.min()) * LOG_UNITS["s"][unit] > SINCE_1970
 
 

@@ -6,6 +6,7 @@ The template, the questions at the terminal and in Blender, and the answers from
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -104,18 +105,12 @@ class Proposal:
     @property
     def text(self) -> str:
         """The file of answers."""
-        lines = [
-            f'format = "{FORMAT}"',
-            '# What the logs seem to be. Replace each "?", check what is marked CHECK, and give the file with --answers.',
-        ]
-        place = None
-        for guess in self.guesses:
-            if place != (guess.table, guess.number):
-                place = guess.table, guess.number
-                heading = f"[[{guess.table}]]" if guess.table in ("logger", "recording") else f"[{guess.table}]"
-                blank = [""] if guess.table != "logger.columns" else []
-                lines += [*blank, heading] if guess.table else blank
-            lines.append(guess.line)
+        what = '# What the logs seem to be. Replace each "?", check what is marked CHECK, and give the file with --answers.'
+        lines = [f'format = "{FORMAT}"', what]
+        for (table, _), guesses in itertools.groupby(self.guesses, lambda guess: (guess.table, guess.number)):
+            lines += [""] if table != "logger.columns" else []
+            lines += [f"[[{table}]]" if table in ("logger", "recording") else f"[{table}]"] if table else []
+            lines += [guess.line for guess in guesses]
         return "\n".join([*lines, "", *(f"# {note}" for note in self.notes)]) + "\n"
 
     def columns(self, number: int = 0) -> dict[str, Guess]:
@@ -138,9 +133,9 @@ class Proposal:
 
 def has_unknown(value: Any) -> bool:
     """Return True if a value is, or holds, :data:`UNKNOWN`."""
-    if isinstance(value, Mapping):
-        return any(has_unknown(one) for one in value.values())
-    return any(has_unknown(one) for one in value) if isinstance(value, list | tuple) else value == UNKNOWN
+    if isinstance(value, Mapping | list | tuple):
+        return any(map(has_unknown, value.values() if isinstance(value, Mapping) else value))
+    return value == UNKNOWN
 
 
 def toml_value(value: Any) -> str:

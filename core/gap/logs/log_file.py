@@ -12,14 +12,14 @@ import numpy as np
 from ...errors import FileError, counted, read_errors_said
 from ...io.input_files import open_regular
 from ...io.text_table import MISSING, read_text_table
-from .log_table import LARGEST_FILE, MOST_VALUES, LogFile, LogTable, require_size
+from .log_table import LARGEST_FILE, LogFile, LogTable, require_size
 from .readers.array_files import read_hdf5, read_mat, read_npz
 from .readers.bags import read_bag, read_mcap
 
 
 def read_text(path: Path) -> LogFile:
     """Read a table of text; raise FileError if it is none."""
-    found = read_text_table(path, MOST_VALUES)
+    found = read_text_table(path)
     rows, columns = found.values.shape
     require_size(rows * columns, columns, path)
     notes, kept, text = list(found.notes), {}, 0
@@ -35,16 +35,10 @@ def read_text(path: Path) -> LogFile:
 
 
 READERS: dict[str, Callable[[Path], LogFile]] = {
-    ".csv": read_text,
-    ".tsv": read_text,
-    ".txt": read_text,
-    ".dat": read_text,
-    ".log": read_text,
+    **dict.fromkeys((".csv", ".tsv", ".txt", ".dat", ".log"), read_text),
     ".mcap": read_mcap,
-    ".bag": read_bag,
-    ".db3": read_bag,
-    ".h5": read_hdf5,
-    ".hdf5": read_hdf5,
+    **dict.fromkeys((".bag", ".db3"), read_bag),
+    **dict.fromkeys((".h5", ".hdf5"), read_hdf5),
     ".npz": read_npz,
     ".mat": read_mat,
 }
@@ -61,18 +55,17 @@ def read_log(path: str | os.PathLike) -> LogFile:
     """
     path = Path(path)
     with read_errors_said(path):
-        return read_bag(path) if path.is_dir() else _reader_of(path)(path)
-
-
-def _reader_of(path: Path) -> Callable[[Path], LogFile]:
-    """Return the reader of a file, by the ending of its name."""
-    size = path.stat().st_size
-    if size > LARGEST_FILE:
-        raise FileError(f"'{path.name}' holds {size / 1e9:.1f} GB and at most {LARGEST_FILE / 1e9:.1f} GB are read: cut it.")
-    with open_regular(path) as file:
-        if not file.read(1):
-            raise FileError(f"'{path.name}' is empty: copy it again.")
-    reader = READERS.get(path.suffix.lower())
-    if reader is None:
-        raise FileError(f"'{path.name}' is no log that is known: give one of {', '.join(READERS)}, or the folder of a bag.")
-    return reader
+        if path.is_dir():
+            return read_bag(path)
+        size = path.stat().st_size
+        if size > LARGEST_FILE:
+            raise FileError(
+                f"'{path.name}' holds {size / 1e9:.1f} GB and at most {LARGEST_FILE / 1e9:.1f} GB are read: cut it."
+            )
+        with open_regular(path) as file:
+            if not file.read(1):
+                raise FileError(f"'{path.name}' is empty: copy it again.")
+        reader = READERS.get(path.suffix.lower())
+        if reader is None:
+            raise FileError(f"'{path.name}' is no log that is known: give one of {', '.join(READERS)}, or the folder of a bag.")
+        return reader(path)

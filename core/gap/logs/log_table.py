@@ -12,12 +12,11 @@ import numpy as np
 
 from ...errors import FileError
 from ...io.csv_table import LARGEST_NUMBER
+from ...io.text_table import MOST_VALUES
 from .column_behaviour import is_clock
 
 LARGEST_FILE = 2 * 2**30
 """Bytes of a log."""
-MOST_VALUES = 100_000_000
-"""Numbers of a log that are read: 0.8 GB, far more than a fit can use."""
 MOST_COLUMNS = 5000
 FEWEST_ROWS = 8
 """Samples of a trial, see :mod:`..dataset.rig`; shorter arrays are settings and no recordings."""
@@ -79,6 +78,11 @@ class LogFile:
     label: str = ""
 
     @property
+    def columns(self) -> dict[str, np.ndarray]:
+        """Values of all columns, by the names that no other table of the file has."""
+        return {table.full_name(name): values for table in self.tables for name, values in table.columns.items()}
+
+    @property
     def name(self) -> str:
         """Name by which answers know the file."""
         return self.label or self.path.name
@@ -103,34 +107,35 @@ def with_distinct_names(logs: Sequence[LogFile], named: Sequence[str] = ()) -> l
     FileError
         Two are still called the same.
     """
-    if not {log.path.name for log in logs} & set(named):
-        logs = joined_frames(logs)
-    if len({log.path.name for log in logs}) < len(logs):
-        logs = [replace(log, label=f"{log.path.absolute().parent.name}/{log.path.name}") for log in logs]
-    names = [log.name for log in logs]
+    found = list(logs)
+    if not {log.path.name for log in found} & set(named):
+        found = _joined_frames(found)
+    if len({log.path.name for log in found}) < len(found):
+        found = [replace(log, label=f"{log.path.absolute().parent.name}/{log.path.name}") for log in found]
+    names = [log.name for log in found]
     for one in names:
         if names.count(one) > 1:
             raise FileError(f"Two logs are called '{one}': rename one, so that each recording has a name.")
-    return list(logs)
+    return found
 
 
-def joined_frames(logs: Sequence[LogFile]) -> list[LogFile]:
+def _joined_frames(logs: list[LogFile]) -> list[LogFile]:
     """Return logs that are matrices of one shape without names and clock as one log, a sample for each file.
 
     The number in the name of a file, with the unit behind it, is the load; the samples are in its order.
     """
-    shapes = {tuple(values.shape for values in log.tables[0].columns.values()) for log in logs if len(log.tables) == 1}
-    is_plain = all(len(log.tables) == 1 and re.fullmatch(r"column_1", next(iter(log.tables[0].columns))) for log in logs)
-    found = [re.search(r"(\d+(?:\.\d+)?)\s*([A-Za-z]*)$", log.path.stem) for log in logs]
-    if len(logs) < 2 or len(shapes) != 1 or not is_plain or not all(found):
-        return list(logs)
+    numbers = [match for log in logs if (match := re.search(r"(\d+(?:\.\d+)?)\s*([A-Za-z]*)$", log.path.stem))]
+    is_plain = all(len(log.tables) == 1 and next(iter(log.tables[0].columns)) == "column_1" for log in logs)
+    if not len(numbers) == len(logs) > 1 or not is_plain:
+        return logs
     frames = [np.stack(list(log.tables[0].columns.values()), axis=1) for log in logs]
     rows, columns = frames[0].shape
-    if rows > MOST_FRAME_ROWS or columns < 2 or any(is_clock(column) for frame in frames for column in frame.T):
-        return list(logs)
-    loads = np.array([float(one[1]) for one in found if one])
+    if any(frame.shape != (rows, columns) for frame in frames) or rows > MOST_FRAME_ROWS or columns < 2:
+        return logs
+    if any(is_clock(column) for frame in frames for column in frame.T):
+        return logs
+    loads, unit = np.array([float(match[1]) for match in numbers]), numbers[0][2]
     order = np.argsort(loads, kind="stable")
-    unit = found[0][2] if found[0] else ""
     texels = np.stack(frames)[order].reshape(len(frames), -1)
     name = f"pressure ({unit})" if unit in {"psi", "Pa", "kPa", "MPa", "bar", "mbar"} else "load"
     table = LogTable(
@@ -156,5 +161,4 @@ def cleaned(values: np.ndarray) -> np.ndarray:
     """Return numbers as float64, with NaN for what is infinite or too large to be measured."""
     found = np.array(values, dtype=float)
     with np.errstate(invalid="ignore"):
-        found[~(np.abs(found) <= LARGEST_NUMBER)] = np.nan
-    return found
+        return np.where(np.abs(found) <= LARGEST_NUMBER, found, np.nan)

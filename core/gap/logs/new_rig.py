@@ -16,12 +16,12 @@ from ...io.csv_table import LARGEST_NUMBER
 from ...io.file_writing import atomic_write, writable_folder
 from ...io.hidden_folder import FileList
 from ...jobs import Job, Progress
-from ..dataset.column_names import FORCE, POSE, SLIDE, Column
+from ..dataset.column_names import POSE, QUANTITIES, Column
 from ..dataset.rig import FORMAT, Rig, read_rig
 from ..dataset.second_logger import at_times
-from .answers import Answers, LoggerAnswer, RecordingAnswer
-from .clock_alignment import ClockShift, clock_shift
-from .column_behaviour import LEAST_CONTACT, contact_of, correlation, is_unordered, missing_code
+from .answers import Answers, RecordingAnswer
+from .clock_alignment import clock_shift
+from .column_behaviour import LEAST_CONTACT, contact_of, correlation, finite, is_unordered, missing_code
 from .column_meaning import SINCE_1970
 from .guess import toml_value
 from .log_table import FEWEST_ROWS, LogFile, LogTable, with_distinct_names
@@ -135,19 +135,30 @@ def _columns_of(logs: Mapping[str, LogFile], file: str, answers: Answers, notes:
             if found is None:
                 raise FileError(f"'{file}' has no column '{name}', which the answers name for {quantity}: check its name.")
             table, own = found
+            values = table.columns[own]
+            if answer.missing is None and (code := missing_code(values)) is not None:
+                raise FileError(
+                    f"'{own}' of '{file}' is {code:g} in {(values == code).mean():.0%} of its samples, and its neighbours are "
+                    f"far away: write missing = {code} at {quantity} if no value was measured there, or missing = any other "
+                    "number."
+                )
             column = f"texel_{i}" if quantity == "texel" else quantity
-            values = _in_si(quantity, answer, table.columns[own], f"'{own}' of '{file}'")
-            tables.setdefault(table.name, (table, {}))[1][column] = values
+            tables.setdefault(table.name, (table, {}))[1][column] = answer.in_si(quantity, values)
     if not tables:
         raise FileError(f"The answers use no column of '{file}': name its columns, or leave the file out.")
-    parts = [_on_clock(columns, _clock_of(log, table, logger, columns), log, notes) for table, columns in tables.values()]
+    clock = logger.columns.get("time")
+    if clock is None:
+        raise FileError(f"The answers name no time of '{log.name}': name its column, or write time = {{ rate = 100.0 }}.")
+    parts = [
+        _on_clock({"time": _time_of(log, table, clock, next(iter(columns))), **columns}, log, notes)
+        for table, columns in tables.values()
+    ]
     made = _on_one_clock(parts, log, notes)
     for quantity, answer in logger.columns.items():
         if answer.constant is not None:
             made[quantity] = np.full(len(made["time"]), answer.constant)
-    time = logger.columns.get("time")
     load = next((made[one] for one in ("force", "depth", "z", "force_z") if one in made), None)
-    if time is not None and time.rate and load is not None and is_unordered(load):
+    if clock.rate and load is not None and is_unordered(load):
         order = np.argsort(load, kind="stable")
         notes.append(
             f"'{log.name}': its rows are points in no order; they were sorted by the load, and show no effect of time."
@@ -162,68 +173,51 @@ def _table_of(tables: Sequence[LogTable], name: str) -> tuple[LogTable, str] | N
     return next(by_full, None) or next(((table, name) for table in tables if name in table.columns), None)
 
 
-def _in_si(quantity: str, answer: Column, values: np.ndarray, where: str) -> np.ndarray:
-    """Return the values of a column; refuse a number that seems to stand for missing values, where the answers name none."""
-    if answer.missing is None and (code := missing_code(values)) is not None:
-        raise FileError(
-            f"{where} is {code:g} in {(values == code).mean():.0%} of its samples, and its neighbours are far away: write "
-            f"missing = {code} at {quantity} if no value was measured there, or missing = any other number."
-        )
-    return answer.in_si(quantity, values)
-
-
-def _clock_of(log: LogFile, table: LogTable, logger: LoggerAnswer, columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return the time stamps of a table, in seconds."""
-    answer = logger.columns.get("time")
-    if answer is None:
-        raise FileError(f"The answers name no time of '{log.name}': name its column, or write time = {{ rate = 100.0 }}.")
-    if answer.rate:
-        return np.arange(table.sample_count) / answer.rate
-    for name in answer.names:
+def _time_of(log: LogFile, table: LogTable, clock: Column, column: str) -> np.ndarray:
+    """Return the time stamps of a table, of which `column` is one, in seconds."""
+    if clock.rate:
+        return np.arange(table.sample_count) / clock.rate
+    for name in clock.names:
         found = _table_of([table], name) or _table_of(log.tables, name)
         if found is None:
             continue
         values = found[0].columns[found[1]]
         if len(values) != table.sample_count:
             raise FileError(
-                f"'{name}' of '{log.name}' has {len(values)} stamps for {table.sample_count} samples of "
-                f"'{next(iter(columns))}': name the clock of these samples."
+                f"'{name}' of '{log.name}' has {len(values)} stamps for {table.sample_count} samples of '{column}': name the "
+                "clock of these samples."
             )
-        return answer.in_si("time", values)
-    raise FileError(f"'{log.name}' has no column '{answer.names[0]}', which the answers name for time: check its name.")
+        return clock.in_si("time", values)
+    raise FileError(f"'{log.name}' has no column '{clock.names[0]}', which the answers name for time: check its name.")
 
 
-def _on_clock(columns: dict[str, np.ndarray], time: np.ndarray, log: LogFile, notes: list[str]) -> dict[str, np.ndarray]:
+def _on_clock(columns: dict[str, np.ndarray], log: LogFile, notes: list[str]) -> dict[str, np.ndarray]:
     """Return columns with a clock that rises: without samples that have no stamp, and with equal stamps spread."""
     name = log.name
-    known = np.isfinite(time)
+    known = np.isfinite(columns["time"])
     if not known.all():
         notes.append(f"'{name}': {int((~known).sum())} samples without a time were left out.")
-        time, columns = time[known], {key: column[known] for key, column in columns.items()}
-    steps = np.diff(time)
-    (back,) = np.nonzero(steps < 0)
+        columns = {key: column[known] for key, column in columns.items()}
+    time = columns["time"]
+    (back,) = np.nonzero(np.diff(time) < 0)
     if len(back):
         raise FileError(
             f"The time of '{name}' goes backwards after sample {back[0] + 1} ({time[back[0] + 1]:.10g} s after "
             f"{time[back[0]]:.10g} s): cut the file where the clock was reset, or sort it."
         )
-    is_twice = np.append(False, (steps == 0) & np.all([_same(c[1:], c[:-1]) for c in columns.values()], axis=0))
+    same = [(c[1:] == c[:-1]) | np.isnan(c[1:]) & np.isnan(c[:-1]) for c in columns.values()]
+    is_twice = np.append(False, np.all(same, axis=0))
     if is_twice.any():
         notes.append(f"'{name}': {int(is_twice.sum())} samples that are there twice, with one stamp, were left out.")
-        time, columns = time[~is_twice], {key: column[~is_twice] for key, column in columns.items()}
-    share = float((np.diff(time) == 0).mean())
+        columns = {key: column[~is_twice] for key, column in columns.items()}
+    share = float((np.diff(columns["time"]) == 0).mean())
     if share:
-        time = _spread(time)
+        columns["time"] = _spread(columns["time"])
         notes.append(f"'{name}': samples with equal stamps ({share:.1%}) were spread evenly up to the next stamp.")
-    steps = np.diff(time)
-    usual = float(np.median(steps)) if len(steps) else 0.0
-    if len(steps) and steps.max() > LONGEST_PAUSE * usual:
+    steps = np.diff(columns["time"])
+    if len(steps) and steps.max() > LONGEST_PAUSE * (usual := float(np.median(steps))):
         notes.append(f"'{name}': the longest pause between two samples is {steps.max():.3g} s, the usual step {usual:.3g} s.")
-    return {"time": time, **columns}
-
-
-def _same(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    return (one == other) | (np.isnan(one) & np.isnan(other))
+    return columns
 
 
 def _spread(time: np.ndarray) -> np.ndarray:
@@ -243,30 +237,23 @@ def _on_one_clock(parts: list[dict[str, np.ndarray]], log: LogFile, notes: list[
     if len(texels) > 1:
         raise FileError(f"The texels of '{log.name}' are in {len(texels)} tables: give those of one table.")
     base = texels[0] if texels else min(parts, key=lambda part: len(part["time"]))
-    begin = max(part["time"][0] for part in parts)
-    end = min(part["time"][-1] for part in parts)
-    inside = (base["time"] >= begin) & (base["time"] <= end)
+    inside = np.all([(base["time"] >= part["time"][0]) & (base["time"] <= part["time"][-1]) for part in parts], axis=0)
     if inside.sum() < 8:
         raise FileError(f"The topics of '{log.name}' have less than eight samples at the same time: record them together.")
-    time = base["time"][inside]
-    found = {"time": time, **{name: column[inside] for name, column in base.items() if name != "time"}}
+    found = {name: column[inside] for name, column in base.items()}
     for part in parts:
         if part is not base:
-            found |= at_times(part, time)
+            found |= at_times(part, found["time"])
+            names = [name for name in base if name != "time"]
             notes.append(
                 f"'{log.name}': {', '.join(sorted(set(part) - {'time'}))} (every {_step(part):.3g} s) were interpolated "
-                f"at the times of {_first_names(base)} (every {_step(base):.3g} s)."
+                f"at the times of {' … '.join(dict.fromkeys((names[0], names[-1])))} (every {_step(base):.3g} s)."
             )
     return found
 
 
 def _step(part: Mapping[str, np.ndarray]) -> float:
     return float(np.median(np.diff(part["time"])))
-
-
-def _first_names(part: Mapping[str, np.ndarray]) -> str:
-    names = [name for name in part if name != "time"]
-    return names[0] if len(names) == 1 else f"{names[0]} … {names[-1]}"
 
 
 # --- a trial and its files
@@ -305,9 +292,9 @@ def _used_part(recording: RecordingAnswer, table: dict[str, np.ndarray]) -> dict
     end = np.inf if recording.end is None else recording.end
     used = (since >= begin) & (since <= end)
     if np.count_nonzero(used) < FEWEST_ROWS:
-        part = f"from {max(begin, 0.0):g} s to {min(end, since[-1]):g} s"
         raise FileError(
-            f"'{recording.name}' lasts {since[-1]:.6g} s and has fewer than {FEWEST_ROWS} samples {part}: write other seconds."
+            f"'{recording.name}' lasts {since[-1]:.6g} s and has fewer than {FEWEST_ROWS} samples from {max(begin, 0.0):g} s "
+            f"to {min(end, since[-1]):g} s: write other seconds."
         )
     return {name: column[used] for name, column in table.items()}
 
@@ -315,33 +302,31 @@ def _used_part(recording: RecordingAnswer, table: dict[str, np.ndarray]) -> dict
 def _lateness(
     recording: RecordingAnswer, driven: dict[str, np.ndarray], answered: dict[str, np.ndarray], apart: float
 ) -> tuple[float, str]:
-    """Return how late the second clock is, by the zeros of both files, and why."""
+    """Return how late the second clock is, by the zeros of both files, and why.
+
+    What both loggers saw is compared: a force where the first one has it, else the motion.
+    """
     if recording.late is not None:
         return recording.late + apart, f"the answers say that the second clock is {recording.late:.6g} s late"
-    found = _shift(recording.name, driven, answered)
-    if min(driven["time"][0], answered["time"][0]) > SINCE_1970:
-        seen = f" (changes agree best with {found.late:.2g} s)" if found and found.is_sure else ""
-        return apart, f"the two clocks show the time of day and count as one{seen}: late = … in its [[recording]] shifts one"
-    best = "do not change" if found is None else f"agree best with a shift of {found.late:.4g} s ({found.quality})"
-    if found is None or not found.is_sure:
-        raise FileError(
-            f"The two files of '{recording.name}' {best}, which does not tell how late the second clock is: write late = … in "
-            "seconds into its [[recording]], 0 if one computer stamped both."
-        )
-    return round(
-        found.late + apart, 6
-    ), f"the second clock is {found.late:.6g} s late, by the correlation of changes ({found.quality})"
-
-
-def _shift(name: str, driven: dict[str, np.ndarray], answered: dict[str, np.ndarray]) -> ClockShift | None:
-    """Compare what both loggers saw: a force where the first one has it, else the motion."""
     cause = next((driven[one] for one in ("force_z", "force", "depth", "z") if one in driven), None)
     answer = _response(answered)
     if cause is None or answer is None:
         raise FileError(
-            f"The two files of '{name}' need z, depth or force in one and texel or force_z in the other: name these columns."
+            f"The two files of '{recording.name}' need z, depth or force in one and texel or force_z in the other: name these "
+            "columns."
         )
-    return clock_shift((driven["time"], cause), (answered["time"], answer))
+    found = clock_shift((driven["time"], cause), (answered["time"], answer))
+    if min(driven["time"][0], answered["time"][0]) > SINCE_1970:
+        seen = f" (changes agree best with {found.late:.2g} s)" if found and found.is_sure else ""
+        return apart, f"the two clocks show the time of day and count as one{seen}: late = … in its [[recording]] shifts one"
+    if found is None or not found.is_sure:
+        best = "do not change" if found is None else f"agree best with a shift of {found.late:.4g} s ({found.quality})"
+        raise FileError(
+            f"The two files of '{recording.name}' {best}, which does not tell how late the second clock is: write late = … in "
+            "seconds into its [[recording]], 0 if one computer stamped both."
+        )
+    why = f"the second clock is {found.late:.6g} s late, by the correlation of changes ({found.quality})"
+    return round(found.late + apart, 6), why
 
 
 def _response(table: Mapping[str, np.ndarray]) -> np.ndarray | None:
@@ -349,33 +334,24 @@ def _response(table: Mapping[str, np.ndarray]) -> np.ndarray | None:
     names = [name for name in table if name.startswith("texel_")]
     if not names:
         return table.get("force_z")
-    values = np.stack([table[name] for name in names], axis=1)
-    values = values - np.nanmedian(values, axis=0)
+    values = np.stack([table[name] - np.nanmedian(table[name]) for name in names], axis=1)
     low, high = np.nanmin(values, axis=0), np.nanmax(values, axis=0)
-    found: np.ndarray = np.nanmean(values * np.where(-low > high, -1.0, 1.0), axis=1)
-    return found
+    return np.nanmean(values * np.where(-low > high, -1.0, 1.0), axis=1)
 
 
 def _check_sizes(table: Mapping[str, np.ndarray], name: str) -> None:
     """Refuse values whose unit must be wrong."""
-    for quantity, column in table.items():
-        known = column[np.isfinite(column)]
-        if not len(known):
-            continue
-        span, size = float(np.ptp(known)), float(np.abs(known).max())
-        if quantity in (*POSE, "depth", *SLIDE) and span > LARGEST_MOTION:
-            raise FileError(
-                f"{quantity} of '{name}' moves by {span:.4g} m: its unit in the answers must be wrong, write mm or um."
-            )
-        if quantity in ("force", *FORCE) and size > LARGEST_FORCE:
-            raise FileError(
-                f"{quantity} of '{name}' reaches {size:.4g} N: its unit in the answers must be wrong, write mN or g."
-            )
-    motions = [np.ptp(c[np.isfinite(c)]) for n, c in table.items() if n in (*POSE, "depth") and np.isfinite(c).any()]
-    if motions and 0.0 < max(motions) < SMALLEST_MOTION:
-        raise FileError(
-            f"The motion of '{name}' spans {max(motions):.3g} m: its unit in the answers must be wrong, write mm or m."
-        )
+    wrong = "its unit in the answers must be wrong"
+    known = {quantity: finite(column) for quantity, column in table.items() if np.isfinite(column).any()}
+    for quantity, values in known.items():
+        span, size, kind = float(np.ptp(values)), float(np.abs(values).max()), QUANTITIES.get(quantity)
+        if kind == "m" and span > LARGEST_MOTION:
+            raise FileError(f"{quantity} of '{name}' moves by {span:.4g} m: {wrong}, write mm or um.")
+        if kind == "N" and size > LARGEST_FORCE:
+            raise FileError(f"{quantity} of '{name}' reaches {size:.4g} N: {wrong}, write mN or g.")
+    motion = max((np.ptp(values) for quantity, values in known.items() if quantity in (*POSE, "depth")), default=0.0)
+    if 0.0 < motion < SMALLEST_MOTION:
+        raise FileError(f"The motion of '{name}' spans {motion:.3g} m: {wrong}, write mm or m.")
     step = _step(table)
     if not 1e-6 <= step <= 5.0:
         raise FileError(f"The samples of '{name}' are {step:.3g} s apart: the unit of time in the answers must be wrong.")
@@ -384,8 +360,8 @@ def _check_sizes(table: Mapping[str, np.ndarray], name: str) -> None:
 def _check_contact(table: Mapping[str, np.ndarray], name: str) -> None:
     """Refuse a recording in which nothing answers, or nothing drives."""
     for group in (("depth", "force"), POSE):
-        own = [table[one] for one in group if one in table]
-        if own and not any(np.ptp(column[np.isfinite(column)]) > 0.0 for column in own if np.isfinite(column).any()):
+        own = [finite(table[one]) for one in group if one in table]
+        if own and not any(len(values) and np.ptp(values) > 0.0 for values in own):
             raise FileError(f"What drove the sensor does not change in '{name}': leave it out, or check which column it is.")
     responses = [column for quantity, column in table.items() if quantity.startswith(("texel_", "force_"))]
     best = max((contact_of(column) for column in responses), default=0.0)

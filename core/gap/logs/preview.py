@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from ...figures.figure_canvas import new_figure
 from ...io.file_writing import atomic_write
 from ..dataset.rig import Rig
+from .column_behaviour import finite
 from .log_table import LogFile
 
 MOST_COLUMNS = 24
@@ -32,16 +34,12 @@ def preview_rows(logs: Sequence[LogFile]) -> list[tuple[str, ...]]:
                 if i == MOST_COLUMNS:
                     rows.append((log.name, f"{table.full_name('')}… {len(table.columns) - i} more", "", "", "", ""))
                     break
-                known = values[np.isfinite(values)]
-                ends = _ends(float(known.min()), float(known.max())) if len(known) else ("", "")
+                known = finite(values)
+                ends = [f"{end:.6g}" for end in (known.min(), known.max())] if len(known) else ["", ""]
+                if len(known) and ends[0] == ends[1]:  # as of clocks that count from 1970
+                    ends = [f"{end:.14g}" for end in (known.min(), known.max())]
                 rows.append((log.name, table.full_name(name), table.units.get(name, ""), str(len(known)), *ends))
     return rows
-
-
-def _ends(least: float, largest: float) -> tuple[str, str]:
-    """Write the ends of a range with six digits, and with more where these are the same, as of clocks that count from 1970."""
-    short = f"{least:.6g}", f"{largest:.6g}"
-    return short if short[0] != short[1] else (f"{least:.14g}", f"{largest:.14g}")
 
 
 def plot_rig(rig: Rig, path: str | Path) -> None:
@@ -57,37 +55,29 @@ def plot_rig(rig: Rig, path: str | Path) -> None:
     FileError
         The file cannot be written.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     trials = rig.trials[:MOST_TRIALS]
-    figure = Figure(figsize=(10.0, 2.4 * len(trials)), layout="constrained")
-    axes = np.atleast_2d(figure.subplots(len(trials), 2, squeeze=False))
+    figure = new_figure(10.0, 2.4 * len(trials))
+    figure.set_layout_engine("constrained")
+    axes = figure.subplots(len(trials), 2, squeeze=False)
     for row, trial in zip(axes, trials, strict=True):
-        driven: dict[str, np.ndarray] = {}
-        answered: dict[str, np.ndarray] = {}
+        driven, answered = {}, {}
         if trial.level is not None:
-            driven["depth (m)" if trial.stimulus == "depth" else "force (N)"] = trial.level
+            driven = {"depth (m)" if trial.stimulus == "depth" else "force (N)": trial.level}
         elif trial.position is not None:
-            driven |= {f"{axis} (m)": values for axis, values in zip("xyz", trial.position.T)}
+            driven = {f"{axis} (m)": values for axis, values in zip("xyz", trial.position.T)}
         if trial.reading is not None:
             loudest = np.argsort(-np.nan_to_num(np.nanmax(trial.reading, axis=0) - np.nanmin(trial.reading, axis=0)))
-            answered |= {f"texel_{i} ({rig.parameters.unit})": trial.reading[:, i] for i in loudest[:MOST_CURVES]}
+            answered = {f"texel_{i} ({rig.parameters.unit})": trial.reading[:, i] for i in loudest[:MOST_CURVES]}
         elif trial.force is not None:
-            answered |= {f"force_{axis} (N)": values for axis, values in zip("xyz", trial.force.T)}
-        _curves(row[0], trial.time, driven)
-        _curves(row[1], trial.time, answered)
+            answered = {f"force_{axis} (N)": values for axis, values in zip("xyz", trial.force.T)}
+        step = max(1, len(trial.time) // MOST_POINTS)
+        for axis, curves in zip(row, (driven, answered), strict=True):
+            for name, values in curves.items():
+                axis.plot(trial.time[::step], values[::step], linewidth=0.8, label=name)
+            if curves:
+                axis.legend(fontsize="x-small", loc="upper right")
         row[0].set_ylabel(f"{trial.name} ({trial.use})")
     for axis in axes[-1]:
         axis.set_xlabel("time (s)")
-    FigureCanvasAgg(figure)
     with atomic_write(path) as temporary:
         figure.savefig(temporary, format="png", dpi=100, metadata={"Software": "Palpate"})
-
-
-def _curves(axis: object, time: np.ndarray, curves: Mapping[str, np.ndarray]) -> None:
-    step = max(1, len(time) // MOST_POINTS)
-    for name, values in curves.items():
-        axis.plot(time[::step], values[::step], linewidth=0.8, label=name)  # type: ignore[attr-defined]
-    if curves:
-        axis.legend(fontsize="x-small", loc="upper right")  # type: ignore[attr-defined]

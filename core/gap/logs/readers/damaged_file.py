@@ -20,7 +20,7 @@ SMALL_FILE = 2**26
 
 
 @contextmanager
-def damage_said(path: Path, kind: str, *passing: type[Exception]) -> Iterator[None]:
+def damage_said(path: Path, kind: str) -> Iterator[None]:
     """Turn what a library raises on a damaged file into one sentence.
 
     Parameters
@@ -40,7 +40,7 @@ def damage_said(path: Path, kind: str, *passing: type[Exception]) -> Iterator[No
     try:
         yield
     except Exception as error:
-        if isinstance(error, (FileError, FileNotFoundError, PermissionError, *passing)):
+        if isinstance(error, (FileError, FileNotFoundError, PermissionError)):
             raise
         if isinstance(error, MemoryError) and not (path.is_file() and path.stat().st_size <= SMALL_FILE):
             raise
@@ -50,11 +50,11 @@ def damage_said(path: Path, kind: str, *passing: type[Exception]) -> Iterator[No
         ) from error
 
 
-def read_by(items: Iterable[Item], path: Path, kind: str, *passing: type[Exception]) -> Iterator[Item]:
+def read_by(items: Iterable[Item], path: Path, kind: str) -> Iterator[Item]:
     """Yield what a library reads; what it raises meanwhile is said by :func:`damage_said`, what the caller raises is not."""
     iterator = iter(items)
     while True:
-        with damage_said(path, kind, *passing):
+        with damage_said(path, kind):
             try:
                 item = next(iterator)
             except StopIteration:

@@ -78,23 +78,19 @@ class TopicColumns:
             return None, ""
         require_size(count * len(names), len(names), self._path)
         values = np.full((count, len(names)), np.nan)
-        rows = np.repeat(np.arange(count), np.diff(np.frombuffer(self._starts, np.uint64)).astype(np.int64))
-        values[rows, np.frombuffer(self._places, np.uint64)] = np.frombuffer(self._values, float)
-        time, said = self._times()
+        rows = np.repeat(np.arange(count), np.diff(np.array(self._starts)).astype(np.int64))
+        values[rows, np.array(self._places)] = np.array(self._values)
+        time, stamps, said = np.array(self._recorded), np.array(self._stamps), ""
+        if np.isfinite(stamps).all() and np.ptp(stamps) > 0.0:
+            difference = float(np.abs((stamps - stamps[0]) - (time - time[0])).max())
+            if difference > _LARGEST_DIFFERENCE:
+                said = (
+                    f"'{self._path.name}': the times in the headers of {self._topic} differ by up to {difference:.3g} s from "
+                    "those of the recorder, which were taken."
+                )
+            time = time if said else stamps
         columns = {TIME: time, **{name: column for name, column in zip(names, cleaned(values).T) if name != TIME}}
         return LogTable(self._topic, columns, {TIME: "s"}), said
-
-    def _times(self) -> tuple[np.ndarray, str]:
-        recorded, stamps = np.frombuffer(self._recorded, float), np.frombuffer(self._stamps, float)
-        if not np.isfinite(stamps).all() or not np.ptp(stamps) > 0.0:
-            return recorded.copy(), ""
-        difference = float(np.abs((stamps - stamps[0]) - (recorded - recorded[0])).max())
-        if difference > _LARGEST_DIFFERENCE:
-            return recorded.copy(), (
-                f"'{self._path.name}': the times in the headers of {self._topic} differ by up to {difference:.3g} s from those "
-                "of the recorder, which were taken."
-            )
-        return stamps.copy(), ""
 
 
 def _stamp(message: Any) -> float | None:
@@ -131,34 +127,25 @@ def _items(message: Any) -> Iterable[tuple[str, Any]]:
 
 def _numbers(message: Any, before: str, depth: int) -> Iterator[tuple[str, float]]:
     """Yield the numbers of a message and their names; times in headers and texts are left out."""
-    if depth > DEEPEST:
-        return
     if depth == 0 and _part(message, "point_step") is not None:
         yield from _points(message)
         return
-    for name, value in _items(message):
-        full = f"{before}{name}"
-        if name in ("header", "stamp", "layout") or isinstance(value, str | bytes | type(None)):
+    for name, value in _items(message) if depth <= DEEPEST else ():
+        full, is_list = f"{before}{name}", isinstance(value, list | tuple)
+        if name in ("header", "stamp", "layout"):
             continue
-        if isinstance(value, bool | int | float | np.number | np.bool_):
+        if isinstance(value, int | float | np.number | np.bool_):
             yield full, float(value)
-        elif isinstance(value, np.ndarray) or (isinstance(value, list | tuple) and value and _is_number(value[0])):
+        elif isinstance(value, np.ndarray) or is_list and value and isinstance(value[0], int | float | np.number):
             if len(value) <= LONGEST_LIST and np.asarray(value).dtype.kind in "iufb":
                 yield from ((f"{full}_{i}", float(number)) for i, number in enumerate(np.ravel(value)))
-        elif isinstance(value, list | tuple):
+        elif is_list:
             for i, part in enumerate(value[:LONGEST_LIST]):
-                yield from _numbers(part, f"{_called(part, f'{full}_{i}')}.", depth + 1)
+                called = _part(part, "child_frame_id", "name")
+                own = called if isinstance(called, str) and called else f"{full}_{i}"
+                yield from _numbers(part, f"{own}.", depth + 1)
         else:
             yield from _numbers(value, f"{full}.", depth + 1)
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, bool | int | float | np.number)
-
-
-def _called(part: Any, otherwise: str) -> str:
-    name = _part(part, "child_frame_id", "name")
-    return name if isinstance(name, str) and name else otherwise
 
 
 def _points(message: Any) -> Iterator[tuple[str, float]]:
