@@ -49,7 +49,8 @@ class RecordingDifferences:
     zeros: dict[str, float]
 
     def odd_recording(self, full: float) -> tuple[str, float, float] | None:
-        """Return the recording that alone differs from the others; None if several do, or none.
+        """Return the recording that alone differs from the others, with its gain over the median, less one, and its level over
+        the median, as a share of the range; None if several do, or none.
 
         Parameters
         ----------

@@ -6,7 +6,6 @@ from __future__ import annotations
 from ...effects.engine.registry import kind_of
 from ...effects.engine.specification import SCATTER
 from ..base.quantities import FORCES, READINGS, friction_kinds
-from ..base.recording_differences import OddRecording
 from ..candidates.silenced_texels import silenced_texels
 from ..dataset.trial import FAULT_KINDS
 from ..fitting.identifiability import LEAST_CYCLES
@@ -123,7 +122,7 @@ def _outcome(result: Diagnosis, errors: GapErrors) -> str:
     return f"{said} Also: {_effects(result, errors)}" if result.findings or result.verdict == "unexplained" else said
 
 
-def _odd_one(odd: OddRecording | None) -> str:
+def _odd_one(odd: tuple[str, float, float] | None) -> str:
     """A sentence on the recording that alone differs from all others; empty if there is none."""
     if odd is None:
         return ""
