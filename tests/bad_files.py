@@ -34,7 +34,8 @@ from palpate.core.gap.logs.answers import answers_of, read_answers
 from palpate.core.gap.logs.log_file import read_log
 from palpate.core.gap.logs.new_rig import write_rig
 from palpate.core.gap.logs.proposal import propose
-from palpate.core.gap.selection.diagnosis import SELECTION_BEGINS, diagnose
+from palpate.core.gap.selection.diagnosis import diagnose
+from palpate.core.gap.selection.search import ALONE
 from palpate.core.io.csv_table import read_table
 from palpate.core.io.recording_npz import load_recording, load_sensor, save_recording, save_sensor
 from palpate.core.io.scenario_npz import load_scenario, save_scenario
@@ -508,7 +509,7 @@ def _fit_rig(folder: Path) -> None:
     """Read a rig, look for faults of its data and fit the base model."""
     job = diagnose(read_rig(folder / "rig.toml"))
     for progress in job:
-        if progress.done >= SELECTION_BEGINS:
+        if progress.done >= ALONE:
             break
     job.close()
 

@@ -35,9 +35,12 @@ MOST_DEAD_SHARE = 0.4
 """If a larger share of the loaded texels seems dead, the model is wrong and not the texels."""
 SAME_LEVEL = 1e-9
 """Share of the largest reading within which values are the same but for rounding."""
-LEAST_REPEATS, LEAST_LEVELS, STEP_IN_NOISE = 2.0, 3, 2.5
-"""Levels are looked for if readings repeat each value so often on average, so that most levels are among them; if so many lie
-above rest; and if neighbours are apart by so many standard deviations of the noise, because noise hides finer ones."""
+LEAST_REPEATS, LEAST_LEVELS = 2.0, 3
+"""Levels are looked for if readings repeat each value so often on average, so that most levels are among them, if so many lie
+above rest, and if neighbours are apart by more than the noise, which hides finer ones."""
+MOST_MISFIT = 0.25
+"""Most by which the number of a level is off, half of what is possible: levels are exact, so another form of converter made
+those that are off by more."""
 ROUNDING = "rounding"
 """Name of the share of a step that a converter rounds up, which its levels do not show."""
 LEVEL_RANGE, LEAST_SHARE, GRID, MOST_ROUNDS = 10.0, 1e-3, 24, 20
@@ -100,7 +103,7 @@ def of_silent_texels(free: Sequence[FreeParameter], effect: Effect) -> Iterator[
 
 
 def quantization_starts(values: np.ndarray, views: Sequence[TrialView], candidate: Candidate) -> list[Effect]:
-    """Return the effect with the levels of a converter that readings show; empty if they show none.
+    """Return the effect with the levels of a converter that readings show; empty if they show none, or not those of the form.
 
     Noise repeats no value, so values that repeat are the levels of a converter.
 
@@ -114,22 +117,25 @@ def quantization_starts(values: np.ndarray, views: Sequence[TrialView], candidat
         The form of the effect.
     """
     levels = distinct(values)
-    if len(values) < LEAST_REPEATS * len(levels) or np.median(np.diff(levels)) < STEP_IN_NOISE * views[0].noise[0]:
+    if len(levels) < LEAST_LEVELS or len(values) < LEAST_REPEATS * len(levels):
         return []
     change = levels - unloaded_reading(views)
     change = change if change[-1] >= -change[0] else -change[::-1]
     sizes = change[change > SAME_LEVEL * change[-1]]
-    if len(sizes) < LEAST_LEVELS:
+    if len(sizes) < LEAST_LEVELS or np.median(np.diff(sizes)) < views[0].noise[0]:
         return []
-    found = level_parameters(sizes, candidate.form)
+    found, misfit = level_parameters(sizes, candidate.form)
+    if misfit > MOST_MISFIT:
+        return []
     shares = (0.0, 0.5) if ROUNDING in candidate.form.defaults() else ()
     return [
         Effect(candidate.name, candidate.form.name, one) for one in [found | {ROUNDING: share} for share in shares] or [found]
     ]
 
 
-def level_parameters(sizes: np.ndarray, form: Form) -> dict[str, Value]:
-    """Return the parameters of a converter with which its levels have whole numbers (:attr:`.specification.Form.level_number`).
+def level_parameters(sizes: np.ndarray, form: Form) -> tuple[dict[str, Value], float]:
+    """Return the parameters of a converter with which its levels have whole numbers (:attr:`.specification.Form.level_number`),
+    and by how much one of them is off at most.
 
     They start where neighbouring levels are nearest to a distance of one, by absolute deviations, because a few levels may be
     missing. Then each distance is a whole number, and least squares fit the parameters to the sums of these.
@@ -163,7 +169,7 @@ def level_parameters(sizes: np.ndarray, form: Form) -> dict[str, Value]:
         if np.array_equal(whole, before):
             break
         at, before = least_squares(lambda x, whole=whole: numbers(x) - whole, at, bounds=(low, high)).x, whole
-    return values(at)
+    return values(at), float(np.abs(numbers(at) - np.round(numbers(at))).max())
 
 
 def unloaded_reading(views: Sequence[TrialView]) -> float:

@@ -253,18 +253,19 @@ class Score:
     def best_form(self, forms: Sequence[Hypothesis]) -> Hypothesis:
         """Return the form of a kind that leaves least on unseen blocks, or one with fewer numbers that does as well.
 
-        It does so within a standard error of the difference, or of the noise. Forms share the allowance for an imperfect
-        formula, so it does not count here.
+        It does so within a standard error of the difference, or of the noise, or as far as fits end. Forms share the allowance
+        for an imperfect formula, so it does not count here.
         """
 
         def left(one: Hypothesis) -> np.ndarray:
             s = one.sums
             return np.asarray((self.weights @ s.left / np.maximum(self.weights @ s.count, 1e-9))[:, self.measured].sum(axis=1))
 
-        least, noise = {id(one): left(one) for one in forms}, float(self.noise.error[self.measured].sum())
+        least = {id(one): left(one) for one in forms}
         top = min(forms, key=lambda one: float(least[id(one)][0]))
         apart = {key: values - least[id(top)] for key, values in least.items()}
-        near = [one for one in forms if one is top or apart[id(one)][0] < max(NEAR_ERRORS * apart[id(one)][1:].std(), noise)]
+        known = max(float(self.noise.error[self.measured].sum()), FIT_TOLERANCE * float(least[id(top)][0]))
+        near = [one for one in forms if one is top or apart[id(one)][0] < max(NEAR_ERRORS * apart[id(one)][1:].std(), known)]
         return min(near, key=lambda one: (one.is_bent, one.number_count, float(least[id(one)][0])))
 
     def values_of_kind(self, forms: Sequence[Hypothesis], library: int) -> np.ndarray:

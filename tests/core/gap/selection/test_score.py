@@ -305,7 +305,7 @@ def test_fits_of_alternatives_start_from_the_fitted_values_of_the_other_effects(
     (screening, _), alone = one.under(""), one.best()
     views, lag = screening.views.fitted, Effect("lag", "first-order", {"time": 0.4})
     both = fit(views, alone.fit.model.with_effect(lag), alone.fit.free, max_steps=3)
-    pair = screening.hypothesis(both, (*alone.names, "lag"), (*alone.forms, "lag/first-order"))
+    pair = screening.hypothesis(both)
     start = screening.start_without(pair, 1, alone)
     assert start.fit.model.effects == both.model.effects[:1] != alone.fit.model.effects and start.forms == alone.forms
     assert start.fit.free == alone.fit.free
