@@ -315,7 +315,8 @@ def _mesh(path: Path, name: str) -> TriangleMesh:
 
     require_regular(path)
     try:
-        loaded = trimesh.load(path, process=False, force="mesh")
+        # STL repeats the vertices of each triangle: they are merged, so that each is one texel
+        loaded = trimesh.load(path, process=path.suffix.lower() == ".stl", force="mesh")
     except Exception as error:  # whatever a reader of meshes raises for a broken file
         raise FileError(f"'{path.name}' is not a mesh that can be read ({error}): give a PLY, STL or OBJ file.") from error
     if not hasattr(loaded, "faces"):

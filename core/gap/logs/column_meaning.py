@@ -230,7 +230,7 @@ def unit_of(kind: str, stated: str, size: float) -> tuple[str, str, bool]:
         return stated, "the file says so", False
     if stated:
         return "?", f"it is in {stated}: write {kind} as unit, and how much of it one {stated} is as factor", True
-    unit = next(unit for most, unit in BY_SIZE[kind] if abs(size) <= most)
+    unit = next((unit for most, unit in BY_SIZE[kind] if abs(size) <= most), "?")  # of nothing known none
     what = "it is about" if kind == "°C" else "it changes by"
     advice = ": write unit, factor and zero, or remove the line" if unit == "?" else ""
     return unit, f"no unit is stated, and {what} {size:.4g}{advice}", True

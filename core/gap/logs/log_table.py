@@ -13,6 +13,7 @@ import numpy as np
 from ...errors import FileError
 from ...io.csv_table import LARGEST_NUMBER
 from ...io.text_table import MOST_VALUES
+from ..dataset.column_names import PRESSURES
 from .column_behaviour import is_clock
 
 LARGEST_FILE = 2 * 2**30
@@ -137,7 +138,7 @@ def _joined_frames(logs: list[LogFile]) -> list[LogFile]:
     loads, unit = np.array([float(match[1]) for match in numbers]), numbers[0][2]
     order = np.argsort(loads, kind="stable")
     texels = np.stack(frames)[order].reshape(len(frames), -1)
-    name = f"pressure ({unit})" if unit in {"psi", "Pa", "kPa", "MPa", "bar", "mbar"} else "load"
+    name = f"pressure ({unit})" if unit in PRESSURES else "load"
     table = LogTable(
         "",
         {name: loads[order], **{f"texel_{i}": np.ascontiguousarray(one) for i, one in enumerate(texels.T)}},

@@ -122,14 +122,14 @@ def check_errors(result: Diagnosis, one: CheckedRecording, quantity: int) -> lis
 
 
 def noise_floor_nrmse(result: Diagnosis) -> float:
-    """Return the NRMSE of noise alone on the fitted trials."""
+    """Return the NRMSE of noise alone on the fitted trials, at the level by which the rule judged."""
     square = count = 0.0
     for predictor in result.of("fit"):
         channels = (predictor.trial.reading, predictor.trial.force)
-        for measured, noise, size in zip(channels, result.noise, result.full, strict=True):
+        for measured, noise, level, size in zip(channels, result.noise, result.noise_level, result.full, strict=True):
             if measured is not None:
                 number = float(np.isfinite(measured).sum())
-                square, count = square + number * (noise.deviation / size) ** 2, count + number
+                square, count = square + number * level * (noise.deviation / size) ** 2, count + number
     return float(np.sqrt(square / max(count, 1.0)))
 
 

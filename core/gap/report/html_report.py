@@ -20,9 +20,6 @@ from .plan_files import planned_sentence
 from .plots import CAPTIONS
 from .sentences import NOT_IDENTIFIABLE, interval_ends, said_confidence
 
-CLOSED_FROM = 0.2
-"""A closed share is shown if the gap, noise removed, is at least this share of the noise floor. Which effects join is decided
-in :mod:`..selection.search`."""
 AS_MUCH = 1.05
 """Up to this ratio the next best effect leaves "as much"."""
 WHITE_MEMORY = 1.5
@@ -89,8 +86,8 @@ def _gap_table(found: dict[str, Any]) -> Table:
         before, after = gap["before"][use], gap["after"][use]
         if before is None:
             continue
-        left = [max(value**2 - floor**2, 0.0) for value in (before, after)]
-        closed = f"{1.0 - left[1] / left[0]:.0%}" if left[0] > (CLOSED_FROM * floor) ** 2 else "–"
+        share = (gap["closed"] or {}).get(use)
+        closed = "–" if share is None else f"{share:.0%}"
         amended = [f"{after:.3%}", f"{floor:.3%}", closed] if found["found"] else ["–", f"{floor:.3%}", "–"]
         rows.append([words, *(f"{frictionless[use]:.3%}" for _ in without), f"{before:.3%}", *amended])
     return Table(head, rows, set(range(1, len(head))))

@@ -142,6 +142,7 @@ def _concluded(begun: _Begun, search: Search, named: Hypothesis, best: Hypothesi
     result, view_set = _under_assumption(begun, search, best)
     result.best = _with_base_refitted(result, view_set, best.fit)
     result.base_structure, result.structure = (_structure(view_set, found) for found in (result.base, result.best))
+    result.noise_level = search.score.noise.under(search.score.weights[0])
     result.line = strongest_line(view_set.whole, result.best.model)
     result.check = checked(search.under("")[0].blocks, search.score, search.base, best)
     result.faults = faults_of(result, named.fit.model)

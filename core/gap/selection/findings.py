@@ -126,6 +126,8 @@ class Diagnosis:
         How the amended model does in each check recording.
     closed : ClosedShares
         How much of the gaps the amended model closes.
+    noise_level : (2,) float
+        Mean square of the noise of readings and of net forces by which the rule judged, in units of the variance in `noise`.
     """
 
     rig: Rig
@@ -151,6 +153,7 @@ class Diagnosis:
     assumed_session: bool = False
     check: CheckOutcome = field(default_factory=CheckOutcome)
     closed: ClosedShares = field(default_factory=ClosedShares)
+    noise_level: np.ndarray = field(default_factory=lambda: np.ones(2))
 
     @property
     def carried_over(self) -> Finding | None:

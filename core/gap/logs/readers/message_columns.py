@@ -29,6 +29,7 @@ PICTURES = (
     *("Log", "DiagnosticArray", "ParameterEvent"),
 )
 """Types of messages that hold no measurements of touch."""
+NUMBERS = (int, float, np.number, np.bool_)
 _POINT_KINDS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 _LARGEST_DIFFERENCE = 10.0
 """Seconds between the times of headers and of the recorder, above which the headers are not believed."""
@@ -127,18 +128,19 @@ def _items(message: Any) -> Iterable[tuple[str, Any]]:
 
 def _numbers(message: Any, before: str, depth: int) -> Iterator[tuple[str, float]]:
     """Yield the numbers of a message and their names; times in headers and texts are left out."""
-    if depth == 0 and _part(message, "point_step") is not None:
+    if depth == 0 and is_dataclass(message) and hasattr(message, "point_step"):
         yield from _points(message)
         return
     for name, value in _items(message) if depth <= DEEPEST else ():
         full, is_list = f"{before}{name}", isinstance(value, list | tuple)
         if name in ("header", "stamp", "layout"):
             continue
-        if isinstance(value, int | float | np.number | np.bool_):
-            yield full, float(value)
-        elif isinstance(value, np.ndarray) or is_list and value and isinstance(value[0], int | float | np.number):
-            if len(value) <= LONGEST_LIST and np.asarray(value).dtype.kind in "iufb":
-                yield from ((f"{full}_{i}", float(number)) for i, number in enumerate(np.ravel(value)))
+        if isinstance(value, NUMBERS):
+            yield full, _as_float(value)
+        elif isinstance(value, np.ndarray) or is_list and value and isinstance(value[0], NUMBERS):
+            is_plain = all(isinstance(one, NUMBERS) for one in value) if is_list else value.dtype.kind in "iufb"
+            if len(value) <= LONGEST_LIST and is_plain:
+                yield from ((f"{full}_{i}", _as_float(number)) for i, number in enumerate(np.ravel(value)))
         elif is_list:
             for i, part in enumerate(value[:LONGEST_LIST]):
                 called = _part(part, "child_frame_id", "name")
@@ -146,6 +148,14 @@ def _numbers(message: Any, before: str, depth: int) -> Iterator[tuple[str, float
                 yield from _numbers(part, f"{own}.", depth + 1)
         else:
             yield from _numbers(value, f"{full}.", depth + 1)
+
+
+def _as_float(number: Any) -> float:
+    """A number of a message; NaN for one that is too large."""
+    try:
+        return float(number)
+    except OverflowError:
+        return np.nan
 
 
 def _points(message: Any) -> Iterator[tuple[str, float]]:

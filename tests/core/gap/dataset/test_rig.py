@@ -58,9 +58,10 @@ def test_a_rig_knows_every_word_that_a_sensor_file_knows(tmp_path):
     assert rig.given == set(words)
 
 
-def test_other_stimuli_meshes_and_forces(tmp_path):
-    trimesh.creation.box((0.02, 0.02, 0.02)).export(tmp_path / "pad.ply")
-    rig = RIG.replace("grid = { rows = 3, columns = 2, pitch = [0.003, 0.004] }", 'mesh = "pad.ply"')
+@pytest.mark.parametrize("kind", ["ply", "stl"])  # STL repeats the vertices of each triangle
+def test_other_stimuli_meshes_and_forces(tmp_path, kind):
+    trimesh.creation.box((0.02, 0.02, 0.02)).export(tmp_path / f"pad.{kind}")
+    rig = RIG.replace("grid = { rows = 3, columns = 2, pitch = [0.003, 0.004] }", f'mesh = "pad.{kind}"')
     names = ("depth", "slide_x", "slide_y", "force_x", "force_z")
     press, again = table(names=names, texels=0), table(names=("force",), texels=8)
     found = read_rig(write(tmp_path, rig, press=press, again=again))

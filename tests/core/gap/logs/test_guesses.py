@@ -11,7 +11,7 @@ from palpate.commands import main
 from palpate.core.errors import FileError
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.logs import questions
-from palpate.core.gap.logs.column_meaning import families
+from palpate.core.gap.logs.column_meaning import families, unit_of
 from palpate.core.gap.logs.log_file import read_log
 from palpate.core.gap.logs.log_table import with_distinct_names
 from palpate.core.gap.logs.proposal import propose
@@ -178,6 +178,7 @@ def test_a_number_that_is_no_temperature_is_asked(tmp_path):
     columns = {"time": TIME, "force": LOAD, "Temp0": 757.0 + noise(400)} | {f"texel_{i}": 10.0 * LOAD for i in range(3)}
     own = columns_of(write_csv(tmp_path / "a.csv", columns))["temperature"]
     assert own.value["unit"] == "?" and "write unit, factor and zero" in own.reason
+    assert unit_of("°C", "", np.nan)[0] == "?"  # of a file in which it is missing
 
 
 def test_the_template_is_written_before_anything_is_refused(tmp_path, capsys):

@@ -165,6 +165,16 @@ def test_mcap_with_json(tmp_path):
     assert "/camera (foxglove.CompressedImage) is not read" in read_log(path).notes[0]
 
 
+def test_what_json_may_hold_besides_numbers_is_left_out():
+    columns = TopicColumns("/force", Path("a.mcap"))
+    for i in range(10):
+        message = {"force": float(i), "count": 10**400, "ragged": [1, [2, 3]], "point_step": 4, "raw": [1, 2.5]}
+        columns.add(message, i * 10**9)
+    table, _ = columns.table()
+    assert set(table.columns) == {"time", "force", "count", "point_step", "raw_0", "raw_1"}
+    assert np.isnan(table.columns["count"]).all() and table.columns["force"][3] == 3.0
+
+
 def test_mcap_with_topics_of_both_versions_of_ros(tmp_path):
     """Their headers have one name and different fields: each channel has types of its own."""
     writer_of = pytest.importorskip("mcap.writer")
