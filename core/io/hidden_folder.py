@@ -41,8 +41,10 @@ def is_private_folder(folder: Path) -> bool:
     return not folder.is_symlink() and any(mark.is_file() and not mark.is_symlink() for mark in marks)
 
 
-class FolderLock:
-    """An exclusive lock on a bake folder or the folder of a study, held until it is released.
+def lock_folder(folder: Path, work: str = "bake") -> BaseFileLock:
+    """Lock a bake folder or the folder of a study; its hidden folder is made if it is missing.
+
+    The lock is held until its ``release()``. The locked file stays: another process may be about to lock it.
 
     Parameters
     ----------
@@ -50,36 +52,25 @@ class FolderLock:
     work : str
         What writes to the folder, for the message.
 
-    Attributes
-    ----------
-    private : Path
-        The hidden folder in it, which is made if it is missing.
-
     Raises
     ------
     FileError
         Another process holds the lock, the hidden folder cannot be made, or something that Palpate did not make has its name.
     """
-
-    def __init__(self, folder: Path, work: str = "bake"):
-        self.private = folder / PRIVATE_FOLDER
-        try:
-            self.private.mkdir(exist_ok=True)
-            if not is_private_folder(self.private) and (self.private.is_symlink() or any(self.private.iterdir())):
-                raise FileError(f"'{self.private}' was not made by Palpate: rename it, or choose another {work} folder.")
-            lock = _lock(self.private)
-        except OSError as error:
-            raise FileError(
-                f"The folder '{self.private}' could not be made ({os_error_reason(error)}): rename what has its name, "
-                f"check the permissions, or choose another {work} folder."
-            ) from error
-        if lock is None:
-            raise FileError(f"Another {work} is writing to '{folder}': wait for it, or choose another folder.")
-        self._lock = lock
-
-    def release(self) -> None:
-        """Release the lock. Its file stays: another process may be about to lock it."""
-        self._lock.release()
+    private = folder / PRIVATE_FOLDER
+    try:
+        private.mkdir(exist_ok=True)
+        if not is_private_folder(private) and (private.is_symlink() or any(private.iterdir())):
+            raise FileError(f"'{private}' was not made by Palpate: rename it, or choose another {work} folder.")
+        lock = _lock(private)
+    except OSError as error:
+        raise FileError(
+            f"The folder '{private}' could not be made ({os_error_reason(error)}): rename what has its name, "
+            f"check the permissions, or choose another {work} folder."
+        ) from error
+    if lock is None:
+        raise FileError(f"Another {work} is writing to '{folder}': wait for it, or choose another folder.")
+    return lock
 
 
 @contextmanager
