@@ -16,10 +16,9 @@ import ctypes
 import errno
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -46,23 +45,10 @@ _NO_DATE = "1980:01:01 00:00:00"
 @cache
 def library() -> str:
     """Return the module that writes images in this process, OpenEXR or OpenImageIO."""
-    return "OpenImageIO" if _process_is_linked_against_openexr() else "OpenEXR"
-
-
-def _process_is_linked_against_openexr() -> bool:
-    """Return True if symbols of an OpenEXR are where those of a module that is loaded later are looked up.
-
-    Modules of Python, such as bpy, keep their libraries to themselves, and so do all on Windows and macOS.
-    """
-    return sys.platform == "linux" and hasattr(ctypes.CDLL(None), "exr_start_read")
-
-
-def _openimageio() -> Any:
-    try:
-        import OpenImageIO
-    except ImportError as error:
-        raise FileError("This Blender's Python has no OpenImageIO: install it, on Debian as python3-openimageio.") from error
-    return OpenImageIO
+    # Symbols of an OpenEXR may be where those of a module that is loaded later are looked up. Modules of Python, such as bpy,
+    # keep their libraries to themselves, and so do all on Windows and macOS.
+    is_linked = sys.platform == "linux" and hasattr(ctypes.CDLL(None), "exr_start_read")
+    return "OpenImageIO" if is_linked else "OpenEXR"
 
 
 def write_image(path: str | os.PathLike, channels: Mapping[str, np.ndarray], attributes: Mapping[str, str]) -> None:
@@ -91,7 +77,10 @@ def write_image(path: str | os.PathLike, channels: Mapping[str, np.ndarray], att
         except RuntimeError as error:
             raise _os_error(str(error)) from error
         return
-    oiio = _openimageio()
+    try:
+        import OpenImageIO as oiio
+    except ImportError as error:
+        raise FileError("This Blender's Python has no OpenImageIO: install it, on Debian as python3-openimageio.") from error
     height, width = next(iter(channels.values())).shape
     spec = oiio.ImageSpec(width, height, len(channels), "float")
     spec.channelnames = tuple(channels)
@@ -121,20 +110,14 @@ UNITS = {"R": "N", "G": "N", "B": "N", "depth": "m", "slip": "m/s", "contact": "
 _PREFIX = "palpate."  # OpenEXR has header attributes of its own, some with a type ("name", "owner", "type")
 
 
-def _pictures(
-    layout: GridLayout | UVLayout, frame: SensorFrame, names: Sequence[str], nearest: np.ndarray | None = None
-) -> np.ndarray:
-    """(channels, height, width) float32 of the channels of a frame, from the top."""
-    columns = {
-        "R": frame.normal_force,
-        "G": frame.shear[:, 0],
-        "B": frame.shear[:, 1],
-        **{name: getattr(frame, name) for name in ("reading", "depth", "slip", "contact")},
-    }
+def _pictures(layout: GridLayout | UVLayout, frame: SensorFrame, nearest: np.ndarray | None) -> dict[str, np.ndarray]:
+    """(height, width) float32 of each channel of a frame by its name, from the top."""
+    columns = {name: getattr(frame, name) for name in CHANNELS[3:]}
+    columns = {"R": frame.normal_force, "G": frame.shear[:, 0], "B": frame.shear[:, 1], **columns}
     if nearest is not None:
-        channels = _channels_of(frame)
-        columns |= dict(zip(layer_names(channels), channels.values[nearest].T, strict=True))
-    table = np.array([columns[name] for name in names], dtype=float)  # (channels, texels)
+        assert frame.channels is not None  # of a sensor that has them in all frames
+        columns |= dict(zip(layer_names(frame.channels), frame.channels.values[nearest].T, strict=True))
+    names, table = list(columns), np.array(list(columns.values()), dtype=float)  # (channels, texels)
     bad = ~(np.abs(table) <= np.finfo(np.float32).max)  # NaN compares false
     if bad.any():
         channel, texel = np.argwhere(bad)[0]
@@ -142,7 +125,7 @@ def _pictures(
     image = layout.image(table.T)
     contact = names.index("contact")
     image[:, :, contact] = image[:, :, contact] >= 0.5
-    return np.ascontiguousarray(np.moveaxis(image[::-1], 2, 0), dtype=np.float32)
+    return dict(zip(names, np.ascontiguousarray(np.moveaxis(image[::-1], 2, 0), dtype=np.float32)))
 
 
 def describe(sensor: Sensor, frame: Frame, digest: str) -> dict[str, str]:
@@ -195,10 +178,9 @@ def write_exr(
     ValueError
         A value is not finite or too large for 32 bits (a fault of the program, not of the user). Nothing is written then.
     """
-    names = CHANNELS if nearest is None else (*CHANNELS, *layer_names(_channels_of(frame)))
-    pictures = _pictures(layout, frame, names, nearest)
+    pictures = _pictures(layout, frame, nearest)
     with atomic_write(path) as temporary:
-        write_image(temporary, dict(zip(names, pictures)), {_PREFIX + key: str(value) for key, value in metadata.items()})
+        write_image(temporary, pictures, {_PREFIX + key: str(value) for key, value in metadata.items()})
 
 
 def layer_names(channels: VectorReadings) -> list[str]:
@@ -214,11 +196,6 @@ def nearest_places(texels: Texels, channels: VectorReadings | None) -> np.ndarra
         return np.zeros(len(texels), int)
     apart = [np.sum((texels.position - place) ** 2, axis=1) for place in channels.place]
     return np.argmin(apart, axis=0)
-
-
-def _channels_of(frame: SensorFrame) -> VectorReadings:
-    assert frame.channels is not None  # of a sensor that has them in all frames
-    return frame.channels
 
 
 def channel_layout(texels: Texels, channels: VectorReadings) -> GridLayout:
