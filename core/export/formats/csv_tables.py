@@ -15,6 +15,7 @@ from ...geometry.grid_layout import GridLayout
 from ...geometry.texels import Texels
 from ...io.bake_folder import folder_names
 from ...io.bake_reader import Bake
+from ...io.csv_table import harmless_cell
 from ...io.file_writing import atomic_write, writable_folder
 from ...jobs import Job
 from ...model.recording import Recording, SensorRecording
@@ -22,7 +23,6 @@ from ..exporter import Exporter, channel_labels, sensor_progress
 
 _QUANTITIES = ("normal_force", "shear_x", "shear_y", "depth", "slip", "contact", "reading")
 """Quantities of a texel; each gets a table of its own."""
-_SHEAR = ("shear_x", "shear_y")
 _DIGITS = 9
 """Significant digits: more than any measurement has, in about half the space of a full double."""
 
@@ -81,8 +81,8 @@ def _clock(part: Recording) -> np.ndarray:
 
 def _channel(sensor: SensorRecording, key: str) -> np.ndarray:
     """(F, n) values of a quantity."""
-    if key in _SHEAR:
-        return sensor.shear[:, :, _SHEAR.index(key)]
+    if key.startswith("shear_"):
+        return sensor.shear[:, :, "xy".index(key[-1])]
     return np.asarray(getattr(sensor, key))
 
 
@@ -114,8 +114,6 @@ def _texel_table(texels: Texels) -> tuple[list[str], np.ndarray]:
 
 def _write_table(path: Path, header: Sequence[str], tables: Iterable[np.ndarray]) -> None:
     """Write tables below one another."""
-    from ...io.csv_table import harmless_cell
-
     with atomic_write(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow([harmless_cell(name) for name in header])

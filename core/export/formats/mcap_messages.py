@@ -112,9 +112,8 @@ def transforms(time: int, parent: str, children: Sequence[str], poses: np.ndarra
 
 WORLD = "world"
 """Frame of the world."""
-POINT_FIELDS = ("x", "y", "z", "normal_force", "shear_x", "shear_y", "reading", "depth", "slip")
-"""Fields of a texel in the point cloud, float32; ``contact`` follows as a byte."""
-_POINT = np.dtype([*((name, "<f4") for name in POINT_FIELDS), ("contact", "u1")])
+_TEXEL = [*((name, "<f4") for name in ("normal_force", "shear_x", "shear_y", "reading", "depth", "slip")), ("contact", "u1")]
+"""Fields of a texel in the point cloud, behind its position."""
 _CHUNK_BYTES = 1 << 20
 
 
@@ -149,37 +148,24 @@ class _Output:
         self._schemas: dict[str, int] = {}
         recording = bake.recording
         self._bodies = _frame_names(recording.body_names)
-        self._frames = {name: self._frame_of(name) for name in bake.texels}
+        carriers = {name: manifest.body for name, manifest in bake.manifests.items()}
+        others = {name: name if name != WORLD else f"{name}_" for name in bake.texels}  # of a sensor whose body is not known
+        self._frames = {name: self._bodies.get(carriers.get(name, ""), other) for name, other in others.items()}
         topics = topic_names(bake.texels)
-        kinds = {
-            "texels": POINT_CLOUD,
-            "tactile_image": IMAGE,
-            "wrench": WRENCH,
-            "centre_of_pressure": POINT,
-        }
+        kinds = {"texels": POINT_CLOUD, "tactile_image": IMAGE, "wrench": WRENCH, "centre_of_pressure": POINT}
         self._transforms = self._channel("/tf", TRANSFORMS)
         self._channels = {
             name: {what: self._channel(f"{topic}/{what}", kind) for what, kind in kinds.items()}
             for name, topic in topics.items()
         }
-        self._points = {name: np.zeros(len(texels), _POINT) for name, texels in bake.texels.items()}
+        self._points = {name: _points_at(texels.position, _TEXEL) for name, texels in bake.texels.items()}
         for name, recorded in recording.sensors.items():
             if recorded.channels is not None:
                 self._channels[name]["channels"] = self._channel(f"{topics[name]}/channels", POINT_CLOUD)
-        for name, texels in bake.texels.items():
-            for axis, values in zip("xyz", texels.position.T):
-                self._points[name][axis] = values
-
-    def _frame_of(self, sensor: str) -> str:
-        """Name of the frame in which a sensor's texels are given: its body's."""
-        manifest = self._bake.manifests.get(sensor)
-        body = manifest.body if manifest is not None else ""
-        return self._bodies.get(body, sensor if sensor != WORLD else f"{sensor}_")
 
     def _channel(self, topic: str, kind: str) -> int:
         if kind not in self._schemas:
-            text = definition(kind).encode()
-            self._schemas[kind] = self._writer.register_schema(kind, "ros2msg", text)
+            self._schemas[kind] = self._writer.register_schema(kind, "ros2msg", definition(kind).encode())
         return int(self._writer.register_channel(topic, "cdr", self._schemas[kind]))
 
     def write(self, part: Recording) -> None:
@@ -231,13 +217,18 @@ class _Output:
             self._writer.add_attachment(0, 0, f"{topic_names(self._bake.texels)[name][1:]}.json", "application/json", text)
 
 
+def _points_at(positions: np.ndarray, fields: list[tuple[str, str]]) -> np.ndarray:
+    """Return the points of a cloud at (n, 3) positions, whose other fields are zero."""
+    points = np.zeros(len(positions), [*((axis, "<f4") for axis in "xyz"), *fields])
+    points["x"], points["y"], points["z"] = positions.T
+    return points
+
+
 def _vector_points(channels: VectorReadings) -> np.ndarray:
     """Return the points of a cloud where channels are measured, with a field ``channel_<name>`` for each."""
     own = [f"channel_{name}" for name in channels.names]
-    points = np.zeros(len(channels.values), [(name, "<f4") for name in (*"xyz", *own)])
-    if channels.place is not None:
-        for axis, values in zip("xyz", channels.place.T, strict=True):
-            points[axis] = values
+    places = np.zeros((len(channels.values), 3)) if channels.place is None else channels.place
+    points = _points_at(places, [(name, "<f4") for name in own])
     for name, values in zip(own, channels.values.T, strict=True):
         points[name] = values
     return points
