@@ -103,11 +103,7 @@ def with_press(scenario: Scenario, press: Press) -> Scenario:
     own = quaternion_product(upright[None], quaternions_from_vectors(turn[:, None] * np.array([0.0, 0.0, 1.0])))
     base = scenario.bodies[sensor.body].motion
     to_world = rotation_matrices(base.quaternions[:1])[0]
-    motion = Motion(
-        times,
-        base.positions[0] + origin @ to_world.T,
-        quaternion_product(base.quaternions[:1], own),
-    )
+    motion = Motion(times, base.positions[0] + origin @ to_world.T, quaternion_product(base.quaternions[:1], own))
     pressing = replace(scenario.bodies[body], motion=motion, free=False, drive=None)
     if press.force > 0.0:
         pressing = _driven(pressing, scenario, body, press, -to_world @ axis)

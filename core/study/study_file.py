@@ -33,6 +33,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
+from itertools import accumulate
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -42,7 +43,7 @@ import numpy as np
 from ..errors import FileError, ParameterError, did_you_mean
 from ..io.input_files import checked_name, is_number, read_toml
 from ..io.schema import LARGEST, WORD, Name, Number, Positive, Switch, known_words, read_words, wanted
-from ..model.parameter import Parameter, Specification, TextParameter
+from ..model.parameter import Parameter, TextParameter
 from ..model.scenario import Scenario
 from .design import (
     CHOICE,
@@ -87,21 +88,18 @@ def part_name(first: int, content: str, done: int, failed: int) -> str:
 
 def part_files(folder: Path) -> list[Path]:
     """Return the parts of a study in the order of their first runs; files that are being written are none."""
-    return [folder / PARTS / name for name, _ in sorted(_found(folder))]
+    return [folder / PARTS / name for name in sorted(match[0] for match in _found(folder))]
 
 
 def counted_runs(folder: Path) -> tuple[int, int]:
     """Return how many runs are done and failed; one that was computed twice counts twice."""
-    counts = [(int(match[1]), int(match[2])) for _, match in _found(folder)]
-    return sum(done for done, _ in counts), sum(failed for _, failed in counts)
+    matches = list(_found(folder))
+    return sum(int(match[1]) for match in matches), sum(int(match[2]) for match in matches)
 
 
-def _found(folder: Path) -> Iterator[tuple[str, re.Match[str]]]:
+def _found(folder: Path) -> Iterator[re.Match[str]]:
     with suppress(FileNotFoundError):
-        for name in os.listdir(folder / PARTS):
-            match = _NAME.fullmatch(name)
-            if match:
-                yield name, match
+        yield from filter(None, map(_NAME.fullmatch, os.listdir(folder / PARTS)))
 
 
 FORMAT = "palpate-sweep/1"
@@ -375,12 +373,11 @@ def _free_variable(name: str, entry: Any) -> Variable:
     """Return the variable of a name that only a job knows; the first of its values tells what it is."""
     words = entry.get(CHOICE) if isinstance(entry, Mapping) else [entry]
     first = words[0] if isinstance(words, list) and words else 0.0
-    specification: Specification | None = Parameter(name, "", 0.0, -math.inf, math.inf, "Number of the job")
     if isinstance(first, bool):
-        specification = None
-    elif isinstance(first, str):
-        specification = TextParameter(name, "", "Text of the job")
-    return Variable(name, name, (JOB,), specification)
+        return Variable(name, name, (JOB,), None)
+    if isinstance(first, str):
+        return Variable(name, name, (JOB,), TextParameter(name, "", "Text of the job"))
+    return Variable(name, name, (JOB,), Parameter(name, "", 0.0, -math.inf, math.inf, "Number of the job"))
 
 
 @dataclass(frozen=True)
@@ -477,7 +474,7 @@ def _distribution(found: Variable, entry: Mapping[str, Any]) -> Distribution:
     if isinstance(found.specification, WholeNumber):
         raise ParameterError(f"{found.name} is a whole number, which cannot be {kind}: use choice.")
     first, second = numbers
-    low, high = found.bounds
+    low, high = found.specification.low, found.specification.high
     if found.specification.above_low:
         low = float(np.nextafter(low, math.inf))
     if kind == NORMAL:
@@ -511,23 +508,18 @@ class Runs:
     def __init__(self, study: Study, plans: Mapping[str, Plan], digests: Mapping[str, str]):
         counts = {scene: study.design.count(plan.varied) for scene, plan in plans.items()}
         check_count(sum(counts.values()))
-        self._plans, self._counts = plans, counts
+        self._plans, self._count = plans, sum(counts.values())
+        self._firsts = dict(zip(counts, accumulate(counts.values(), initial=0)))
         self._columns = {scene: columns_of(study.design, plan.varied) for scene, plan in plans.items()}
         self._hashes = {scene: _hash_of(plan, digests[scene]) for scene, plan in plans.items()}
 
     def __len__(self) -> int:
-        return sum(self._counts.values())
+        return self._count
 
     def __getitem__(self, at: int) -> Run:
-        row = index = range(len(self))[at]
-        for scene, count in self._counts.items():
-            if row < count:
-                return self._run(index, scene, row)
-            row -= count
-        raise IndexError(at)
-
-    def _run(self, index: int, scene: str, row: int) -> Run:
-        found = {name: column[row] for name, column in self._columns[scene].items()}
+        index = range(self._count)[at]
+        scene = next(name for name, first in reversed(self._firsts.items()) if first <= index)
+        found = {name: column[index - self._firsts[scene]] for name, column in self._columns[scene].items()}
         values = {name: float(value) if isinstance(value, np.floating) else value for name, value in found.items()}
         own = self._hashes[scene].copy()
         own.update(json.dumps([index, values]).encode())
