@@ -46,14 +46,9 @@ def expanded(words: Iterable[str], known: Iterable[str]) -> list[str]:
 
 
 def find_meshes(vary: Mapping[str, Any], base: Path) -> dict[str, Path]:
-    """Return the mesh files of a study by the names that it gives, each read once to see that it is one.
+    """Return the mesh files that `vary` of a study names, by these names; each is read once to see that it is one.
 
-    Parameters
-    ----------
-    vary : mapping
-        Of the study.
-    base : Path
-        Folder of the study's file.
+    `base` is the folder of the study's file.
 
     Raises
     ------
@@ -71,13 +66,10 @@ def find_meshes(vary: Mapping[str, Any], base: Path) -> dict[str, Path]:
             words += [word for word in given if isinstance(word, str)] if isinstance(given, list) else []
     files: dict[str, Path] = {}
     for word in words:
-        if not glob.has_magic(word):
-            files[word] = base / word
-            continue
-        found = sorted(glob.glob(word, root_dir=base))
+        found = [Path(name).as_posix() for name in sorted(glob.glob(word, root_dir=base))] if glob.has_magic(word) else [word]
         if not found:
             raise FileError(f"No file next to the study matches the meshes '{word}': check its name and folder.")
-        files |= {Path(name).as_posix(): base / name for name in found}
+        files |= {name: base / name for name in found}
     for file in files.values():
         turned_outwards(load_mesh(file), file.name)
     return files
@@ -203,15 +195,14 @@ def check_count(count: int) -> None:
 def columns_of(design: Design, varied: Mapping[str, Distribution]) -> dict[str, np.ndarray]:
     """Return the values of the varied numbers in the order of the runs, (count,) each, by name."""
     columns: dict[str, np.ndarray] = {}
-    if varied and design.kind == GRID:
+    if design.kind == GRID:
         count = repeat = design.count(varied)
         for name, distribution in varied.items():  # the last one changes fastest
             own = distribution.grid_values()
             repeat //= len(own)
             columns[name] = np.tile(np.repeat(own, repeat), count // (repeat * len(own)))
     elif varied:
-        cube = _unit_points(design, len(varied))
-        columns = {name: one.values(cube[:, axis]) for axis, (name, one) in enumerate(varied.items())}
+        columns = {name: one.values(axis) for (name, one), axis in zip(varied.items(), _unit_points(design, len(varied)).T)}
     return columns
 
 

@@ -1,24 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The file of a study: scene, design, and the distributions of the varied parameters.
-
-::
-
-    format = "palpate-sweep/1"
-    name = "presses on a fingertip"      # optional, for the report and the dataset
-    scene = "fingertip.blend"            # or scenes = ["*.blend"]
-    design = "latin-hypercube"           # grid, random, latin-hypercube or sobol
-    samples = 1000                       # runs per scene; a grid takes all combinations of its levels
-    seed = 1
-
-    [vary]
-    "Fingertip.k" = { log-uniform = [20, 200] }
-    "Fingertip.effect.creep" = { choice = [true, false] }
-
-    [press]                              # presses at random places
-    depth = { uniform = [0.5e-3, 2e-3] }
-    slide = { uniform = [0.0, 3e-3] }
-
-Instead of a scene a study may name a job, a Python file that computes its runs: ``job = "count.py"``.
+"""The file of a study: scene, design, and the distributions of the varied parameters, as ``docs/sweep.md`` describes it.
 
 The output folder keeps the file with a table ``[frozen]`` at its end: the version, and digests of the scenes.
 """
@@ -144,21 +125,14 @@ class Study:
     ----------
     scenes : tuple of str
         Files or patterns, relative to the file of the study; with `is_job` one Python file.
-    design : Design
     vary : mapping
         By names of variables: a table with a distribution, or a value that is the same in all runs.
-    press : mapping or None
-        The table of a press.
     fps : float or None
         Frames per second instead of those of the scene.
-    run_limit : float or None
-        Seconds that a run may take.
-    run_memory : float or None
-        MB that the process of a run may hold.
+    run_limit, run_memory : float or None
+        Seconds that a run may take, and MB that its process may hold.
     name : str
         For the report and the dataset; empty if the file gives none.
-    images : bool
-        Whether runs have tactile images.
     recordings : bool
         True if runs have files of their own, as a bake has; with images they do in any case.
     points : bool
@@ -200,8 +174,6 @@ class Plan:
     ----------
     scenario : Scenario or None
         As the scene says, with the study's frame rate; None for a job.
-    varied : dict of str to Distribution
-    fixed : dict of str to value
     press : Press or None
         With the numbers that do not vary.
     meshes : mapping of str to Path
@@ -304,13 +276,10 @@ def plan_for(
 
     Parameters
     ----------
-    study : Study
     scenario : Scenario or None
         None for a job, which takes any names: numbers, texts, and switches.
-    properties : mapping of str to SceneProperty, optional
-        What the properties of the scene are that the study names.
-    meshes : mapping of str to Path, optional
-        Copies of the files with the shapes of targets that the study names.
+    properties, meshes : mapping, optional
+        The properties of the scene, and the copies of the mesh files, that the study names.
 
     Raises
     ------
@@ -352,6 +321,7 @@ def _variables(
 ) -> dict[str, Variable]:
     """Return what the names of a study mean in a scene; refuse what does not vary there."""
     known = variables_of(scenario, press is not None) | {name: item.variable() for name, item in properties.items()}
+    pressing = {scenario.bodies[one.body].name for one in scenario.targets if press is not None and one.name == press.target}
     found: dict[str, Variable] = {}
     for name in names:
         if press is None and name.startswith(f"{PRESS}."):
@@ -361,10 +331,7 @@ def _variables(
                 f"'{name}' is a property of Blender, and '{scenario.name}' is no .blend: give the .blend itself."
             )
         found[name] = own = variable(name, known, scenario)
-        is_pressing = press is not None and any(
-            target.name == press.target and scenario.bodies[target.body].name == own.owner for target in scenario.targets
-        )
-        if is_pressing and own.words[0] in MOTION_WORDS:
+        if own.owner in pressing and own.words[0] in MOTION_WORDS:
             raise ParameterError(f"'{name}' has no effect, because [press] moves '{own.owner}': leave it out of [vary].")
     return found
 
@@ -491,18 +458,8 @@ def _distribution(found: Variable, entry: Mapping[str, Any]) -> Distribution:
 class Runs:
     """All runs of a study in order, each made when it is asked for: a million of them take 8 bytes for each varied number.
 
-    Parameters
-    ----------
-    study : Study
-    plans : mapping of str to Plan
-        By the names of the scenes.
-    digests : mapping of str to str
-        Of the scenes: of their scenarios, and of their files where each run is read from the scene.
-
-    Raises
-    ------
-    ParameterError
-        There are too many.
+    Plans and digests are by the names of the scenes. A digest is that of a scenario, and of its file where each run is read
+    from the scene. Raises ParameterError if there are too many runs.
     """
 
     def __init__(self, study: Study, plans: Mapping[str, Plan], digests: Mapping[str, str]):

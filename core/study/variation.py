@@ -1,22 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A scenario with varied numbers: which names a study may vary, their bounds, and what each changes.
 
-======================================  =================================================================================
-``SENSOR.k`` and every parameter        of :class:`.SensorParameters`
-``SENSOR.effect.KIND``                  true or false: whether the sensor has the effect
-``SENSOR.effect.KIND.PARAMETER``        parameter of the effect, ``form`` or ``seed``; the effect is added if need be
-``BODY.mass``                           kg, of a body that forces move; its inertia grows with it
-``BODY.shift.x``, ``y``, ``z``          m, added to the whole motion, in the world
-``BODY.turn.x``, ``y``, ``z``           rad, a rotation vector about the body's origin at the first frame, in the world
-``BODY.velocity.x``, …                  m/s, of a free body at the start; ``angular_velocity`` in rad/s
-``BODY.drive.PARAMETER``                of :class:`.Drive`; ``drive.target`` in the unit of its control, constant
-``TARGET.scale``                        factor of its shape about the body's origin
-``TARGET.mesh``                         its shape: a mesh file, in metres, in the frame of its body
-``gravity.x``, ``y``, ``z``             m/s²
-``press.NUMBER``                        of :class:`.Press`
-======================================  =================================================================================
-
-Bounds and units come from the specifications that panels and files use.
+``docs/sweep.md`` lists the names. Bounds and units come from the specifications that panels and files use.
 """
 
 from __future__ import annotations
@@ -124,18 +109,11 @@ def _body_words(body: Body) -> Iterable[tuple[tuple[str, ...], Specification]]:
     if body.drive is not None:
         for key, specification in DRIVE_PARAMETERS.items():
             yield ("drive", key), specification
-        yield ("drive", "target"), Parameter("target", "", 0.0, -inf, inf, "Target of the drive")
+        yield ("drive", "target"), Parameter("target", "", 0.0, -inf, inf, "Target of the drive")  # in the unit of its control
 
 
 def variable(name: str, known: Mapping[str, Variable], scenario: Scenario) -> Variable:
-    """Return the variable of a name.
-
-    Parameters
-    ----------
-    name : str
-    known : mapping of str to Variable
-        Of :func:`variables_of`.
-    scenario : Scenario
+    """Return the variable of a name: one of those that :func:`variables_of` found, or of an effect.
 
     Raises
     ------
@@ -192,14 +170,10 @@ def varied_scenario(
     meshes: Mapping[str, Path] | None = None,
     shared: SharedResults | None = None,
 ) -> Scenario:
-    """Return a scenario with the values of one run.
+    """Return a scenario with the values of one run, by names that :func:`variable` knows.
 
     Parameters
     ----------
-    scenario : Scenario
-        As the scene says.
-    values : mapping of str to value
-        By names that :func:`variable` knows.
     press : Press, optional
         The numbers of the study's press that do not vary.
     meshes : mapping of str to Path, optional
