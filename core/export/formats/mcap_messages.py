@@ -30,8 +30,8 @@ WRENCH = "geometry_msgs/msg/WrenchStamped"
 POINT = "geometry_msgs/msg/PointStamped"
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
 
-_UINT8, _FLOAT32 = 2, 7
-_FIELD_TYPES = {"|u1": _UINT8, "<f4": _FLOAT32}
+_FIELD_TYPES = {"|u1": 2, "<f4": 7}
+"""UINT8 and FLOAT32 of a ``PointField``."""
 
 
 @cache
@@ -66,15 +66,7 @@ def _message(kind: str, *values: Any) -> bytes:
 
 
 def point_cloud(time: int, frame: str, points: np.ndarray) -> bytes:
-    """Return a ``PointCloud2``.
-
-    Parameters
-    ----------
-    time : int, nanoseconds
-    frame : str
-    points : (n,) structured array
-        Its fields, float32 or uint8, become the fields of the points; x, y and z are among them.
-    """
+    """Return a ``PointCloud2`` with the fields, float32 or uint8, of a structured array (n,), x, y and z among them."""
     kinds = points.dtype.fields or {}
     about = ((name, offset, _FIELD_TYPES[kind.str], 1) for name, (kind, offset, *_) in kinds.items())
     fields = [_part("sensor_msgs/msg/PointField", *one) for one in about]
