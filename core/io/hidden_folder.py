@@ -77,18 +77,8 @@ def lock_folder(folder: Path, work: str = "bake") -> BaseFileLock:
 def temporary_folder(parent: Path, purpose: str) -> Iterator[Path]:
     """Make a hidden folder in `parent`, and remove it with all that it holds when the body ends.
 
-    Those that killed processes have left there are removed first.
-
-    Parameters
-    ----------
-    parent : Path
-    purpose : str
-        Part of its name.
-
-    Raises
-    ------
-    FileError
-        It cannot be made.
+    Those that killed processes have left there are removed first. `purpose` is part of its name. Raises FileError if it cannot
+    be made.
     """
     remove_abandoned(parent)
     try:
@@ -113,13 +103,11 @@ def remove_abandoned(parent: Path) -> None:
     """Remove the temporary folders that killed processes have left in a folder."""
     for folder in sorted(parent.glob(".palpate-*-????????")):
         with suppress(OSError):
-            if is_private_folder(folder):
-                lock = _lock(folder)
-                if lock is not None:
-                    lock.release()
-                    _remove(folder)
-            else:
+            if not is_private_folder(folder):
                 folder.rmdir()  # of a kill before the lock; raises if it holds anything
+            elif (lock := _lock(folder)) is not None:
+                lock.release()
+                _remove(folder)
 
 
 def _remove(folder: Path) -> None:
@@ -140,12 +128,9 @@ def _lock(folder: Path) -> BaseFileLock | None:
     return lock
 
 
-# The files of an export, which take the place of those of the export before.
-#
 # An export is written whole into a hidden folder. Then its files are moved to their places, and files of the earlier export
-# that have no successor are removed: an export of a hundred frames that is followed by one of ten leaves no images of the
-# earlier one. A list in the folder names the files of exports with their SHA-256. Only files that the list names, and that
-# still have the content it was written for, are removed.
+# that have no successor are removed. A list in the folder names the files of exports with their SHA-256. Only files that the
+# list names, and that still have the content it was written for, are removed.
 
 LIST_NAME = ".palpate-export.json"
 LIST_FORMAT = "palpate-export/1"
@@ -156,10 +141,7 @@ _moving = threading.Lock()
 class FileList:
     """The list of all files that were written into a folder, by kind: a format of an export, a kind of figures, a report.
 
-    Parameters
-    ----------
-    folder : Path
-        What killed processes have left in it is removed.
+    What killed processes have left in the folder is removed.
     """
 
     def __init__(self, folder: Path):
@@ -169,18 +151,7 @@ class FileList:
 
     @contextmanager
     def new_files(self, purpose: str) -> Iterator[Path]:
-        """Make a hidden folder for new files, which is removed in the end.
-
-        Parameters
-        ----------
-        purpose : str
-            Part of its name.
-
-        Raises
-        ------
-        FileError
-            It cannot be made. Errors of the body name the places that the files would get.
-        """
+        """Make a hidden folder for new files as :func:`temporary_folder`; errors name the places that the files would get."""
         with temporary_folder(self._folder, purpose) as new:
             try:
                 yield new
@@ -267,8 +238,8 @@ class FileList:
     def _write(self, kinds: Mapping[str, dict[str, Any]]) -> None:
         """Write the list with these kinds; the others are as they were."""
         self._kinds |= kinds
+        content = {"format": LIST_FORMAT, "exports": self._kinds}
         with atomic_write(self._folder / LIST_NAME) as temporary:
-            content = {"format": LIST_FORMAT, "exports": self._kinds}
             temporary.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
 
@@ -306,10 +277,7 @@ def _read(path: Path) -> dict[str, dict[str, Any]]:
     """Return the kinds of a list; none when it is missing or damaged, so that nothing is removed by it."""
     try:
         content = json.loads(read_bytes(path).decode("utf-8"))
-        if content["format"] != LIST_FORMAT:
-            return {}
-        return {
-            kind: {"files": {**own["files"]}, "source": str(own.get("source", ""))} for kind, own in content["exports"].items()
-        }
+        kinds = content["exports"].items() if content["format"] == LIST_FORMAT else ()
+        return {kind: {"files": {**own["files"]}, "source": str(own.get("source", ""))} for kind, own in kinds}
     except (OSError, ValueError, RecursionError, KeyError, TypeError, AttributeError, FileError):
         return {}

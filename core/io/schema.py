@@ -39,16 +39,9 @@ _NAME = "name"
 
 
 def wanted(advice: str, names: bool = False, **limits: Any) -> msgspec.Meta:
-    """Return the annotation of a word.
+    """Return the annotation of a word with limits of :class:`msgspec.Meta`.
 
-    Parameters
-    ----------
-    advice : str
-        What to write, for the sentence of a mistake.
-    names : bool
-        Whether each text has to be a name (:func:`.checked_name`).
-    **limits
-        Of :class:`msgspec.Meta`.
+    `advice` says what to write, for the sentence of a mistake. With `names` each text has to be one (:func:`.checked_name`).
     """
     return msgspec.Meta(description=advice, title=_NAME if names else None, **limits)
 
@@ -72,14 +65,10 @@ def known_words(table: Mapping[str, Any], words: Iterable[str], where: str, what
 def read_words(
     table: Any, kind: Callable[..., T], where: str, what: str = THIS_FORMAT, besides: Iterable[str] = (), **given: Any
 ) -> T:
-    """Return a table of a file as an object of a dataclass.
+    """Return a table of a file as an object of a dataclass, whose fields are the words of the table.
 
     Parameters
     ----------
-    table : mapping
-        As TOML gives it.
-    kind : type
-        The dataclass; its fields are the words of the table.
     where, what : str
         Which table of which file this is, and what its format is called, for messages.
     besides : iterable of str
@@ -119,7 +108,6 @@ def read_json(path: str | os.PathLike, kind: Callable[..., T], format_name: str,
 
     Parameters
     ----------
-    path : path
     kind : type
         A dataclass. Other keys than its fields are left out.
     format_name : str

@@ -49,13 +49,7 @@ SHAPE_WORDS = ("grid", "mesh", "thickness")
 class SensorModel:
     """A sensor without its texels.
 
-    Attributes
-    ----------
-    name : str
-    parameters : SensorParameters
-    effects : tuple of Effect
-    shape : mapping
-        Keys of a rig's [sensor] for its shape (:data:`SHAPE_WORDS`); empty when the sensor is a mesh of a scene.
+    `shape` has the keys of a rig's [sensor] for it (:data:`SHAPE_WORDS`), none when the sensor is a mesh of a scene.
     """
 
     name: str
@@ -96,13 +90,12 @@ def read_sensor(path: str | os.PathLike) -> SensorModel:
     """
     table = read_toml(path, "sensor")
     try:
-        return sensor_of(table)
+        return _sensor_of(table)
     except PalpateError as error:
         raise type(error)(f"'{Path(path).name}': {error}") from error
 
 
-def sensor_of(table: Mapping[str, Any]) -> SensorModel:
-    """Return the sensor that the tables of a file describe; raise the same errors as :func:`read_sensor`."""
+def _sensor_of(table: Mapping[str, Any]) -> SensorModel:
     if table.get("format") != FORMAT:
         raise FileError(f'Its format is {table.get("format")!r}: a sensor\'s file begins with format = "{FORMAT}".')
     found = read_words(table, _SensorFile, "the file", besides=("format",))
@@ -131,10 +124,7 @@ def _checked_shape(words: Mapping[str, Any]) -> dict[str, Any]:
 def checked_grid(grid: Any, where: str) -> tuple[int, int, tuple[float, float]]:
     """Return rows, columns and pitch (x and y, metres) of a grid as a file writes it.
 
-    Raises
-    ------
-    FileError
-        It is no grid, or one with too many texels; `where` says of which table or file.
+    Raises FileError if it is no grid, or one with too many texels; `where` says of which table or file.
     """
     if not isinstance(grid, Mapping):
         raise FileError(f"grid of {where} is {grid!r:.80}: write {{ rows = 14, columns = 6, pitch = [0.0034, 0.0034] }}.")

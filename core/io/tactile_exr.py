@@ -52,20 +52,9 @@ def library() -> str:
 
 
 def write_image(path: str | os.PathLike, channels: Mapping[str, np.ndarray], attributes: Mapping[str, str]) -> None:
-    """Write an image, ZIP-compressed; equal images give equal bytes.
+    """Write (height, width) float32 channels as an image, from the top, ZIP-compressed; equal images give equal bytes.
 
-    Parameters
-    ----------
-    path : path
-    channels : mapping of str to (height, width) float32
-        The first row is the top of the picture.
-    attributes : mapping of str to str
-        Added to the header.
-
-    Raises
-    ------
-    OSError, FileError
-        The file cannot be written.
+    The attributes are added to the header. Raises OSError or FileError where the file cannot be written.
     """
     texts = {name: value.encode("utf-8", "replace").decode() for name, value in attributes.items()}
     if library() == "OpenEXR":
@@ -99,14 +88,10 @@ def _os_error(message: str) -> OSError:
 
 
 CHANNELS = ("R", "G", "B", "reading", "depth", "slip", "contact")
-"""Names of the channels."""
-
 CHANNEL_LAYER = "channels"
 """Name of the vector layer that images of a sensor with several channels have besides."""
-
 UNITS = {"R": "N", "G": "N", "B": "N", "depth": "m", "slip": "m/s", "contact": "1"}
 """Units of the channels; that of ``reading`` is the sensor's."""
-
 _PREFIX = "palpate."  # OpenEXR has header attributes of its own, some with a type ("name", "owner", "type")
 
 
@@ -129,11 +114,7 @@ def _pictures(layout: GridLayout | UVLayout, frame: SensorFrame, nearest: np.nda
 
 
 def describe(sensor: Sensor, frame: Frame, digest: str) -> dict[str, str]:
-    """Return the metadata of a tactile image: its sensor, time, units, and hashes of what it was computed from.
-
-    ``unit.R``, ``unit.depth``, … are the units of the channels; ``parameters`` is a hash of the sensor's parameters, of what is
-    painted on it and of its effects, ``digest`` one of everything that the forces depend on.
-    """
+    """Return the metadata of a tactile image, as ``docs/files.md`` lists them; `digest` is that of the scenario."""
     about = {
         "sensor": sensor.name,
         "frame": str(frame.frame),
@@ -162,10 +143,6 @@ def write_exr(
 
     Parameters
     ----------
-    path : path
-    layout : GridLayout or UVLayout
-        Of the sensor's texels.
-    frame : SensorFrame
     metadata : mapping of str to str
         Become header attributes named ``palpate.<key>``, see :func:`describe`.
     nearest : (n,) int, optional
@@ -219,8 +196,6 @@ def write_vector_exrs(folder: Path, values: np.ndarray, shape: tuple[int, int], 
 
     Parameters
     ----------
-    folder : path
-        Is made if it is not there.
     values : (T, k, 3) float
         Of places row by row, the row with the least y first.
     shape : (int, int)

@@ -64,13 +64,7 @@ class TextTable:
 
 
 def read_text_table(path: str | os.PathLike, most_values: int = 100_000_000) -> TextTable:
-    """Read a table of text.
-
-    Parameters
-    ----------
-    path : path
-    most_values : int
-        Numbers that are read at most.
+    """Read a table of text of at most `most_values` numbers.
 
     Raises
     ------
@@ -257,8 +251,8 @@ def _header(
         wide = [form.cells(comments[-1])]
         wide = wide if len(wide[0]) == width else []
     fitting = [cells for cells in wide if _filled(cells) == width or len(cells) == width]
-    if fitting and len(fitting) > 1 and (len(wide) == 2 or _are_units(fitting[-1])):
-        names, below = fitting[-2], fitting[-1]
+    if len(fitting) > 1 and (len(wide) == 2 or _are_units(fitting[-1])):
+        names, below = fitting[-2:]
     elif fitting:
         names, below = fitting[-1], []
     elif wide and width - 1 <= _filled(wide[-1]) <= 2 * width:
@@ -304,11 +298,9 @@ def _values(
     values = np.full((len(lines), len(names)), np.nan)
     wrong: dict[str, list[tuple[int, str]]] = {}
     for row, (number, text) in zip(values, lines, strict=True):
-        cells = form.cells(text)
-        for i in range(min(len(names), len(cells))):
-            found = form.number(cells[i])
-            if found is not None:
-                row[i] = found
-            if cells[i] and (found is None or found != found):
-                wrong.setdefault(names[i], []).append((number, cells[i]))
+        for i, (name, cell) in enumerate(zip(names, form.cells(text))):
+            found = form.number(cell)
+            row[i] = value = math.nan if found is None else found
+            if cell and math.isnan(value):
+                wrong.setdefault(name, []).append((number, cell))
     return values, wrong
