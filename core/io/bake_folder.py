@@ -1,9 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A bake folder: names of its folders and files, and the manifest that describes each sensor's bake.
-
-A bake folder holds one folder per sensor. Each of these holds ``recording.npz``, ``sensor.npz``, ``manifest.json`` and, unless
-the bake has no images, one EXR image per frame and ``images.sha256``, the list of their checksums. It has the format of
-``sha256sum``, so ``sha256sum -c images.sha256`` checks a folder without Palpate.
+"""A bake folder: names of its folders and files, which ``docs/files.md`` lists, and the manifest of each sensor's bake.
 
 A bake belongs to the .blend whose path is in the manifest, as long as that file exists, and in it to the scene with the id that
 the manifest has. So a .blend that was renamed or moved may replace its bake, and a copy may not replace that of its original.

@@ -187,8 +187,6 @@ def channel_layout(texels: Texels, channels: VectorReadings) -> GridLayout:
 
 LAYER, AXES = "field", "XYZ"
 """Name of the layer, and of its channels."""
-DIGITS = 4
-"""Of the number of a frame in the name of a file."""
 
 
 def write_vector_exrs(folder: Path, values: np.ndarray, shape: tuple[int, int], unit: str) -> list[Path]:
@@ -220,7 +218,7 @@ def write_vector_exrs(folder: Path, values: np.ndarray, shape: tuple[int, int], 
     images = values.reshape(-1, rows, columns, 3)[:, ::-1].astype(np.float32)
     files = FileList(writable_folder(folder, create=True))
     with files.new_files(LAYER) as new:
-        paths = [new / f"{LAYER}_{frame:0{DIGITS}d}.exr" for frame in range(len(images))]
+        paths = [new / f"{LAYER}_{frame:04d}.exr" for frame in range(len(images))]
         for frame, (path, image) in enumerate(zip(paths, images)):
             pictures = {f"{LAYER}.{axis}": image[:, :, i] for i, axis in enumerate(AXES)}
             with atomic_write(path) as temporary:

@@ -15,6 +15,7 @@ import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -201,7 +202,7 @@ def _lines(file: Iterator[str], path: Path) -> tuple[list[tuple[int, str]], list
 
 def _form(lines: Sequence[str], path: Path) -> tuple[_Form, int]:
     """Return how the numbers are written, and the first line of the table: the form with the most lines of equal width."""
-    best: tuple[int, int, int, _Form, int] | None = None
+    found: list[tuple[tuple[int, int, int], _Form, int]] = []
     for order, separator in enumerate(SEPARATORS):
         for decimal in (".", ",") if separator != "," else (".",):
             form = _Form(separator, decimal)
@@ -211,21 +212,17 @@ def _form(lines: Sequence[str], path: Path) -> tuple[_Form, int]:
             first = _first_row(widths, usual)
             if usual and first is not None:
                 key = sum(width == usual for width in widths), min(usual, 2), -order - (decimal == ",")
-                if best is None or key > best[:3]:
-                    best = (*key, _Form(separator, decimal, usual), first)
-    if best is None:
+                found.append((key, _Form(separator, decimal, usual), first))
+    if not found:
         raise FileError(f"'{path.name}' holds no numbers: there are no measurements in it, give a table of them.")
-    return best[3], best[4]
+    return max(found, key=itemgetter(0))[1:]
 
 
 def _width(row: Sequence[str], form: _Form) -> int:
     """Return the number of cells of a row of numbers, without empty ones at its end; 0 for text with less than half numbers."""
-    kept = list(row)
-    while kept and not kept[-1]:
-        kept.pop()
-    numbers = [form.number(cell) for cell in kept]
-    known = sum(number is not None and number == number for number in numbers)
-    return len(kept) if known and 2 * sum(number is not None for number in numbers) >= len(kept) else 0
+    width = _filled(row)
+    numbers = [number for number in map(form.number, row[:width]) if number is not None]
+    return width if any(number == number for number in numbers) and 2 * len(numbers) >= width else 0
 
 
 def _first_row(widths: Sequence[int], usual: int) -> int | None:

@@ -156,18 +156,14 @@ def _phases(press: Press) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     depth = -press.clearance if press.force > 0.0 else press.depth
     approach = press.clearance / press.speed + press.settle if press.force > 0.0 else (depth + press.clearance) / press.speed
     sliding = max(press.slide / press.slide_speed, abs(press.twist) / press.twist_speed)
-    corners = [(approach, depth, 0.0), (press.hold, depth, 0.0)]
+    corners = [(0.0, -press.clearance, 0.0), (approach, depth, 0.0), (press.hold, depth, 0.0)]
     if sliding > 0.0:
         corners += [(sliding / TWIST_STEPS, depth, step / TWIST_STEPS) for step in range(1, TWIST_STEPS + 1)]
         corners.append((press.hold, depth, 1.0))
     if press.force == 0.0:
         corners.append((approach, -press.clearance, corners[-1][2]))
-    rows = [(0.0, -press.clearance, 0.0)]
-    for seconds, at, share in corners:
-        if seconds > 0.0:
-            rows.append((rows[-1][0] + seconds, at, share))
-    times, depths, shares = np.array(rows).T
-    return times, depths, shares
+    seconds, depths, shares = np.array([corners[0], *(corner for corner in corners if corner[0] > 0.0)]).T
+    return np.cumsum(seconds), depths, shares
 
 
 def _driven(body: Body, scenario: Scenario, index: int, press: Press, down: np.ndarray) -> Body:

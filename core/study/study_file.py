@@ -46,16 +46,7 @@ from .presses import PLACE_PARAMETERS, PRESS_PARAMETERS, Press, with_press
 from .scene_property import SceneProperty, WholeNumber, is_scene_property
 from .variation import MOTION_WORDS, PRESS, Variable, variable, variables_of
 
-# The output folder of a study, and how many runs it has by the names of its parts, which any Python can read.
-#
-# ::
-#
-#     study.toml                    the study, with the version and the digests of its scenes
-#     scenes/                       scenes as the solver sees them, copies of .blend and mesh files
-#     parts/<first run>-<content>-<done>-<failed>.parquet
-#                                   a batch of runs: values, metrics and frames of those that are done, why others failed
-#     layouts/<digest>/             what the frames of many runs have in common: features and texels
-#     runs/<digest>/                files of a run, where the study asks for recordings or images, or has a job
+# The output folder of a study, which docs/sweep.md describes. The names of its parts say how many runs it has, without pyarrow.
 
 STUDY_NAME = "study.toml"
 SCENES, PARTS, LAYOUTS, RUNS = "scenes", "parts", "layouts", "runs"
