@@ -320,14 +320,10 @@ def other_owner(manifest: Manifest, bake_folder: Path, owner: BakeOwner) -> str:
     return "" if is_ours else f"'{blend}'"
 
 
-# A complete bake takes the place of the earlier one, folder by folder.
-#
 # A bake is written into the folder ``new`` of the hidden folder. When it is complete, each sensor's folder is moved into the
 # folder ``old``, and the new one into its place. An error takes all of this back. A kill may leave folders of both bakes, whose
-# manifests have different ids, so that every reader says so, and the next bake replaces them.
-#
-# Files in a replaced folder that no bake has written belong to the user and move into the new folder. Nothing else than the
-# files of a bake is removed.
+# manifests have different ids, so that every reader says so, and the next bake replaces them. Files in a replaced folder that
+# no bake has written belong to the user and move into the new folder.
 
 NEW, OLD = "new", "old"
 

@@ -159,22 +159,10 @@ class FileList:
                 raise FileError(str(error).replace(str(new), str(self._folder))) from error
 
     def replace(self, new: Path, written: Mapping[str, Iterable[Path]], source: str = "") -> list[Path]:
-        """Put new files in the place of the earlier ones of their kinds.
+        """Put files that were written into the folder `new` of :meth:`new_files`, by kind, in the place of the earlier ones.
 
-        Parameters
-        ----------
-        new : Path
-            The folder from :meth:`new_files`, in which they were written.
-        written : mapping of str to iterable of Path
-            The files in it, by kind.
-        source : str
-            What they were made from. Earlier files that were made from the same stay; those made from something else are
-            removed, and without a source all of them.
-
-        Returns
-        -------
-        list of Path
-            Where the files are now.
+        Earlier files of these kinds that were made from the same `source` stay; those made from something else are removed, and
+        without a source all of them. Returns where the files are now.
 
         Raises
         ------

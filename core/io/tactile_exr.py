@@ -1,10 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tactile images in the OpenEXR format: three channels that Blender's image nodes read directly, and all others beside them.
 
-``R`` is the normal force and ``G``, ``B`` the shear along the texel's x and y axes, all in newtons; ``reading`` is in
-the sensor's unit, ``depth`` in metres, ``slip`` in metres per second, ``contact`` 0 or 1. All are 32-bit floats; pixels
-that show no texel are 0. Row 0 of the layout is the bottom of the picture. A sensor with several channels has the vector layer
-``channels`` besides, which shows at each texel the channels of the nearest place where such are measured.
+``docs/files.md`` lists the channels. Row 0 of the layout is the bottom of the picture.
 
 Images of readings with three signed channels (:func:`write_vector_exrs`) have one layer with the channels X, Y and Z, which
 image programs, Blender's among them, show as one vector, in the unit of the readings.
@@ -31,12 +28,9 @@ from ..model.sensor import Sensor
 from .file_writing import atomic_write, writable_folder
 from .hidden_folder import FileList
 
-# OpenEXR images of 32-bit floats with named channels and attributes, written by a library.
-#
-# The library is OpenEXR, from PyPI. In a Blender that is linked against an OpenEXR of its own, the dynamic linker would mix the
-# symbols of the two, and the first file written would end the process (seen in Debian's Blender 4.3). There the images go
-# through OpenImageIO, which Blender brings along. Pixels, names and attributes are the same; equal images give equal bytes in
-# each.
+# Images are written by OpenEXR, from PyPI. In a Blender that is linked against an OpenEXR of its own, the dynamic linker would
+# mix the symbols of the two, and the first file written would end the process (seen in Debian's Blender 4.3). There the images
+# go through OpenImageIO, which Blender brings along. Pixels, names and attributes are the same; equal images give equal bytes.
 
 _NO_DATE = "1980:01:01 00:00:00"
 """OpenImageIO would write the present time, and equal images would differ."""

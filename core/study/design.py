@@ -129,11 +129,6 @@ class Distribution:
     low: float = -math.inf
     high: float = math.inf
 
-    @property
-    def count(self) -> int:
-        """Number of values in a grid."""
-        return len(self.words) if self.kind == CHOICE else self.levels
-
     def grid_values(self) -> np.ndarray:
         """Return the values of a grid; a normal distribution gives the middles of parts of equal probability."""
         if self.kind == CHOICE:
@@ -180,7 +175,7 @@ class Design:
         """Return the number of points."""
         if self.kind != GRID:
             return self.samples
-        return math.prod(distribution.count for distribution in varied.values())
+        return math.prod(len(one.words) if one.kind == CHOICE else one.levels for one in varied.values())
 
 
 def check_count(count: int) -> None:

@@ -43,19 +43,9 @@ class WholeNumber(Parameter):
 
 @dataclass(frozen=True)
 class SceneProperty:
-    """Type, unit and bounds of a property of a scene.
+    """Type, unit and bounds of a property of a scene, whose name is its path.
 
-    Attributes
-    ----------
-    name : str
-        Its path.
-    kind : str
-    unit : str
-        Of a number, as Blender stores it; "" where it has none.
-    low, high : float or None
-        Bounds of a number, inclusive; None where it has none.
-    choices : tuple of str
-        Words that a choice knows.
+    The unit of a number is as Blender stores it, "" where it has none. Its bounds are inclusive, None where it has none.
     """
 
     name: str
@@ -97,7 +87,7 @@ def read_overrides(path: str | os.PathLike) -> dict[str, Any]:
 
     Raises
     ------
-    FileError
+    FileError, ParameterError
         It cannot be read, or has something else than paths of properties.
     """
     table, name = read_toml(path, "file of overrides"), Path(path).name
@@ -120,13 +110,7 @@ def write_properties(path: str | os.PathLike, properties: Iterable[SceneProperty
 
 
 def read_properties(path: str | os.PathLike) -> dict[str, SceneProperty]:
-    """Read the properties that :func:`write_properties` wrote, by path; none where there is no file.
-
-    Raises
-    ------
-    FileError
-        It cannot be read, or is damaged.
-    """
+    """Read the properties that :func:`write_properties` wrote, by path; none where there is no file. Raises FileError."""
     try:
         found, _ = read_json(path, _PropertiesFile, PROPERTIES_FORMAT, "start the study again")
     except FileNotFoundError:

@@ -283,9 +283,9 @@ def plan_for(
     else:
         scenario = at_rate(scenario, study.fps)
         if study.press is not None:
-            press = _press(study, scenario)
+            press, of_press = _press(study.press, scenario, study.design.kind == GRID)
             with_press(scenario, press)  # refuses what no press of this study could do
-            entries |= _press_entries(study)
+            entries |= of_press
         variables = _variables(entries, scenario, press, properties or {})
     varied: dict[str, Distribution] = {}
     fixed: dict[str, Value] = {}
@@ -375,9 +375,11 @@ def at_rate(scenario: Scenario, fps: float | None) -> Scenario:
     return replace(scenario, fps=fps, frame_end=scenario.frame_start + max(1, math.floor(seconds * fps + 1e-9)))
 
 
-def _press(study: Study, scenario: Scenario) -> Press:
-    """Return the press of a study with default numbers; sensor and target may go unnamed where there is only one."""
-    table = study.press or {}
+def _press(table: Mapping[str, Any], scenario: Scenario, is_grid: bool) -> tuple[Press, dict[str, Any]]:
+    """Return the press of a study with default numbers, and the entries of the others by their names.
+
+    Sensor and target may go unnamed where there is only one.
+    """
     known_words(table, ("sensor", "target", *PRESS_PARAMETERS), "[press]", A_STUDY)
     readable = [sensor.name for sensor in scenario.read_out]
     carriers = {sensor.body for sensor in scenario.sensors}
@@ -388,22 +390,17 @@ def _press(study: Study, scenario: Scenario) -> Press:
             known = ", ".join(f"'{name}'" for name in candidates) or "none"
             raise ParameterError(f"[press] does not say its {word}, and '{scenario.name}' has {known}: add {word} = \"…\".")
         names[word] = checked_name(table.get(word, *candidates[:1]), "[press]")
-    if study.design.kind == GRID and not all(word in table for word in PLACE_PARAMETERS):
+    if is_grid and not all(word in table for word in PLACE_PARAMETERS):
         raise ParameterError("A grid has no random places to press on: use random, latin-hypercube or sobol.")
     if "depth" in table and "force" in table:
         raise ParameterError("[press] has a depth and a force: give one of the two.")
-    return Press(names["sensor"], names["target"])
-
-
-def _press_entries(study: Study) -> dict[str, Any]:
-    table = study.press or {}
-    entries = {f"{PRESS}.{word}": table[word] for word in PRESS_PARAMETERS if word in table}
+    entries = {word: table[word] for word in PRESS_PARAMETERS if word in table}
     for word in PLACE_PARAMETERS:
-        entries.setdefault(f"{PRESS}.{word}", {UNIFORM: [0.0, 1.0]})
+        entries.setdefault(word, {UNIFORM: [0.0, 1.0]})
     for direction, directed in _DIRECTIONS.items():
-        if directed in table and study.design.kind != GRID:
-            entries.setdefault(f"{PRESS}.{direction}", {UNIFORM: [-math.pi, math.pi]})
-    return entries
+        if directed in table and not is_grid:
+            entries.setdefault(direction, {UNIFORM: [-math.pi, math.pi]})
+    return Press(names["sensor"], names["target"]), {f"{PRESS}.{word}": entry for word, entry in entries.items()}
 
 
 _Pair = Annotated[list[Number], wanted("give two numbers", min_length=2, max_length=2)]
