@@ -35,8 +35,6 @@ UNITS = {
 }
 """Units of the arrays of :func:`bake_arrays` that have one; `reading` has the sensor's own."""
 
-Write = Callable[[Bake, Path, FigureStyle], Job[list[Path]]]
-
 
 @dataclass(frozen=True)
 class Exporter:
@@ -52,7 +50,7 @@ class Exporter:
     """
 
     name: str
-    write: Write
+    write: Callable[[Bake, Path, FigureStyle], Job[list[Path]]]
 
 
 def bake_arrays(bake: Bake, name: str) -> dict[str, np.ndarray]:

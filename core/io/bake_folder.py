@@ -278,18 +278,10 @@ def _own_digest(content: Mapping[str, Any]) -> str:
 
 @dataclass(frozen=True)
 class BakeOwner:
-    """The scene that is baked.
+    """The scene that is baked, by the id that its .blend stores, and the other scenes of that .blend.
 
-    Attributes
-    ----------
-    scene_id : str
-        Id of the scene; empty where its .blend does not store one.
-    blend : Path or None
-        The .blend that the bake belongs to; None if the scene was never saved.
-    source : Path or None
-        The .blend that was opened, where the scene is saved to another one together with the bake.
-    other_scenes : frozenset of str
-        Ids of the other scenes in the same .blend.
+    The bake belongs to `blend`, None if the scene was never saved. `source` is the .blend that was opened, where the scene is
+    saved to another one together with the bake.
     """
 
     scene_id: str = ""

@@ -44,13 +44,8 @@ def is_private_folder(folder: Path) -> bool:
 def lock_folder(folder: Path, work: str = "bake") -> BaseFileLock:
     """Lock a bake folder or the folder of a study; its hidden folder is made if it is missing.
 
-    The lock is held until its ``release()``. The locked file stays: another process may be about to lock it.
-
-    Parameters
-    ----------
-    folder : Path
-    work : str
-        What writes to the folder, for the message.
+    The lock is held until its ``release()``. The locked file stays: another process may be about to lock it. `work` says in
+    messages what writes to the folder.
 
     Raises
     ------

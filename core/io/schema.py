@@ -106,20 +106,8 @@ def read_words(
 def read_json(path: str | os.PathLike, kind: Callable[..., T], format_name: str, advice: str) -> tuple[T, dict[str, Any]]:
     """Read a JSON file that Palpate wrote.
 
-    Parameters
-    ----------
-    kind : type
-        A dataclass. Other keys than its fields are left out.
-    format_name : str
-        What the file says of its format.
-    advice : str
-        What to do if it is damaged.
-
-    Returns
-    -------
-    found : object of the dataclass
-    content : dict
-        All of the file.
+    Returns an object of the dataclass `kind`, without keys that are no fields of it, and all of the file. `format_name` is what
+    the file says of its format, and `advice` what to do if it is damaged.
 
     Raises
     ------

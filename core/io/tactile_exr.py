@@ -30,10 +30,8 @@ from .hidden_folder import FileList
 
 # Images are written by OpenEXR, from PyPI. In a Blender that is linked against an OpenEXR of its own, the dynamic linker would
 # mix the symbols of the two, and the first file written would end the process (seen in Debian's Blender 4.3). There the images
-# go through OpenImageIO, which Blender brings along. Pixels, names and attributes are the same; equal images give equal bytes.
-
-_NO_DATE = "1980:01:01 00:00:00"
-"""OpenImageIO would write the present time, and equal images would differ."""
+# go through OpenImageIO, which Blender brings along. Pixels, names and attributes are the same; each library writes equal
+# images as equal bytes.
 
 
 @cache
@@ -67,7 +65,8 @@ def write_image(path: str | os.PathLike, channels: Mapping[str, np.ndarray], att
     height, width = next(iter(channels.values())).shape
     spec = oiio.ImageSpec(width, height, len(channels), "float")
     spec.channelnames = tuple(channels)
-    for name, value in {"compression": "zip", "DateTime": _NO_DATE, **texts}.items():
+    # Without a date OpenImageIO would write the present time, and equal images would differ.
+    for name, value in {"compression": "zip", "DateTime": "1980:01:01 00:00:00", **texts}.items():
         spec.attribute(name, value)
     image = oiio.ImageOutput.create("image.exr")
     pixels = np.stack(list(channels.values()), axis=-1)
@@ -86,7 +85,6 @@ CHANNEL_LAYER = "channels"
 """Name of the vector layer that images of a sensor with several channels have besides."""
 UNITS = {"R": "N", "G": "N", "B": "N", "depth": "m", "slip": "m/s", "contact": "1"}
 """Units of the channels; that of ``reading`` is the sensor's."""
-_PREFIX = "palpate."  # OpenEXR has header attributes of its own, some with a type ("name", "owner", "type")
 
 
 def _pictures(layout: GridLayout | UVLayout, frame: SensorFrame, nearest: np.ndarray | None) -> dict[str, np.ndarray]:
@@ -151,7 +149,8 @@ def write_exr(
     """
     pictures = _pictures(layout, frame, nearest)
     with atomic_write(path) as temporary:
-        write_image(temporary, pictures, {_PREFIX + key: str(value) for key, value in metadata.items()})
+        # The prefix is for attributes that OpenEXR has itself, some with a type ("name", "owner", "type").
+        write_image(temporary, pictures, {f"palpate.{key}": str(value) for key, value in metadata.items()})
 
 
 def layer_names(channels: VectorReadings) -> list[str]:

@@ -11,9 +11,9 @@ import glob
 import math
 import os
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path, PurePath
+from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
@@ -33,16 +33,6 @@ MESH = "mesh"
 """Last word of the name of a target's shape."""
 MESHES = "meshes"
 """Folder of the copies, in that of the scenes."""
-
-
-def expanded(words: Iterable[str], known: Iterable[str]) -> list[str]:
-    """Return the names of files that words of a choice mean: those that fit a pattern, in order, or the word itself."""
-    names = list(known)
-    found: list[str] = []
-    for word in words:
-        fitting = [name for name in names if PurePath(name).match(word)] if glob.has_magic(word) else [word]
-        found += [name for name in fitting if name not in found]
-    return found
 
 
 def find_meshes(vary: Mapping[str, Any], base: Path) -> dict[str, Path]:
@@ -156,16 +146,7 @@ class Distribution:
 
 @dataclass(frozen=True)
 class Design:
-    """How a study chooses the values of its runs.
-
-    Attributes
-    ----------
-    kind : str
-        One of :data:`DESIGNS`.
-    samples : int
-        Runs per scene; a grid has its own number.
-    seed : int
-    """
+    """How a study chooses the values of its runs; `samples` are for each scene, and a grid has its own number."""
 
     kind: DesignKind = field(metadata={WORD: "design"})
     samples: Annotated[int, wanted("give a whole number of runs, above zero", ge=1, le=2**63 - 1)] = 0

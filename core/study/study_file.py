@@ -6,6 +6,7 @@ The output folder keeps the file with a table ``[frozen]`` at its end: the versi
 
 from __future__ import annotations
 
+import glob
 import hashlib
 import json
 import math
@@ -14,8 +15,8 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
-from itertools import accumulate
-from pathlib import Path
+from itertools import accumulate, chain
+from pathlib import Path, PurePath
 from typing import Annotated, Any
 
 import msgspec
@@ -40,7 +41,6 @@ from .design import (
     Value,
     check_count,
     columns_of,
-    expanded,
 )
 from .presses import PLACE_PARAMETERS, PRESS_PARAMETERS, Press, with_press
 from .scene_property import SceneProperty, WholeNumber, is_scene_property
@@ -180,11 +180,6 @@ class Plan:
     meshes: Mapping[str, Path] = field(default_factory=dict)
     tied: Mapping[str, tuple[str, float | None]] = field(default_factory=dict)
 
-    def with_tied(self, values: Mapping[str, Value]) -> dict[str, Value]:
-        """Return the values of a run with those that follow others."""
-        known = {**self.fixed, **values}
-        return {**values, **{name: _times(known[other], factor) for name, (other, factor) in self.tied.items()}}
-
     @property
     def scene_properties(self) -> list[str]:
         """Paths of the properties of the scene that the study sets: where there are any, each run is read from the scene."""
@@ -193,18 +188,9 @@ class Plan:
 
 @dataclass(frozen=True)
 class Run:
-    """One run of a study.
+    """One run of a study: its index from zero over all scenes, its scene in the output folder, and the values that vary.
 
-    Attributes
-    ----------
-    index : int
-        From zero, over all scenes.
-    scene : str
-        Name of its scene in the output folder.
-    values : dict of str to value
-        What varies.
-    digest : str
-        A hash of the scenario of the scene, of what the study fixes, of `index` and `values`; the name of its folder.
+    `digest`, the name of its folder, is a hash of the scenario of the scene, of what the study fixes, of `index` and `values`.
     """
 
     index: int
@@ -359,12 +345,13 @@ def _times(value: Any, factor: float | None) -> Any:
     return value if factor is None or not is_number(value) else value * factor
 
 
-def _with_files(found: Variable, entry: Mapping[str, Any], meshes: Iterable[str]) -> Mapping[str, Any]:
+def _with_files(found: Variable, entry: Mapping[str, Any], meshes: Mapping[str, Path]) -> Mapping[str, Any]:
     """Return the table of a target's shape with the names of files in the place of patterns; other tables as they are."""
     words = entry.get(CHOICE)
     if found.words != (MESH,) or not isinstance(words, list) or not all(isinstance(word, str) for word in words):
         return entry
-    return {**entry, CHOICE: expanded(words, meshes)}
+    files = [[name for name in meshes if PurePath(name).match(word)] if glob.has_magic(word) else [word] for word in words]
+    return {**entry, CHOICE: list(dict.fromkeys(chain.from_iterable(files)))}
 
 
 def at_rate(scenario: Scenario, fps: float | None) -> Scenario:
@@ -468,7 +455,9 @@ class Runs:
         values = {name: float(value) if isinstance(value, np.floating) else value for name, value in found.items()}
         own = self._hashes[scene].copy()
         own.update(json.dumps([index, values]).encode())
-        values = self._plans[scene].with_tied(values)
+        plan = self._plans[scene]
+        known = {**plan.fixed, **values}
+        values |= {name: _times(known[other], factor) for name, (other, factor) in plan.tied.items()}
         named = {SCENE: scene, **values} if len(self._plans) > 1 else values
         return Run(index, scene, named, own.hexdigest()[:24])
 

@@ -41,18 +41,9 @@ MOTION_WORDS = (*_BODY_VECTORS, "drive", "mass")
 
 @dataclass(frozen=True)
 class Variable:
-    """A number, text or switch that a study may vary.
+    """A number or text that a study may vary, or a switch, which has no specification.
 
-    Attributes
-    ----------
-    name : str
-        As the study writes it.
-    owner : str
-        Name of the sensor, body or target; ``gravity`` and ``press`` own theirs.
-    words : tuple of str
-        The rest of the name.
-    specification : Specification or None
-        None for a switch, which is true or false.
+    Its name begins with that of its owner, a sensor, body or target, ``gravity`` or ``press``, and `words` are the rest.
     """
 
     name: str

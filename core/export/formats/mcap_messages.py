@@ -94,7 +94,6 @@ WORLD = "world"
 """Frame of the world."""
 _TEXEL = [*((name, "<f4") for name in ("normal_force", "shear_x", "shear_y", "reading", "depth", "slip")), ("contact", "u1")]
 """Fields of a texel in the point cloud, behind its position."""
-_CHUNK_BYTES = 1 << 20
 
 
 def write_mcap(bake: Bake, folder: Path, style: FigureStyle) -> Job[list[Path]]:
@@ -106,7 +105,7 @@ def write_mcap(bake: Bake, folder: Path, style: FigureStyle) -> Job[list[Path]]:
 
     path = folder / "palpate.mcap"
     with atomic_write(path) as temporary, open(temporary, "wb") as file:
-        writer = Writer(file, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD)
+        writer = Writer(file, chunk_size=1 << 20, compression=CompressionType.ZSTD)
         writer.start(profile=Profile.ROS2, library="palpate")
         output = _Output(writer, bake, style.shown)
         names, frames = list(bake.texels), len(bake.recording.frames)
