@@ -301,7 +301,7 @@ class BakeOwner:
 
 
 def other_owner(manifest: Manifest, bake_folder: Path, owner: BakeOwner) -> str:
-    """Return whose bake a manifest in a bake folder describes, in words, if it is not that of `owner`; empty if it is."""
+    """Return whose bake a manifest describes, in words, if it belongs to another scene than `owner`; empty if not."""
     if manifest.scene_id != owner.scene_id and manifest.scene_id in owner.other_scenes:
         return "another scene of the same .blend"
     stated = manifest.scene_path

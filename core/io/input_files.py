@@ -24,7 +24,10 @@ _KINDS = {stat.S_IFIFO: "a FIFO", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a de
 
 
 def require_regular(path: str | os.PathLike, opened: int | None = None) -> None:
-    """Raise :class:`FileError` if `path`, perhaps open as `opened`, is a FIFO, a socket or a device; a missing file passes."""
+    """Raise :class:`FileError` if `path`, perhaps open as `opened`, is a FIFO, a socket or a device.
+
+    A missing file and a folder pass.
+    """
     try:
         kind = _KINDS.get(stat.S_IFMT(os.stat(path if opened is None else opened).st_mode))
     except OSError:
