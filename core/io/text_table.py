@@ -80,10 +80,11 @@ def read_text_table(path: str | os.PathLike, most_values: int = 100_000_000) -> 
     form, first = _form([text for _, text in lines[:SAMPLE]], path)
     head = [form.cells(text) for _, text in lines[:first]]
     names, units, notes = _header(head, comments, form, [form.cells(text) for _, text in lines[first : first + SAMPLE]], path)
-    if (len(lines) - first) * len(names) > most_values:
+    count = (len(lines) - first) * len(names)
+    if count > most_values:
         raise FileError(
-            f"'{path.name}' holds {(len(lines) - first) * len(names):,} numbers in {len(names):,} columns and at most "
-            f"{most_values:,} are read: cut it into several files, or keep fewer samples per second."
+            f"'{path.name}' holds {count:,} numbers in {len(names):,} columns and at most {most_values:,} are read: cut it "
+            "into several files, or keep fewer samples per second."
         )
     values, wrong = _values(lines[first:], names, form)
     numbers = np.array([number for number, _ in lines[first:]])
