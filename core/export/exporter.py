@@ -88,14 +88,22 @@ def exporter_for(name: str) -> Exporter:
 
 
 def export(bake: Bake, kind: str | Exporter, folder: str | os.PathLike, style: FigureStyle | None = None) -> Job[list[Path]]:
-    """Write a bake in another format into a folder, which is created if it is missing, with the folders above it.
+    """Write a bake in another format.
 
     Parameters
     ----------
+    bake : Bake
     kind : str or Exporter
         Name of a format, as "csv", or an exporter that is not among them.
+    folder : path
+        Created if it is missing, with the folders above it.
     style : FigureStyle, optional
         Colours and their scale, for formats with pictures.
+
+    Yields
+    ------
+    Progress
+        Before each sensor is written; the stage is the sensor's name.
 
     Returns
     -------

@@ -78,41 +78,51 @@ def frame_file(frame: int) -> str:
 
 @dataclass(frozen=True)
 class Manifest:
-    """Description of one sensor's bake: where it comes from and how to read it. Defaults are those of older manifests.
+    """Description of one sensor's bake: where it comes from and how to read it.
 
     Attributes
     ----------
+    sensor : str
     palpate : str
         Version of Palpate that wrote it.
     frame_start, frame_end : int
         Frames of the whole bake, both included.
+    fps : float, frames per second
     dt : float, seconds
-        Substep; `step_reason` says why that one.
+        Substep.
+    step_reason : str
+        Why that one; empty when the manifest is older.
     digest : str
         :meth:`.scenario.Scenario.digest` of what was solved. Sensors of one bake have the same digest.
     unit : str
         Of the channel ``reading``.
     shape : (int, int)
         Height and width of the images, pixels.
+    parameters : dict
+        Of the sensor, JSON values.
+    warnings : tuple of str
     complete : bool
         True once all images and the recording are written.
-    scene_file, scene_path : str
-        Name of the .blend that was baked, and its path relative to the bake folder, with ``/``; empty when it had none.
+    scene_file : str
+        Name, without its folder, of the .blend that was baked; empty when it had none, or when the manifest is older.
     body : str
-        Name of the body that carries the sensor, among those of the recording.
+        Name of the body that carries the sensor, among those of the recording; empty when the manifest is older.
     bake_id : str
-        Hash of all files of the bake, the same for all of its sensors.
+        Hash of all files of the bake, the same for all of its sensors; empty when the manifest is older.
     scene_id : str
-        Id of the scene that was baked, as stored in its .blend; empty when it stored none.
+        Id of the scene that was baked, as stored in its .blend; empty when it stored none, or when the manifest is older.
+    scene_path : str
+        Path of the .blend, relative to the bake folder, with ``/``; empty as `scene_file`.
     sensors : tuple of str
-        Names of all sensors of the bake.
+        Names of all sensors of the bake; empty when the manifest is older.
     files : dict of str to str
         SHA-256 of each file in the folder except the manifest itself and the images, by name. Those of the images are in
         ``images.sha256``, which is one of these files.
     effects : list of dict, or None
-        Of the sensor, each as :func:`.registry.to_dict` writes it.
+        Of the sensor, each as :func:`.registry.to_dict` writes it; None when the manifest is older.
     channels : dict
-        Of a sensor with several channels, as :func:`.recording_npz.described` returns them. Others have no such word.
+        Of a sensor with several channels: their `unit` and `names`, and the `place` of each group of them
+        (:func:`.recording_npz.described`). Others have none, and no such word.
     """
 
     sensor: str
@@ -144,7 +154,13 @@ class Manifest:
         return IMAGE_LIST_NAME in self.files
 
     def check_files(self, folder: Path, images: bool) -> None:
-        """Raise FileError if a file in the bake's folder is missing or damaged; the images are read for that only if asked."""
+        """Check the files in the bake's folder against their SHA-256; the images, each of which is read for that, if asked.
+
+        Raises
+        ------
+        FileError
+            A file is missing or damaged.
+        """
         for name, sha256 in self.files.items():
             check_sha256(folder / name, sha256)
         if images and self.has_images:
@@ -167,7 +183,18 @@ def check_sha256(path: Path, sha256: str) -> None:
 def write_image_of(folder: Path, sensor: Sensor, frame: Frame, digest: str) -> None:
     """Write the tactile image of a frame of a sensor into its folder, and add its SHA-256 to the list there.
 
-    `digest` is that of the scenario. Raises FileError or OSError where a file cannot be written.
+    Parameters
+    ----------
+    folder : Path
+    sensor : Sensor
+    frame : Frame
+    digest : str
+        Of the scenario.
+
+    Raises
+    ------
+    FileError, OSError
+        A file cannot be written.
     """
     path = folder / frame_file(frame.frame)
     nearest = nearest_places(sensor.texels, None if sensor.channels is None else sensor.channels.no_frames())
@@ -179,7 +206,10 @@ def write_image_of(folder: Path, sensor: Sensor, frame: Frame, digest: str) -> N
 def write_arrays_of(folder: Path, sensor: Sensor, recording: Recording) -> dict[str, str]:
     """Write recording and texels of a sensor into its folder, and return the SHA-256 of all files there, by name.
 
-    Raises FileError or OSError where a file cannot be written.
+    Raises
+    ------
+    FileError, OSError
+        A file cannot be written.
     """
     own = replace(recording, sensors={sensor.name: recording.sensors[sensor.name]})
     save_recording(folder / RECORDING_NAME, own)
@@ -199,7 +229,16 @@ def read_checksums(path: Path) -> Iterator[tuple[str, str]]:
 def manifest_of(scenario: Scenario, sensor: Sensor, recording: Recording, files: Mapping[str, str]) -> Manifest:
     """Return the manifest of a sensor, complete but for what a .blend and its bake add.
 
-    `recording` is of the scenario, and `files` has the SHA-256 of the files in the sensor's folder by name.
+    Parameters
+    ----------
+    scenario : Scenario
+        That was computed.
+    sensor : Sensor
+        One of its sensors.
+    recording : Recording
+        Of the scenario.
+    files : mapping of str to str
+        SHA-256 of the files in the sensor's folder, by name.
     """
     channels = recording.sensors[sensor.name].channels
     return Manifest(
@@ -278,10 +317,18 @@ def _own_digest(content: Mapping[str, Any]) -> str:
 
 @dataclass(frozen=True)
 class BakeOwner:
-    """The scene that is baked, by the id that its .blend stores, and the other scenes of that .blend.
+    """The scene that is baked.
 
-    The bake belongs to `blend`, None if the scene was never saved. `source` is the .blend that was opened, where the scene is
-    saved to another one together with the bake.
+    Attributes
+    ----------
+    scene_id : str
+        Id of the scene; empty where its .blend does not store one.
+    blend : Path or None
+        The .blend that the bake belongs to; None if the scene was never saved.
+    source : Path or None
+        The .blend that was opened, where the scene is saved to another one together with the bake.
+    other_scenes : frozenset of str
+        Ids of the other scenes in the same .blend.
     """
 
     scene_id: str = ""
@@ -301,7 +348,16 @@ class BakeOwner:
 
 
 def other_owner(manifest: Manifest, bake_folder: Path, owner: BakeOwner) -> str:
-    """Return whose bake a manifest describes, in words, if it belongs to another scene than `owner`; empty if not."""
+    """Return whose bake a manifest describes, in words, if it belongs to another scene than `owner`; empty if not.
+
+    Parameters
+    ----------
+    manifest : Manifest
+        Of a sensor's folder in `bake_folder`.
+    bake_folder : Path
+    owner : BakeOwner
+        The scene that would replace the bake.
+    """
     if manifest.scene_id != owner.scene_id and manifest.scene_id in owner.other_scenes:
         return "another scene of the same .blend"
     stated = manifest.scene_path
@@ -340,7 +396,10 @@ def begin_bake(bake_folder: Path) -> Path:
 def publish_bake(bake_folder: Path, names: Sequence[str], last: Callable[[], None] = lambda: None) -> None:
     """Move the new folders of these names to their places, and do one more step; if anything fails, nothing has changed.
 
-    Raises OSError where a folder cannot be moved.
+    Raises
+    ------
+    OSError
+        A folder cannot be moved.
     """
     new, old = (bake_folder / PRIVATE_FOLDER / name for name in (NEW, OLD))
     old.mkdir(exist_ok=True)

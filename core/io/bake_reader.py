@@ -47,7 +47,13 @@ class Bake:
         return {name: (texels, self.painted[name], self.parameters[name]) for name, texels in self.texels.items()}
 
     def select(self, names: Sequence[str]) -> Bake:
-        """Return the bake of some of the sensors, in the order of `names`; raise FileError if there is no such sensor."""
+        """Return the bake of some of the sensors, in the order of `names`.
+
+        Raises
+        ------
+        FileError
+            There is no such sensor.
+        """
         for name in names:
             if name not in self.recording.sensors:
                 raise FileError(f"There is no sensor '{name}' in this bake: choose from {', '.join(self.recording.sensors)}.")
@@ -90,7 +96,19 @@ def read_bake(folder: str | os.PathLike, images: bool = True) -> Bake:
 
 
 def read_sensors(folders: Sequence[Path], images: bool = True) -> Bake:
-    """Read the folders of some sensors of one bake; `images` and errors as of :func:`read_bake`."""
+    """Read the folders of some sensors of one bake.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+    images : bool
+        Check the tactile images as well, every one of which is read for that.
+
+    Raises
+    ------
+    FileError
+        As :func:`read_bake`.
+    """
     manifests = {folder: read_manifest(folder) for folder in folders}
     first = manifests[folders[0]]
     for folder, manifest in manifests.items():
@@ -133,7 +151,13 @@ def _parameters(folder: Path, manifest: Manifest) -> SensorParameters:
 
 
 def frame_index(recording: Recording, frame: int) -> int:
-    """Return the index of a frame in a recording; raise FileError if it was not baked."""
+    """Return the index of a frame in a recording.
+
+    Raises
+    ------
+    FileError
+        The frame was not baked.
+    """
     (found,) = np.nonzero(recording.frames == frame)
     if len(found) == 0:
         raise FileError(f"Frame {frame} is not in the bake: choose from {recording.frames[0]} to {recording.frames[-1]}.")

@@ -44,7 +44,15 @@ LARGEST_TABLE = 512 * 2**20
 
 @dataclass(frozen=True)
 class Table:
-    """A table that was read: names of the columns as in its header, and (rows, columns) float, NaN where a cell is empty."""
+    """A table that was read.
+
+    Attributes
+    ----------
+    names : list of str
+        Of the columns, as in the header.
+    values : (rows, columns) float
+        NaN where a cell is empty.
+    """
 
     names: list[str]
     values: np.ndarray

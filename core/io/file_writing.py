@@ -31,8 +31,16 @@ unfinished: set[Path] = set()
 def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
     """Write a file so that `path` always has either its old content or all of the new content.
 
-    Yields a new, empty file beside `path`, with the same suffix. The body of the ``with`` statement writes and closes it. It
-    replaces `path`, or the file to which a link there points, when the body ends, and is removed when the body raises.
+    Parameters
+    ----------
+    path : path
+        The file to make or to replace. Where it is a symbolic link, the file it points to is replaced.
+
+    Yields
+    ------
+    Path
+        A new, empty file beside `path`, with the same suffix. The body of the ``with`` statement writes and closes it. It
+        replaces `path` when the body ends, and is removed when the body raises.
 
     Raises
     ------
@@ -70,9 +78,18 @@ def require_replaceable(path: str | os.PathLike) -> None:
 
 
 def writable_folder(path: str | os.PathLike, create: bool = False) -> Path:
-    """Check that files can be written into a folder, by making one, and return its absolute path.
+    """Check that files can be written into a folder, by making one.
 
-    With `create` it is made if it is missing, with the folders above it that are missing.
+    Parameters
+    ----------
+    path : path
+    create : bool
+        Create the folder if it is missing, and the folders above it that are missing.
+
+    Returns
+    -------
+    Path
+        Absolute.
 
     Raises
     ------
@@ -99,7 +116,15 @@ def writable_folder(path: str | os.PathLike, create: bool = False) -> Path:
 def writable_file(path: str | os.PathLike) -> Path:
     """Check before work begins that a file could be written, and create the folders above it that are missing.
 
-    Returns its absolute path without links. Raises FileError as :func:`atomic_write`.
+    Returns
+    -------
+    Path
+        Absolute, without links.
+
+    Raises
+    ------
+    FileError
+        As :func:`atomic_write`.
     """
     require_replaceable(path)
     target = Path(os.path.realpath(path))
@@ -165,7 +190,22 @@ def _remedy(error: OSError) -> str:
 
 
 def require_space(folder: str | os.PathLike, needed: float, what: str) -> None:
-    """Raise FileError if the disk of a folder, which need not exist yet, has less space than the bytes that `what` needs."""
+    """Check that a disk has the space that work needs.
+
+    Parameters
+    ----------
+    folder : path
+        It need not exist yet.
+    needed : float, bytes
+        From above.
+    what : str
+        What will be written, for the message.
+
+    Raises
+    ------
+    FileError
+        There is less space.
+    """
     place = Path(os.path.abspath(folder))
     while not os.path.exists(place):
         place = place.parent

@@ -72,8 +72,18 @@ def lock_folder(folder: Path, work: str = "bake") -> BaseFileLock:
 def temporary_folder(parent: Path, purpose: str) -> Iterator[Path]:
     """Make a hidden folder in `parent`, and remove it with all that it holds when the body ends.
 
-    Those that killed processes have left there are removed first. `purpose` is part of its name. Raises FileError if it cannot
-    be made.
+    Those that killed processes have left there are removed first.
+
+    Parameters
+    ----------
+    parent : Path
+    purpose : str
+        Part of its name.
+
+    Raises
+    ------
+    FileError
+        It cannot be made.
     """
     remove_abandoned(parent)
     try:
@@ -136,7 +146,10 @@ _moving = threading.Lock()
 class FileList:
     """The list of all files that were written into a folder, by kind: a format of an export, a kind of figures, a report.
 
-    What killed processes have left in the folder is removed.
+    Parameters
+    ----------
+    folder : Path
+        What killed processes have left in it is removed.
     """
 
     def __init__(self, folder: Path):
@@ -146,7 +159,18 @@ class FileList:
 
     @contextmanager
     def new_files(self, purpose: str) -> Iterator[Path]:
-        """Make a hidden folder for new files as :func:`temporary_folder`; errors name the places that the files would get."""
+        """Make a hidden folder for new files, which is removed in the end.
+
+        Parameters
+        ----------
+        purpose : str
+            Part of its name.
+
+        Raises
+        ------
+        FileError
+            It cannot be made. Errors of the body name the places that the files would get.
+        """
         with temporary_folder(self._folder, purpose) as new:
             try:
                 yield new
@@ -154,10 +178,22 @@ class FileList:
                 raise FileError(str(error).replace(str(new), str(self._folder))) from error
 
     def replace(self, new: Path, written: Mapping[str, Iterable[Path]], source: str = "") -> list[Path]:
-        """Put files that were written into the folder `new` of :meth:`new_files`, by kind, in the place of the earlier ones.
+        """Put new files in the place of the earlier ones of their kinds.
 
-        Earlier files of these kinds that were made from the same `source` stay; those made from something else are removed, and
-        without a source all of them. Returns where the files are now.
+        Parameters
+        ----------
+        new : Path
+            The folder from :meth:`new_files`, in which they were written.
+        written : mapping of str to iterable of Path
+            The files in it, by kind.
+        source : str
+            What they were made from. Earlier files that were made from the same stay; those made from something else are
+            removed, and without a source all of them.
+
+        Returns
+        -------
+        list of Path
+            Where the files are now.
 
         Raises
         ------

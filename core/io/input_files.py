@@ -37,7 +37,14 @@ def require_regular(path: str | os.PathLike, opened: int | None = None) -> None:
 
 
 def open_regular(path: str | os.PathLike, mode: str = "rb", **options: Any) -> IO[Any]:
-    """Open a regular file as :func:`open` does, with its options.
+    """Open a regular file as :func:`open` does.
+
+    Parameters
+    ----------
+    path : path
+    mode : str
+    **options
+        Others of :func:`open`, such as `encoding`.
 
     Raises
     ------
@@ -63,9 +70,17 @@ def read_bytes(path: str | os.PathLike) -> bytes:
 
 
 def read_bounded(path: str | os.PathLike, limit: int, what: str = "file", advice: str = "give a smaller file") -> bytes:
-    """Return the content of a regular file of at most `limit` bytes.
+    """Return the content of a regular file that is not larger than it may be.
 
-    `what` the file should be, as in "rig", and `advice` on a larger file are for messages.
+    Parameters
+    ----------
+    path : path
+    limit : int
+        Bytes; no more are read.
+    what : str
+        What the file should be, for messages, as in "rig".
+    advice : str
+        What the user of a larger file should know or do.
 
     Raises
     ------
@@ -92,7 +107,13 @@ LONGEST_NAME = 255
 
 
 def read_toml(path: str | os.PathLike, what: str) -> dict[str, Any]:
-    """Read a TOML file; `what` it describes is for messages, as in "rig".
+    """Read a TOML file.
+
+    Parameters
+    ----------
+    path : path
+    what : str
+        What the file describes, for messages, as in "rig".
 
     Raises
     ------
@@ -112,7 +133,13 @@ def read_toml(path: str | os.PathLike, what: str) -> dict[str, Any]:
 
 
 def checked_name(name: Any, where: str) -> str:
-    """Return a name that a file gives; raise FileError, which says `where`, if it is no text, or one that cannot be a name."""
+    """Return a name that a file gives.
+
+    Raises
+    ------
+    FileError
+        It is no text, or a text that cannot be a name; `where` says of which file.
+    """
     if not isinstance(name, str) or not name.strip():
         raise FileError(f"The name in {where} is {name!r:.60}: write a text.")
     if len(name) > LONGEST_NAME:
@@ -135,9 +162,15 @@ _UTF_16 = (b"\xff\xfe", b"\xfe\xff", b"<\x00", b"\x00<")
 
 
 def read_xml(path: str | os.PathLike, what: str) -> ElementTree.Element:
-    """Read an XML file; `what` it should be is for messages, as in "a robot".
+    """Read an XML file.
 
     Entities and document types are refused, not expanded: nested entities grow without limit, and others read files.
+
+    Parameters
+    ----------
+    path : path
+    what : str
+        What the file should be, for messages, as in "a robot".
 
     Returns
     -------

@@ -41,7 +41,18 @@ from .input_files import open_regular
 
 
 def write_arrays(path: str | os.PathLike, arrays: Mapping[str, np.ndarray]) -> None:
-    """Write arrays as .npz, whole or not at all; equal arrays give equal bytes. Raises FileError if that is not possible."""
+    """Write arrays as .npz, whole or not at all; equal arrays give equal bytes.
+
+    Parameters
+    ----------
+    path : path
+    arrays : mapping of str to ndarray
+
+    Raises
+    ------
+    FileError
+        The file cannot be written.
+    """
     if any(array.dtype.hasobject for array in arrays.values()):
         raise ValueError("objects are not written: reading them would run code")
     with atomic_write(path) as temporary, open(temporary, "wb") as file:
@@ -52,7 +63,13 @@ def write_arrays(path: str | os.PathLike, arrays: Mapping[str, np.ndarray]) -> N
 def open_arrays(path: str | os.PathLike, what: str, advice: str) -> Iterator[Any]:
     """Give the arrays of an .npz file by name, and say in one sentence what is wrong with it.
 
-    `what` the file should be, as in "recording", and `advice` on a file that is missing or damaged are for messages.
+    Parameters
+    ----------
+    path : path
+    what : str
+        What the file should be, as in "recording".
+    advice : str
+        What to do if it is missing or damaged.
 
     Raises
     ------
@@ -80,7 +97,13 @@ _LAYOUTS: dict[str, type[GridLayout] | type[UVLayout]] = {"grid": GridLayout, "u
 
 
 def save_sensor(path: str | os.PathLike, texels: Texels, painted: Painted | None = None) -> None:
-    """Write texels, their layout and what is painted on them as .npz; raises as :func:`write_arrays`."""
+    """Write texels, their layout and what is painted on them as .npz, whole or not at all.
+
+    Raises
+    ------
+    FileError
+        The file cannot be written.
+    """
     write_arrays(path, sensor_arrays(texels, painted))
 
 
@@ -95,7 +118,13 @@ def sensor_arrays(texels: Texels, painted: Painted | None = None) -> dict[str, n
 
 
 def load_sensor(path: str | os.PathLike) -> tuple[Texels, Painted]:
-    """Read what :func:`save_sensor` wrote; raises as :func:`open_arrays`."""
+    """Read what :func:`save_sensor` wrote.
+
+    Raises
+    ------
+    FileError
+        There is no such file, or it is damaged or something else.
+    """
     with open_arrays(path, "sensor", "bake again with this version") as members:
         return sensor_in(members)
 
@@ -162,7 +191,13 @@ def sensor_members(sensors: Iterable[SensorArrays]) -> dict[str, np.ndarray]:
 
 
 def load_recording(path: str | os.PathLike) -> Recording:
-    """Read a recording that :func:`save_recording` wrote; raises as :func:`open_arrays`."""
+    """Read a recording that :func:`save_recording` wrote.
+
+    Raises
+    ------
+    FileError
+        There is no such file, or it is damaged or something else.
+    """
     with open_arrays(path, "recording", "bake again") as members:
         return _recording(path, members)
 
@@ -228,7 +263,13 @@ def _recording(path: str | os.PathLike, members: Any) -> Recording:
 
 
 def load_with_sensors(path: str | os.PathLike) -> tuple[Recording, Sensors]:
-    """Read a recording with the sensors that its file has, and that of a bake has not; raises as :func:`open_arrays`."""
+    """Read what :func:`save_with_sensors` wrote, or a recording alone, which has no sensors.
+
+    Raises
+    ------
+    FileError
+        There is no such file, or it is damaged or something else.
+    """
     sensors: Sensors = {}
     try:
         with open_arrays(path, "recording", "write it again") as members:

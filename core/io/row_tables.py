@@ -27,8 +27,16 @@ IN_MEMORY_BYTES = 1 << 24
 class RowTable:
     """A table that grows row by row, so a long scene and its bake need no more memory than a short one.
 
-    The temporary file has no name, and is gone when the table and its arrays are. It lies in `folder`, by default where
-    :func:`tempfile.gettempdir` says. `kind` is the dtype of a row; `what` the rows are is for messages.
+    The temporary file has no name, and is gone when the table and its arrays are.
+
+    Parameters
+    ----------
+    kind : dtype
+        Of a row; that of an array is ``(float, shape)``.
+    what : str
+        What the rows are, for messages, as in "The motion of a long scene".
+    folder : Path, optional
+        Where the temporary file lies. Default: where :func:`tempfile.gettempdir` says.
     """
 
     def __init__(self, kind: DTypeLike, what: str, folder: Path | None = None):
@@ -57,7 +65,10 @@ class RowTable:
     def rows(self) -> np.ndarray:
         """Return all rows, (rows, …) of the type; a view of the temporary file, which cannot be changed, if there is one.
 
-        Raises FileError as :meth:`append`.
+        Raises
+        ------
+        FileError
+            As :meth:`append`.
         """
         try:
             self._file.flush()
@@ -87,7 +98,15 @@ def motion_table(first: np.ndarray | float) -> RowTable:
 
 
 class FrameTable:
-    """The frames of one run, whose `bodies` have these names; `folder` as of :class:`RowTable`."""
+    """The frames of one run.
+
+    Parameters
+    ----------
+    bodies : sequence of str
+        Names of the bodies.
+    folder : Path, optional
+        Where a long run keeps its frames, see :class:`.RowTable`.
+    """
 
     def __init__(self, bodies: Sequence[str], folder: Path | None = None):
         self._bodies, self._folder = tuple(bodies), folder
@@ -124,7 +143,12 @@ class FrameTable:
     def recording(self, dt: float, digest: str, warnings: Sequence[str], step_reason: str) -> Recording:
         """Return all frames, one at least, with what else a :class:`.Recording` says.
 
-        The arrays of a long one are views of the file. Raises FileError as :meth:`RowTable.append`.
+        The arrays of a long one are views of the file.
+
+        Raises
+        ------
+        FileError
+            The temporary file cannot be written or read.
         """
         assert self._first is not None
         rows = self._table.rows()

@@ -41,7 +41,13 @@ _CLASS, _ARRAY, _TUPLE, _DICT = "class", "array", "tuple", "dict"
 
 
 def save_scenario(path: str | os.PathLike, scenario: Scenario) -> None:
-    """Write a scenario as .npz; equal scenarios give equal bytes. Raises as :func:`.recording_npz.write_arrays`."""
+    """Write a scenario as .npz, whole or not at all; equal scenarios give equal bytes.
+
+    Raises
+    ------
+    FileError
+        The file cannot be written.
+    """
     arrays: list[np.ndarray] = []
     tree = _packed(scenario, arrays)
     header = {"format": SCENARIO_FORMAT, "digest": scenario.digest(), "scenario": tree}

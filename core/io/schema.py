@@ -39,9 +39,16 @@ _NAME = "name"
 
 
 def wanted(advice: str, names: bool = False, **limits: Any) -> msgspec.Meta:
-    """Return the annotation of a word with limits of :class:`msgspec.Meta`.
+    """Return the annotation of a word.
 
-    `advice` says what to write, for the sentence of a mistake. With `names` each text has to be one (:func:`.checked_name`).
+    Parameters
+    ----------
+    advice : str
+        What to write, for the sentence of a mistake.
+    names : bool
+        Whether each text has to be a name (:func:`.checked_name`).
+    **limits
+        Of :class:`msgspec.Meta`.
     """
     return msgspec.Meta(description=advice, title=_NAME if names else None, **limits)
 
@@ -65,10 +72,14 @@ def known_words(table: Mapping[str, Any], words: Iterable[str], where: str, what
 def read_words(
     table: Any, kind: Callable[..., T], where: str, what: str = THIS_FORMAT, besides: Iterable[str] = (), **given: Any
 ) -> T:
-    """Return a table of a file as an object of a dataclass, whose fields are the words of the table.
+    """Return a table of a file as an object of a dataclass.
 
     Parameters
     ----------
+    table : mapping
+        As TOML gives it.
+    kind : type
+        The dataclass; its fields are the words of the table.
     where, what : str
         Which table of which file this is, and what its format is called, for messages.
     besides : iterable of str
@@ -106,8 +117,21 @@ def read_words(
 def read_json(path: str | os.PathLike, kind: Callable[..., T], format_name: str, advice: str) -> tuple[T, dict[str, Any]]:
     """Read a JSON file that Palpate wrote.
 
-    Returns an object of the dataclass `kind`, without keys that are no fields of it, and all of the file. `format_name` is what
-    the file says of its format, and `advice` what to do if it is damaged.
+    Parameters
+    ----------
+    path : path
+    kind : type
+        A dataclass. Other keys than its fields are left out.
+    format_name : str
+        What the file says of its format.
+    advice : str
+        What to do if it is damaged.
+
+    Returns
+    -------
+    found : object of the dataclass
+    content : dict
+        All of the file.
 
     Raises
     ------

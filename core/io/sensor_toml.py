@@ -49,7 +49,13 @@ SHAPE_WORDS = ("grid", "mesh", "thickness")
 class SensorModel:
     """A sensor without its texels.
 
-    `shape` has the keys of a rig's [sensor] for it (:data:`SHAPE_WORDS`), none when the sensor is a mesh of a scene.
+    Attributes
+    ----------
+    name : str
+    parameters : SensorParameters
+    effects : tuple of Effect
+    shape : mapping
+        Keys of a rig's [sensor] for its shape (:data:`SHAPE_WORDS`); empty when the sensor is a mesh of a scene.
     """
 
     name: str
@@ -124,7 +130,10 @@ def _checked_shape(words: Mapping[str, Any]) -> dict[str, Any]:
 def checked_grid(grid: Any, where: str) -> tuple[int, int, tuple[float, float]]:
     """Return rows, columns and pitch (x and y, metres) of a grid as a file writes it.
 
-    Raises FileError if it is no grid, or one with too many texels; `where` says of which table or file.
+    Raises
+    ------
+    FileError
+        It is no grid, or one with too many texels; `where` says of which table or file.
     """
     if not isinstance(grid, Mapping):
         raise FileError(f"grid of {where} is {grid!r:.80}: write {{ rows = 14, columns = 6, pitch = [0.0034, 0.0034] }}.")

@@ -44,9 +44,20 @@ def library() -> str:
 
 
 def write_image(path: str | os.PathLike, channels: Mapping[str, np.ndarray], attributes: Mapping[str, str]) -> None:
-    """Write (height, width) float32 channels as an image, from the top, ZIP-compressed; equal images give equal bytes.
+    """Write an image, ZIP-compressed; equal images give equal bytes.
 
-    The attributes are added to the header. Raises OSError or FileError where the file cannot be written.
+    Parameters
+    ----------
+    path : path
+    channels : mapping of str to (height, width) float32
+        The first row is the top of the picture.
+    attributes : mapping of str to str
+        Added to the header.
+
+    Raises
+    ------
+    OSError, FileError
+        The file cannot be written.
     """
     texts = {name: value.encode("utf-8", "replace").decode() for name, value in attributes.items()}
     if library() == "OpenEXR":
@@ -135,6 +146,10 @@ def write_exr(
 
     Parameters
     ----------
+    path : path
+    layout : GridLayout or UVLayout
+        Of the sensor's texels.
+    frame : SensorFrame
     metadata : mapping of str to str
         Become header attributes named ``palpate.<key>``, see :func:`describe`.
     nearest : (n,) int, optional
@@ -187,6 +202,8 @@ def write_vector_exrs(folder: Path, values: np.ndarray, shape: tuple[int, int], 
 
     Parameters
     ----------
+    folder : path
+        Is made if it is not there.
     values : (T, k, 3) float
         Of places row by row, the row with the least y first.
     shape : (int, int)

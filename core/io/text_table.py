@@ -65,7 +65,13 @@ class TextTable:
 
 
 def read_text_table(path: str | os.PathLike, most_values: int = 100_000_000) -> TextTable:
-    """Read a table of text of at most `most_values` numbers.
+    """Read a table of text.
+
+    Parameters
+    ----------
+    path : path
+    most_values : int
+        Numbers that are read at most.
 
     Raises
     ------
@@ -108,8 +114,16 @@ def read_columns(path: str | os.PathLike, quantities: Mapping[str, str]) -> dict
     The name of a column is a quantity, ``compression``, or another word for it (:data:`QUANTITY_NAMES`). Its unit is in the
     name, as ``compression (mm)`` or ``compression_mm``, or in the line below; without one its numbers are in SI units.
 
-    `quantities` has the SI unit of each, a key of :data:`.csv_table.UNITS`. Returns those that the file has, (m,) float, all
-    finite; columns of other names are left out.
+    Parameters
+    ----------
+    path : path
+    quantities : mapping
+        Name of a quantity → its SI unit, a key of :data:`.csv_table.UNITS`. Columns of other names are left out.
+
+    Returns
+    -------
+    dict of (m,) float
+        The quantities that the file has. Every value is finite.
 
     Raises
     ------

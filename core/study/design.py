@@ -36,9 +36,14 @@ MESHES = "meshes"
 
 
 def find_meshes(vary: Mapping[str, Any], base: Path) -> dict[str, Path]:
-    """Return the mesh files that `vary` of a study names, by these names; each is read once to see that it is one.
+    """Return the mesh files of a study by the names that it gives, each read once to see that it is one.
 
-    `base` is the folder of the study's file.
+    Parameters
+    ----------
+    vary : mapping
+        Of the study.
+    base : Path
+        Folder of the study's file.
 
     Raises
     ------
@@ -146,7 +151,16 @@ class Distribution:
 
 @dataclass(frozen=True)
 class Design:
-    """How a study chooses the values of its runs; `samples` are for each scene, and a grid has its own number."""
+    """How a study chooses the values of its runs.
+
+    Attributes
+    ----------
+    kind : str
+        One of :data:`DESIGNS`.
+    samples : int
+        Runs per scene; a grid has its own number.
+    seed : int
+    """
 
     kind: DesignKind = field(metadata={WORD: "design"})
     samples: Annotated[int, wanted("give a whole number of runs, above zero", ge=1, le=2**63 - 1)] = 0

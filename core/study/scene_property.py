@@ -43,9 +43,19 @@ class WholeNumber(Parameter):
 
 @dataclass(frozen=True)
 class SceneProperty:
-    """Type, unit and bounds of a property of a scene, whose name is its path.
+    """Type, unit and bounds of a property of a scene.
 
-    The unit of a number is as Blender stores it, "" where it has none. Its bounds are inclusive, None where it has none.
+    Attributes
+    ----------
+    name : str
+        Its path.
+    kind : str
+    unit : str
+        Of a number, as Blender stores it; "" where it has none.
+    low, high : float or None
+        Bounds of a number, inclusive; None where it has none.
+    choices : tuple of str
+        Words that a choice knows.
     """
 
     name: str
@@ -110,7 +120,13 @@ def write_properties(path: str | os.PathLike, properties: Iterable[SceneProperty
 
 
 def read_properties(path: str | os.PathLike) -> dict[str, SceneProperty]:
-    """Read the properties that :func:`write_properties` wrote, by path; none where there is no file. Raises FileError."""
+    """Read the properties that :func:`write_properties` wrote, by path; none where there is no file.
+
+    Raises
+    ------
+    FileError
+        It cannot be read, or is damaged.
+    """
     try:
         found, _ = read_json(path, _PropertiesFile, PROPERTIES_FORMAT, "start the study again")
     except FileNotFoundError:

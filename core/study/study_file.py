@@ -116,14 +116,21 @@ class Study:
     ----------
     scenes : tuple of str
         Files or patterns, relative to the file of the study; with `is_job` one Python file.
+    design : Design
     vary : mapping
         By names of variables: a table with a distribution, or a value that is the same in all runs.
+    press : mapping or None
+        The table of a press.
     fps : float or None
         Frames per second instead of those of the scene.
-    run_limit, run_memory : float or None
-        Seconds that a run may take, and MB that its process may hold.
+    run_limit : float or None
+        Seconds that a run may take.
+    run_memory : float or None
+        MB that the process of a run may hold.
     name : str
         For the report and the dataset; empty if the file gives none.
+    images : bool
+        Whether runs have tactile images.
     recordings : bool
         True if runs have files of their own, as a bake has; with images they do in any case.
     points : bool
@@ -165,6 +172,8 @@ class Plan:
     ----------
     scenario : Scenario or None
         As the scene says, with the study's frame rate; None for a job.
+    varied : dict of str to Distribution
+    fixed : dict of str to value
     press : Press or None
         With the numbers that do not vary.
     meshes : mapping of str to Path
@@ -188,9 +197,18 @@ class Plan:
 
 @dataclass(frozen=True)
 class Run:
-    """One run of a study: its index from zero over all scenes, its scene in the output folder, and the values that vary.
+    """One run of a study.
 
-    `digest`, the name of its folder, is a hash of the scenario of the scene, of what the study fixes, of `index` and `values`.
+    Attributes
+    ----------
+    index : int
+        From zero, over all scenes.
+    scene : str
+        Name of its scene in the output folder.
+    values : dict of str to value
+        What varies.
+    digest : str
+        A hash of the scenario of the scene, of what the study fixes, of `index` and `values`; the name of its folder.
     """
 
     index: int
@@ -253,10 +271,13 @@ def plan_for(
 
     Parameters
     ----------
+    study : Study
     scenario : Scenario or None
         None for a job, which takes any names: numbers, texts, and switches.
-    properties, meshes : mapping, optional
-        The properties of the scene, and the copies of the mesh files, that the study names.
+    properties : mapping of str to SceneProperty, optional
+        What the properties of the scene are that the study names.
+    meshes : mapping of str to Path, optional
+        Copies of the files with the shapes of targets that the study names.
 
     Raises
     ------
@@ -433,8 +454,18 @@ def _distribution(found: Variable, entry: Mapping[str, Any]) -> Distribution:
 class Runs:
     """All runs of a study in order, each made when it is asked for: a million of them take 8 bytes for each varied number.
 
-    Plans and digests are by the names of the scenes. A digest is that of a scenario, and of its file where each run is read
-    from the scene. Raises ParameterError if there are too many runs.
+    Parameters
+    ----------
+    study : Study
+    plans : mapping of str to Plan
+        By the names of the scenes.
+    digests : mapping of str to str
+        Of the scenes: of their scenarios, and of their files where each run is read from the scene.
+
+    Raises
+    ------
+    ParameterError
+        There are too many.
     """
 
     def __init__(self, study: Study, plans: Mapping[str, Plan], digests: Mapping[str, str]):

@@ -41,9 +41,18 @@ MOTION_WORDS = (*_BODY_VECTORS, "drive", "mass")
 
 @dataclass(frozen=True)
 class Variable:
-    """A number or text that a study may vary, or a switch, which has no specification.
+    """A number, text or switch that a study may vary.
 
-    Its name begins with that of its owner, a sensor, body or target, ``gravity`` or ``press``, and `words` are the rest.
+    Attributes
+    ----------
+    name : str
+        As the study writes it.
+    owner : str
+        Name of the sensor, body or target; ``gravity`` and ``press`` own theirs.
+    words : tuple of str
+        The rest of the name.
+    specification : Specification or None
+        None for a switch, which is true or false.
     """
 
     name: str
@@ -104,7 +113,14 @@ def _body_words(body: Body) -> Iterable[tuple[tuple[str, ...], Specification]]:
 
 
 def variable(name: str, known: Mapping[str, Variable], scenario: Scenario) -> Variable:
-    """Return the variable of a name: one of those that :func:`variables_of` found, or of an effect.
+    """Return the variable of a name.
+
+    Parameters
+    ----------
+    name : str
+    known : mapping of str to Variable
+        Of :func:`variables_of`.
+    scenario : Scenario
 
     Raises
     ------
@@ -161,10 +177,14 @@ def varied_scenario(
     meshes: Mapping[str, Path] | None = None,
     shared: SharedResults | None = None,
 ) -> Scenario:
-    """Return a scenario with the values of one run, by names that :func:`variable` knows.
+    """Return a scenario with the values of one run.
 
     Parameters
     ----------
+    scenario : Scenario
+        As the scene says.
+    values : mapping of str to value
+        By names that :func:`variable` knows.
     press : Press, optional
         The numbers of the study's press that do not vary.
     meshes : mapping of str to Path, optional
