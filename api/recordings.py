@@ -253,7 +253,7 @@ class Recording:
         """Write the recording with its sensors as .npz, whole or not at all; :func:`read_recording` reads it, and numpy too."""
         if Path(path).suffix != ".npz":
             raise ArgumentError(f"path is '{path}': end the name with .npz.")
-        recording_npz.save_with_sensors(path, self.bake.recording, self.bake.sensors)
+        recording_npz.save_recording(path, self.bake.recording, self.bake.sensors)
 
     def export(
         self,

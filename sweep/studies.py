@@ -17,7 +17,7 @@ import numpy as np
 from ..core.compiled.thread_team import count_of_cores
 from ..core.errors import FileError, PalpateError
 from ..core.io.file_writing import writable_folder
-from ..core.io.hidden_folder import PRIVATE_FOLDER, FolderLock
+from ..core.io.hidden_folder import PRIVATE_FOLDER, lock_folder
 from ..core.jobs import Progress
 from ..core.study.study_file import PARTS, RUNS, SCENES, STUDY_NAME, read_study
 from . import driver
@@ -77,7 +77,7 @@ def output_folder(place: Path, out: Path | str | None) -> Path:
 def locked_folder(place: Path, folder: Path) -> Iterator[None]:
     """Hold a study's folder, which is made where it is missing, and removed again if the study was refused."""
     is_new = not folder.exists()
-    lock = FolderLock(writable_folder(folder, create=not place.is_dir()), "sweep")
+    lock = lock_folder(writable_folder(folder, create=not place.is_dir()), "sweep")
     try:
         yield
     finally:

@@ -33,7 +33,7 @@ from ...core.io.bake_folder import (
     write_manifest,
 )
 from ...core.io.file_writing import require_space, writable_folder
-from ...core.io.hidden_folder import PRIVATE_FOLDER, FolderLock, is_private_folder
+from ...core.io.hidden_folder import PRIVATE_FOLDER, is_private_folder, lock_folder
 from ...core.io.input_files import read_bytes
 from ...core.io.row_tables import FrameTable
 from ...core.io.tactile_exr import CHANNELS
@@ -173,7 +173,7 @@ class BakeFiles:
         self.folders = {name: self.folder / self._names[name] for name in self._sensors}
         if not is_private_folder(self.folder / PRIVATE_FOLDER):
             self._check_replaceable()  # before anything is made
-        self._lock = FolderLock(writable_folder(self.folder, create=True))
+        self._lock = lock_folder(writable_folder(self.folder, create=True))
         try:
             with _refusals_named(self.folder):
                 new = begin_bake(self.folder)
@@ -184,7 +184,7 @@ class BakeFiles:
         except BaseException:
             self._lock.release()
             raise
-        self._frames = FrameTable([body.name for body in scenario.bodies], self._lock.private)
+        self._frames = FrameTable([body.name for body in scenario.bodies], self.folder / PRIVATE_FOLDER)
         self._images = images
 
     def __enter__(self) -> BakeFiles:

@@ -26,21 +26,14 @@ UNITS = {
     "shear": "N",
     "depth": "m",
     "slip": "m/s",
-    "contact": "1",
     "net_force": "N",
     "net_torque": "N m",
     "centre_of_pressure": "m",
-    "channels_clipped": "1",
     "channels_place": "m",
     "texel_position": "m",
     "texel_area": "m2",
 }
 """Units of the arrays of :func:`bake_arrays` that have one; `reading` has the sensor's own."""
-
-CHANNEL_ARRAYS = {"channels": "values", "channels_clipped": "clipped", "channels_place": "place"}
-"""Arrays of a sensor with several channels, and their names in :class:`.VectorReadings`."""
-
-Write = Callable[[Bake, Path, FigureStyle], Job[list[Path]]]
 
 
 @dataclass(frozen=True)
@@ -57,16 +50,17 @@ class Exporter:
     """
 
     name: str
-    write: Write
+    write: Callable[[Bake, Path, FigureStyle], Job[list[Path]]]
 
 
 def bake_arrays(bake: Bake, name: str) -> dict[str, np.ndarray]:
     """Return everything about one sensor as arrays: its recording, and its texels under names that begin with ``texel_``."""
-    texels, recorded = bake.texels[name], bake.recording.sensors[name]
+    texels, recorded, channels = bake.texels[name], bake.recording.sensors[name], bake.recording.sensors[name].channels
     arrays = {key: getattr(recorded, key) for key in SENSOR_FIELDS}
-    if recorded.channels is not None:
-        own = {key: getattr(recorded.channels, name) for key, name in CHANNEL_ARRAYS.items()}
-        arrays |= {key: array for key, array in own.items() if array is not None}
+    if channels is not None:
+        arrays |= {"channels": channels.values, "channels_clipped": channels.clipped}
+        if channels.place is not None:
+            arrays["channels_place"] = channels.place
     arrays |= {f"texel_{key}": getattr(texels, key) for key in ("position", "normal", "tangent", "area", "vertex")}
     arrays["texel_uv"] = texels.layout.uv()
     if isinstance(texels.layout, GridLayout):

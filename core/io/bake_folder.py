@@ -1,9 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A bake folder: names of its folders and files, and the manifest that describes each sensor's bake.
-
-A bake folder holds one folder per sensor. Each of these holds ``recording.npz``, ``sensor.npz``, ``manifest.json`` and, unless
-the bake has no images, one EXR image per frame and ``images.sha256``, the list of their checksums. It has the format of
-``sha256sum``, so ``sha256sum -c images.sha256`` checks a folder without Palpate.
+"""A bake folder: names of its folders and files, which ``docs/files.md`` lists, and the manifest of each sensor's bake.
 
 A bake belongs to the .blend whose path is in the manifest, as long as that file exists, and in it to the scene with the id that
 the manifest has. So a .blend that was renamed or moved may replace its bake, and a copy may not replace that of its original.
@@ -364,24 +360,18 @@ def other_owner(manifest: Manifest, bake_folder: Path, owner: BakeOwner) -> str:
     """
     if manifest.scene_id != owner.scene_id and manifest.scene_id in owner.other_scenes:
         return "another scene of the same .blend"
-    if manifest.scene_path and not manifest.scene_path.startswith(("//", "\\\\")) and "\0" not in manifest.scene_path:
-        blend = Path(os.path.normpath(Path(os.path.realpath(bake_folder), manifest.scene_path)))
-    else:
-        return ""
-    if not os.path.isfile(blend):
+    stated = manifest.scene_path
+    blend = Path(os.path.normpath(Path(os.path.realpath(bake_folder), stated)))
+    if not stated or stated.startswith(("//", "\\\\")) or "\0" in stated or not os.path.isfile(blend):
         return ""
     is_ours = any(own is not None and own.is_file() and own.samefile(blend) for own in (owner.blend, owner.source))
     return "" if is_ours else f"'{blend}'"
 
 
-# A complete bake takes the place of the earlier one, folder by folder.
-#
 # A bake is written into the folder ``new`` of the hidden folder. When it is complete, each sensor's folder is moved into the
 # folder ``old``, and the new one into its place. An error takes all of this back. A kill may leave folders of both bakes, whose
-# manifests have different ids, so that every reader says so, and the next bake replaces them.
-#
-# Files in a replaced folder that no bake has written belong to the user and move into the new folder. Nothing else than the
-# files of a bake is removed.
+# manifests have different ids, so that every reader says so, and the next bake replaces them. Files in a replaced folder that
+# no bake has written belong to the user and move into the new folder.
 
 NEW, OLD = "new", "old"
 

@@ -8,7 +8,7 @@ the same bake. So whoever draws or exports a bake may rely on it.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -64,7 +64,7 @@ class Bake:
 
 
 def read_bake(folder: str | os.PathLike, images: bool = True) -> Bake:
-    """Read a bake folder, or the folder of one sensor in it, and check all of its files; the images only with `images`.
+    """Read a bake folder, or the folder of one sensor in it, and check its files; all images are read for that with `images`.
 
     Raises
     ------
@@ -76,7 +76,9 @@ def read_bake(folder: str | os.PathLike, images: bool = True) -> Bake:
     folder = Path(folder)
     if os.path.lexists(folder / MANIFEST_NAME):
         return read_sensors([folder], images)
-    folders = [place for place in sorted(folder.iterdir()) if place.name != PRIVATE_FOLDER and _is_bake(place)]
+    marks = (MANIFEST_NAME, RECORDING_NAME, SENSOR_NAME)  # even a damaged bake is one
+    places = [place for place in sorted(folder.iterdir()) if place.name != PRIVATE_FOLDER]
+    folders = [place for place in places if any(os.path.lexists(place / name) for name in marks)]
     if not folders and is_interrupted(folder):
         raise FileError(f"A bake in '{folder}' was interrupted while it took the place of the earlier one: bake again.")
     if not folders:
@@ -85,15 +87,12 @@ def read_bake(folder: str | os.PathLike, images: bool = True) -> Bake:
     expected = dict.fromkeys(name for manifest in bake.manifests.values() for name in manifest.sensors)
     for name in expected:
         if name not in bake.texels:
+            quoted = ", ".join(f"'{name}'" for name in expected)
             raise FileError(
-                f"The sensor '{name}' is missing from the bake in '{folder}', which had {_quoted(expected)}: bake again, or "
+                f"The sensor '{name}' is missing from the bake in '{folder}', which had {quoted}: bake again, or "
                 "choose the folder of one sensor."
             )
     return bake
-
-
-def _quoted(names: Iterable[str]) -> str:
-    return ", ".join(f"'{name}'" for name in names)
 
 
 def read_sensors(folders: Sequence[Path], images: bool = True) -> Bake:
@@ -149,11 +148,6 @@ def _parameters(folder: Path, manifest: Manifest) -> SensorParameters:
     except PalpateError as error:
         raise FileError(f"'{folder / MANIFEST_NAME}' is damaged ({str(error).rstrip('.')}): bake again.") from error
     return parameters
-
-
-def _is_bake(folder: Path) -> bool:
-    """Return True if a folder in a bake folder holds a sensor's bake, even a damaged one."""
-    return any(os.path.lexists(folder / file) for file in (MANIFEST_NAME, RECORDING_NAME, SENSOR_NAME))
 
 
 def frame_index(recording: Recording, frame: int) -> int:

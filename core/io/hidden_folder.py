@@ -41,45 +41,31 @@ def is_private_folder(folder: Path) -> bool:
     return not folder.is_symlink() and any(mark.is_file() and not mark.is_symlink() for mark in marks)
 
 
-class FolderLock:
-    """An exclusive lock on a bake folder or the folder of a study, held until it is released.
+def lock_folder(folder: Path, work: str = "bake") -> BaseFileLock:
+    """Lock a bake folder or the folder of a study; its hidden folder is made if it is missing.
 
-    Parameters
-    ----------
-    folder : Path
-    work : str
-        What writes to the folder, for the message.
-
-    Attributes
-    ----------
-    private : Path
-        The hidden folder in it, which is made if it is missing.
+    The lock is held until its ``release()``. The locked file stays: another process may be about to lock it. `work` says in
+    messages what writes to the folder.
 
     Raises
     ------
     FileError
         Another process holds the lock, the hidden folder cannot be made, or something that Palpate did not make has its name.
     """
-
-    def __init__(self, folder: Path, work: str = "bake"):
-        self.private = folder / PRIVATE_FOLDER
-        try:
-            self.private.mkdir(exist_ok=True)
-            if not is_private_folder(self.private) and (self.private.is_symlink() or any(self.private.iterdir())):
-                raise FileError(f"'{self.private}' was not made by Palpate: rename it, or choose another {work} folder.")
-            lock = _lock(self.private)
-        except OSError as error:
-            raise FileError(
-                f"The folder '{self.private}' could not be made ({os_error_reason(error)}): rename what has its name, "
-                f"check the permissions, or choose another {work} folder."
-            ) from error
-        if lock is None:
-            raise FileError(f"Another {work} is writing to '{folder}': wait for it, or choose another folder.")
-        self._lock = lock
-
-    def release(self) -> None:
-        """Release the lock. Its file stays: another process may be about to lock it."""
-        self._lock.release()
+    private = folder / PRIVATE_FOLDER
+    try:
+        private.mkdir(exist_ok=True)
+        if not is_private_folder(private) and (private.is_symlink() or any(private.iterdir())):
+            raise FileError(f"'{private}' was not made by Palpate: rename it, or choose another {work} folder.")
+        lock = _lock(private)
+    except OSError as error:
+        raise FileError(
+            f"The folder '{private}' could not be made ({os_error_reason(error)}): rename what has its name, "
+            f"check the permissions, or choose another {work} folder."
+        ) from error
+    if lock is None:
+        raise FileError(f"Another {work} is writing to '{folder}': wait for it, or choose another folder.")
+    return lock
 
 
 @contextmanager
@@ -122,13 +108,11 @@ def remove_abandoned(parent: Path) -> None:
     """Remove the temporary folders that killed processes have left in a folder."""
     for folder in sorted(parent.glob(".palpate-*-????????")):
         with suppress(OSError):
-            if is_private_folder(folder):
-                lock = _lock(folder)
-                if lock is not None:
-                    lock.release()
-                    _remove(folder)
-            else:
+            if not is_private_folder(folder):
                 folder.rmdir()  # of a kill before the lock; raises if it holds anything
+            elif (lock := _lock(folder)) is not None:
+                lock.release()
+                _remove(folder)
 
 
 def _remove(folder: Path) -> None:
@@ -149,12 +133,9 @@ def _lock(folder: Path) -> BaseFileLock | None:
     return lock
 
 
-# The files of an export, which take the place of those of the export before.
-#
 # An export is written whole into a hidden folder. Then its files are moved to their places, and files of the earlier export
-# that have no successor are removed: an export of a hundred frames that is followed by one of ten leaves no images of the
-# earlier one. A list in the folder names the files of exports with their SHA-256. Only files that the list names, and that
-# still have the content it was written for, are removed.
+# that have no successor are removed. A list in the folder names the files of exports with their SHA-256. Only files that the
+# list names, and that still have the content it was written for, are removed.
 
 LIST_NAME = ".palpate-export.json"
 LIST_FORMAT = "palpate-export/1"
@@ -276,8 +257,8 @@ class FileList:
     def _write(self, kinds: Mapping[str, dict[str, Any]]) -> None:
         """Write the list with these kinds; the others are as they were."""
         self._kinds |= kinds
+        content = {"format": LIST_FORMAT, "exports": self._kinds}
         with atomic_write(self._folder / LIST_NAME) as temporary:
-            content = {"format": LIST_FORMAT, "exports": self._kinds}
             temporary.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
 
@@ -315,10 +296,7 @@ def _read(path: Path) -> dict[str, dict[str, Any]]:
     """Return the kinds of a list; none when it is missing or damaged, so that nothing is removed by it."""
     try:
         content = json.loads(read_bytes(path).decode("utf-8"))
-        if content["format"] != LIST_FORMAT:
-            return {}
-        return {
-            kind: {"files": {**own["files"]}, "source": str(own.get("source", ""))} for kind, own in content["exports"].items()
-        }
+        kinds = content["exports"].items() if content["format"] == LIST_FORMAT else ()
+        return {kind: {"files": {**own["files"]}, "source": str(own.get("source", ""))} for kind, own in kinds}
     except (OSError, ValueError, RecursionError, KeyError, TypeError, AttributeError, FileError):
         return {}

@@ -20,21 +20,20 @@ import numpy as np
 from ..errors import FileError, MeshError, read_errors_said
 from ..geometry.mesh import TriangleMesh, checked_mesh
 
-_KINDS = {
-    stat.S_IFIFO: "a FIFO",
-    stat.S_IFSOCK: "a socket",
-    stat.S_IFCHR: "a device",
-    stat.S_IFBLK: "a device",
-}
+_KINDS = {stat.S_IFIFO: "a FIFO", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device"}
 
 
-def require_regular(path: str | os.PathLike) -> None:
-    """Raise :class:`FileError` if `path` is a FIFO, a socket or a device. A missing file and a folder pass."""
+def require_regular(path: str | os.PathLike, opened: int | None = None) -> None:
+    """Raise :class:`FileError` if `path`, perhaps open as `opened`, is a FIFO, a socket or a device.
+
+    A missing file and a folder pass.
+    """
     try:
-        mode = os.stat(path).st_mode
+        kind = _KINDS.get(stat.S_IFMT(os.stat(path if opened is None else opened).st_mode))
     except OSError:
         return
-    _require_regular(path, mode)
+    if kind is not None:
+        raise FileError(f"'{Path(path)}' is {kind}, not a file: give the name of a regular file.")
 
 
 def open_regular(path: str | os.PathLike, mode: str = "rb", **options: Any) -> IO[Any]:
@@ -57,7 +56,7 @@ def open_regular(path: str | os.PathLike, mode: str = "rb", **options: Any) -> I
     require_regular(path)  # before it is opened: opening some devices has an effect of its own
     file = open(path, mode, opener=_open_without_waiting, **options)  # noqa: SIM115 - the caller closes it
     try:
-        _require_regular(path, os.fstat(file.fileno()).st_mode)  # it may have been exchanged meanwhile
+        require_regular(path, file.fileno())  # it may have been exchanged meanwhile
     except BaseException:
         file.close()
         raise
@@ -97,12 +96,6 @@ def read_bounded(path: str | os.PathLike, limit: int, what: str = "file", advice
 
 def _open_without_waiting(path: str, flags: int) -> int:
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0), 0o666)
-
-
-def _require_regular(path: str | os.PathLike, mode: int) -> None:
-    kind = _KINDS.get(stat.S_IFMT(mode))
-    if kind is not None:
-        raise FileError(f"'{Path(path)}' is {kind}, not a file: give the name of a regular file.")
 
 
 # --- TOML

@@ -5,7 +5,7 @@ Members: ``header.npy`` (JSON text), ``frames``, ``times``, ``poses``, ``velocit
 header's list, ``sensor_<i>/normal_force`` and so on with the names of :class:`.recording.SensorRecording`. A sensor with
 several channels also has ``sensor_<i>/channels/values`` and ``…/clipped``, whose unit, names and places are in the header.
 
-A file that also has the sensors (:func:`save_with_sensors`) has ``sensor_<i>/texels/…`` as in :mod:`.recording_npz`, and
+A file that also has the sensors has ``sensor_<i>/texels/…`` as in :mod:`.recording_npz`, and
 ``sensor_<i>/parameters`` (JSON text). A program that reads recordings reads these files, too.
 """
 
@@ -113,11 +113,8 @@ def sensor_arrays(texels: Texels, painted: Painted | None = None) -> dict[str, n
     arrays = {"format": np.array(SENSOR_FORMAT), "layout": np.array(kind)}
     arrays |= {name: np.asarray(getattr(texels, name)) for name in _ARRAYS}
     arrays |= {f"layout/{item.name}": np.asarray(getattr(texels.layout, item.name)) for item in fields(texels.layout)}
-    for item in fields(painted or Painted()):
-        values = getattr(painted, item.name, None)
-        if values is not None:
-            arrays[f"painted/{item.name}"] = np.asarray(values)
-    return arrays
+    stated = {f"painted/{item.name}": getattr(painted, item.name, None) for item in fields(Painted)}
+    return arrays | {name: np.asarray(values) for name, values in stated.items() if values is not None}
 
 
 def load_sensor(path: str | os.PathLike) -> tuple[Texels, Painted]:
@@ -151,39 +148,35 @@ def _plain(value: np.ndarray) -> Any:
 RECORDING_FORMAT = "palpate-recording/2"
 
 
-def save_recording(path: str | os.PathLike, recording: Recording) -> None:
-    """Write a recording as .npz, whole or not at all; the same recording gives the same bytes.
+Sensors = dict[str, tuple[Texels, Painted, SensorParameters]]
+"""Texels, what is painted on them, and parameters of each sensor by its name."""
+
+
+def save_recording(path: str | os.PathLike, recording: Recording, sensors: Sensors | None = None) -> None:
+    """Write a recording as .npz, with its sensors if they are given, whole or not at all; the same data give the same bytes.
 
     Raises
     ------
     FileError
         The file cannot be written.
     ValueError
-        As :func:`recording_arrays`.
-    """
-    write_arrays(path, recording_arrays(recording))
-
-
-def recording_arrays(recording: Recording) -> dict[str, np.ndarray]:
-    """Return the members of a recording's file by name.
-
-    Raises
-    ------
-    ValueError
         A number is not finite or an array has another number of frames (a fault of the program, not of the user).
     """
-    arrays = {"header": np.array(json.dumps(_header(recording), allow_nan=False))}
-    for name in ("frames", "times", "poses", "velocities"):
-        arrays[name] = np.asarray(getattr(recording, name))
+    arrays = {name: np.asarray(getattr(recording, name)) for name in ("frames", "times", "poses", "velocities")}
     arrays |= sensor_members(recording.sensors.values())
     for name, array in arrays.items():
-        if name != "header" and len(array) != len(recording.frames):
+        if len(array) != len(recording.frames):
             raise ValueError(f"'{name}' has {len(array)} frames, the recording {len(recording.frames)}")
         if array.dtype.kind == "f" and not all(np.isfinite(array[rows]).all() for rows in row_blocks(array)):
             raise ValueError(f"'{name}' of the recording has values that are not finite")
         if array.dtype.kind not in "fiubU":
             raise ValueError(f"'{name}' of the recording has type {array.dtype}")
-    return arrays
+    for i, name in enumerate(recording.sensors):
+        if sensors and name in sensors:
+            texels, painted, parameters = sensors[name]
+            arrays |= {f"sensor_{i}/texels/{key}": values for key, values in sensor_arrays(texels, painted).items()}
+            arrays[f"sensor_{i}/parameters"] = np.array(json.dumps(asdict(parameters)))
+    write_arrays(path, {"header": np.array(json.dumps(_header(recording), allow_nan=False)), **arrays})
 
 
 def sensor_members(sensors: Iterable[SensorArrays]) -> dict[str, np.ndarray]:
@@ -267,27 +260,6 @@ def _recording(path: str | os.PathLike, members: Any) -> Recording:
         warnings=tuple(str(warning) for warning in header["warnings"]),
         step_reason=str(header.get("step_reason", "")),
     )
-
-
-Sensors = dict[str, tuple[Texels, Painted, SensorParameters]]
-"""Arrays of the recording of each sensor, by its name."""
-
-
-def save_with_sensors(path: str | os.PathLike, recording: Recording, sensors: Sensors) -> None:
-    """Write a recording with its sensors, whole or not at all.
-
-    Raises
-    ------
-    FileError
-        The file cannot be written.
-    """
-    arrays = recording_arrays(recording)
-    for i, name in enumerate(recording.sensors):
-        if name in sensors:
-            texels, painted, parameters = sensors[name]
-            arrays |= {f"sensor_{i}/texels/{key}": values for key, values in sensor_arrays(texels, painted).items()}
-            arrays[f"sensor_{i}/parameters"] = np.array(json.dumps(asdict(parameters)))
-    write_arrays(path, arrays)
 
 
 def load_with_sensors(path: str | os.PathLike) -> tuple[Recording, Sensors]:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from ..errors import FileError, os_error_reason
-from ..model.recording import CLIPPED, SENSOR_FIELDS, VALUES, Frame, Recording, SensorRecording
+from ..model.recording import CLIPPED, SENSOR_FIELDS, VALUES, Frame, Recording
 from .recording_npz import sensor_members
 
 IN_MEMORY_BYTES = 1 << 24
@@ -83,9 +83,8 @@ class RowTable:
         return np.frombuffer(mapped, self._kind)
 
     def _error(self, error: OSError) -> FileError:
-        place, remedy = self._folder, "choose another folder"
-        if place is None:
-            place, remedy = Path(tempfile.gettempdir()), "name another folder in the environment variable TMPDIR"
+        place = self._folder or tempfile.gettempdir()
+        remedy = "choose another folder" if self._folder else "name another folder in the environment variable TMPDIR"
         return FileError(
             f"{self._what} could not be kept in '{place}' ({os_error_reason(error)}): free some space there, or {remedy}."
         )
@@ -154,19 +153,11 @@ class FrameTable:
         assert self._first is not None
         rows = self._table.rows()
         members = {name: rows[name].copy() if self._table.is_in_memory else rows[name] for name in rows.dtype.names or ()}
-        sensors = {}
-        for i, (name, sensor) in enumerate(self._first.sensors.items()):
+        found = Recording.stack([self._first], self._bodies, dt, digest, warnings, step_reason)
+        for i, (name, sensor) in enumerate(found.sensors.items()):
             own = {key: members[f"sensor_{i}/{key}"] for key in SENSOR_FIELDS}
-            channels = sensor.channels
-            if channels is not None:
-                channels = replace(channels, values=members[f"sensor_{i}/{VALUES}"], clipped=members[f"sensor_{i}/{CLIPPED}"])
-            sensors[name] = SensorRecording(**own, channels=channels, unit=sensor.unit)
-        return Recording(
-            **{name: members[name] for name in ("frames", "times", "poses", "velocities")},
-            sensors=sensors,
-            body_names=self._bodies,
-            dt=dt,
-            digest=digest,
-            warnings=tuple(warnings),
-            step_reason=step_reason,
-        )
+            if sensor.channels is not None:
+                values, clipped = members[f"sensor_{i}/{VALUES}"], members[f"sensor_{i}/{CLIPPED}"]
+                own["channels"] = replace(sensor.channels, values=values, clipped=clipped)
+            found.sensors[name] = replace(sensor, **own)
+        return replace(found, **{name: members[name] for name in ("frames", "times", "poses", "velocities")})

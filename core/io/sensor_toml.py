@@ -73,20 +73,15 @@ class _SensorFile:
 
 def write_sensor(path: str | os.PathLike, model: SensorModel) -> None:
     """Write a sensor as TOML, completely or not at all; raise :class:`FileError` when that is not possible."""
-    text = sensor_text(model)
-    with atomic_write(path) as fresh:
-        fresh.write_text(text, encoding="utf-8", newline="\n")
-
-
-def sensor_text(model: SensorModel) -> str:
-    """Return the text of a sensor's file."""
     import tomli_w
 
     words = {name: getattr(model.parameters, name) for name in SENSOR_PARAMETERS}
-    table: dict[str, Any] = {"format": FORMAT, "name": model.name, "sensor": {**words, **_plain(model.shape)}}
+    table: dict[str, Any] = {"format": FORMAT, "name": model.name, "sensor": {**words, **model.shape}}
     if model.effects:
         table["effect"] = [to_dict(item) for item in model.effects]
-    return tomli_w.dumps(table)
+    text = tomli_w.dumps(table)
+    with atomic_write(path) as fresh:
+        fresh.write_text(text, encoding="utf-8", newline="\n")
 
 
 def read_sensor(path: str | os.PathLike) -> SensorModel:
@@ -101,13 +96,12 @@ def read_sensor(path: str | os.PathLike) -> SensorModel:
     """
     table = read_toml(path, "sensor")
     try:
-        return sensor_of(table)
+        return _sensor_of(table)
     except PalpateError as error:
         raise type(error)(f"'{Path(path).name}': {error}") from error
 
 
-def sensor_of(table: Mapping[str, Any]) -> SensorModel:
-    """Return the sensor that the tables of a file describe; raise the same errors as :func:`read_sensor`."""
+def _sensor_of(table: Mapping[str, Any]) -> SensorModel:
     if table.get("format") != FORMAT:
         raise FileError(f'Its format is {table.get("format")!r}: a sensor\'s file begins with format = "{FORMAT}".')
     found = read_words(table, _SensorFile, "the file", besides=("format",))
@@ -167,7 +161,3 @@ def checked_lengths(value: Any, count: int, what: str) -> tuple[float, ...]:
             f"{what} is {value!r:.80}: give {many} above zero, in metres, from {SHORTEST_LENGTH:g} to {LONGEST_LENGTH:g}."
         )
     return tuple(float(item) for item in items)
-
-
-def _plain(words: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: list(value) if isinstance(value, tuple) else value for key, value in words.items()}

@@ -1,10 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tactile images in the OpenEXR format: three channels that Blender's image nodes read directly, and all others beside them.
 
-``R`` is the normal force and ``G``, ``B`` the shear along the texel's x and y axes, all in newtons; ``reading`` is in
-the sensor's unit, ``depth`` in metres, ``slip`` in metres per second, ``contact`` 0 or 1. All are 32-bit floats; pixels
-that show no texel are 0. Row 0 of the layout is the bottom of the picture. A sensor with several channels has the vector layer
-``channels`` besides, which shows at each texel the channels of the nearest place where such are measured.
+``docs/files.md`` lists the channels. Row 0 of the layout is the bottom of the picture.
 
 Images of readings with three signed channels (:func:`write_vector_exrs`) have one layer with the channels X, Y and Z, which
 image programs, Blender's among them, show as one vector, in the unit of the readings.
@@ -16,10 +13,9 @@ import ctypes
 import errno
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -32,37 +28,19 @@ from ..model.sensor import Sensor
 from .file_writing import atomic_write, writable_folder
 from .hidden_folder import FileList
 
-# OpenEXR images of 32-bit floats with named channels and attributes, written by a library.
-#
-# The library is OpenEXR, from PyPI. In a Blender that is linked against an OpenEXR of its own, the dynamic linker would mix the
-# symbols of the two, and the first file written would end the process (seen in Debian's Blender 4.3). There the images go
-# through OpenImageIO, which Blender brings along. Pixels, names and attributes are the same; equal images give equal bytes in
-# each.
-
-_NO_DATE = "1980:01:01 00:00:00"
-"""OpenImageIO would write the present time, and equal images would differ."""
+# Images are written by OpenEXR, from PyPI. In a Blender that is linked against an OpenEXR of its own, the dynamic linker would
+# mix the symbols of the two, and the first file written would end the process (seen in Debian's Blender 4.3). There the images
+# go through OpenImageIO, which Blender brings along. Pixels, names and attributes are the same; each library writes equal
+# images as equal bytes.
 
 
 @cache
 def library() -> str:
     """Return the module that writes images in this process, OpenEXR or OpenImageIO."""
-    return "OpenImageIO" if _process_is_linked_against_openexr() else "OpenEXR"
-
-
-def _process_is_linked_against_openexr() -> bool:
-    """Return True if symbols of an OpenEXR are where those of a module that is loaded later are looked up.
-
-    Modules of Python, such as bpy, keep their libraries to themselves, and so do all on Windows and macOS.
-    """
-    return sys.platform == "linux" and hasattr(ctypes.CDLL(None), "exr_start_read")
-
-
-def _openimageio() -> Any:
-    try:
-        import OpenImageIO
-    except ImportError as error:
-        raise FileError("This Blender's Python has no OpenImageIO: install it, on Debian as python3-openimageio.") from error
-    return OpenImageIO
+    # Symbols of an OpenEXR may be where those of a module that is loaded later are looked up. Modules of Python, such as bpy,
+    # keep their libraries to themselves, and so do all on Windows and macOS.
+    is_linked = sys.platform == "linux" and hasattr(ctypes.CDLL(None), "exr_start_read")
+    return "OpenImageIO" if is_linked else "OpenEXR"
 
 
 def write_image(path: str | os.PathLike, channels: Mapping[str, np.ndarray], attributes: Mapping[str, str]) -> None:
@@ -91,11 +69,15 @@ def write_image(path: str | os.PathLike, channels: Mapping[str, np.ndarray], att
         except RuntimeError as error:
             raise _os_error(str(error)) from error
         return
-    oiio = _openimageio()
+    try:
+        import OpenImageIO as oiio
+    except ImportError as error:
+        raise FileError("This Blender's Python has no OpenImageIO: install it, on Debian as python3-openimageio.") from error
     height, width = next(iter(channels.values())).shape
     spec = oiio.ImageSpec(width, height, len(channels), "float")
     spec.channelnames = tuple(channels)
-    for name, value in {"compression": "zip", "DateTime": _NO_DATE, **texts}.items():
+    # Without a date OpenImageIO would write the present time, and equal images would differ.
+    for name, value in {"compression": "zip", "DateTime": "1980:01:01 00:00:00", **texts}.items():
         spec.attribute(name, value)
     image = oiio.ImageOutput.create("image.exr")
     pixels = np.stack(list(channels.values()), axis=-1)
@@ -110,31 +92,20 @@ def _os_error(message: str) -> OSError:
 
 
 CHANNELS = ("R", "G", "B", "reading", "depth", "slip", "contact")
-"""Names of the channels."""
-
 CHANNEL_LAYER = "channels"
 """Name of the vector layer that images of a sensor with several channels have besides."""
-
 UNITS = {"R": "N", "G": "N", "B": "N", "depth": "m", "slip": "m/s", "contact": "1"}
 """Units of the channels; that of ``reading`` is the sensor's."""
 
-_PREFIX = "palpate."  # OpenEXR has header attributes of its own, some with a type ("name", "owner", "type")
 
-
-def _pictures(
-    layout: GridLayout | UVLayout, frame: SensorFrame, names: Sequence[str], nearest: np.ndarray | None = None
-) -> np.ndarray:
-    """(channels, height, width) float32 of the channels of a frame, from the top."""
-    columns = {
-        "R": frame.normal_force,
-        "G": frame.shear[:, 0],
-        "B": frame.shear[:, 1],
-        **{name: getattr(frame, name) for name in ("reading", "depth", "slip", "contact")},
-    }
+def _pictures(layout: GridLayout | UVLayout, frame: SensorFrame, nearest: np.ndarray | None) -> dict[str, np.ndarray]:
+    """(height, width) float32 of each channel of a frame by its name, from the top."""
+    columns = {name: getattr(frame, name) for name in CHANNELS[3:]}
+    columns = {"R": frame.normal_force, "G": frame.shear[:, 0], "B": frame.shear[:, 1], **columns}
     if nearest is not None:
-        channels = _channels_of(frame)
-        columns |= dict(zip(layer_names(channels), channels.values[nearest].T, strict=True))
-    table = np.array([columns[name] for name in names], dtype=float)  # (channels, texels)
+        assert frame.channels is not None  # of a sensor that has them in all frames
+        columns |= dict(zip(layer_names(frame.channels), frame.channels.values[nearest].T, strict=True))
+    names, table = list(columns), np.array(list(columns.values()), dtype=float)  # (channels, texels)
     bad = ~(np.abs(table) <= np.finfo(np.float32).max)  # NaN compares false
     if bad.any():
         channel, texel = np.argwhere(bad)[0]
@@ -142,15 +113,11 @@ def _pictures(
     image = layout.image(table.T)
     contact = names.index("contact")
     image[:, :, contact] = image[:, :, contact] >= 0.5
-    return np.ascontiguousarray(np.moveaxis(image[::-1], 2, 0), dtype=np.float32)
+    return dict(zip(names, np.ascontiguousarray(np.moveaxis(image[::-1], 2, 0), dtype=np.float32)))
 
 
 def describe(sensor: Sensor, frame: Frame, digest: str) -> dict[str, str]:
-    """Return the metadata of a tactile image: its sensor, time, units, and hashes of what it was computed from.
-
-    ``unit.R``, ``unit.depth``, … are the units of the channels; ``parameters`` is a hash of the sensor's parameters, of what is
-    painted on it and of its effects, ``digest`` one of everything that the forces depend on.
-    """
+    """Return the metadata of a tactile image, as ``docs/files.md`` lists them; `digest` is that of the scenario."""
     about = {
         "sensor": sensor.name,
         "frame": str(frame.frame),
@@ -195,10 +162,10 @@ def write_exr(
     ValueError
         A value is not finite or too large for 32 bits (a fault of the program, not of the user). Nothing is written then.
     """
-    names = CHANNELS if nearest is None else (*CHANNELS, *layer_names(_channels_of(frame)))
-    pictures = _pictures(layout, frame, names, nearest)
+    pictures = _pictures(layout, frame, nearest)
     with atomic_write(path) as temporary:
-        write_image(temporary, dict(zip(names, pictures)), {_PREFIX + key: str(value) for key, value in metadata.items()})
+        # The prefix is for attributes that OpenEXR has itself, some with a type ("name", "owner", "type").
+        write_image(temporary, pictures, {f"palpate.{key}": str(value) for key, value in metadata.items()})
 
 
 def layer_names(channels: VectorReadings) -> list[str]:
@@ -216,11 +183,6 @@ def nearest_places(texels: Texels, channels: VectorReadings | None) -> np.ndarra
     return np.argmin(apart, axis=0)
 
 
-def _channels_of(frame: SensorFrame) -> VectorReadings:
-    assert frame.channels is not None  # of a sensor that has them in all frames
-    return frame.channels
-
-
 def channel_layout(texels: Texels, channels: VectorReadings) -> GridLayout:
     """Return rows and columns of the places where a sensor's channels are measured, seen onto the middle of its texels."""
     count = channels.values.shape[-2]
@@ -233,8 +195,6 @@ def channel_layout(texels: Texels, channels: VectorReadings) -> GridLayout:
 
 LAYER, AXES = "field", "XYZ"
 """Name of the layer, and of its channels."""
-DIGITS = 4
-"""Of the number of a frame in the name of a file."""
 
 
 def write_vector_exrs(folder: Path, values: np.ndarray, shape: tuple[int, int], unit: str) -> list[Path]:
@@ -268,7 +228,7 @@ def write_vector_exrs(folder: Path, values: np.ndarray, shape: tuple[int, int], 
     images = values.reshape(-1, rows, columns, 3)[:, ::-1].astype(np.float32)
     files = FileList(writable_folder(folder, create=True))
     with files.new_files(LAYER) as new:
-        paths = [new / f"{LAYER}_{frame:0{DIGITS}d}.exr" for frame in range(len(images))]
+        paths = [new / f"{LAYER}_{frame:04d}.exr" for frame in range(len(images))]
         for frame, (path, image) in enumerate(zip(paths, images)):
             pictures = {f"{LAYER}.{axis}": image[:, :, i] for i, axis in enumerate(AXES)}
             with atomic_write(path) as temporary:

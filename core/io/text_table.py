@@ -15,6 +15,7 @@ import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -81,10 +82,11 @@ def read_text_table(path: str | os.PathLike) -> TextTable:
     form, first = _form([text for _, text in lines[:SAMPLE]], path)
     head = [form.cells(text) for _, text in lines[:first]]
     names, units, notes = _header(head, comments, form, [form.cells(text) for _, text in lines[first : first + SAMPLE]], path)
-    if (len(lines) - first) * len(names) > MOST_VALUES:
+    count = (len(lines) - first) * len(names)
+    if count > MOST_VALUES:
         raise FileError(
-            f"'{path.name}' holds {(len(lines) - first) * len(names):,} numbers in {len(names):,} columns and at most "
-            f"{MOST_VALUES:,} are read: cut it into several files, or keep fewer samples per second."
+            f"'{path.name}' holds {count:,} numbers in {len(names):,} columns and at most {MOST_VALUES:,} are read: cut it "
+            "into several files, or keep fewer samples per second."
         )
     values, wrong = _values(lines[first:], names, form)
     numbers = np.array([number for number, _ in lines[first:]])
@@ -203,7 +205,7 @@ def _lines(file: Iterator[str], path: Path) -> tuple[list[tuple[int, str]], list
 
 def _form(lines: Sequence[str], path: Path) -> tuple[_Form, int]:
     """Return how the numbers are written, and the first line of the table: the form with the most lines of equal width."""
-    best: tuple[int, int, int, _Form, int] | None = None
+    found: list[tuple[tuple[int, int, int], _Form, int]] = []
     for order, separator in enumerate(SEPARATORS):
         for decimal in (".", ",") if separator != "," else (".",):
             form = _Form(separator, decimal)
@@ -213,21 +215,17 @@ def _form(lines: Sequence[str], path: Path) -> tuple[_Form, int]:
             first = _first_row(widths, usual)
             if usual and first is not None:
                 key = sum(width == usual for width in widths), min(usual, 2), -order - (decimal == ",")
-                if best is None or key > best[:3]:
-                    best = (*key, _Form(separator, decimal, usual), first)
-    if best is None:
+                found.append((key, _Form(separator, decimal, usual), first))
+    if not found:
         raise FileError(f"'{path.name}' holds no numbers: there are no measurements in it, give a table of them.")
-    return best[3], best[4]
+    return max(found, key=itemgetter(0))[1:]
 
 
 def _width(row: Sequence[str], form: _Form) -> int:
     """Return the number of cells of a row of numbers, without empty ones at its end; 0 for text with less than half numbers."""
-    kept = list(row)
-    while kept and not kept[-1]:
-        kept.pop()
-    numbers = [form.number(cell) for cell in kept]
-    known = sum(number is not None and number == number for number in numbers)
-    return len(kept) if known and 2 * sum(number is not None for number in numbers) >= len(kept) else 0
+    width = _filled(row)
+    numbers = [number for number in map(form.number, row[:width]) if number is not None]
+    return width if any(number == number for number in numbers) and 2 * len(numbers) >= width else 0
 
 
 def _first_row(widths: Sequence[int], usual: int) -> int | None:
@@ -253,8 +251,8 @@ def _header(
         wide = [form.cells(comments[-1])]
         wide = wide if len(wide[0]) == width else []
     fitting = [cells for cells in wide if _filled(cells) == width or len(cells) == width]
-    if fitting and len(fitting) > 1 and (len(wide) == 2 or _are_units(fitting[-1])):
-        names, below = fitting[-2], fitting[-1]
+    if len(fitting) > 1 and (len(wide) == 2 or _are_units(fitting[-1])):
+        names, below = fitting[-2:]
     elif fitting:
         names, below = fitting[-1], []
     elif wide and width - 1 <= _filled(wide[-1]) <= 2 * width:
@@ -300,11 +298,9 @@ def _values(
     values = np.full((len(lines), len(names)), np.nan)
     wrong: dict[str, list[tuple[int, str]]] = {}
     for row, (number, text) in zip(values, lines, strict=True):
-        cells = form.cells(text)
-        for i in range(min(len(names), len(cells))):
-            found = form.number(cells[i])
-            if found is not None:
-                row[i] = found
-            if cells[i] and (found is None or found != found):
-                wrong.setdefault(names[i], []).append((number, cells[i]))
+        for i, (name, cell) in enumerate(zip(names, form.cells(text))):
+            found = form.number(cell)
+            row[i] = value = math.nan if found is None else found
+            if cell and math.isnan(value):
+                wrong.setdefault(name, []).append((number, cell))
     return values, wrong

@@ -11,9 +11,9 @@ import glob
 import math
 import os
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path, PurePath
+from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
@@ -33,16 +33,6 @@ MESH = "mesh"
 """Last word of the name of a target's shape."""
 MESHES = "meshes"
 """Folder of the copies, in that of the scenes."""
-
-
-def expanded(words: Iterable[str], known: Iterable[str]) -> list[str]:
-    """Return the names of files that words of a choice mean: those that fit a pattern, in order, or the word itself."""
-    names = list(known)
-    found: list[str] = []
-    for word in words:
-        fitting = [name for name in names if PurePath(name).match(word)] if glob.has_magic(word) else [word]
-        found += [name for name in fitting if name not in found]
-    return found
 
 
 def find_meshes(vary: Mapping[str, Any], base: Path) -> dict[str, Path]:
@@ -71,13 +61,10 @@ def find_meshes(vary: Mapping[str, Any], base: Path) -> dict[str, Path]:
             words += [word for word in given if isinstance(word, str)] if isinstance(given, list) else []
     files: dict[str, Path] = {}
     for word in words:
-        if not glob.has_magic(word):
-            files[word] = base / word
-            continue
-        found = sorted(glob.glob(word, root_dir=base))
+        found = [Path(name).as_posix() for name in sorted(glob.glob(word, root_dir=base))] if glob.has_magic(word) else [word]
         if not found:
             raise FileError(f"No file next to the study matches the meshes '{word}': check its name and folder.")
-        files |= {Path(name).as_posix(): base / name for name in found}
+        files |= {name: base / name for name in found}
     for file in files.values():
         turned_outwards(load_mesh(file), file.name)
     return files
@@ -137,11 +124,6 @@ class Distribution:
     low: float = -math.inf
     high: float = math.inf
 
-    @property
-    def count(self) -> int:
-        """Number of values in a grid."""
-        return len(self.words) if self.kind == CHOICE else self.levels
-
     def grid_values(self) -> np.ndarray:
         """Return the values of a grid; a normal distribution gives the middles of parts of equal probability."""
         if self.kind == CHOICE:
@@ -188,7 +170,7 @@ class Design:
         """Return the number of points."""
         if self.kind != GRID:
             return self.samples
-        return math.prod(distribution.count for distribution in varied.values())
+        return math.prod(len(one.words) if one.kind == CHOICE else one.levels for one in varied.values())
 
 
 def check_count(count: int) -> None:
@@ -203,15 +185,14 @@ def check_count(count: int) -> None:
 def columns_of(design: Design, varied: Mapping[str, Distribution]) -> dict[str, np.ndarray]:
     """Return the values of the varied numbers in the order of the runs, (count,) each, by name."""
     columns: dict[str, np.ndarray] = {}
-    if varied and design.kind == GRID:
+    if design.kind == GRID:
         count = repeat = design.count(varied)
         for name, distribution in varied.items():  # the last one changes fastest
             own = distribution.grid_values()
             repeat //= len(own)
             columns[name] = np.tile(np.repeat(own, repeat), count // (repeat * len(own)))
     elif varied:
-        cube = _unit_points(design, len(varied))
-        columns = {name: one.values(cube[:, axis]) for axis, (name, one) in enumerate(varied.items())}
+        columns = {name: one.values(axis) for (name, one), axis in zip(varied.items(), _unit_points(design, len(varied)).T)}
     return columns
 
 

@@ -103,11 +103,7 @@ def with_press(scenario: Scenario, press: Press) -> Scenario:
     own = quaternion_product(upright[None], quaternions_from_vectors(turn[:, None] * np.array([0.0, 0.0, 1.0])))
     base = scenario.bodies[sensor.body].motion
     to_world = rotation_matrices(base.quaternions[:1])[0]
-    motion = Motion(
-        times,
-        base.positions[0] + origin @ to_world.T,
-        quaternion_product(base.quaternions[:1], own),
-    )
+    motion = Motion(times, base.positions[0] + origin @ to_world.T, quaternion_product(base.quaternions[:1], own))
     pressing = replace(scenario.bodies[body], motion=motion, free=False, drive=None)
     if press.force > 0.0:
         pressing = _driven(pressing, scenario, body, press, -to_world @ axis)
@@ -160,18 +156,14 @@ def _phases(press: Press) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     depth = -press.clearance if press.force > 0.0 else press.depth
     approach = press.clearance / press.speed + press.settle if press.force > 0.0 else (depth + press.clearance) / press.speed
     sliding = max(press.slide / press.slide_speed, abs(press.twist) / press.twist_speed)
-    corners = [(approach, depth, 0.0), (press.hold, depth, 0.0)]
+    corners = [(0.0, -press.clearance, 0.0), (approach, depth, 0.0), (press.hold, depth, 0.0)]
     if sliding > 0.0:
         corners += [(sliding / TWIST_STEPS, depth, step / TWIST_STEPS) for step in range(1, TWIST_STEPS + 1)]
         corners.append((press.hold, depth, 1.0))
     if press.force == 0.0:
         corners.append((approach, -press.clearance, corners[-1][2]))
-    rows = [(0.0, -press.clearance, 0.0)]
-    for seconds, at, share in corners:
-        if seconds > 0.0:
-            rows.append((rows[-1][0] + seconds, at, share))
-    times, depths, shares = np.array(rows).T
-    return times, depths, shares
+    seconds, depths, shares = np.array([corners[0], *(corner for corner in corners if corner[0] > 0.0)]).T
+    return np.cumsum(seconds), depths, shares
 
 
 def _driven(body: Body, scenario: Scenario, index: int, press: Press, down: np.ndarray) -> Body:

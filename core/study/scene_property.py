@@ -97,7 +97,7 @@ def read_overrides(path: str | os.PathLike) -> dict[str, Any]:
 
     Raises
     ------
-    FileError
+    FileError, ParameterError
         It cannot be read, or has something else than paths of properties.
     """
     table, name = read_toml(path, "file of overrides"), Path(path).name

@@ -1,30 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The file of a study: scene, design, and the distributions of the varied parameters.
-
-::
-
-    format = "palpate-sweep/1"
-    name = "presses on a fingertip"      # optional, for the report and the dataset
-    scene = "fingertip.blend"            # or scenes = ["*.blend"]
-    design = "latin-hypercube"           # grid, random, latin-hypercube or sobol
-    samples = 1000                       # runs per scene; a grid takes all combinations of its levels
-    seed = 1
-
-    [vary]
-    "Fingertip.k" = { log-uniform = [20, 200] }
-    "Fingertip.effect.creep" = { choice = [true, false] }
-
-    [press]                              # presses at random places
-    depth = { uniform = [0.5e-3, 2e-3] }
-    slide = { uniform = [0.0, 3e-3] }
-
-Instead of a scene a study may name a job, a Python file that computes its runs: ``job = "count.py"``.
+"""The file of a study: scene, design, and the distributions of the varied parameters, as ``docs/sweep.md`` describes it.
 
 The output folder keeps the file with a table ``[frozen]`` at its end: the version, and digests of the scenes.
 """
 
 from __future__ import annotations
 
+import glob
 import hashlib
 import json
 import math
@@ -33,7 +15,8 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
+from itertools import accumulate, chain
+from pathlib import Path, PurePath
 from typing import Annotated, Any
 
 import msgspec
@@ -42,7 +25,7 @@ import numpy as np
 from ..errors import FileError, ParameterError, did_you_mean
 from ..io.input_files import checked_name, is_number, read_toml
 from ..io.schema import LARGEST, WORD, Name, Number, Positive, Switch, known_words, read_words, wanted
-from ..model.parameter import Parameter, Specification, TextParameter
+from ..model.parameter import Parameter, TextParameter
 from ..model.scenario import Scenario
 from .design import (
     CHOICE,
@@ -58,22 +41,12 @@ from .design import (
     Value,
     check_count,
     columns_of,
-    expanded,
 )
 from .presses import PLACE_PARAMETERS, PRESS_PARAMETERS, Press, with_press
 from .scene_property import SceneProperty, WholeNumber, is_scene_property
 from .variation import MOTION_WORDS, PRESS, Variable, variable, variables_of
 
-# The output folder of a study, and how many runs it has by the names of its parts, which any Python can read.
-#
-# ::
-#
-#     study.toml                    the study, with the version and the digests of its scenes
-#     scenes/                       scenes as the solver sees them, copies of .blend and mesh files
-#     parts/<first run>-<content>-<done>-<failed>.parquet
-#                                   a batch of runs: values, metrics and frames of those that are done, why others failed
-#     layouts/<digest>/             what the frames of many runs have in common: features and texels
-#     runs/<digest>/                files of a run, where the study asks for recordings or images, or has a job
+# The output folder of a study, which docs/sweep.md describes. The names of its parts say how many runs it has, without pyarrow.
 
 STUDY_NAME = "study.toml"
 SCENES, PARTS, LAYOUTS, RUNS = "scenes", "parts", "layouts", "runs"
@@ -87,21 +60,18 @@ def part_name(first: int, content: str, done: int, failed: int) -> str:
 
 def part_files(folder: Path) -> list[Path]:
     """Return the parts of a study in the order of their first runs; files that are being written are none."""
-    return [folder / PARTS / name for name, _ in sorted(_found(folder))]
+    return [folder / PARTS / name for name in sorted(match[0] for match in _found(folder))]
 
 
 def counted_runs(folder: Path) -> tuple[int, int]:
     """Return how many runs are done and failed; one that was computed twice counts twice."""
-    counts = [(int(match[1]), int(match[2])) for _, match in _found(folder)]
-    return sum(done for done, _ in counts), sum(failed for _, failed in counts)
+    matches = list(_found(folder))
+    return sum(int(match[1]) for match in matches), sum(int(match[2]) for match in matches)
 
 
-def _found(folder: Path) -> Iterator[tuple[str, re.Match[str]]]:
+def _found(folder: Path) -> Iterator[re.Match[str]]:
     with suppress(FileNotFoundError):
-        for name in os.listdir(folder / PARTS):
-            match = _NAME.fullmatch(name)
-            if match:
-                yield name, match
+        yield from filter(None, map(_NAME.fullmatch, os.listdir(folder / PARTS)))
 
 
 FORMAT = "palpate-sweep/1"
@@ -219,11 +189,6 @@ class Plan:
     meshes: Mapping[str, Path] = field(default_factory=dict)
     tied: Mapping[str, tuple[str, float | None]] = field(default_factory=dict)
 
-    def with_tied(self, values: Mapping[str, Value]) -> dict[str, Value]:
-        """Return the values of a run with those that follow others."""
-        known = {**self.fixed, **values}
-        return {**values, **{name: _times(known[other], factor) for name, (other, factor) in self.tied.items()}}
-
     @property
     def scene_properties(self) -> list[str]:
         """Paths of the properties of the scene that the study sets: where there are any, each run is read from the scene."""
@@ -325,9 +290,9 @@ def plan_for(
     else:
         scenario = at_rate(scenario, study.fps)
         if study.press is not None:
-            press = _press(study, scenario)
+            press, of_press = _press(study.press, scenario, study.design.kind == GRID)
             with_press(scenario, press)  # refuses what no press of this study could do
-            entries |= _press_entries(study)
+            entries |= of_press
         variables = _variables(entries, scenario, press, properties or {})
     varied: dict[str, Distribution] = {}
     fixed: dict[str, Value] = {}
@@ -354,6 +319,7 @@ def _variables(
 ) -> dict[str, Variable]:
     """Return what the names of a study mean in a scene; refuse what does not vary there."""
     known = variables_of(scenario, press is not None) | {name: item.variable() for name, item in properties.items()}
+    pressing = {scenario.bodies[one.body].name for one in scenario.targets if press is not None and one.name == press.target}
     found: dict[str, Variable] = {}
     for name in names:
         if press is None and name.startswith(f"{PRESS}."):
@@ -363,10 +329,7 @@ def _variables(
                 f"'{name}' is a property of Blender, and '{scenario.name}' is no .blend: give the .blend itself."
             )
         found[name] = own = variable(name, known, scenario)
-        is_pressing = press is not None and any(
-            target.name == press.target and scenario.bodies[target.body].name == own.owner for target in scenario.targets
-        )
-        if is_pressing and own.words[0] in MOTION_WORDS:
+        if own.owner in pressing and own.words[0] in MOTION_WORDS:
             raise ParameterError(f"'{name}' has no effect, because [press] moves '{own.owner}': leave it out of [vary].")
     return found
 
@@ -375,12 +338,11 @@ def _free_variable(name: str, entry: Any) -> Variable:
     """Return the variable of a name that only a job knows; the first of its values tells what it is."""
     words = entry.get(CHOICE) if isinstance(entry, Mapping) else [entry]
     first = words[0] if isinstance(words, list) and words else 0.0
-    specification: Specification | None = Parameter(name, "", 0.0, -math.inf, math.inf, "Number of the job")
     if isinstance(first, bool):
-        specification = None
-    elif isinstance(first, str):
-        specification = TextParameter(name, "", "Text of the job")
-    return Variable(name, name, (JOB,), specification)
+        return Variable(name, name, (JOB,), None)
+    if isinstance(first, str):
+        return Variable(name, name, (JOB,), TextParameter(name, "", "Text of the job"))
+    return Variable(name, name, (JOB,), Parameter(name, "", 0.0, -math.inf, math.inf, "Number of the job"))
 
 
 @dataclass(frozen=True)
@@ -404,12 +366,13 @@ def _times(value: Any, factor: float | None) -> Any:
     return value if factor is None or not is_number(value) else value * factor
 
 
-def _with_files(found: Variable, entry: Mapping[str, Any], meshes: Iterable[str]) -> Mapping[str, Any]:
+def _with_files(found: Variable, entry: Mapping[str, Any], meshes: Mapping[str, Path]) -> Mapping[str, Any]:
     """Return the table of a target's shape with the names of files in the place of patterns; other tables as they are."""
     words = entry.get(CHOICE)
     if found.words != (MESH,) or not isinstance(words, list) or not all(isinstance(word, str) for word in words):
         return entry
-    return {**entry, CHOICE: expanded(words, meshes)}
+    files = [[name for name in meshes if PurePath(name).match(word)] if glob.has_magic(word) else [word] for word in words]
+    return {**entry, CHOICE: list(dict.fromkeys(chain.from_iterable(files)))}
 
 
 def at_rate(scenario: Scenario, fps: float | None) -> Scenario:
@@ -420,9 +383,11 @@ def at_rate(scenario: Scenario, fps: float | None) -> Scenario:
     return replace(scenario, fps=fps, frame_end=scenario.frame_start + max(1, math.floor(seconds * fps + 1e-9)))
 
 
-def _press(study: Study, scenario: Scenario) -> Press:
-    """Return the press of a study with default numbers; sensor and target may go unnamed where there is only one."""
-    table = study.press or {}
+def _press(table: Mapping[str, Any], scenario: Scenario, is_grid: bool) -> tuple[Press, dict[str, Any]]:
+    """Return the press of a study with default numbers, and the entries of the others by their names.
+
+    Sensor and target may go unnamed where there is only one.
+    """
     known_words(table, ("sensor", "target", *PRESS_PARAMETERS), "[press]", A_STUDY)
     readable = [sensor.name for sensor in scenario.read_out]
     carriers = {sensor.body for sensor in scenario.sensors}
@@ -433,22 +398,17 @@ def _press(study: Study, scenario: Scenario) -> Press:
             known = ", ".join(f"'{name}'" for name in candidates) or "none"
             raise ParameterError(f"[press] does not say its {word}, and '{scenario.name}' has {known}: add {word} = \"…\".")
         names[word] = checked_name(table.get(word, *candidates[:1]), "[press]")
-    if study.design.kind == GRID and not all(word in table for word in PLACE_PARAMETERS):
+    if is_grid and not all(word in table for word in PLACE_PARAMETERS):
         raise ParameterError("A grid has no random places to press on: use random, latin-hypercube or sobol.")
     if "depth" in table and "force" in table:
         raise ParameterError("[press] has a depth and a force: give one of the two.")
-    return Press(names["sensor"], names["target"])
-
-
-def _press_entries(study: Study) -> dict[str, Any]:
-    table = study.press or {}
-    entries = {f"{PRESS}.{word}": table[word] for word in PRESS_PARAMETERS if word in table}
+    entries = {word: table[word] for word in PRESS_PARAMETERS if word in table}
     for word in PLACE_PARAMETERS:
-        entries.setdefault(f"{PRESS}.{word}", {UNIFORM: [0.0, 1.0]})
+        entries.setdefault(word, {UNIFORM: [0.0, 1.0]})
     for direction, directed in _DIRECTIONS.items():
-        if directed in table and study.design.kind != GRID:
-            entries.setdefault(f"{PRESS}.{direction}", {UNIFORM: [-math.pi, math.pi]})
-    return entries
+        if directed in table and not is_grid:
+            entries.setdefault(direction, {UNIFORM: [-math.pi, math.pi]})
+    return Press(names["sensor"], names["target"]), {f"{PRESS}.{word}": entry for word, entry in entries.items()}
 
 
 _Pair = Annotated[list[Number], wanted("give two numbers", min_length=2, max_length=2)]
@@ -477,7 +437,7 @@ def _distribution(found: Variable, entry: Mapping[str, Any]) -> Distribution:
     if isinstance(found.specification, WholeNumber):
         raise ParameterError(f"{found.name} is a whole number, which cannot be {kind}: use choice.")
     first, second = numbers
-    low, high = found.bounds
+    low, high = found.specification.low, found.specification.high
     if found.specification.above_low:
         low = float(np.nextafter(low, math.inf))
     if kind == NORMAL:
@@ -511,27 +471,24 @@ class Runs:
     def __init__(self, study: Study, plans: Mapping[str, Plan], digests: Mapping[str, str]):
         counts = {scene: study.design.count(plan.varied) for scene, plan in plans.items()}
         check_count(sum(counts.values()))
-        self._plans, self._counts = plans, counts
+        self._plans, self._count = plans, sum(counts.values())
+        self._firsts = dict(zip(counts, accumulate(counts.values(), initial=0)))
         self._columns = {scene: columns_of(study.design, plan.varied) for scene, plan in plans.items()}
         self._hashes = {scene: _hash_of(plan, digests[scene]) for scene, plan in plans.items()}
 
     def __len__(self) -> int:
-        return sum(self._counts.values())
+        return self._count
 
     def __getitem__(self, at: int) -> Run:
-        row = index = range(len(self))[at]
-        for scene, count in self._counts.items():
-            if row < count:
-                return self._run(index, scene, row)
-            row -= count
-        raise IndexError(at)
-
-    def _run(self, index: int, scene: str, row: int) -> Run:
-        found = {name: column[row] for name, column in self._columns[scene].items()}
+        index = range(self._count)[at]
+        scene = next(name for name, first in reversed(self._firsts.items()) if first <= index)
+        found = {name: column[index - self._firsts[scene]] for name, column in self._columns[scene].items()}
         values = {name: float(value) if isinstance(value, np.floating) else value for name, value in found.items()}
         own = self._hashes[scene].copy()
         own.update(json.dumps([index, values]).encode())
-        values = self._plans[scene].with_tied(values)
+        plan = self._plans[scene]
+        known = {**plan.fixed, **values}
+        values |= {name: _times(known[other], factor) for name, (other, factor) in plan.tied.items()}
         named = {SCENE: scene, **values} if len(self._plans) > 1 else values
         return Run(index, scene, named, own.hexdigest()[:24])
 

@@ -1,22 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A scenario with varied numbers: which names a study may vary, their bounds, and what each changes.
 
-======================================  =================================================================================
-``SENSOR.k`` and every parameter        of :class:`.SensorParameters`
-``SENSOR.effect.KIND``                  true or false: whether the sensor has the effect
-``SENSOR.effect.KIND.PARAMETER``        parameter of the effect, ``form`` or ``seed``; the effect is added if need be
-``BODY.mass``                           kg, of a body that forces move; its inertia grows with it
-``BODY.shift.x``, ``y``, ``z``          m, added to the whole motion, in the world
-``BODY.turn.x``, ``y``, ``z``           rad, a rotation vector about the body's origin at the first frame, in the world
-``BODY.velocity.x``, …                  m/s, of a free body at the start; ``angular_velocity`` in rad/s
-``BODY.drive.PARAMETER``                of :class:`.Drive`; ``drive.target`` in the unit of its control, constant
-``TARGET.scale``                        factor of its shape about the body's origin
-``TARGET.mesh``                         its shape: a mesh file, in metres, in the frame of its body
-``gravity.x``, ``y``, ``z``             m/s²
-``press.NUMBER``                        of :class:`.Press`
-======================================  =================================================================================
-
-Bounds and units come from the specifications that panels and files use.
+``docs/sweep.md`` lists the names. Bounds and units come from the specifications that panels and files use.
 """
 
 from __future__ import annotations
@@ -37,19 +22,18 @@ from ..geometry.rotations import quaternion_product, quaternions_from_vectors, r
 from ..io.input_files import load_mesh
 from ..model.body import DRIVE_PARAMETERS, Body, Motion, Signal
 from ..model.parameter import ChoiceParameter, Parameter, Specification, TextParameter
+from ..model.recording import AXES
 from ..model.scenario import Scenario
 from ..model.sensor import Effect, Sensor
 from ..model.sensor_parameters import SENSOR_PARAMETERS
 from ..model.shared_results import SharedResults
 from .presses import PRESS_PARAMETERS, Press, with_press
 
-AXES = ("x", "y", "z")
 MOST_MESHES_KEPT = 64
 """Meshes that a process keeps in memory."""
 PRESS = "press"
 """First word of the numbers of a press."""
 
-_YES_NO = "true or false"
 _BODY_VECTORS = {"shift": "m", "turn": "rad", "velocity": "m/s", "angular_velocity": "rad/s"}
 MOTION_WORDS = (*_BODY_VECTORS, "drive", "mass")
 """First words of the names of what decides how a body moves."""
@@ -76,17 +60,11 @@ class Variable:
     words: tuple[str, ...]
     specification: Specification | None
 
-    @property
-    def bounds(self) -> tuple[float, float]:
-        """Lowest and highest value."""
-        found = self.specification
-        return (found.low, found.high) if isinstance(found, Parameter) else (-inf, inf)
-
     def read(self, value: Any) -> Any:
         """Return a value that a study gives, checked; raise :class:`ParameterError` when it means nothing here."""
         if self.specification is None:
             if not isinstance(value, bool):
-                raise ParameterError(f"{self.name} is {value!r:.60}: write {_YES_NO}.")
+                raise ParameterError(f"{self.name} is {value!r:.60}: write true or false.")
             return value
         read = self.specification.read(value)
         if read is None:
@@ -131,7 +109,7 @@ def _body_words(body: Body) -> Iterable[tuple[tuple[str, ...], Specification]]:
     if body.drive is not None:
         for key, specification in DRIVE_PARAMETERS.items():
             yield ("drive", key), specification
-        yield ("drive", "target"), Parameter("target", "", 0.0, -inf, inf, "Target of the drive")
+        yield ("drive", "target"), Parameter("target", "", 0.0, -inf, inf, "Target of the drive")  # in the unit of its control
 
 
 def variable(name: str, known: Mapping[str, Variable], scenario: Scenario) -> Variable:
@@ -230,12 +208,8 @@ def varied_scenario(
         gravity[AXES.index(words[0])] = value
     if press is not None:
         press = replace(press, **{words[0]: value for words, value in grouped.pop(PRESS, ())})
-    changed = replace(
-        scenario,
-        gravity=gravity,
-        sensors=tuple(_varied_sensor(sensor, grouped.get(sensor.name, ())) for sensor in scenario.sensors),
-    )
-    changed = _with_shapes(changed, grouped, meshes or {})
+    sensors = tuple(_varied_sensor(sensor, grouped.get(sensor.name, ())) for sensor in scenario.sensors)
+    changed = _with_shapes(replace(scenario, gravity=gravity, sensors=sensors), grouped, meshes or {})
     bodies = tuple(_varied_body(body, grouped.get(body.name, ()), scenario) for body in changed.bodies)
     changed = replace(changed, bodies=bodies)
     if press is not None:
@@ -281,7 +255,13 @@ def _with_shapes(scenario: Scenario, grouped: Mapping[str, list], meshes: Mappin
             continue
         if target.deformation is not None:
             raise PalpateError(f"'{target.name}' deforms, so its {' and '.join(own)} cannot vary: leave it out of the study.")
-        mesh = _mesh_called(own["mesh"], target.name, meshes) if "mesh" in own else target.mesh
+        mesh, name = target.mesh, own.get("mesh")
+        if name is not None:
+            if name not in meshes:
+                raise ParameterError(
+                    f"The mesh of '{target.name}' is '{name:.80}', and the study has no such file: check its name."
+                )
+            mesh = _shape_in(meshes[name])
         if own.get("scale", 1.0) != 1.0:
             mesh = replace(mesh, vertices=mesh.vertices * own["scale"])
         targets[index] = target = replace(target, mesh=mesh)
@@ -290,12 +270,6 @@ def _with_shapes(scenario: Scenario, grouped: Mapping[str, list], meshes: Mappin
             center, inertia, _ = mass_properties(target.mesh, body.mass, body.name)
             bodies[target.body] = replace(body, center_of_mass=center, inertia=inertia)
     return replace(scenario, targets=tuple(targets), bodies=tuple(bodies))
-
-
-def _mesh_called(name: str, target: str, meshes: Mapping[str, Path]) -> TriangleMesh:
-    if name not in meshes:
-        raise ParameterError(f"The mesh of '{target}' is '{name:.80}', and the study has no such file: check its name.")
-    return _shape_in(meshes[name])
 
 
 @lru_cache(maxsize=MOST_MESHES_KEPT)

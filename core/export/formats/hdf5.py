@@ -17,15 +17,12 @@ from ...io.file_writing import atomic_write
 from ...jobs import Job
 from ..exporter import UNITS, Exporter, bake_arrays, sensor_progress
 
-_GROWTH_BYTES = 1 << 24
-"""By which the file in memory grows."""
-
 
 def write_hdf5(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Path]]:
     """Write ``palpate.h5``. The library makes it in memory, because it crashes on a write that fails, as on a full disk."""
     h5py = imported("h5py", "HDF5")
     recording, path = bake.recording, folder / "palpate.h5"
-    with h5py.File(path.name, "w", driver="core", backing_store=False, block_size=_GROWTH_BYTES) as file:
+    with h5py.File(path.name, "w", driver="core", backing_store=False, block_size=1 << 24) as file:  # bytes by which it grows
         file.attrs.update({"format": "palpate-hdf5/1", "digest": recording.digest, "dt": recording.dt})
         _dataset(file, "frame", recording.frames, "1")
         _dataset(file, "time", recording.times, "s")

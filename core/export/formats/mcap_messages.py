@@ -30,8 +30,8 @@ WRENCH = "geometry_msgs/msg/WrenchStamped"
 POINT = "geometry_msgs/msg/PointStamped"
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
 
-_UINT8, _FLOAT32 = 2, 7
-_FIELD_TYPES = {"|u1": _UINT8, "<f4": _FLOAT32}
+_FIELD_TYPES = {"|u1": 2, "<f4": 7}
+"""UINT8 and FLOAT32 of a ``PointField``."""
 
 
 @cache
@@ -65,39 +65,19 @@ def _message(kind: str, *values: Any) -> bytes:
     return bytes(_store().serialize_cdr(_part(kind, *values), kind))
 
 
-def point_cloud(time: int, frame: str, points: np.ndarray) -> bytes:
-    """Return a ``PointCloud2``.
-
-    Parameters
-    ----------
-    time : int, nanoseconds
-    frame : str
-    points : (n,) structured array
-        Its fields, float32 or uint8, become the fields of the points; x, y and z are among them.
-    """
+def point_cloud(header: Any, points: np.ndarray) -> bytes:
+    """Return a ``PointCloud2`` with the fields, float32 or uint8, of a structured array (n,), x, y and z among them."""
     kinds = points.dtype.fields or {}
     about = ((name, offset, _FIELD_TYPES[kind.str], 1) for name, (kind, offset, *_) in kinds.items())
     fields = [_part("sensor_msgs/msg/PointField", *one) for one in about]
     data = np.frombuffer(points.tobytes(), np.uint8)
-    return _message(
-        POINT_CLOUD, _header(time, frame), 1, len(points), fields, False, points.dtype.itemsize, points.nbytes, data, True
-    )
+    return _message(POINT_CLOUD, header, 1, len(points), fields, False, points.dtype.itemsize, points.nbytes, data, True)
 
 
-def image(time: int, frame: str, pixels: np.ndarray) -> bytes:
+def image(header: Any, pixels: np.ndarray) -> bytes:
     """Return an ``Image`` of one float32 channel (``32FC1``); `pixels` is (height, width), the top row first."""
     data = np.frombuffer(np.ascontiguousarray(pixels, "<f4").tobytes(), np.uint8)
-    return _message(IMAGE, _header(time, frame), *pixels.shape, "32FC1", 0, 4 * pixels.shape[1], data)
-
-
-def wrench(time: int, frame: str, force: np.ndarray, torque: np.ndarray) -> bytes:
-    """Return a ``WrenchStamped`` of a force (N) and a torque (N·m), (3,) each."""
-    return _message(WRENCH, _header(time, frame), _part("geometry_msgs/msg/Wrench", _vector(force), _vector(torque)))
-
-
-def point(time: int, frame: str, position: np.ndarray) -> bytes:
-    """Return a ``PointStamped`` at a position, (3,) m."""
-    return _message(POINT, _header(time, frame), _part("geometry_msgs/msg/Point", *map(float, position)))
+    return _message(IMAGE, header, *pixels.shape, "32FC1", 0, 4 * pixels.shape[1], data)
 
 
 def transforms(time: int, parent: str, children: Sequence[str], poses: np.ndarray) -> bytes:
@@ -112,10 +92,8 @@ def transforms(time: int, parent: str, children: Sequence[str], poses: np.ndarra
 
 WORLD = "world"
 """Frame of the world."""
-POINT_FIELDS = ("x", "y", "z", "normal_force", "shear_x", "shear_y", "reading", "depth", "slip")
-"""Fields of a texel in the point cloud, float32; ``contact`` follows as a byte."""
-_POINT = np.dtype([*((name, "<f4") for name in POINT_FIELDS), ("contact", "u1")])
-_CHUNK_BYTES = 1 << 20
+_TEXEL = [*((name, "<f4") for name in ("normal_force", "shear_x", "shear_y", "reading", "depth", "slip")), ("contact", "u1")]
+"""Fields of a texel in the point cloud, behind its position."""
 
 
 def write_mcap(bake: Bake, folder: Path, style: FigureStyle) -> Job[list[Path]]:
@@ -127,7 +105,7 @@ def write_mcap(bake: Bake, folder: Path, style: FigureStyle) -> Job[list[Path]]:
 
     path = folder / "palpate.mcap"
     with atomic_write(path) as temporary, open(temporary, "wb") as file:
-        writer = Writer(file, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD)
+        writer = Writer(file, chunk_size=1 << 20, compression=CompressionType.ZSTD)
         writer.start(profile=Profile.ROS2, library="palpate")
         output = _Output(writer, bake, style.shown)
         names, frames = list(bake.texels), len(bake.recording.frames)
@@ -149,37 +127,24 @@ class _Output:
         self._schemas: dict[str, int] = {}
         recording = bake.recording
         self._bodies = _frame_names(recording.body_names)
-        self._frames = {name: self._frame_of(name) for name in bake.texels}
-        topics = topic_names(bake.texels)
-        kinds = {
-            "texels": POINT_CLOUD,
-            "tactile_image": IMAGE,
-            "wrench": WRENCH,
-            "centre_of_pressure": POINT,
-        }
+        carriers = {name: manifest.body for name, manifest in bake.manifests.items()}
+        others = {name: name if name != WORLD else f"{name}_" for name in bake.texels}  # of a sensor whose body is not known
+        self._frames = {name: self._bodies.get(carriers.get(name, ""), other) for name, other in others.items()}
+        self._topics = topic_names(bake.texels)
+        kinds = {"texels": POINT_CLOUD, "tactile_image": IMAGE, "wrench": WRENCH, "centre_of_pressure": POINT}
         self._transforms = self._channel("/tf", TRANSFORMS)
         self._channels = {
             name: {what: self._channel(f"{topic}/{what}", kind) for what, kind in kinds.items()}
-            for name, topic in topics.items()
+            for name, topic in self._topics.items()
         }
-        self._points = {name: np.zeros(len(texels), _POINT) for name, texels in bake.texels.items()}
+        self._points = {name: _points_at(texels.position, _TEXEL) for name, texels in bake.texels.items()}
         for name, recorded in recording.sensors.items():
             if recorded.channels is not None:
-                self._channels[name]["channels"] = self._channel(f"{topics[name]}/channels", POINT_CLOUD)
-        for name, texels in bake.texels.items():
-            for axis, values in zip("xyz", texels.position.T):
-                self._points[name][axis] = values
-
-    def _frame_of(self, sensor: str) -> str:
-        """Name of the frame in which a sensor's texels are given: its body's."""
-        manifest = self._bake.manifests.get(sensor)
-        body = manifest.body if manifest is not None else ""
-        return self._bodies.get(body, sensor if sensor != WORLD else f"{sensor}_")
+                self._channels[name]["channels"] = self._channel(f"{self._topics[name]}/channels", POINT_CLOUD)
 
     def _channel(self, topic: str, kind: str) -> int:
         if kind not in self._schemas:
-            text = definition(kind).encode()
-            self._schemas[kind] = self._writer.register_schema(kind, "ros2msg", text)
+            self._schemas[kind] = self._writer.register_schema(kind, "ros2msg", definition(kind).encode())
         return int(self._writer.register_channel(topic, "cdr", self._schemas[kind]))
 
     def write(self, part: Recording) -> None:
@@ -189,20 +154,22 @@ class _Output:
             poses = transforms(time, WORLD, list(self._bodies.values()), part.poses[i])
             self._message(self._transforms, time, int(part.frames[i]), poses)
             for name, recorded in part.sensors.items():
-                own, frame, points = recorded.at(i), self._frames[name], self._points[name]
+                own, header, points = recorded.at(i), _header(time, self._frames[name]), self._points[name]
                 for field in ("normal_force", "reading", "depth", "slip", "contact"):
                     points[field] = getattr(own, field)
                 points["shear_x"], points["shear_y"] = own.shear.T
                 texels = self._bake.texels[name]
                 picture = texels.layout.image(self._shown.values(own, texels))[::-1]
+                wrench = _part("geometry_msgs/msg/Wrench", _vector(own.net_force), _vector(own.net_torque))
+                centre = _part("geometry_msgs/msg/Point", *map(float, own.centre_of_pressure))
                 content = {
-                    "texels": point_cloud(time, frame, points),
-                    "tactile_image": image(time, frame, picture),
-                    "wrench": wrench(time, frame, own.net_force, own.net_torque),
-                    "centre_of_pressure": point(time, frame, own.centre_of_pressure),
+                    "texels": point_cloud(header, points),
+                    "tactile_image": image(header, picture),
+                    "wrench": _message(WRENCH, header, wrench),
+                    "centre_of_pressure": _message(POINT, header, centre),
                 }
                 if own.channels is not None:
-                    content["channels"] = point_cloud(time, frame, _vector_points(own.channels))
+                    content["channels"] = point_cloud(header, _vector_points(own.channels))
                 for what, message in content.items():
                     self._message(self._channels[name][what], time, int(part.frames[i]), message)
 
@@ -228,16 +195,21 @@ class _Output:
             if channels is not None:
                 content["channels"] = described(channels)
             text = json.dumps(content, allow_nan=False).encode()
-            self._writer.add_attachment(0, 0, f"{topic_names(self._bake.texels)[name][1:]}.json", "application/json", text)
+            self._writer.add_attachment(0, 0, f"{self._topics[name][1:]}.json", "application/json", text)
+
+
+def _points_at(positions: np.ndarray, fields: list[tuple[str, str]]) -> np.ndarray:
+    """Return the points of a cloud at (n, 3) positions, whose other fields are zero."""
+    points = np.zeros(len(positions), [*((axis, "<f4") for axis in "xyz"), *fields])
+    points["x"], points["y"], points["z"] = positions.T
+    return points
 
 
 def _vector_points(channels: VectorReadings) -> np.ndarray:
     """Return the points of a cloud where channels are measured, with a field ``channel_<name>`` for each."""
     own = [f"channel_{name}" for name in channels.names]
-    points = np.zeros(len(channels.values), [(name, "<f4") for name in (*"xyz", *own)])
-    if channels.place is not None:
-        for axis, values in zip("xyz", channels.place.T, strict=True):
-            points[axis] = values
+    places = np.zeros((len(channels.values), 3)) if channels.place is None else channels.place
+    points = _points_at(places, [(name, "<f4") for name in own])
     for name, values in zip(own, channels.values.T, strict=True):
         points[name] = values
     return points

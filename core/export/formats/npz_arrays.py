@@ -22,11 +22,10 @@ def write_npz(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Path]]:
         yield sensor_progress(bake, name)
         path = folder / f"{stem}.npz"
         channels = bake.recording.sensors[name].channels
-        about = (
-            {} if channels is None else {"channels_names": np.array(channels.names), "channels_unit": np.array(channels.unit)}
-        )
-        clock = {"frame": bake.recording.frames, "time": bake.recording.times}
-        write_arrays(path, {**clock, **bake_arrays(bake, name), **about})
+        arrays = {"frame": bake.recording.frames, "time": bake.recording.times, **bake_arrays(bake, name)}
+        if channels is not None:
+            arrays |= {"channels_names": np.array(channels.names), "channels_unit": np.array(channels.unit)}
+        write_arrays(path, arrays)
         written.append(path)
     return written
 

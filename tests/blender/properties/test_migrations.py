@@ -8,7 +8,7 @@ from blender_scenes import press, raw_settings, reopen, save
 from palpate.addon.properties import migrations
 from palpate.addon.properties.migrations import VERSION
 from palpate.addon.session import session_state
-from palpate.core.io.hidden_folder import FolderLock
+from palpate.core.io.hidden_folder import lock_folder
 
 
 def test_a_newer_file_is_left_alone_and_it_is_said(tmp_path):
@@ -75,5 +75,5 @@ def save_scene_with(folder, private_folder):
     press()
     (folder / "palpate").mkdir(parents=True)
     if private_folder:
-        FolderLock(folder / "palpate").release()
+        lock_folder(folder / "palpate").release()
     return save(folder)

@@ -41,7 +41,8 @@ def ball():
 def test_a_property_says_what_it_is_and_takes_values(ball, path, kind, bounds):
     found = scene_overrides.describe(path)
     assert (found.name, found.kind) == (path, kind)
-    assert bounds is None or found.variable().bounds == bounds
+    limits = found.variable().specification
+    assert bounds is None or (limits.low, limits.high) == bounds
     value = {"number": 2.5, "whole number": 4, "switch": False, "choice": found.choices[-1:]}[kind]
     value = value[0] if kind == "choice" else value
     scene_overrides.apply({path: value})

@@ -12,7 +12,7 @@ from palpate.core.io.file_writing import atomic_write
 from palpate.core.io.hidden_folder import (
     LOCK_NAME,
     PRIVATE_FOLDER,
-    FolderLock,
+    lock_folder,
     remove_abandoned,
     remove_own_files,
     temporary_folder,
@@ -21,9 +21,9 @@ from palpate.core.io.hidden_folder import (
 PROGRAM = """
 import os, sys
 from pathlib import Path
-from palpate.core.io.hidden_folder import FolderLock, temporary_folder
+from palpate.core.io.hidden_folder import lock_folder, temporary_folder
 place = Path(sys.argv[1])
-lock = FolderLock(place)
+lock = lock_folder(place)
 with temporary_folder(place, "video") as folder:
     (folder / "half.png").write_text("half")
     print("working", flush=True)
@@ -47,19 +47,19 @@ def temporary(folder):
 
 def test_a_second_process_is_refused_until_the_first_ends(other, tmp_path):
     with pytest.raises(FileError, match=r"^Another bake is writing to '.*': wait for it, or choose another folder\.$"):
-        FolderLock(tmp_path)
+        lock_folder(tmp_path)
     other.kill()
     other.wait()
-    FolderLock(tmp_path).release()
+    lock_folder(tmp_path).release()
     assert [path.name for path in (tmp_path / PRIVATE_FOLDER).iterdir()] == [LOCK_NAME]
 
 
 def test_one_process_locks_a_folder_once(tmp_path):
-    lock = FolderLock(tmp_path, "sweep")
+    lock = lock_folder(tmp_path, "sweep")
     with pytest.raises(FileError, match="^Another sweep is writing to"):
-        FolderLock(tmp_path, "sweep")
+        lock_folder(tmp_path, "sweep")
     lock.release()
-    FolderLock(tmp_path, "sweep").release()
+    lock_folder(tmp_path, "sweep").release()
 
 
 def test_what_killed_processes_have_left_is_removed_and_nothing_else(other, tmp_path):
@@ -100,14 +100,14 @@ def test_a_hidden_folder_of_the_user_s_is_refused(tmp_path, what):
         else:
             (place / "notes.txt").write_text("mine")
     with pytest.raises(FileError, match="was not made by Palpate|could not be made"):
-        FolderLock(place.parent)
+        lock_folder(place.parent)
     assert (mine / LOCK_NAME).read_text() == "mine"
 
 
 def test_the_hidden_folder_of_an_earlier_version_is_ours(tmp_path):
     (tmp_path / PRIVATE_FOLDER).mkdir()
     (tmp_path / PRIVATE_FOLDER / "palpate-folder.json").write_text("{}")
-    FolderLock(tmp_path).release()
+    lock_folder(tmp_path).release()
     assert sorted(path.name for path in (tmp_path / PRIVATE_FOLDER).iterdir()) == ["palpate-folder.json", LOCK_NAME]
 
 
@@ -115,6 +115,6 @@ def test_the_hidden_folder_of_an_earlier_version_is_ours(tmp_path):
 def test_a_read_only_folder_is_one_sentence(tmp_path):
     tmp_path.chmod(0o500)
     with pytest.raises(FileError, match="could not be made"):
-        FolderLock(tmp_path)
+        lock_folder(tmp_path)
     with pytest.raises(FileError, match="No folder can be made"), temporary_folder(tmp_path, "video"):
         pass
