@@ -8,7 +8,7 @@ from collections import Counter
 from pathlib import Path
 
 from ..core.errors import FileError
-from ..core.io.file_writing import atomic_write, writable_file
+from ..core.io.file_writing import writable_file, write_text
 from . import checks, console
 
 
@@ -49,7 +49,6 @@ def run(arguments: argparse.Namespace) -> int:
             rows.append(gap_table.row_of(gap.diagnosis, gap.errors, by_hand.get(rig.name)))
     print(console.text_table(gap_table.cells(rows), "<>>>><"))
     if arguments.out:
-        with atomic_write(arguments.out) as path:
-            path.write_text(gap_table.markdown(rows), encoding="utf-8", newline="\n")
+        write_text(arguments.out, gap_table.markdown(rows))
         print(f"wrote: {arguments.out}")
     return 0

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..core.figures.html_templates import render_html
-from ..core.io.file_writing import atomic_write
+from ..core.io.file_writing import write_text
 from .chapter import Chapter
 
 TEMPLATE = Path(__file__).parent / "templates" / "paper.html"
@@ -28,5 +28,4 @@ def write_page(path: Path, chapters: Sequence[Chapter], seconds: float) -> None:
         links={picture: picture.relative_to(folder).as_posix() for picture in pictures},
         vectors={picture: file.relative_to(folder).as_posix() for picture, file in vectors.items() if file.exists()},
     )
-    with atomic_write(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(path, text)

@@ -19,7 +19,7 @@ from ..core.figures.html_templates import render_html
 from ..core.figures.quantities import Extent
 from ..core.figures.tactile_image import SensorView, draw_colour_bar
 from ..core.geometry.texels import Texels
-from ..core.io.file_writing import atomic_write
+from ..core.io.file_writing import write_text
 from ..core.io.hidden_folder import temporary_folder
 from ..core.study.study_file import Study
 from .dataset import TABLE_NAME, TIMINGS_NAME, UNNAMED_STUDY
@@ -117,8 +117,7 @@ def write_report(folder: Path, study: Study) -> None:
         pictures=pictures,
         shown=_shown_sentence(values, metrics, *drawn),
     )
-    with atomic_write(folder / REPORT_NAME) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+    write_text(folder / REPORT_NAME, page)
 
 
 def _seconds_of(timings: Path) -> float:

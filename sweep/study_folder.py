@@ -19,7 +19,7 @@ from pathlib import Path
 
 from ..core.errors import FileError
 from ..core.io.bake_folder import folder_names
-from ..core.io.file_writing import atomic_write, file_sha256, writable_folder
+from ..core.io.file_writing import file_sha256, writable_folder, write_text
 from ..core.io.scenario_npz import load_scenario, save_scenario
 from ..core.model.scenario import Scenario
 from ..core.study.design import MESHES, find_meshes, freeze_meshes, mesh_copy
@@ -126,8 +126,7 @@ def _frozen(study: Study, file: Path, folder: Path, sources: Mapping[str, Path],
     mesh_entries = tuple(FrozenFile(name, copy.stem) for name, copy in meshes.items())
     frozen = Frozen(VERSION, len(runs), tuple(entries), mesh_entries)
     text = frozen_text(file.read_text(encoding="utf-8"), frozen)
-    with atomic_write(folder / STUDY_NAME) as fresh:
-        fresh.write_text(text, encoding="utf-8", newline="\n")
+    write_text(folder / STUDY_NAME, text)
     return OpenStudy(folder, study, plans, runs)
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import bpy
 
 from ...core.errors import ParameterError, SceneError
-from ...core.io.file_writing import atomic_write, writable_file
+from ...core.io.file_writing import writable_file, write_text
 from ...core.model.body import DRIVE_PARAMETERS
 from ...core.model.parameter import Choice, ChoiceParameter, Parameter, Specification
 from ...core.model.sensor_parameters import SENSOR_PARAMETERS
@@ -254,6 +254,5 @@ def write_study(scene) -> Path:
     with suppress(ValueError):  # on another drive
         tables["scene"] = Path(os.path.relpath(tables["scene"], path.parent)).as_posix()
     study_file.study_of(tables, path.name)
-    with atomic_write(path) as fresh:
-        fresh.write_text(tomli_w.dumps(tables), encoding="utf-8", newline="\n")
+    write_text(path, tomli_w.dumps(tables))
     return path

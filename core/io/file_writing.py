@@ -65,6 +65,12 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
         unfinished.discard(temporary)
 
 
+def write_text(path: str | os.PathLike, text: str) -> None:
+    """Write a file of text whole (see :func:`atomic_write`): in UTF-8, and with the same line ends on every system."""
+    with atomic_write(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
 def require_replaceable(path: str | os.PathLike) -> None:
     """Raise FileError if something is at `path` that no file may replace: a folder, a device, or a file that is read-only."""
     require_name(path)
@@ -207,9 +213,10 @@ def require_space(folder: str | os.PathLike, needed: float, what: str) -> None:
         There is less space.
     """
     place = Path(os.path.abspath(folder))
-    while not os.path.exists(place):
-        place = place.parent
-    free = shutil.disk_usage(place).free
+    existing = next((one for one in (place, *place.parents) if os.path.exists(one)), None)
+    if existing is None:
+        raise FileError(f"'{folder}' is on a drive that is not there: choose another folder.")
+    free = shutil.disk_usage(existing).free
     if free < needed:
         raise FileError(
             f"{what} needs up to {needed / 1e6:.0f} MB and the disk of '{folder}' has {free / 1e6:.0f} MB left: "

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import FileError, os_error_reason
-from .file_writing import atomic_write, file_sha256, require_replaceable, unfinished, writable_folder
+from .file_writing import atomic_write, file_sha256, require_replaceable, unfinished, writable_folder, write_text
 from .input_files import read_bytes
 
 if TYPE_CHECKING:
@@ -258,8 +258,7 @@ class FileList:
         """Write the list with these kinds; the others are as they were."""
         self._kinds |= kinds
         content = {"format": LIST_FORMAT, "exports": self._kinds}
-        with atomic_write(self._folder / LIST_NAME) as temporary:
-            temporary.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+        write_text(self._folder / LIST_NAME, json.dumps(content, indent=1) + "\n")
 
 
 def remove_own_files() -> None:

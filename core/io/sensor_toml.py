@@ -32,7 +32,7 @@ from ..effects.engine.registry import check, from_dict, to_dict
 from ..errors import FileError, PalpateError
 from ..model.sensor import Effect
 from ..model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters, stated_parameters
-from .file_writing import atomic_write
+from .file_writing import write_text
 from .input_files import checked_name, is_number, read_toml
 from .schema import Name, known_words, read_words, wanted
 
@@ -80,8 +80,7 @@ def write_sensor(path: str | os.PathLike, model: SensorModel) -> None:
     if model.effects:
         table["effect"] = [to_dict(item) for item in model.effects]
     text = tomli_w.dumps(table)
-    with atomic_write(path) as fresh:
-        fresh.write_text(text, encoding="utf-8", newline="\n")
+    write_text(path, text)
 
 
 def read_sensor(path: str | os.PathLike) -> SensorModel:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from ..errors import FileError, ParameterError
-from ..io.file_writing import atomic_write
+from ..io.file_writing import write_text
 from ..io.input_files import read_toml
 from ..io.schema import read_json
 from ..model.parameter import Choice, ChoiceParameter, Parameter, Specification
@@ -88,8 +88,7 @@ def write_overrides(path: str | os.PathLike, values: Mapping[str, Any]) -> None:
     import tomli_w
 
     text = tomli_w.dumps({"format": OVERRIDES_FORMAT, OVERRIDES: dict(values)})
-    with atomic_write(path) as fresh:
-        fresh.write_text(text, encoding="utf-8", newline="\n")
+    write_text(path, text)
 
 
 def read_overrides(path: str | os.PathLike) -> dict[str, Any]:
@@ -114,9 +113,8 @@ def read_overrides(path: str | os.PathLike) -> dict[str, Any]:
 def write_properties(path: str | os.PathLike, properties: Iterable[SceneProperty]) -> None:
     """Write what properties of a scene are; :class:`FileError` if that fails."""
     rows = [asdict(item) for item in properties]
-    with atomic_write(path) as fresh:
-        text = json.dumps({"format": PROPERTIES_FORMAT, "properties": rows}, ensure_ascii=False, indent=1)
-        fresh.write_text(text + "\n", encoding="utf-8", newline="\n")
+    text = json.dumps({"format": PROPERTIES_FORMAT, "properties": rows}, ensure_ascii=False, indent=1)
+    write_text(path, text + "\n")
 
 
 def read_properties(path: str | os.PathLike) -> dict[str, SceneProperty]:

@@ -13,7 +13,7 @@ from ...figures.figure_canvas import save_pixels
 from ...figures.figure_style import FigureStyle
 from ...io.bake_folder import folder_names
 from ...io.bake_reader import Bake
-from ...io.file_writing import atomic_write, writable_folder
+from ...io.file_writing import writable_folder, write_text
 from ...io.tactile_exr import channel_layout
 from ...jobs import Job
 from ...model.recording import row_blocks
@@ -56,8 +56,7 @@ def _save(path: Path, pixels: np.ndarray, shape: tuple[int, ...]) -> None:
 def _write_scale(path: Path, quantity: str, ends: tuple[float, float], colour_map: str) -> None:
     """Write the colour scale of pictures as JSON."""
     scale = {"quantity": quantity, "first_colour": ends[0], "last_colour": ends[1], "colour_map": colour_map}
-    with atomic_write(path) as temporary:
-        temporary.write_text(json.dumps(scale, indent=2) + "\n", encoding="utf-8")
+    write_text(path, json.dumps(scale, indent=2) + "\n")
 
 
 def _write_channels(bake: Bake, name: str, folder: Path) -> list[Path]:

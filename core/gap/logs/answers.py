@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from ...errors import FileError, counted
-from ...io.file_writing import atomic_write, writable_folder
+from ...io.file_writing import writable_folder, write_text
 from ...io.input_files import checked_name, read_toml
 from ...io.schema import WORD, Name, Seconds, known_words, read_words, wanted
 from ..dataset.column_names import QUANTITIES, Column, read_column
@@ -126,8 +126,7 @@ def answers_or_template(proposal: Proposal, folder: str | os.PathLike, advice: s
     path = Path(folder) / ANSWERS_NAME
     questions = proposal.questions
     if not path.exists():
-        with atomic_write(writable_folder(folder, create=True) / ANSWERS_NAME) as temporary:
-            temporary.write_text(proposal.text, encoding="utf-8", newline="\n")
+        write_text(writable_folder(folder, create=True) / ANSWERS_NAME, proposal.text)
     elif questions:
         raise FileError(f"'{path}' has answers already: give it with --answers, or remove it for a new template.")
     if questions:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...errors import FileError
 from ...io.csv_table import LARGEST_NUMBER
-from ...io.file_writing import atomic_write, writable_folder
+from ...io.file_writing import atomic_write, writable_folder, write_text
 from ...io.hidden_folder import FileList
 from ...jobs import Job, Progress
 from ..dataset.column_names import POSE, QUANTITIES, Column
@@ -93,8 +93,7 @@ def write_rig(logs: Sequence[LogFile], answers: Answers, folder: str | os.PathLi
             tables = [_columns_of(by_name, file, answers, notes) for file in recording.files]
             trials.append(_trial(recording, tables, names[recording.name], new, notes))
         text = _rig_text(answers, trials, notes)
-        with atomic_write(new / RIG_NAME) as temporary:
-            temporary.write_text(text, encoding="utf-8", newline="\n")
+        write_text(new / RIG_NAME, text)
         rig = read_rig(new / RIG_NAME)
         files.replace(new, {"rig": [*sorted(new.glob("*.csv")), new / RIG_NAME]})
     return NewRig(folder / RIG_NAME, rig, tuple(dict.fromkeys(notes)))

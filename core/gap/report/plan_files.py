@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...io.file_writing import atomic_write
+from ...io.file_writing import atomic_write, write_text
 from ...io.hidden_folder import FileList
 from ..planning.experiment_plan import ExperimentPlan, PlannedExperiment
 from ..planning.paths import Trajectory
@@ -105,8 +105,7 @@ def write_plan(plan: ExperimentPlan, folder: Path) -> list[Path]:
         if one is not None:
             write_trajectory(one.trajectory, new / TRAJECTORY)
             made.append(new / TRAJECTORY)
-        with atomic_write(new / PLAN) as temporary:
-            temporary.write_text(json.dumps(words, indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+        write_text(new / PLAN, json.dumps(words, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
         return files.replace(new, {"plan": made})
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import PalpateError
-from ...io.file_writing import atomic_write
+from ...io.file_writing import write_text
 from ...io.hidden_folder import FileList
 from ...io.sensor_toml import write_sensor
 from ...jobs import Job, Progress, part_of_job
@@ -171,11 +171,8 @@ def write_report(result: Diagnosis, folder: Path, errors: GapErrors) -> Job[None
             experiment, notes = None, [f"No further recording was planned: {error}"]
         yield Progress("writing the report", 900, 1000)
         found = summary(result, errors, experiment, notes)
-        with atomic_write(new / "report.html") as temporary:
-            text = html_report(result, found, headline(result, errors), pictures, new)
-            temporary.write_text(text, encoding="utf-8")
-        with atomic_write(new / "gap.json") as temporary:
-            temporary.write_text(json.dumps(found, indent=2, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+        write_text(new / "report.html", html_report(result, found, headline(result, errors), pictures, new))
+        write_text(new / "gap.json", json.dumps(found, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
         made = [f"{name}.{kind}" for name in pictures for kind in FILE_TYPES]
         if experiment is not None:
             write_trajectory(experiment.trajectory, new / NEXT_TRAJECTORY)

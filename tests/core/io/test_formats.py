@@ -190,6 +190,13 @@ def test_a_disk_that_is_too_small_is_named(tmp_path):
         require_space(tmp_path / "not" / "yet", 1e24, "The bake")
 
 
+def test_a_drive_that_is_not_there_is_named(monkeypatch):
+    """As Z: on Windows, of which no folder exists."""
+    monkeypatch.setattr(os.path, "exists", lambda _: False)
+    with pytest.raises(FileError, match="is on a drive that is not there: choose another folder"):
+        require_space("Z:/bakes", 1.0, "The bake")
+
+
 # --- names
 
 
