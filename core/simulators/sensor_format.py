@@ -17,12 +17,13 @@ import numpy as np
 from ..errors import FileError, PalpateError, SensorError
 from ..geometry.mesh import TriangleMesh, checked_mesh
 from ..geometry.texels import texels_with_normals
+from ..io.bake_folder import folder_names
 from ..io.file_writing import atomic_write, writable_folder
 from ..io.hidden_folder import FileList
 from ..io.input_files import require_xml_text
 from ..model.sensor import Effect, Sensor
 from ..model.sensor_parameters import SensorParameters
-from .sensor_on_mesh import SensorOnMesh
+from .sensor_on_mesh import SensorOnMesh, identifiers
 
 LARGEST_SENSOR, SMALLEST_SENSOR = 3.0, 2e-4
 """Metres. The largest sensors are mats and floors of 2 m; the smallest, on tips of catheters, have 1 mm."""
@@ -169,11 +170,6 @@ class FoundSensor:
         return SensorOnMesh(sensor, mesh, self.surface, self.frame_position, self.frame_quaternion)
 
 
-Write = Callable[[Sequence[SensorOnMesh], Path], Written]
-Read = Callable[[str | os.PathLike], list[FoundSensor]]
-Holds = Callable[[str | os.PathLike], bool]
-
-
 @dataclass(frozen=True)
 class SensorFormat:
     """A format that sensors can be written in, read from, or both.
@@ -185,7 +181,8 @@ class SensorFormat:
     title, description : str
         As in Blender's menus.
     write : callable or None
-        Takes the sensors and an empty folder, and returns the files that it wrote, in that folder or in a folder in it.
+        Takes a sensor, the path of its files without their ending, and an identifier; returns the files that it wrote. No two
+        sensors of an export have the same path, or the same identifier, which is a word of ASCII letters, digits and ``_``.
     read : callable or None
         Takes the path of a file and returns its sensors; raises FileError for a file that is damaged.
     holds : callable or None
@@ -196,9 +193,9 @@ class SensorFormat:
     name: str
     title: str
     description: str
-    write: Write | None = None
-    read: Read | None = None
-    holds: Holds | None = None
+    write: Callable[[SensorOnMesh, Path, str], Written] | None = None
+    read: Callable[[str | os.PathLike], list[FoundSensor]] | None = None
+    holds: Callable[[str | os.PathLike], bool] | None = None
 
 
 FORMATS = f"{__package__}.formats"
@@ -249,9 +246,11 @@ def export_sensors(sensors: Sequence[SensorOnMesh], kind: str, folder: str | os.
         raise PalpateError("There is no sensor to write: make one with Physics › Palpate › Make Sensor.")
     folder = writable_folder(folder, create=True)
     files = FileList(folder)
+    stems, words = folder_names(item.name for item in sensors), identifiers(item.name for item in sensors)
     with files.new_files("sensor") as new:
-        written = write(sensors, new)
-        return Written(files.replace(new, {f"sensor {kind}": written.files}), written.notes)
+        written = [write(item, new / stems[item.name], words[item.name]) for item in sensors]
+        made = files.replace(new, {f"sensor {kind}": [file for one in written for file in one.files]})
+        return Written(made, [note for one in written for note in one.notes])
 
 
 def import_sensors(path: str | os.PathLike) -> tuple[SensorFormat, list[FoundSensor]]:
@@ -269,15 +268,16 @@ def import_sensors(path: str | os.PathLike) -> tuple[SensorFormat, list[FoundSen
     FileError
         There is no such file, it is damaged, or it holds no sensor of a known format.
     """
-    readable = [item for item in formats().values() if item.read is not None and item.holds is not None]
-    for item in readable:
-        if item.holds is not None and item.read is not None and item.holds(path):
-            found = item.read(path)
-            for sensor in found:
-                _require_finite(path, sensor)
-            return item, found
-    titles = ", ".join(item.title for item in readable)
-    raise FileError(f"'{path}' holds no sensor that can be read: give a file of one of these, {titles}.")
+    titles = []
+    for item in formats().values():
+        if item.read is not None and item.holds is not None:
+            if item.holds(path):
+                found = item.read(path)
+                for sensor in found:
+                    _require_finite(path, sensor)
+                return item, found
+            titles.append(item.title)
+    raise FileError(f"'{path}' holds no sensor that can be read: give a file of one of these, {', '.join(titles)}.")
 
 
 def _require_finite(path: str | os.PathLike, sensor: FoundSensor) -> None:
