@@ -19,7 +19,7 @@ from ..errors import ParameterError
 from ..geometry.rotations import rotation_matrices
 from ..solver.pressed_model import PressedModel
 from ..solver.pressing import Environment, PressedTexels, begin_at, stacked_states
-from .load_search import DONE, PHASE, LoadSearch, advance_search, begin_search, forget_load, place_trial, residual
+from .load_search import DONE, PHASE, LoadSearch, advance_search, begin_search, forget_load, place_trial
 
 
 class LoadBalance:
@@ -50,7 +50,8 @@ class LoadBalance:
         count = len(environments)
         self._out, self._environments, self._press = out, environments, press
         self._search = LoadSearch.of(model.sensor.texels, model.sensor.parameters.max_penetration, count)
-        self._engine, self._rotation, self._residual = np.zeros((count, 7)), np.zeros((count, 3, 3)), np.zeros((count, 6))
+        self._engine, self._rotation = np.zeros((count, 7)), np.zeros((count, 3, 3))
+        self._units = np.where(np.arange(6) < 3, -1.0, -self._search.extent[1])
         self._normals, self._degrees = model.sensor.texels.normal, 0
         self._states = stacked_states(environments)
         self._saved = [np.empty_like(field) for field in self._states]
@@ -103,8 +104,7 @@ class LoadBalance:
                 np.copyto(field, copy)
             self._press()
             going = _advance_searches(out.wrench, out.texels, self._engine, out.poses, self._search)
-        _write_residuals(self._residual, self._search)
-        return self._residual[:, :degrees].copy()
+        return (self._search.excess * self._units)[:, :degrees]
 
 
 def pulling_loads(given: np.ndarray, direction: np.ndarray, rotation: np.ndarray, normals: np.ndarray) -> np.ndarray:
@@ -183,11 +183,3 @@ def _advance_searches(
             place_trial(e, engine[e], poses[e, 1], search)
             going |= search.state[e, PHASE] != DONE
     return going
-
-
-@kernel
-def _write_residuals(out: np.ndarray, search: LoadSearch) -> None:
-    """Write the part of each load that the contact does not exert."""
-    for e in range(out.shape[0]):
-        for i in range(6):
-            out[e, i] = residual(e, i, search)

@@ -211,12 +211,6 @@ def place_trial(e: int, engine: np.ndarray, pose: np.ndarray, search: LoadSearch
 
 
 @kernel
-def residual(e: int, i: int, search: LoadSearch) -> float:
-    """Return a component of the load less what the contact exerts, N or N·m."""
-    return -search.excess[e, i] * (search.extent[1] if i >= 3 else 1.0)
-
-
-@kernel
 def _compare(e: int, wrench: np.ndarray, touching: bool, search: LoadSearch) -> None:
     """Write what the contact of a trial exerts more than the load, and where it exerted least."""
     push, degrees = 0.0, search.state[e, DEGREES]

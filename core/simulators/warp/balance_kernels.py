@@ -14,11 +14,11 @@ import numpy as np
 
 from ...geometry.bvh import Tree
 from ...geometry.rotations import write_rotation
-from ..load_search import DONE, PHASE, LoadSearch, advance_search, begin_search, forget_load, place_trial, residual
+from ...solver.pressing import are_poses
+from ..load_search import DONE, PHASE, LoadSearch, advance_search, begin_search, forget_load, place_trial
 from .block import block_sum, wait_for_block
 from .press_arrays import Jumps, Results, SensorArrays, Slots, TargetArrays, Worlds
 from .press_kernels import (
-    are_poses,
     begin_point,
     end_step,
     find_contact,
@@ -106,7 +106,8 @@ def balance_world(
     if first:
         worlds.fresh[world] = begins
         for i in range(6):
-            beginning.residual[world, i] = residual(world, i, search) if i < degrees else 0.0
+            unit = search.extent[1] if i >= 3 else 1.0
+            beginning.residual[world, i] = -search.excess[world, i] * unit if i < degrees else 0.0
     wait_for_block()
     for texel in range(lane, out.texels.shape[1], lanes):
         write_reading(world, texel, out.texels[world, texel, 0], sensor, worlds, slots, out)

@@ -37,6 +37,7 @@ from ...solver.dynamics.contact_assembly import LinearContact, Tangent, linearis
 from ...solver.dynamics.effect_kernels import FULL_STEP, NO_TIME
 from ...solver.dynamics.friction_state import relative_motion, velocity_at
 from ...solver.jumps import crosses_texel, meets_sphere
+from ...solver.pressing import are_poses, write_reaction
 from .block import block_sum, wait_for_block
 from .effect_functions import force_with_effects, friction_with_effects, reading_with_effects
 from .press_arrays import BoolArray, Jumps, Results, SensorArrays, Slots, TargetArrays, Worlds
@@ -165,20 +166,6 @@ def _relate_target(world: int, end: int, target: int, dt: float, worlds: Worlds)
         _write_row(turned, worlds.pose[world, target])
 
 
-def are_poses(poses: np.ndarray) -> bool:
-    """Whether all of the poses (b, 7) are finite, with quaternions that are not zero."""
-    good = True
-    for body in range(poses.shape[0]):
-        size, square = 0.0, 0.0
-        for i in range(7):
-            size += abs(poses[body, i])
-        for i in range(3, 7):
-            square += poses[body, i] * poses[body, i]
-        if not (size < math.inf and 0.0 < square < math.inf):
-            good = False
-    return good
-
-
 def place_next(pose: np.ndarray, position: np.ndarray, quaternion: np.ndarray) -> None:
     """Write a pose (7,) as position and unit quaternion."""
     w, x, y, z = pose[3], pose[4], pose[5], pose[6]
@@ -197,8 +184,7 @@ def _write_row(values: np.ndarray, out: np.ndarray) -> None:
 
 def _turn_motion(dt: float, step_motion: np.ndarray, rotation: np.ndarray, motion: np.ndarray, out: np.ndarray) -> None:
     """Write a relative motion (12,), given in the sensor's axes at the step's beginning, in those at its end."""
-    for i in range(12):
-        out[i] = motion[i]
+    _write_row(motion, out)
     for k in range(3):
         for m in range(3):
             turn = 0.0  # entry (m, k) of the sensor's W in its own axes
@@ -534,29 +520,13 @@ def sum_world(world: int, lane: int, lanes: int, sensor: SensorArrays, worlds: W
         fx, fy, fz = block_sum(fx), block_sum(fy), block_sum(fz)
         mx, my, mz = block_sum(mx), block_sum(my), block_sum(mz)
         if lane == 0:
-            _write_wrench((fx, fy, fz), (mx, my, mz), 1 + target, worlds.position[world], worlds.rotation[world],
-                          out.wrench[world, target])  # fmt: skip
+            net = np.zeros(6)
+            net[0], net[1], net[2], net[3], net[4], net[5] = fx, fy, fz, mx, my, mz
+            at, turned, sensor_body = worlds.position[world], worlds.rotation[world], worlds.poses.shape[1]  # at the step's end
+            write_reaction(net, turned[sensor_body], at[sensor_body], at[sensor_body + 1 + target], out.wrench[world, target])
     too_deep = block_sum(too_deep)
     if lane == 0:
         out.too_deep[world] = int(too_deep)
-
-
-def _write_wrench(
-    force: Vector, torque: Vector, target: int, position: np.ndarray, rotation: np.ndarray, wrench: np.ndarray
-) -> None:
-    """Write what a target exerts on the sensor, given about its origin in its frame, as the wrench (6,) on the target."""
-    sensor = position.shape[0] // 2  # at the step's end
-    body = sensor + target
-    for i in range(3):
-        wrench[i] = -(rotation[sensor, i, 0] * force[0] + rotation[sensor, i, 1] * force[1] + rotation[sensor, i, 2] * force[2])
-        wrench[3 + i] = -(rotation[sensor, i, 0] * torque[0] + rotation[sensor, i, 1] * torque[1]
-                          + rotation[sensor, i, 2] * torque[2])  # fmt: skip
-    x = position[sensor, 0] - position[body, 0]
-    y = position[sensor, 1] - position[body, 1]
-    z = position[sensor, 2] - position[body, 2]
-    wrench[3] += y * wrench[2] - z * wrench[1]
-    wrench[4] += z * wrench[0] - x * wrench[2]
-    wrench[5] += x * wrench[1] - y * wrench[0]
 
 
 def mark_jumps(world: int, lane: int, lanes: int, worlds: Worlds, jumps: Jumps, out: Results) -> None:
