@@ -33,6 +33,7 @@ from ...laws.friction import (
 )
 from ...laws.normal_force import normal_force, normal_tangent
 from ...solver.detection.narrow_phase import NEARLY_TOO_DEEP
+from ...solver.detection.shape_contacts import in_sensor_axes, in_target_axes, write_pose
 from ...solver.dynamics.contact_assembly import LinearContact, Tangent, linearise_contact
 from ...solver.dynamics.effect_kernels import FULL_STEP, NO_TIME
 from ...solver.dynamics.friction_state import relative_motion, velocity_at
@@ -162,7 +163,7 @@ def _relate_target(world: int, end: int, target: int, dt: float, worlds: Worlds)
         _turn_motion(dt, worlds.step_motion[world, 0], worlds.rotation[world, 0], motion, turned)
         _write_row(turned, worlds.end_motion[world, target])
     else:
-        write_pose(worlds.position[world], worlds.rotation[world], row, row + 1 + target, turned)
+        write_pose(row, row + 1 + target, worlds.position[world], worlds.rotation[world], turned)
         _write_row(turned, worlds.pose[world, target])
 
 
@@ -194,21 +195,6 @@ def _turn_motion(dt: float, step_motion: np.ndarray, rotation: np.ndarray, motio
             out[k] += dt * turn * motion[m]
             for j in range(3):
                 out[3 + 3 * k + j] += dt * turn * motion[3 + 3 * m + j]
-
-
-def write_pose(position: np.ndarray, rotation: np.ndarray, sensor: int, body: int, pose: np.ndarray) -> None:
-    """Write the rotation (row by row) and position of a sensor's body in the frame of a target's."""
-    for i in range(3):
-        total = 0.0
-        for k in range(3):
-            total += rotation[body, k, i] * (position[sensor, k] - position[body, k])
-        pose[9 + i] = total
-        for j in range(3):
-            pose[3 * i + j] = (
-                rotation[body, 0, i] * rotation[sensor, 0, j]
-                + rotation[body, 1, i] * rotation[sensor, 1, j]
-                + rotation[body, 2, i] * rotation[sensor, 2, j]
-            )
 
 
 # --- what a texel measures
@@ -376,9 +362,8 @@ def find_contact(
     tx = m[9] + m[0] * px + m[1] * py + m[2] * pz
     ty = m[10] + m[3] * px + m[4] * py + m[5] * pz
     tz = m[11] + m[6] * px + m[7] * py + m[8] * pz
-    dx = reach * (m[0] * ax + m[1] * ay + m[2] * az)
-    dy = reach * (m[3] * ax + m[4] * ay + m[5] * az)
-    dz = reach * (m[6] * ax + m[7] * ay + m[8] * az)
+    dx, dy, dz = in_target_axes((ax, ay, az), m)
+    dx, dy, dz = reach * dx, reach * dy, reach * dz
     segment, before = Segment(tx - dx, ty - dy, tz - dz, dx, dy, dz), slots.pressed[world, target, point]
     hint, is_mesh = -1, targets.kind[target] == MESH
     if is_mesh:
@@ -396,9 +381,7 @@ def find_contact(
         return Touch(pressed, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     pressed = 1.0 - found.t
     depth, way = pressed * abs(dx * found.nx + dy * found.ny + dz * found.nz), pressed * reach
-    nx = m[0] * found.nx + m[3] * found.ny + m[6] * found.nz
-    ny = m[1] * found.nx + m[4] * found.ny + m[7] * found.nz
-    nz = m[2] * found.nx + m[5] * found.ny + m[8] * found.nz
+    nx, ny, nz = in_sensor_axes((found.nx, found.ny, found.nz), m)
     zx, zy, zz = turned_into_plane(
         (z[world, target, 0, point], z[world, target, 1, point], z[world, target, 2, point]), (nx, ny, nz)
     )  # fmt: skip
@@ -535,10 +518,7 @@ def mark_jumps(world: int, lane: int, lanes: int, worlds: Worlds, jumps: Jumps, 
     for target in range(jumps.sphere.shape[0]):
         pose, sphere, old = worlds.pose[world, target], jumps.sphere[target], jumps.centre[world, target]
         sx, sy, sz = old[0], old[1], old[2]
-        dx, dy, dz = sphere[0] - pose[9], sphere[1] - pose[10], sphere[2] - pose[11]
-        x = pose[0] * dx + pose[3] * dy + pose[6] * dz
-        y = pose[1] * dx + pose[4] * dy + pose[7] * dz
-        z = pose[2] * dx + pose[5] * dy + pose[8] * dz
+        x, y, z = in_sensor_axes((sphere[0] - pose[9], sphere[1] - pose[10], sphere[2] - pose[11]), pose)
         if worlds.valid[world] and not worlds.fresh[world]:
             b = jumps.bound
             if meets_sphere((sx, sy, sz), (x, y, z), sphere[3] + b[3], (b[0], b[1], b[2])):

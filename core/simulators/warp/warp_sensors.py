@@ -27,7 +27,6 @@ from ..load_search import LoadSearch
 from ..pressed_sensors import available_memory, check_memory, checked_mask, checked_numbers, fault_of
 from ..sensor_on_mesh import SensorOnMesh
 from . import balance_kernels, press_kernels
-from .balance_kernels import Beginning
 from .block import WARP
 from .effect_functions import EffectFunctions, functions_of
 from .engine import require_device, require_warp
@@ -205,7 +204,7 @@ class WarpSensors:
         """Reasons as :attr:`.PressedSensors.residual_reason` gives them; the loads and poses come to the host for it."""
         if self.residual is None:
             return ""
-        search, degrees = self._balance[2], self.residual.shape[1]
+        search, degrees = self._balance[1], self.residual.shape[1]
         quaternion = self.poses.numpy()[:, 0, 3:].astype(float)
         length = np.linalg.norm(quaternion, axis=1, keepdims=True)
         rotation = rotation_matrices(np.divide(quaternion, length, out=np.eye(4)[[0] * len(self)], where=length > 0.0))
@@ -264,20 +263,20 @@ class WarpSensors:
         degrees, sensor = int(load.shape[1]), self._item
         if not self._balance:
             found = self._translation.value(LoadSearch.of(sensor.texels, sensor.parameters.max_penetration, e), self.device)
-            self._balance = *self._room(Slots.zero(1, *self._of_slots), Beginning.zero(1)), found
+            self._balance = *self._room(Slots.zero(1, *self._of_slots)), found
             self._kernel_of_load = self._translation.kernel(balance_kernels.balance_world, 2, WARP)
-        _, beginning, search = self._balance
+        search = self._balance[1]
         if not on_device:
             load = warp.array(load, dtype=warp.float64, device=self.device)
         warp.copy(search.given[:, :degrees], load)
-        self.residual, self.displacement = beginning.residual[:, :degrees], search.at
+        self.residual, self.displacement = search.residual[:, :degrees], search.at
         return degrees
 
     def _forget_loads(self) -> None:
         """Go on without displacement."""
         self.residual = None
         if self._balance:
-            search = self._balance[2]
+            search = self._balance[1]
             search.at.zero_()
             search.state.zero_()
 
