@@ -70,14 +70,8 @@ class PressedSensor:
 
     Attributes
     ----------
-    too_deep : int
-        How many contact points are pressed past their maximum penetration at the last step, and measure nothing.
     residual : (1,), (3,) or (6,) float, N and N·m
         Part of the load given to the last step that no contact balances.
-    residual_reason : str
-        One sentence where this load pulls, with the convention of loads; else empty.
-    displacement : (6,) float, metres and rad
-        Of the target from its pose at the last step, for the load: in the world, and rotation vector about its origin.
 
     Notes
     -----
@@ -126,18 +120,21 @@ class PressedSensor:
 
     @property
     def displacement(self) -> np.ndarray:
-        """Of the target from its pose at the last step (6,), metres and rad."""
+        """(6,) float, metres and rad: of the target from its pose at the last step, for the load.
+
+        In the world, and rotation vector about its origin.
+        """
         return np.zeros(6) if self._balance is None else self._balance.displacement[0].copy()
 
     @property
     def residual_reason(self) -> str:
-        """Why no contact balances the load given to the last step, where it pulls; else empty."""
+        """One sentence where the load given to the last step pulls, with the convention of loads; else empty."""
         is_pull = len(self.residual) and self._balance is not None and self._balance.pulls[0]
         return f"The load {PULL}" if is_pull else ""
 
     @property
     def too_deep(self) -> int:
-        """How many contact points are pressed past their maximum penetration at the last step."""
+        """How many contact points are pressed past their maximum penetration at the last step, and measure nothing."""
         return int(self._out.too_deep[0])
 
     def reset(self, sensor_pose: Pose, target_pose: Pose | Sequence[Pose]) -> None:

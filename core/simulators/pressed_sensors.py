@@ -111,10 +111,6 @@ class PressedSensors:
     ----------
     residual : (E, 1), (E, 3) or (E, 6) float, N and N·m
         Part of the loads given to the last step that no contact balances.
-    residual_reason : str
-        One sentence where some of these loads pull, with the convention of loads; else empty.
-    displacement : (E, 6) float, metres and rad
-        Of the targets from their poses at the last step, for the loads: in the world, and rotation vector about their origin.
 
     Notes
     -----
@@ -169,7 +165,10 @@ class PressedSensors:
 
     @property
     def displacement(self) -> np.ndarray:
-        """Of the targets from their poses at the last step (E, 6), metres and rad."""
+        """(E, 6) float, metres and rad: of the targets from their poses at the last step, for the loads.
+
+        In the world, and rotation vectors about their origins.
+        """
         return np.zeros((len(self), 6)) if self._balance is None else self._balance.displacement.copy()
 
     def reset(self, mask: ArrayLike | None = None) -> None:
@@ -223,7 +222,10 @@ class PressedSensors:
                 self._balance.forget(np.ones(e, bool))
             self._press()
         else:
-            self._press_under(wrench)
+            load = checked_numbers("The loads", wrench, [(e, 1), (e, 3), (e, 6)], f"({e}, 6), ({e}, 3) or ({e}, 1)")
+            if self._balance is None:
+                self._balance = LoadBalance(self._model, self._out, self._environments, self._press)
+            self.residual = self._balance.step(load.astype(float))
         self._jumps.find()
         self._read(fresh)
         if out is None:
@@ -252,14 +254,6 @@ class PressedSensors:
         self._work(self._threads[0], starts)
         for helper in helpers:
             helper.join()
-
-    def _press_under(self, wrench: ArrayLike) -> None:
-        """Run one step of all environments under their loads."""
-        e = len(self)
-        load = checked_numbers("The loads", wrench, [(e, 1), (e, 3), (e, 6)], f"({e}, 6), ({e}, 3) or ({e}, 1)")
-        if self._balance is None:
-            self._balance = LoadBalance(self._model, self._out, self._environments, self._press)
-        self.residual = self._balance.step(load.astype(float))
 
     def _work(self, presser: Presser, starts: Iterator[int]) -> None:
         """Take chunks of environments until none is left."""

@@ -32,16 +32,14 @@ LARGEST_PITCH, SMALLEST_PITCH = 0.3, 1e-6
 UNITS = {"millimetres": 1e-3, "centimetres": 1e-2, "micrometres": 1e-6, "inches": 0.0254}
 
 
-def require_sensor_size(points: np.ndarray, name: str, what: str = "sensor") -> None:
+def require_sensor_size(points: np.ndarray, name: str) -> None:
     """Raise SensorError if a sensor, or the distance between its texels, cannot be as large as its coordinates in metres say.
 
     Parameters
     ----------
     points : (n, 3) float, metres
-        Places of its texels, or vertices of its surface.
+        Places of its texels.
     name : str
-    what : str
-        What is checked, for the message.
     """
     from scipy.spatial import cKDTree
 
@@ -50,12 +48,13 @@ def require_sensor_size(points: np.ndarray, name: str, what: str = "sensor") -> 
     span = float(np.ptp(points, axis=0).max())
     distance = cKDTree(points).query(points, 2)[0][:, 1]
     pitch = float(np.median(distance[distance > 0.0])) if (distance > 0.0).any() else 0.0
-    if SMALLEST_SENSOR <= span <= LARGEST_SENSOR and pitch <= LARGEST_PITCH and (pitch >= SMALLEST_PITCH or what != "sensor"):
+    spans = SMALLEST_SENSOR <= span <= LARGEST_SENSOR
+    if spans and SMALLEST_PITCH <= pitch <= LARGEST_PITCH:
         return
-    size = f"{span:.3g} m across" if not SMALLEST_SENSOR <= span <= LARGEST_SENSOR else f"of texels {pitch:.3g} m apart"
+    size = f"of texels {pitch:.3g} m apart" if spans else f"{span:.3g} m across"
     possible = [word for word, metres in UNITS.items() if SMALLEST_SENSOR <= span * metres <= LARGEST_SENSOR / 3.0]
     asked = f"are its coordinates in {possible[0]}? Scale it by {UNITS[possible[0]]:g}" if possible else "give metres"
-    raise SensorError(f"The {what} '{name}' would be {size}, and lengths are metres: {asked}.")
+    raise SensorError(f"The sensor '{name}' would be {size}, and lengths are metres: {asked}.")
 
 
 DIGITS = 9
@@ -198,16 +197,12 @@ class SensorFormat:
     holds: Callable[[str | os.PathLike], bool] | None = None
 
 
-FORMATS = f"{__package__}.formats"
-"""The package of the formats."""
-
-
 @cache
 def formats() -> dict[str, SensorFormat]:
     """Return every format by its name, in alphabetical order."""
-    package = importlib.import_module(FORMATS)
+    package = importlib.import_module(f"{__package__}.formats")
     names = sorted(module.name for module in pkgutil.iter_modules(package.__path__))
-    found = [importlib.import_module(f"{FORMATS}.{name}").FORMAT for name in names]
+    found = [importlib.import_module(f"{package.__name__}.{name}").FORMAT for name in names]
     return {item.name: item for item in found}
 
 

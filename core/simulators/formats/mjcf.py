@@ -122,15 +122,9 @@ def _tactile(path: str | os.PathLike, root: ElementTree.Element, model: Any, dat
     else:
         normal = stated if normals == count else vertex_normals(shape)
     world = rotation_matrices(quaternion_of(data.geom_xmat[geom])) @ turn.T
-    return FoundSensor(
-        name,
-        position,
-        normal / np.linalg.norm(normal, axis=1, keepdims=True),
-        shape.triangles,
-        tangent=tangent,
-        frame_position=data.geom_xpos[geom] - world @ shift,
-        frame_quaternion=quaternion_of(world),
-    )
+    normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    place, turn = data.geom_xpos[geom] - world @ shift, quaternion_of(world)
+    return FoundSensor(name, position, normal, shape.triangles, tangent=tangent, frame_position=place, frame_quaternion=turn)
 
 
 def _in_full_precision(

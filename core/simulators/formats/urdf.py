@@ -141,9 +141,8 @@ def _tactile(path: str | os.PathLike, item: ElementTree.Element) -> FoundSensor:
             raise FileError(f"'{name}' in '{path}' has {rows} × {columns} texels: at most {MOST_TEXELS} are read.")
         size = array.get("size") or "0 0"
         spacing, offset = _numbers(path, array, "spacing", size), _numbers(path, array, "offset", "0 0")
-        row, column = (index.ravel() for index in np.indices((rows, columns)))
-        if array.get("order", "row-major") == "column-major":
-            row, column = (index.T.ravel() for index in np.indices((rows, columns)))
+        by_columns = array.get("order") == "column-major"
+        row, column = (index.ravel("F" if by_columns else "C") for index in np.indices((rows, columns)))
         place = np.stack([row * spacing[0] - offset[0], column * spacing[1] - offset[1], 0.0 * row, 1.0 + 0.0 * row], axis=1)
         frames = np.repeat(frame[None], len(row), axis=0)
         frames[:, :, 3] = place @ frame.T

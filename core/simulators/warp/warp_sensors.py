@@ -85,8 +85,6 @@ class WarpSensors:
         itself, and then call :meth:`step` without poses.
     residual : (E, 1), (E, 3) or (E, 6) warp.array, N and N·m
         Part of the loads given to the last step that no contact balances; None where none was given.
-    residual_reason : str
-        One sentence where some of these loads pull, with the convention of loads; else empty.
     displacement : (E, 6) warp.array, metres and rad
         Of the targets from their poses at the last step, for the loads: in the world, and rotation vector about their origin;
         None before a load was given.
@@ -107,7 +105,7 @@ class WarpSensors:
         _check(item.sensor, targets, dt, environments)
         self._warp, self.device = warp, require_device(warp, device, single)
         self._on_gpu = bool(warp.get_device(self.device).is_cuda)
-        self._environments, sensor = environments, item.sensor
+        sensor = item.sensor
         points = contact_points(sensor.texels, sensor.parameters.points_per_texel)
         sensors = sensors_of(sensor, parameters, environments) if parameters else [sensor]
         effects = functions_of(sensors, dt)
@@ -139,7 +137,7 @@ class WarpSensors:
 
     def __len__(self) -> int:
         """Return the number of environments."""
-        return self._environments
+        return int(self._size[0])
 
     def __repr__(self) -> str:
         return f"<WarpSensors: {self._size[0]} environments, {self._size[1]} texels, {self._size[2]} targets, on {self.device}>"
@@ -183,7 +181,10 @@ class WarpSensors:
             degrees = self._take_loads(wrench)
             self._launch(self._kernel_of_load, (e, adders), adders, degrees, *arrays, *ends, *self._balance)
         else:
-            self._forget_loads()
+            self.residual = None
+            if self._balance:  # go on without displacement
+                self._balance[1].at.zero_()
+                self._balance[1].state.zero_()
             self._launch(self._move, (e, movers), movers, sensor, worlds)
             self._launch(self._press, (e, n), *arrays, self._out)
             self._launch(self._finish, (e, adders), adders, sensor, worlds, slots, *ends)
@@ -271,14 +272,6 @@ class WarpSensors:
         warp.copy(search.given[:, :degrees], load)
         self.residual, self.displacement = search.residual[:, :degrees], search.at
         return degrees
-
-    def _forget_loads(self) -> None:
-        """Go on without displacement."""
-        self.residual = None
-        if self._balance:
-            search = self._balance[1]
-            search.at.zero_()
-            search.state.zero_()
 
 
 _NO_MESH = TriangleMesh(np.eye(3), np.array([[0, 1, 2]]))
