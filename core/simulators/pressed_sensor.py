@@ -70,8 +70,14 @@ class PressedSensor:
 
     Attributes
     ----------
+    too_deep : int
+        How many contact points are pressed past their maximum penetration at the last step, and measure nothing.
     residual : (1,), (3,) or (6,) float, N and N·m
         Part of the load given to the last step that no contact balances.
+    residual_reason : str
+        One sentence where this load pulls, with the convention of loads; else empty.
+    displacement : (6,) float, metres and rad
+        Of the target from its pose at the last step, for the load: in the world, and rotation vector about its origin.
 
     Notes
     -----

@@ -111,6 +111,10 @@ class PressedSensors:
     ----------
     residual : (E, 1), (E, 3) or (E, 6) float, N and N·m
         Part of the loads given to the last step that no contact balances.
+    residual_reason : str
+        One sentence where some of these loads pull, with the convention of loads; else empty.
+    displacement : (E, 6) float, metres and rad
+        Of the targets from their poses at the last step, for the loads: in the world, and rotation vector about their origin.
 
     Notes
     -----

@@ -85,6 +85,8 @@ class WarpSensors:
         itself, and then call :meth:`step` without poses.
     residual : (E, 1), (E, 3) or (E, 6) warp.array, N and N·m
         Part of the loads given to the last step that no contact balances; None where none was given.
+    residual_reason : str
+        One sentence where some of these loads pull, with the convention of loads; else empty.
     displacement : (E, 6) warp.array, metres and rad
         Of the targets from their poses at the last step, for the loads: in the world, and rotation vector about their origin;
         None before a load was given.
