@@ -34,7 +34,7 @@ from ...laws.friction import (
 from ...laws.normal_force import normal_force, normal_tangent
 from ...solver.detection.narrow_phase import NEARLY_TOO_DEEP
 from ...solver.detection.shape_contacts import in_sensor_axes, in_target_axes, write_pose
-from ...solver.dynamics.contact_assembly import Tangent, linearise_contact
+from ...solver.dynamics.contact_assembly import LinearContact, Tangent, linearise_contact
 from ...solver.dynamics.effect_kernels import FULL_STEP, NO_TIME
 from ...solver.dynamics.friction_state import relative_motion, velocity_at
 from ...solver.jumps import crosses_texel, meets_sphere
@@ -47,6 +47,28 @@ NO_CONTACT, TOO_DEEP = -1.0, -2.0
 """Instead of a share in :attr:`.Slots.pressed`."""
 HAS_EFFECTS = 0
 """Whether effects act on forces; the translation of a sensor puts its own number here."""
+
+
+class Entry(NamedTuple):
+    """Where a segment enters a target.
+
+    Attributes
+    ----------
+    t : float
+        Position on the segment, 0 at its base and 1 at its tip; another number where it does not.
+    nx, ny, nz : float
+        Outward normal there, in the target's frame.
+    triangle : int
+    inside : bool
+        The base is inside the target, as far as the segment tells.
+    """
+
+    t: float
+    nx: float
+    ny: float
+    nz: float
+    triangle: int
+    inside: bool
 
 
 class Touch(NamedTuple):
@@ -74,6 +96,23 @@ class Touch(NamedTuple):
     zx: float
     zy: float
     zz: float
+
+
+class Sliding(NamedTuple):
+    """How a target moves at a contact point, relative to the sensor.
+
+    Attributes
+    ----------
+    rate : float, m/s
+        Of the depth.
+    x, y, z : float, m/s
+        In the plane of the surface.
+    """
+
+    rate: float
+    x: float
+    y: float
+    z: float
 
 
 # --- where the bodies are
@@ -234,15 +273,13 @@ def begin_point(world: int, point: int, slots: Slots) -> None:
             slots.memory[world, point, i, j] = 0.0
 
 
-def _sliding_at(
-    px: float, py: float, pz: float, nx: float, ny: float, nz: float, m: np.ndarray
-) -> tuple[float, float, float, float]:
-    """Return the rate of the depth at a point (m) of a target with a relative motion (12,), and its sliding (3), m/s."""
+def _sliding_at(px: float, py: float, pz: float, nx: float, ny: float, nz: float, m: np.ndarray) -> Sliding:
+    """Motion of a target at a point (m), given its relative motion (12,), as rate along the normal and sliding."""
     vx, vy, vz = velocity_at(
         (px, py, pz), (m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], m[9], m[10], m[11])
     )  # fmt: skip
     rate = vx * nx + vy * ny + vz * nz
-    return rate, vx - rate * nx, vy - rate * ny, vz - rate * nz
+    return Sliding(rate, vx - rate * nx, vy - rate * ny, vz - rate * nz)
 
 
 def _advance_point(world: int, point: int, law: ContactLaw, sensor: SensorArrays, worlds: Worlds, slots: Slots) -> None:
@@ -252,31 +289,29 @@ def _advance_point(world: int, point: int, law: ContactLaw, sensor: SensorArrays
     deepest, deepest_rate, deepest_slide_step = 0.0, 0.0, 0.0
     for target in range(slots.pressed.shape[1]):
         pressed, depth = slots.pressed[world, target, point], slots.depth[world, target, point]
-        n, bristle = slots.normal, slots.bristle
+        n, z = slots.normal, slots.bristle
         nx, ny, nz = n[world, target, 0, point], n[world, target, 1, point], n[world, target, 2, point]
-        zx, zy, zz = bristle[world, target, 0, point], bristle[world, target, 1, point], bristle[world, target, 2, point]
+        zx, zy, zz = z[world, target, 0, point], z[world, target, 1, point], z[world, target, 2, point]
         if pressed >= 0.0:  # a GPU has read all of them at a time
             px, py, pz = contact_point(point, pressed, sensor)
-            rate, x, y, z = _sliding_at(px, py, pz, nx, ny, nz, worlds.motion[world, 0, target])
-            square = x * x + y * y + z * z
-            end = depth + sensor.dt * rate
+            moved = _sliding_at(px, py, pz, nx, ny, nz, worlds.motion[world, 0, target])
+            square = moved.x * moved.x + moved.y * moved.y + moved.z * moved.z
+            end = depth + sensor.dt * moved.rate
             tangent = _tangent(
-                world, TexelMotion(depth, rate, 0.0, math.sqrt(square)), painted, scale, sensor,
+                world, TexelMotion(depth, moved.rate, 0.0, math.sqrt(square)), painted, scale, sensor,
                 slots.memory[world, point],
             )  # fmt: skip
             contact = linearise_contact(
-                (nx, ny, nz), (zx, zy, zz), (x + rate * nx, y + rate * ny, z + rate * nz), tangent, sensor.dt, law
+                (nx, ny, nz), (zx, zy, zz),
+                (moved.x + moved.rate * nx, moved.y + moved.rate * ny, moved.z + moved.rate * nz), tangent, sensor.dt, law,
             )  # fmt: skip
-            _, vx, vy, vz = _sliding_at(px, py, pz, nx, ny, nz, worlds.end_motion[world, target])  # in the sensor's axes then
-            zx = next_deflection(contact.keep, zx, contact.gain, vx)
-            zy = next_deflection(contact.keep, zy, contact.gain, vy)
-            zz = next_deflection(contact.keep, zz, contact.gain, vz)
-            held = deflection_scale(zx * zx + zy * zy + zz * zz, contact.limit)
-            bristle[world, target, 0, point] = held * zx
-            bristle[world, target, 1, point] = held * zy
-            bristle[world, target, 2, point] = held * zz
+            v = _sliding_at(px, py, pz, nx, ny, nz, worlds.end_motion[world, target])
+            zx, zy, zz = _next_bristle(contact, v, (zx, zy, zz))
+            z[world, target, 0, point] = zx
+            z[world, target, 1, point] = zy
+            z[world, target, 2, point] = zz
             if end > deepest:
-                deepest, deepest_rate, deepest_slide_step = end, rate, sensor.dt * math.sqrt(square)
+                deepest, deepest_rate, deepest_slide_step = end, moved.rate, sensor.dt * math.sqrt(square)
     if HAS_EFFECTS == 1:
         force_with_effects(
             FULL_STEP, TexelMotion(deepest, deepest_rate, deepest_slide_step, 0.0), whole_texel_law(painted, sensor.share, 1.0),
@@ -303,6 +338,15 @@ def _tangent(
     return Tangent(bias, slope, scale, viscosity, pulls)
 
 
+def _next_bristle(contact: LinearContact, v: Sliding, bristle: Vector) -> tuple[float, float, float]:
+    """Return a bristle at the step's end, given the sliding in the sensor's axes at that time."""
+    zx = next_deflection(contact.keep, bristle[0], contact.gain, v.x)
+    zy = next_deflection(contact.keep, bristle[1], contact.gain, v.y)
+    zz = next_deflection(contact.keep, bristle[2], contact.gain, v.z)
+    scale = deflection_scale(zx * zx + zy * zy + zz * zz, contact.limit)
+    return scale * zx, scale * zy, scale * zz
+
+
 def contact_point(point: int, pressed: float, sensor: SensorArrays) -> tuple[float, float, float]:
     """Return where a contact point touches, given the share of the maximum penetration that is pressed in, in metres."""
     way, f = pressed * sensor.reach, sensor.frame
@@ -321,28 +365,23 @@ def find_contact(
     dx, dy, dz = in_target_axes((ax, ay, az), m)
     dx, dy, dz = reach * dx, reach * dy, reach * dz
     segment, before = Segment(tx - dx, ty - dy, tz - dz, dx, dy, dz), slots.pressed[world, target, point]
-    kind = targets.kind[target]
-    if kind == MESH:
-        t, fx, fy, fz, triangle, inside = _mesh_entry(
-            segment, targets.mesh[target], before, slots.triangle[world, target, point], tree
-        )  # fmt: skip
-        slots.triangle[world, target, point] = triangle
-    else:
-        t, fx, fy, fz, inside = _shape_entry(
-            kind, (targets.size[target, 0], targets.size[target, 1], targets.size[target, 2]),
-            (segment.ox, segment.oy, segment.oz), (dx / reach, dy / reach, dz / reach), reach,
-        )  # fmt: skip
+    hint, is_mesh = -1, targets.kind[target] == MESH
+    if is_mesh:
+        hint = slots.triangle[world, target, point]
+    found = _entry(segment, target, before, hint, reach, targets, tree)
+    if is_mesh:
+        slots.triangle[world, target, point] = found.triangle
     z = slots.bristle
-    if not (0.0 <= t <= 1.0):
-        pressed = TOO_DEEP if inside else NO_CONTACT
+    if not (0.0 <= found.t <= 1.0):
+        pressed = TOO_DEEP if found.inside else NO_CONTACT
         slots.pressed[world, target, point] = pressed
         for i in range(3):
             z[world, target, i, point] = 0.0
             slots.force[world, target, i, point] = 0.0
         return Touch(pressed, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    pressed = 1.0 - t
-    depth, way = pressed * abs(dx * fx + dy * fy + dz * fz), pressed * reach
-    nx, ny, nz = in_sensor_axes((fx, fy, fz), m)
+    pressed = 1.0 - found.t
+    depth, way = pressed * abs(dx * found.nx + dy * found.ny + dz * found.nz), pressed * reach
+    nx, ny, nz = in_sensor_axes((found.nx, found.ny, found.nz), m)
     zx, zy, zz = turned_into_plane(
         (z[world, target, 0, point], z[world, target, 1, point], z[world, target, 2, point]), (nx, ny, nz)
     )  # fmt: skip
@@ -354,30 +393,34 @@ def find_contact(
     return Touch(pressed, depth, px - way * ax, py - way * ay, pz - way * az, nx, ny, nz, zx, zy, zz)
 
 
-def _shape_entry(kind: int, size: Vector, base: Vector, way: Vector, length: float) -> tuple[float, float, float, float, bool]:
-    """Return where a segment of a length (m) enters a shape, as :mod:`.shape_contacts` has it.
+def _entry(segment: Segment, target: int, before: float, hint: int, length: float, targets: TargetArrays, tree: Tree) -> Entry:
+    """Return where a segment of a length (m) enters a target."""
+    if targets.kind[target] == MESH:
+        return _mesh_entry(segment, targets.mesh[target], before, hint, tree)
+    return _shape_entry(
+        targets.kind[target], (targets.size[target, 0], targets.size[target, 1], targets.size[target, 2]),
+        (segment.ox, segment.oy, segment.oz), (segment.dx / length, segment.dy / length, segment.dz / length), length,
+    )  # fmt: skip
 
-    Position on the segment, 0 at its base and 1 at its tip, and another number where it does not; outward normal there, in the
-    target's frame; and whether the base is inside the target, as far as the segment tells.
-    """
+
+def _shape_entry(kind: int, size: Vector, base: Vector, way: Vector, length: float) -> Entry:
+    """Return where a segment of a length (m) enters a shape, as :mod:`.shape_contacts` has it."""
     if is_in_shape(kind, size, base):
-        return 2.0, 0.0, 0.0, 0.0, True
+        return Entry(2.0, 0.0, 0.0, 0.0, -1, True)
     enters, axis = shape_entry(kind, size, base, way)
     if not (0.0 <= enters <= length):
-        return 2.0, 0.0, 0.0, 0.0, False
+        return Entry(2.0, 0.0, 0.0, 0.0, -1, False)
     nx, ny, nz = shape_normal(
         kind, size, axis, (base[0] + enters * way[0], base[1] + enters * way[1], base[2] + enters * way[2])
     )  # fmt: skip
-    return enters / length, nx, ny, nz, False
+    return Entry(enters / length, nx, ny, nz, -1, False)
 
 
-def _mesh_entry(
-    segment: Segment, mesh: int, before: float, hint: int, tree: Tree
-) -> tuple[float, float, float, float, int, bool]:
-    """Do as :func:`_shape_entry` for a mesh, past the maximum penetration as :mod:`.narrow_phase` has it; also the triangle."""
+def _mesh_entry(segment: Segment, mesh: int, before: float, hint: int, tree: Tree) -> Entry:
+    """Return where a segment enters a mesh; past the maximum penetration as :mod:`.narrow_phase` has it."""
     t, triangle, leaving = segment_entry(segment, mesh, hint, tree)
     if triangle >= 0:
-        return t, tree.faces[triangle, 9], tree.faces[triangle, 10], tree.faces[triangle, 11], triangle, False
+        return Entry(t, tree.faces[triangle, 9], tree.faces[triangle, 10], tree.faces[triangle, 11], triangle, False)
     inside = leaving <= 1.0
     ox, oy, oz, dx, dy, dz = segment
     if not inside and (before == TOO_DEEP or before > NEARLY_TOO_DEEP):
@@ -395,7 +438,7 @@ def _mesh_entry(
                 size += (b[3 + i] - b[i]) / length
             far, _, out = segment_entry(Segment(ox, oy, oz, size * dx, size * dy, size * dz), mesh, -1, tree)
             inside = out < far
-    return 2.0, 0.0, 0.0, 0.0, -1, inside
+    return Entry(2.0, 0.0, 0.0, 0.0, -1, inside)
 
 
 def _contact_force(
@@ -404,14 +447,14 @@ def _contact_force(
     """Return the normal part of a contact's force on the sensor, and the force in the sensor's frame (N)."""
     stiff, scale = sensor.multipliers[point, 0], sensor.multipliers[point, 1]
     painted = scaled_law(law, stiff, scale)
-    rate, x, y, z = _sliding_at(at.px, at.py, at.pz, at.nx, at.ny, at.nz, worlds.motion[world, 1, target])
-    square = x * x + y * y + z * z
-    fn = normal_force(at.depth, rate, painted)
+    v = _sliding_at(at.px, at.py, at.pz, at.nx, at.ny, at.nz, worlds.motion[world, 1, target])
+    square = v.x * v.x + v.y * v.y + v.z * v.z
+    fn = normal_force(at.depth, v.rate, painted)
     factor, viscosity = 1.0, 0.0
     if HAS_EFFECTS == 1:
         speed = math.sqrt(square)
         whole, _, _ = force_with_effects(
-            NO_TIME, TexelMotion(at.depth, rate, 0.0, speed), whole_texel_law(painted, sensor.share, 1.0),
+            NO_TIME, TexelMotion(at.depth, v.rate, 0.0, speed), whole_texel_law(painted, sensor.share, 1.0),
             sensor.force_constants[world], slots.memory[world, point], False,
         )  # fmt: skip
         factor, viscosity = friction_with_effects(speed, whole, sensor.friction_constants[world])
@@ -421,9 +464,9 @@ def _contact_force(
     fx, fy, fz = 0.0, 0.0, 0.0
     if fn > 0.0:
         zx, zy, zz, decay = held * at.zx, held * at.zy, held * at.zz, sliding_decay(square, fn, friction)
-        fx = friction_force(zx, rate_under_decay(zx, x, decay), x, friction)
-        fy = friction_force(zy, rate_under_decay(zy, y, decay), y, friction)
-        fz = friction_force(zz, rate_under_decay(zz, z, decay), z, friction)
+        fx = friction_force(zx, rate_under_decay(zx, v.x, decay), v.x, friction)
+        fy = friction_force(zy, rate_under_decay(zy, v.y, decay), v.y, friction)
+        fz = friction_force(zz, rate_under_decay(zz, v.z, decay), v.z, friction)
     return fn, fx + fn * at.nx, fy + fn * at.ny, fz + fn * at.nz
 
 
