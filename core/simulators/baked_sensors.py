@@ -13,10 +13,10 @@ import numpy as np
 from ..effects.engine.registry import check, from_dict
 from ..errors import FileError, PalpateError, suggestion
 from ..geometry.mesh import TriangleMesh
-from ..io.bake_folder import MANIFEST_NAME, UNCHANGED_NOTE, BakeOwner, Manifest, other_owner
+from ..io.bake_folder import MANIFEST_NAME, UNCHANGED_NOTE, BakeOwner, other_owner
 from ..io.bake_reader import Bake, read_bake
 from ..io.input_files import read_bytes
-from ..model.sensor import Effect, Sensor
+from ..model.sensor import Sensor
 from .sensor_on_mesh import SensorOnMesh
 
 DEFAULT_FOLDER = "palpate-bake"
@@ -73,7 +73,9 @@ def _checked_sensor(blend: Path, found: Bake, name: str) -> SensorOnMesh:
     other = other_owner(manifest, folder.parent, BakeOwner(blend=blend))
     if other:
         raise FileError(f"'{folder}' is the bake of {other} and not of '{blend}': give the bake folder of this .blend.")
-    if _has_changed(blend, folder, manifest):
+    saved_later = blend.stat().st_mtime > (folder / MANIFEST_NAME).stat().st_mtime + CLOCK
+    note = (UNCHANGED_NOTE + manifest.bake_id).encode()  # that the .blend is as it was baked
+    if saved_later and not (manifest.bake_id and note in read_bytes(blend)):
         raise FileError(
             f"'{blend}' was saved after its bake in '{folder}' and may have changed: "
             f"run 'palpate bake {blend}' (of a compressed file it cannot be told)."
@@ -90,7 +92,8 @@ def _checked_sensor(blend: Path, found: Bake, name: str) -> SensorOnMesh:
         )
     texels, parameters = found.texels[name], found.parameters[name]
     try:
-        effects = _effects(manifest.effects, name, len(texels), parameters.gain)
+        effects = tuple(from_dict(table, parameters.gain) for table in manifest.effects)
+        check(effects, name, len(texels), parameters.gain)
     except PalpateError as error:
         raise FileError(f"'{folder / MANIFEST_NAME}' is damaged ({error}): run 'palpate bake {blend}'.") from error
     mesh = TriangleMesh(texels.position, np.asarray(texels.layout.triangles, np.int64))
@@ -98,16 +101,3 @@ def _checked_sensor(blend: Path, found: Bake, name: str) -> SensorOnMesh:
     texels = replace(texels, vertex=np.arange(len(texels)))
     sensor = Sensor(name, 0, texels, parameters, painted=found.painted[name], effects=effects)
     return SensorOnMesh(sensor, mesh, None, pose[:3].copy(), pose[3:].copy())
-
-
-def _has_changed(blend: Path, folder: Path, manifest: Manifest) -> bool:
-    """Return True if a .blend was saved after its bake and does not say that it is as it was baked."""
-    if blend.stat().st_mtime <= (folder / MANIFEST_NAME).stat().st_mtime + CLOCK:
-        return False
-    return not manifest.bake_id or (UNCHANGED_NOTE + manifest.bake_id).encode() not in read_bytes(blend)
-
-
-def _effects(tables: Sequence[dict], name: str, texels: int, gain: float) -> tuple[Effect, ...]:
-    effects = tuple(from_dict(table, gain) for table in tables)
-    check(effects, name, texels, gain)
-    return effects

@@ -10,7 +10,7 @@ impedance at the largest depth. Newton's hydroelastic contact takes the pressure
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -122,7 +122,7 @@ class MujocoContact:
     contacts: int
     error: TranslationError
     damping_error: TranslationError
-    notes: tuple[str, ...] = field(default_factory=tuple)
+    notes: tuple[str, ...]
 
     def force(self, depth: np.ndarray) -> np.ndarray:
         """Return MuJoCo's force of all contacts at depths (m,), metres, at rest, N."""
@@ -154,7 +154,7 @@ class NewtonContact:
     pressure: np.ndarray
     friction: float
     error: TranslationError
-    notes: tuple[str, ...] = field(default_factory=tuple)
+    notes: tuple[str, ...]
 
 
 def force_curve(item: SensorOnMesh, depth: float | None = None) -> ForceCurve:
@@ -180,7 +180,13 @@ def force_curve(item: SensorOnMesh, depth: float | None = None) -> ForceCurve:
             f"up to its maximum penetration, {limit:g} m."
         )
     depths = np.linspace(0.0, largest, SAMPLES)
-    kept, left_out = _without_memory(sensor.effects)
+
+    def is_function_of_depth(effect: Effect) -> bool:
+        form = form_of(effect.name, effect.form)
+        return kind_of(effect.name).site_of(form) == "contact" and form.law is not None and not form.state_size
+
+    kept = tuple(effect for effect in sensor.effects if is_function_of_depth(effect))
+    left_out = tuple(effect.name for effect in sensor.effects if not is_function_of_depth(effect))
     time, at_depth = np.arange(SAMPLES, dtype=float), depths[:, None]
     still = normal_forces(kept, sensor.parameters, time, at_depth, rate=np.zeros_like(at_depth))[:, 0]
     moved = normal_forces(kept, sensor.parameters, time, at_depth, rate=np.ones_like(at_depth))[:, 0]  # affine in the rate
@@ -188,17 +194,6 @@ def force_curve(item: SensorOnMesh, depth: float | None = None) -> ForceCurve:
     damping = moved - still
     damping[0] = damping[1]  # at depth zero nothing is in contact
     return ForceCurve(depths, texels * still, texels * damping, float(np.sum(sensor.texels.area)), left_out)
-
-
-def _without_memory(effects: Sequence[Effect]) -> tuple[tuple[Effect, ...], tuple[str, ...]]:
-    """Return the effects that are functions of the depth alone, and the names of the others."""
-    kept: list[Effect] = []
-    left_out: list[Effect] = []
-    for effect in effects:
-        form = form_of(effect.name, effect.form)
-        acts = kind_of(effect.name).site_of(form) == "contact" and form.law is not None and not form.state_size
-        (kept if acts else left_out).append(effect)
-    return tuple(kept), tuple(effect.name for effect in left_out)
 
 
 def mujoco_contact(

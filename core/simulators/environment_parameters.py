@@ -36,7 +36,13 @@ def sensors_of(sensor: Sensor, columns: Columns, environments: int) -> list[Sens
         A name is unknown, or a column has another shape or a value that is not allowed.
     """
     known = _names(sensor)
-    values = {name: _column(name, column, environments) for name, column in columns.items()}
+    values = {name: np.asarray(column) for name, column in columns.items()}
+    for name, column in values.items():
+        if column.shape != (environments,) or column.dtype.kind not in "fiu":
+            raise ParameterError(
+                f"'{name:.80}' is {column.dtype} of shape {column.shape}: "
+                f"give a number for each environment, ({environments},)."
+            )
     for name in values:
         if name not in known:
             advice = did_you_mean(name, known, f"give {', '.join(known)}.")
@@ -54,16 +60,6 @@ def _names(sensor: Sensor) -> list[str]:
             continue
         names += [f"effect.{item.name}.{key}" for key in (*(p.name for p in form.parameters), "seed")]
     return list(dict.fromkeys(names))
-
-
-def _column(name: str, column: ArrayLike, environments: int) -> np.ndarray:
-    """Return a column as numbers."""
-    values = np.asarray(column)
-    if values.shape != (environments,) or values.dtype.kind not in "fiu":
-        raise ParameterError(
-            f"'{name:.80}' is {values.dtype} of shape {values.shape}: give a number for each environment, ({environments},)."
-        )
-    return values
 
 
 def _varied(sensor: Sensor, number: int, values: Mapping[str, float]) -> Sensor:

@@ -19,7 +19,7 @@ from ..errors import ParameterError
 from ..geometry.rotations import rotation_matrices
 from ..solver.pressed_model import PressedModel
 from ..solver.pressing import Environment, PressedTexels, begin_at, stacked_states
-from .load_search import DONE, PHASE, LoadSearch, advance_search, begin_search, forget_load, place_trial, residual
+from .load_search import DONE, PHASE, LoadSearch, advance_search, begin_search, forget_load, place_trial
 
 
 class LoadBalance:
@@ -50,7 +50,8 @@ class LoadBalance:
         count = len(environments)
         self._out, self._environments, self._press = out, environments, press
         self._search = LoadSearch.of(model.sensor.texels, model.sensor.parameters.max_penetration, count)
-        self._engine, self._rotation, self._residual = np.zeros((count, 7)), np.zeros((count, 3, 3)), np.zeros((count, 6))
+        self._rotation = np.zeros((count, 3, 3))
+        self._units = np.where(np.arange(6) < 3, -1.0, -self._search.extent[1])
         self._normals, self._degrees = model.sensor.texels.normal, 0
         self._states = stacked_states(environments)
         self._saved = [np.empty_like(field) for field in self._states]
@@ -92,19 +93,18 @@ class LoadBalance:
         out.begins[whole] = False
         for copy, field in zip(self._saved, self._states, strict=True):
             np.copyto(copy, field)
-        np.copyto(self._engine, out.poses[:, 1])
+        np.copyto(self._search.engine, out.poses[:, 1])
         quaternion = out.poses[whole, 0, 3:]
         self._rotation[whole] = rotation_matrices(quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True))
         self._search.given[:, :degrees] = wrench
-        _begin_searches(degrees, whole, self._rotation, self._engine, out.poses, self._search)
+        _begin_searches(degrees, whole, self._rotation, out.poses, self._search)
         going = True
         while going:
             for copy, field in zip(self._saved, self._states, strict=True):
                 np.copyto(field, copy)
             self._press()
-            going = _advance_searches(out.wrench, out.texels, self._engine, out.poses, self._search)
-        _write_residuals(self._residual, self._search)
-        return self._residual[:, :degrees].copy()
+            going = _advance_searches(out.wrench, out.texels, out.poses, self._search)
+        return (self._search.excess * self._units)[:, :degrees]
 
 
 def pulling_loads(given: np.ndarray, direction: np.ndarray, rotation: np.ndarray, normals: np.ndarray) -> np.ndarray:
@@ -158,36 +158,24 @@ def check_targets(count: int) -> None:
 
 
 @kernel
-def _begin_searches(
-    degrees: int, whole: np.ndarray, rotation: np.ndarray, engine: np.ndarray, poses: np.ndarray, search: LoadSearch
-) -> None:
+def _begin_searches(degrees: int, whole: np.ndarray, rotation: np.ndarray, poses: np.ndarray, search: LoadSearch) -> None:
     """Begin in the environments of a mask (E,), and write the poses of the first trials."""
     for e in range(whole.shape[0]):
         if whole[e]:
             begin_search(e, degrees, rotation[e], search)
-            place_trial(e, engine[e], poses[e, 1], search)
+            place_trial(e, poses[e, 1], search)
 
 
 @kernel
-def _advance_searches(
-    wrench: np.ndarray, texels: np.ndarray, engine: np.ndarray, poses: np.ndarray, search: LoadSearch
-) -> bool:
+def _advance_searches(wrench: np.ndarray, texels: np.ndarray, poses: np.ndarray, search: LoadSearch) -> bool:
     """Go on after a trial, write the poses of the next trials, and return whether there is one."""
     going = False
-    for e in range(engine.shape[0]):
+    for e in range(poses.shape[0]):
         if search.state[e, PHASE] != DONE:
             touching = False
             for texel in range(texels.shape[1]):
                 touching |= texels[e, texel, 0] > 0.0
             advance_search(e, wrench[e, 0], touching, search)
-            place_trial(e, engine[e], poses[e, 1], search)
+            place_trial(e, poses[e, 1], search)
             going |= search.state[e, PHASE] != DONE
     return going
-
-
-@kernel
-def _write_residuals(out: np.ndarray, search: LoadSearch) -> None:
-    """Write the part of each load that the contact does not exert."""
-    for e in range(out.shape[0]):
-        for i in range(6):
-            out[e, i] = residual(e, i, search)

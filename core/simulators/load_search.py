@@ -62,8 +62,12 @@ class LoadSearch(NamedTuple):
         in.
     normal : (3,) float
         Mean normal of the texels, in the sensor's frame.
+    engine : (E, 7) float
+        Pose of the target that the other program has.
     given, load : (E, 6) float, N and N·m
         What the contact is to exert on the target, as it was given and over the radius.
+    residual : (E, 6) float, N and N·m
+        Part of the load that the contact does not exert, for who asks.
     direction : (E, 3) float
         In the world, of a load with one component.
     at, trial, touched : (E, 6) float, metres and rad
@@ -79,8 +83,10 @@ class LoadSearch(NamedTuple):
 
     extent: np.ndarray
     normal: np.ndarray
+    engine: np.ndarray
     given: np.ndarray
     load: np.ndarray
+    residual: np.ndarray
     direction: np.ndarray
     at: np.ndarray
     trial: np.ndarray
@@ -97,10 +103,11 @@ class LoadSearch(NamedTuple):
         """Return the searches of E environments of a sensor."""
         offset, normal = texels.position - texels.position.mean(axis=0), texels.normal.mean(axis=0)
         radius = max(float(np.sqrt((offset**2).sum(axis=1).mean())), 1e-300)
-        given, load, at, trial, touched, excess, found = np.zeros((7, e, 6))
+        given, load, residual, at, trial, touched, excess, found = np.zeros((8, e, 6))
         return cls(
             extent=np.array([max_penetration, radius]), normal=normal / max(float(np.linalg.norm(normal)), 1e-300),
-            given=given, load=load, direction=np.zeros((e, 3)), at=at, trial=trial, touched=touched, excess=excess, found=found,
+            engine=np.zeros((e, 7)), given=given, load=load, residual=residual, direction=np.zeros((e, 3)), at=at, trial=trial,
+            touched=touched, excess=excess, found=found,
             jacobian=np.zeros((e, 6, 6)), system=np.zeros((e, 6, 7)), number=np.zeros((e, 4)), state=np.zeros((e, 6), np.int64),
         )  # fmt: skip
 
@@ -200,20 +207,14 @@ def advance_search(e: int, wrench: np.ndarray, touching: bool, search: LoadSearc
 
 
 @kernel
-def place_trial(e: int, engine: np.ndarray, pose: np.ndarray, search: LoadSearch) -> None:
-    """Write the pose (7,) of a target for the next trial, given the engine's pose (7,)."""
-    trial = search.trial[e]
+def place_trial(e: int, pose: np.ndarray, search: LoadSearch) -> None:
+    """Write the pose (7,) of a target for the next trial."""
+    trial, engine = search.trial[e], search.engine[e]
     for i in range(3):
         pose[i] = engine[i] + trial[i]
     c, x, y, z = quaternion_of_vector(trial[3], trial[4], trial[5])
     qw, qx, qy, qz = multiply(c, x, y, z, engine[3], engine[4], engine[5], engine[6])
     pose[3], pose[4], pose[5], pose[6] = qw, qx, qy, qz
-
-
-@kernel
-def residual(e: int, i: int, search: LoadSearch) -> float:
-    """Return a component of the load less what the contact exerts, N or N·m."""
-    return -search.excess[e, i] * (search.extent[1] if i >= 3 else 1.0)
 
 
 @kernel

@@ -59,7 +59,8 @@ def read_openrave(path: str | os.PathLike) -> list[OpenRaveSensor]:
         There is no such file, it is not XML, it holds no tactile sensor, or a value is not a number or out of bounds.
     """
     root = read_xml(path, "a sensor definition")
-    found = [_sensor(path, attached) for attached in root.iter("AttachedSensor") if _tactile(attached) is not None]
+    tactile = ((attached, _tactile(attached)) for attached in root.iter("AttachedSensor"))
+    found = [_sensor(path, attached, element) for attached, element in tactile if element is not None]
     if not found:
         raise FileError(f"'{path}' has no <AttachedSensor> with a <sensor type=\"{SENSOR_TYPE}\">: give a file that has one.")
     return found
@@ -71,10 +72,8 @@ def _tactile(attached: ElementTree.Element) -> ElementTree.Element | None:
     return next((s for s in sensors if s.get("type", "").lower() == SENSOR_TYPE.lower()), None)
 
 
-def _sensor(path: str | os.PathLike, attached: ElementTree.Element) -> OpenRaveSensor:
-    """Return the definition in an <AttachedSensor> that has a tactile sensor."""
-    element = _tactile(attached)
-    assert element is not None
+def _sensor(path: str | os.PathLike, attached: ElementTree.Element, element: ElementTree.Element) -> OpenRaveSensor:
+    """Return the definition in the tactile sensor of an <AttachedSensor>."""
     name = element.get("name") or attached.get("name") or "sensor"
     values: dict[str, Any] = {}
     for child in element:

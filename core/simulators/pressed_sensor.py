@@ -104,19 +104,19 @@ class PressedSensor:
         self._environments, self._workspace = model.environments(1), model.workspace()
         self._presser = model.presser(memory, out, self._environments, self._workspace)
         self._rows = [(row[:3], row[3:]) for row in out.poses[0]]
-        self._texels = (
+        arrays = (
             memory.force, memory.shear, memory.friction, memory.depth, memory.slip, memory.contact, out.readings[0],
             memory.whole_net[:3], memory.whole_net[3:], memory.centre,
         )  # fmt: skip
+        self._texels = dict(zip(SENSOR_FIELDS, arrays, strict=True))
         wrench = out.wrench[0, 0] if self._one_target else out.wrench[0]
         self._force, self._torque = wrench[..., :3], wrench[..., 3:]
         self._balance: LoadBalance | None = None
         self._jumps = JumpFinder(mounted_texels(item.sensor), targets, out)
         self.residual = np.zeros(0)
         self._steps = 0
-        if target_pose is None or sensor_pose is None:
-            self._begins_at_first_step()
-        else:
+        self._chain = model.readout_chain()
+        if target_pose is not None and sensor_pose is not None:
             self.reset(sensor_pose, target_pose)
 
     def __repr__(self) -> str:
@@ -126,18 +126,21 @@ class PressedSensor:
 
     @property
     def displacement(self) -> np.ndarray:
-        """Of the target from its pose at the last step (6,), metres and rad."""
+        """(6,) float, metres and rad: of the target from its pose at the last step, for the load.
+
+        In the world, and rotation vector about its origin.
+        """
         return np.zeros(6) if self._balance is None else self._balance.displacement[0].copy()
 
     @property
     def residual_reason(self) -> str:
-        """Why no contact balances the load given to the last step, where it pulls; else empty."""
+        """One sentence where the load given to the last step pulls, with the convention of loads; else empty."""
         is_pull = len(self.residual) and self._balance is not None and self._balance.pulls[0]
         return f"The load {PULL}" if is_pull else ""
 
     @property
     def too_deep(self) -> int:
-        """How many contact points are pressed past their maximum penetration at the last step."""
+        """How many contact points are pressed past their maximum penetration at the last step, and measure nothing."""
         return int(self._out.too_deep[0])
 
     def reset(self, sensor_pose: Pose, target_pose: Pose | Sequence[Pose]) -> None:
@@ -156,12 +159,6 @@ class PressedSensor:
         self._out.begins[0] = False
         self._forget_load()
         self._jumps.find()
-
-    def _begins_at_first_step(self) -> None:
-        """Begin at the poses of the first step, at rest there."""
-        self._chain = self._model.readout_chain()
-        self._out.begins[0] = True
-        self._jumps.forget(np.ones(1, bool))
 
     def step(
         self,
@@ -191,12 +188,10 @@ class PressedSensor:
             A pose is not finite, or a quaternion is zero; or the load is none. The sensor stays at the step before. Or a target
             went through the sensor within this step; the sensor is behind it now, and goes on.
         """
-        if self._steps == 0 and not self._out.begins[0]:
-            before = self._out.poses[0, :, :3].copy()
-            self._read_poses(sensor_pose, target_pose)
+        before = self._out.poses[0, :, :3].copy() if self._steps == 0 and not self._out.begins[0] else None
+        self._read_poses(sensor_pose, target_pose)
+        if before is not None:
             self._require_plausible_speed(before)
-        else:
-            self._read_poses(sensor_pose, target_pose)
         if wrench is None:
             self._forget_load()
             self._press()
@@ -213,10 +208,10 @@ class PressedSensor:
         if self._jumps.jumped[0]:
             raise ParameterError(f"A target went through the sensor within one step: {REMEDY}")
         if out is None:
-            arrays = zip(SENSOR_FIELDS, self._texels, strict=True)
-            texels = SensorFrame(**{name: values.copy() for name, values in arrays}, channels=None, unit=self._unit)
+            copies = {name: values.copy() for name, values in self._texels.items()}
+            texels = SensorFrame(**copies, channels=None, unit=self._unit)
             return Contact(texels, self._force.copy(), self._torque.copy())
-        for name, values in zip(SENSOR_FIELDS, self._texels, strict=True):
+        for name, values in self._texels.items():
             np.copyto(getattr(out.texels, name), values)
         np.copyto(out.force_on_target, self._force)
         np.copyto(out.torque_on_target, self._torque)

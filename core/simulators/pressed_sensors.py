@@ -144,7 +144,9 @@ class PressedSensors:
             model.presser(StepMemory.zero(n, len(targets)), self._out, self._environments, model.workspace())
             for _ in range(model.threads(environments, threads))
         ]
-        self._jumps = JumpFinder(mounted_texels(item.sensor), targets, self._out)
+        o, self._jumps = self._out, JumpFinder(mounted_texels(item.sensor), targets, self._out)
+        wrench = o.wrench[:, 0] if self._one_target else o.wrench
+        self._found = Contacts(o.texels, o.readings, o.contact, wrench, o.too_deep, o.valid, self._jumps.jumped)
         self._chunk = max(1, min(CHUNK_POINTS // n, -(-environments // (4 * len(self._threads)))))
         self._chains = [model.readout_chain()] * environments  # each gets its own with its first step
         self._steps = np.zeros(environments, np.int64)
@@ -167,7 +169,10 @@ class PressedSensors:
 
     @property
     def displacement(self) -> np.ndarray:
-        """Of the targets from their poses at the last step (E, 6), metres and rad."""
+        """(E, 6) float, metres and rad: of the targets from their poses at the last step, for the loads.
+
+        In the world, and rotation vectors about their origins.
+        """
         return np.zeros((len(self), 6)) if self._balance is None else self._balance.displacement.copy()
 
     def reset(self, mask: ArrayLike | None = None) -> None:
@@ -178,12 +183,7 @@ class PressedSensors:
         mask : (E,) bool, optional
             Which; by default all.
         """
-        chosen = np.ones(len(self), bool) if mask is None else np.asarray(mask)
-        if chosen.dtype != np.bool_ or chosen.shape != (len(self),):
-            raise ParameterError(
-                f"The mask of environments to reset is {chosen.dtype} of shape {chosen.shape}: give ({len(self)},) bool."
-            )
-        self._out.begins[chosen] = True
+        self._out.begins[slice(None) if mask is None else checked_mask(mask, len(self))] = True
 
     def step(
         self,
@@ -210,9 +210,7 @@ class PressedSensors:
         ParameterError
             Poses or loads have another shape. Those that are not finite are no error (see :attr:`Contacts.valid`).
         """
-        e, t, o = len(self), self._out.wrench.shape[1], self._out
-        wrenches = o.wrench[:, 0] if self._one_target else o.wrench
-        found = Contacts(o.texels, o.readings, o.contact, wrenches, o.too_deep, o.valid, self._jumps.jumped)
+        e, t, found = len(self), self._out.wrench.shape[1], self._found
         if out is not None:
             _check_room(out, found)
         self._take("sensor", sensor_poses, [(e, 7), (7,)], self._out.poses[:, 0])
@@ -228,7 +226,10 @@ class PressedSensors:
                 self._balance.forget(np.ones(e, bool))
             self._press()
         else:
-            self._press_under(wrench)
+            load = checked_numbers("The loads", wrench, [(e, 1), (e, 3), (e, 6)], f"({e}, 6), ({e}, 3) or ({e}, 1)")
+            if self._balance is None:
+                self._balance = LoadBalance(self._model, self._out, self._environments, self._press)
+            self.residual = self._balance.step(load.astype(float))
         self._jumps.find()
         self._read(fresh)
         if out is None:
@@ -243,13 +244,7 @@ class PressedSensors:
             position, quaternion = (np.asarray(part) for part in poses)
             if position.shape[-1] == 3 and quaternion.shape[-1] == 4 and position.shape[:-1] == quaternion.shape[:-1]:
                 poses = np.concatenate([position, quaternion], axis=-1)
-        values = np.asarray(poses)
-        if values.shape not in shapes or values.dtype.kind not in "fiu":
-            wanted = " or ".join(map(str, shapes))
-            raise ParameterError(
-                f"The poses of the {whose} are {values.dtype} of shape {values.shape}: give numbers of shape {wanted}."
-            )
-        rows[...] = values
+        rows[...] = checked_numbers(f"The poses of the {whose}", poses, shapes, " or ".join(map(str, shapes)))
 
     def _press(self) -> None:
         """Let the solver take one step in all environments."""
@@ -263,17 +258,6 @@ class PressedSensors:
         self._work(self._threads[0], starts)
         for helper in helpers:
             helper.join()
-
-    def _press_under(self, wrench: ArrayLike) -> None:
-        """Run one step of all environments under their loads."""
-        load, e = np.asarray(wrench), len(self)
-        if load.shape not in ((e, 1), (e, 3), (e, 6)) or load.dtype.kind not in "fiu":
-            raise ParameterError(
-                f"The loads are {load.dtype} of shape {load.shape}: give numbers of shape ({e}, 6), ({e}, 3) or ({e}, 1)."
-            )
-        if self._balance is None:
-            self._balance = LoadBalance(self._model, self._out, self._environments, self._press)
-        self.residual = self._balance.step(load.astype(float))
 
     def _work(self, presser: Presser, starts: Iterator[int]) -> None:
         """Take chunks of environments until none is left."""
@@ -309,6 +293,24 @@ def _check_room(out: Contacts, found: Contacts) -> None:
             raise ParameterError(
                 f"'{name}' of out is {values.dtype} of shape {values.shape}: give {wanted.dtype} of shape {wanted.shape}."
             )
+
+
+def checked_numbers(what: str, values: ArrayLike, shapes: Sequence[tuple[int, ...]], wanted: str) -> np.ndarray:
+    """Return numbers as an array; raise :class:`.ParameterError`, which asks for the wanted shape, where theirs is another."""
+    found = np.asarray(values)
+    if found.shape not in shapes or found.dtype.kind not in "fiu":
+        raise ParameterError(f"{what} are {found.dtype} of shape {found.shape}: give numbers of shape {wanted}.")
+    return found
+
+
+def checked_mask(mask: ArrayLike, environments: int) -> np.ndarray:
+    """Return which environments to reset, (E,) bool; raise :class:`.ParameterError` for anything else."""
+    found = np.asarray(mask)
+    if found.dtype != np.bool_ or found.shape != (environments,):
+        raise ParameterError(
+            f"The mask of environments to reset is {found.dtype} of shape {found.shape}: give ({environments},) bool."
+        )
+    return found
 
 
 def check_memory(environments: int, size: int, there: float) -> None:

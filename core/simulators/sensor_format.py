@@ -17,12 +17,13 @@ import numpy as np
 from ..errors import FileError, PalpateError, SensorError
 from ..geometry.mesh import TriangleMesh, checked_mesh
 from ..geometry.texels import texels_with_normals
+from ..io.bake_folder import folder_names
 from ..io.file_writing import atomic_write, writable_folder
 from ..io.hidden_folder import FileList
 from ..io.input_files import require_xml_text
 from ..model.sensor import Effect, Sensor
 from ..model.sensor_parameters import SensorParameters
-from .sensor_on_mesh import SensorOnMesh
+from .sensor_on_mesh import SensorOnMesh, identifiers
 
 LARGEST_SENSOR, SMALLEST_SENSOR = 3.0, 2e-4
 """Metres. The largest sensors are mats and floors of 2 m; the smallest, on tips of catheters, have 1 mm."""
@@ -31,16 +32,14 @@ LARGEST_PITCH, SMALLEST_PITCH = 0.3, 1e-6
 UNITS = {"millimetres": 1e-3, "centimetres": 1e-2, "micrometres": 1e-6, "inches": 0.0254}
 
 
-def require_sensor_size(points: np.ndarray, name: str, what: str = "sensor") -> None:
+def require_sensor_size(points: np.ndarray, name: str) -> None:
     """Raise SensorError if a sensor, or the distance between its texels, cannot be as large as its coordinates in metres say.
 
     Parameters
     ----------
     points : (n, 3) float, metres
-        Places of its texels, or vertices of its surface.
+        Places of its texels.
     name : str
-    what : str
-        What is checked, for the message.
     """
     from scipy.spatial import cKDTree
 
@@ -49,12 +48,13 @@ def require_sensor_size(points: np.ndarray, name: str, what: str = "sensor") -> 
     span = float(np.ptp(points, axis=0).max())
     distance = cKDTree(points).query(points, 2)[0][:, 1]
     pitch = float(np.median(distance[distance > 0.0])) if (distance > 0.0).any() else 0.0
-    if SMALLEST_SENSOR <= span <= LARGEST_SENSOR and pitch <= LARGEST_PITCH and (pitch >= SMALLEST_PITCH or what != "sensor"):
+    spans = SMALLEST_SENSOR <= span <= LARGEST_SENSOR
+    if spans and SMALLEST_PITCH <= pitch <= LARGEST_PITCH:
         return
-    size = f"{span:.3g} m across" if not SMALLEST_SENSOR <= span <= LARGEST_SENSOR else f"of texels {pitch:.3g} m apart"
+    size = f"of texels {pitch:.3g} m apart" if spans else f"{span:.3g} m across"
     possible = [word for word, metres in UNITS.items() if SMALLEST_SENSOR <= span * metres <= LARGEST_SENSOR / 3.0]
     asked = f"are its coordinates in {possible[0]}? Scale it by {UNITS[possible[0]]:g}" if possible else "give metres"
-    raise SensorError(f"The {what} '{name}' would be {size}, and lengths are metres: {asked}.")
+    raise SensorError(f"The sensor '{name}' would be {size}, and lengths are metres: {asked}.")
 
 
 DIGITS = 9
@@ -169,11 +169,6 @@ class FoundSensor:
         return SensorOnMesh(sensor, mesh, self.surface, self.frame_position, self.frame_quaternion)
 
 
-Write = Callable[[Sequence[SensorOnMesh], Path], Written]
-Read = Callable[[str | os.PathLike], list[FoundSensor]]
-Holds = Callable[[str | os.PathLike], bool]
-
-
 @dataclass(frozen=True)
 class SensorFormat:
     """A format that sensors can be written in, read from, or both.
@@ -185,7 +180,8 @@ class SensorFormat:
     title, description : str
         As in Blender's menus.
     write : callable or None
-        Takes the sensors and an empty folder, and returns the files that it wrote, in that folder or in a folder in it.
+        Takes a sensor, the path of its files without their ending, and an identifier; returns the files that it wrote. No two
+        sensors of an export have the same path, or the same identifier, which is a word of ASCII letters, digits and ``_``.
     read : callable or None
         Takes the path of a file and returns its sensors; raises FileError for a file that is damaged.
     holds : callable or None
@@ -196,21 +192,17 @@ class SensorFormat:
     name: str
     title: str
     description: str
-    write: Write | None = None
-    read: Read | None = None
-    holds: Holds | None = None
-
-
-FORMATS = f"{__package__}.formats"
-"""The package of the formats."""
+    write: Callable[[SensorOnMesh, Path, str], Written] | None = None
+    read: Callable[[str | os.PathLike], list[FoundSensor]] | None = None
+    holds: Callable[[str | os.PathLike], bool] | None = None
 
 
 @cache
 def formats() -> dict[str, SensorFormat]:
     """Return every format by its name, in alphabetical order."""
-    package = importlib.import_module(FORMATS)
+    package = importlib.import_module(f"{__package__}.formats")
     names = sorted(module.name for module in pkgutil.iter_modules(package.__path__))
-    found = [importlib.import_module(f"{FORMATS}.{name}").FORMAT for name in names]
+    found = [importlib.import_module(f"{package.__name__}.{name}").FORMAT for name in names]
     return {item.name: item for item in found}
 
 
@@ -249,9 +241,11 @@ def export_sensors(sensors: Sequence[SensorOnMesh], kind: str, folder: str | os.
         raise PalpateError("There is no sensor to write: make one with Physics › Palpate › Make Sensor.")
     folder = writable_folder(folder, create=True)
     files = FileList(folder)
+    stems, words = folder_names(item.name for item in sensors), identifiers(item.name for item in sensors)
     with files.new_files("sensor") as new:
-        written = write(sensors, new)
-        return Written(files.replace(new, {f"sensor {kind}": written.files}), written.notes)
+        written = [write(item, new / stems[item.name], words[item.name]) for item in sensors]
+        made = files.replace(new, {f"sensor {kind}": [file for one in written for file in one.files]})
+        return Written(made, [note for one in written for note in one.notes])
 
 
 def import_sensors(path: str | os.PathLike) -> tuple[SensorFormat, list[FoundSensor]]:
@@ -269,15 +263,16 @@ def import_sensors(path: str | os.PathLike) -> tuple[SensorFormat, list[FoundSen
     FileError
         There is no such file, it is damaged, or it holds no sensor of a known format.
     """
-    readable = [item for item in formats().values() if item.read is not None and item.holds is not None]
-    for item in readable:
-        if item.holds is not None and item.read is not None and item.holds(path):
-            found = item.read(path)
-            for sensor in found:
-                _require_finite(path, sensor)
-            return item, found
-    titles = ", ".join(item.title for item in readable)
-    raise FileError(f"'{path}' holds no sensor that can be read: give a file of one of these, {titles}.")
+    titles = []
+    for item in formats().values():
+        if item.read is not None and item.holds is not None:
+            if item.holds(path):
+                found = item.read(path)
+                for sensor in found:
+                    _require_finite(path, sensor)
+                return item, found
+            titles.append(item.title)
+    raise FileError(f"'{path}' holds no sensor that can be read: give a file of one of these, {', '.join(titles)}.")
 
 
 def _require_finite(path: str | os.PathLike, sensor: FoundSensor) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -96,11 +96,8 @@ def texel_arrays(item: SensorOnMesh) -> dict[str, np.ndarray]:
     arrays = {name: np.asarray(getattr(texels, name), float) for name in ("position", "normal", "tangent", "area")}
     if isinstance(texels.layout, GridLayout):
         arrays |= {"row": np.asarray(texels.layout.row), "column": np.asarray(texels.layout.column)}
-    for entry in fields(item.sensor.painted):
-        values = getattr(item.sensor.painted, entry.name)
-        if values is not None:
-            arrays[f"factor_{entry.name}"] = np.asarray(values, float)
-    return arrays
+    painted = {name: values for name, values in vars(item.sensor.painted).items() if values is not None}
+    return arrays | {f"factor_{name}": np.asarray(values, float) for name, values in painted.items()}
 
 
 def identifiers(names: Iterable[str]) -> dict[str, str]:
@@ -124,7 +121,7 @@ def unmodelled(item: SensorOnMesh) -> list[str]:
         found.append(f"the normal law '{law.normal_law}'")
     if law.points_per_texel > 1:
         found.append(f"{law.points_per_texel} contact points per texel")
-    painted = [entry.name for entry in fields(item.sensor.painted) if getattr(item.sensor.painted, entry.name) is not None]
+    painted = [name for name, values in vars(item.sensor.painted).items() if values is not None]
     if painted:
         found.append(f"painted {', '.join(painted)}")
     if item.sensor.effects:

@@ -42,6 +42,30 @@ def targets_of(given: TriangleMesh | Shape | Sequence[TriangleMesh | Shape]) -> 
     return [turned_outwards(one, "the target") if isinstance(one, TriangleMesh) else one for one in targets]
 
 
+def pressed_scenario(sensor: Sensor, meshes: Sequence[TriangleMesh], dt: float) -> Scenario:
+    """Return a scenario of a sensor and targets that another program moves in steps of `dt` seconds.
+
+    Raises
+    ------
+    ParameterError
+        The step is not above zero, or the sensor deforms by prescription.
+    """
+    if not (np.isfinite(dt) and dt > 0):
+        raise ParameterError(f"The step is {dt:g} s: give a number above zero.")
+    if sensor.deformation is not None:
+        raise ParameterError(f"'{sensor.name}' deforms by prescription: take a sensor that keeps its shape in this loop.")
+    names = [f"target {number}" for number in range(1, len(meshes) + 1)]
+    return Scenario(
+        bodies=(Body("sensor", Motion.at_rest()), *(Body(name, Motion.at_rest()) for name in names)),
+        sensors=(sensor,),
+        targets=tuple(Target(name, 1 + i, mesh) for i, (name, mesh) in enumerate(zip(names, meshes, strict=True))),
+        frame_start=0,
+        frame_end=1,
+        fps=1.0 / dt,
+        dt=dt,
+    )
+
+
 class PressedModel:
     """A sensor, the object in contact with it, and the solver's arrays for them.
 
@@ -74,26 +98,10 @@ class PressedModel:
     """
 
     def __init__(self, sensor: Sensor, targets: Sequence[TriangleMesh | Shape], dt: float, threads: int | None = None):
-        if not (np.isfinite(dt) and dt > 0):
-            raise ParameterError(f"The step is {dt:g} s: give a number above zero.")
         if not targets:
             raise ParameterError(f"There is no target for '{sensor.name}': give a mesh, or several.")
-        if sensor.deformation is not None:
-            raise ParameterError(f"'{sensor.name}' deforms by prescription: take a sensor that keeps its shape in this loop.")
         meshes = [target.stand_in if isinstance(target, Shape) else target for target in targets]
-        names = [f"target {number}" for number in range(1, len(targets) + 1)]
-        simulation = Simulation(
-            Scenario(
-                bodies=(Body("sensor", Motion.at_rest()), *(Body(name, Motion.at_rest()) for name in names)),
-                sensors=(sensor,),
-                targets=tuple(Target(name, 1 + i, mesh) for i, (name, mesh) in enumerate(zip(names, meshes, strict=True))),
-                frame_start=0,
-                frame_end=1,
-                fps=1.0 / dt,
-                dt=dt,
-            ),
-            threads,
-        )
+        simulation = Simulation(pressed_scenario(sensor, meshes, dt), threads)
         self.sensor = sensor
         self.rate = simulation.scenario.fps
         self.texels = len(sensor.texels)

@@ -251,7 +251,7 @@ def press_environment(number: int, pressing: Pressing, environment: Environment)
     """Run one step of an environment and write down what its sensor measures."""
     out, poses, model, workspace = pressing.pressed, pressing.pressed.poses[number], pressing.model, pressing.workspace
     memory, state, dt, own = pressing.memory, environment.state, pressing.dt[0], environment.own
-    out.valid[number] = _are_poses(poses)
+    out.valid[number] = are_poses(poses)
     if not out.valid[number]:
         out.begins[number] = True
         _clear(number, out)
@@ -281,17 +281,18 @@ def _copy_table(values: np.ndarray, out: np.ndarray) -> None:
 
 
 @kernel
-def _are_poses(poses: np.ndarray) -> bool:
+def are_poses(poses: np.ndarray) -> bool:
     """Whether all of the poses (b, 7) are finite, with quaternions that are not zero."""
-    for body in range(len(poses)):
+    good = True
+    for body in range(poses.shape[0]):
         size, square = 0.0, 0.0
         for i in range(7):
             size += abs(poses[body, i])
         for i in range(3, 7):
             square += poses[body, i] * poses[body, i]
         if not (size < math.inf and 0.0 < square < math.inf):
-            return False
-    return True
+            good = False
+    return good
 
 
 @kernel
@@ -380,7 +381,7 @@ def _read(number: int, pressing: Pressing, readout: np.ndarray, state: State) ->
             pair += 1
         for i in range(6):
             t.whole_net[i] += t.net[0, i]
-        _write_reaction(t.net[0], workspace.bodies.rotation[0], state.position[0], state.position[1 + target],
+        write_reaction(t.net[0], workspace.bodies.rotation[0], state.position[0], state.position[1 + target],
                         out.wrench[number, target])  # fmt: skip
     for i in range(3):
         t.centre[i] = t.moment[0, i] / t.moment[0, 3] if t.moment[0, 3] > 0.0 else 0.0
@@ -396,12 +397,12 @@ def _read(number: int, pressing: Pressing, readout: np.ndarray, state: State) ->
 
 
 @kernel
-def _write_reaction(
+def write_reaction(
     net: np.ndarray, rotation: np.ndarray, origin: np.ndarray, target_origin: np.ndarray, wrench: np.ndarray
 ) -> None:
     """Write the wrench on a target (6,), in the world about its origin, from that on the sensor, in and about its frame."""
     for i in range(3):
-        for part in (0, 3):
+        for part in range(0, 6, 3):
             wrench[part + i] = -(rotation[i, 0] * net[part] + rotation[i, 1] * net[part + 1] + rotation[i, 2] * net[part + 2])
     x, y, z = origin[0] - target_origin[0], origin[1] - target_origin[1], origin[2] - target_origin[2]
     wrench[3] += y * wrench[2] - z * wrench[1]

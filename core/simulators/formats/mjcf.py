@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """MJCF: a MuJoCo body with a collision mesh and the sensor ``tactile``, whose mesh has the texels for vertices.
 
+MuJoCo compiles what is read, and so resolves defaults, classes, includes and frames. A tactile's texels are the vertices of its
+mesh; the touch sites of a body are the texels of one sensor; a touch_grid has directions, which become texels on a sphere.
+
 MuJoCo 3.3.5 and later know the sensor. It gives three numbers for each texel: the depth (m) to which the texel is inside what
 touches the body, and two sliding speeds (m/s). For the linear law the texel's normal force without damping is `k` times the
 depth. What carries the body is MuJoCo's own contact, between convex shapes.
@@ -9,7 +12,6 @@ depth. What carries the body is MuJoCo's own contact, between convex shapes.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -20,17 +22,11 @@ from ...errors import FileError, imported
 from ...geometry.mesh import TriangleMesh, checked_mesh, vertex_normals
 from ...geometry.point_surface import triangles_between
 from ...geometry.rotations import quaternion_of, rotation_matrices
-from ...io.bake_folder import folder_names
 from ...io.input_files import read_xml
 from ...io.sensor_toml import MOST_TEXELS
 from ..contact_translation import REFERENCE_MASS, MujocoContact, mujoco_contact
 from ..sensor_format import FoundSensor, SensorFormat, Written, add, comment, numbers, write_xml
 from ..sensor_on_mesh import SensorOnMesh, unmodelled
-
-# Sensors of MJCF files, as MuJoCo compiles them: ``tactile``, ``touch`` on sites, and the plugin ``touch_grid``.
-#
-# MuJoCo resolves defaults, classes, includes and frames. A tactile's texels are the vertices of its mesh; the touch sites of
-# a body are the texels of one sensor; a touch_grid has directions, which become texels on a sphere.
 
 PLUGIN = "mujoco.sensor.touch_grid"
 SETTINGS = ("nchannel", "size", "fov", "gamma")
@@ -111,7 +107,7 @@ def _tactile(path: str | os.PathLike, root: ElementTree.Element, model: Any, dat
     mesh, geom = int(model.sensor_objid[number]), int(model.sensor_refid[number])
     first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
     _require_count(path, name, count)
-    turn, shift = rotation_matrices(model.mesh_quat[mesh][None])[0], model.mesh_pos[mesh]
+    turn, shift = rotation_matrices(model.mesh_quat[mesh]), model.mesh_pos[mesh]
     position = model.mesh_vert[first : first + count].astype(float) @ turn.T + shift
     position = _in_full_precision(root, model.mesh(mesh).name, model.mesh_scale[mesh], position)
     start, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
@@ -125,16 +121,10 @@ def _tactile(path: str | os.PathLike, root: ElementTree.Element, model: Any, dat
         normal, tangent = frames[:, 0], frames[:, 1]
     else:
         normal = stated if normals == count else vertex_normals(shape)
-    world = rotation_matrices(quaternion_of(data.geom_xmat[geom])[None])[0] @ turn.T
-    return FoundSensor(
-        name,
-        position,
-        normal / np.linalg.norm(normal, axis=1, keepdims=True),
-        shape.triangles,
-        tangent=tangent,
-        frame_position=data.geom_xpos[geom] - world @ shift,
-        frame_quaternion=quaternion_of(world),
-    )
+    world = rotation_matrices(quaternion_of(data.geom_xmat[geom])) @ turn.T
+    normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    place, turn = data.geom_xpos[geom] - world @ shift, quaternion_of(world)
+    return FoundSensor(name, position, normal, shape.triangles, tangent=tangent, frame_position=place, frame_quaternion=turn)
 
 
 def _in_full_precision(
@@ -162,20 +152,15 @@ def _touch_sensors(mujoco: Any, spec: Any, model: Any, data: Any, sites: list[in
     alone = len(sites) - sum(map(len, chosen.values()))
     if chosen and alone:
         notes.append(f"{alone} <touch> on bodies with fewer than three of them were not imported.")
-    return [
-        _touch_sensor(model, data, body, own, _site_normals(mujoco, spec, model, data, own)) for body, own in chosen.items()
-    ]
-
-
-def _touch_sensor(model: Any, data: Any, body: int, sites: list[int], normals: np.ndarray) -> FoundSensor:
-    turn, place = rotation_matrices(data.xquat[body][None])[0], data.xpos[body].copy()
-    position, normal = (data.site_xpos[sites] - place) @ turn, normals @ turn
-    name = model.body(body).name or "touch"
-    note = f"'{name}': its {len(sites)} texels are <touch> sites, with the normals of the nearest surface of their body."
-    faces = triangles_between(position, normal)
-    return FoundSensor(
-        name, position, normal, faces, frame_position=place, frame_quaternion=data.xquat[body].copy(), notes=[note]
-    )
+    found = []
+    for body, own in chosen.items():
+        place, quaternion, name = data.xpos[body].copy(), data.xquat[body].copy(), model.body(body).name or "touch"
+        turn = rotation_matrices(quaternion)
+        position, normal = (data.site_xpos[own] - place) @ turn, _site_normals(mujoco, spec, model, data, own) @ turn
+        note = f"'{name}': its {len(own)} texels are <touch> sites, with the normals of the nearest surface of their body."
+        faces, frame = triangles_between(position, normal), {"frame_position": place, "frame_quaternion": quaternion}
+        found.append(FoundSensor(name, position, normal, faces, **frame, notes=[note]))
+    return found
 
 
 def _site_normals(mujoco: Any, spec: Any, model: Any, data: Any, sites: list[int]) -> np.ndarray:
@@ -238,8 +223,7 @@ def _bin_middles(count: int, limit: float, gamma: float) -> np.ndarray:
     edges = np.linspace(-1.0, 1.0, count + 1)
     share = min(max(gamma, 0.0), 1.0)
     edges = np.radians(limit) * (share * edges**5 + (1.0 - share) * edges)
-    middles: np.ndarray = (edges[1:] + edges[:-1]) / 2.0
-    return middles
+    return np.asarray((edges[1:] + edges[:-1]) / 2.0)
 
 
 def _require_count(path: str | os.PathLike, name: str, count: int) -> None:
@@ -256,18 +240,12 @@ MOST_HULL_GAP = 1e-4
 costs 35 times as much, and finds 40 contacts under a ball, whose stiffness is no longer ours."""
 
 
-def write_mjcf(sensors: Sequence[SensorOnMesh], folder: Path) -> Written:
-    """Write one file per sensor."""
-    files, notes = [], []
-    stems = folder_names(item.name for item in sensors)
-    for item in sensors:
-        contact = mujoco_contact(item, impedance=IMPEDANCE)
-        own = _notes(item, contact)
-        path = folder / f"{stems[item.name]}.xml"
-        write_xml(path, _model(item, contact, own))
-        files.append(path)
-        notes += own
-    return Written(files, notes)
+def write_mjcf(item: SensorOnMesh, path: Path, _: str) -> Written:
+    """Write a file."""
+    contact, file = mujoco_contact(item, impedance=IMPEDANCE), Path(f"{path}.xml")
+    notes = _notes(item, contact)
+    write_xml(file, _model(item, contact, notes))
+    return Written([file], notes)
 
 
 def _model(item: SensorOnMesh, contact: MujocoContact, notes: list[str]) -> ElementTree.Element:

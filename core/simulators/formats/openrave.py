@@ -4,10 +4,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from pathlib import Path
 
-from ...io.bake_folder import folder_names
 from ...io.input_files import read_xml
 from ..openrave_file import OpenRaveSensor, read_openrave, write_openrave
 from ..sensor_format import FoundSensor, SensorFormat, Written
@@ -31,20 +29,18 @@ def read_definitions(path: str | os.PathLike) -> list[FoundSensor]:
     return found
 
 
-def write_definitions(sensors: Sequence[SensorOnMesh], folder: Path) -> Written:
-    """Write the parameters of each sensor into a file."""
-    files = []
-    for item, stem in zip(sensors, folder_names(item.name for item in sensors).values(), strict=True):
-        files.append(folder / f"{stem}.openrave.xml")
-        write_openrave(files[-1], [OpenRaveSensor(item.name, item.name, item.sensor.parameters)])
-    return Written(files, [f"'{item.name}': OpenRAVE's XML has parameters, and no texels or effects." for item in sensors])
+def write_definition(item: SensorOnMesh, path: Path, _: str) -> Written:
+    """Write the parameters of a sensor."""
+    file = Path(f"{path}.openrave.xml")
+    write_openrave(file, [OpenRaveSensor(item.name, item.name, item.sensor.parameters)])
+    return Written([file], [f"'{item.name}': OpenRAVE's XML has parameters, and no texels or effects."])
 
 
 FORMAT = SensorFormat(
     "openrave",
     "OpenRAVE (XML)",
     "Parameters of sensors, as in the paper's Table 2",
-    write_definitions,
+    write_definition,
     read_definitions,
     is_openrave,
 )

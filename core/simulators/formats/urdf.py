@@ -9,7 +9,6 @@ from __future__ import annotations
 import io
 import os
 import re
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -19,13 +18,12 @@ import numpy as np
 from ...errors import FileError, PalpateError, imported
 from ...geometry.mesh import TriangleMesh
 from ...geometry.point_surface import triangles_between
-from ...io.bake_folder import folder_names
 from ...io.file_writing import atomic_write
 from ...io.input_files import load_mesh, read_xml
 from ...io.sensor_toml import MOST_TEXELS
 from ..probe_list import write_probe_list
 from ..sensor_format import FoundSensor, SensorFormat, Written, add, comment, numbers, write_xml
-from ..sensor_on_mesh import SensorOnMesh, identifiers, unmodelled
+from ..sensor_on_mesh import SensorOnMesh, unmodelled
 
 TEXEL_NAME = re.compile(
     r"(?:texel|taxel|tactel|tactile|sensor|probe)(?:[_\-/ ]?[a-z]+)*[_\-/ ]*(\d+(?:[_\-]\d+)*)(?:[_\-]?(?:link|frame|joint))?$",
@@ -143,9 +141,8 @@ def _tactile(path: str | os.PathLike, item: ElementTree.Element) -> FoundSensor:
             raise FileError(f"'{name}' in '{path}' has {rows} × {columns} texels: at most {MOST_TEXELS} are read.")
         size = array.get("size") or "0 0"
         spacing, offset = _numbers(path, array, "spacing", size), _numbers(path, array, "offset", "0 0")
-        row, column = (index.ravel() for index in np.indices((rows, columns)))
-        if array.get("order", "row-major") == "column-major":
-            row, column = (index.T.ravel() for index in np.indices((rows, columns)))
+        by_columns = array.get("order") == "column-major"
+        row, column = (index.ravel("F" if by_columns else "C") for index in np.indices((rows, columns)))
         place = np.stack([row * spacing[0] - offset[0], column * spacing[1] - offset[1], 0.0 * row, 1.0 + 0.0 * row], axis=1)
         frames = np.repeat(frame[None], len(row), axis=0)
         frames[:, :, 3] = place @ frame.T
@@ -213,9 +210,8 @@ def _file_of(path: str | os.PathLike, name: str) -> Path:
         return folder / plain
     package, _, inside = plain.removeprefix("package://").partition("/")
     for above in (folder, *folder.parents):
-        for file in (above / package / inside, above / inside if above.name == package else above / package / inside):
-            if file.is_file():
-                return file
+        if (above / package / inside).is_file():
+            return above / package / inside
     raise FileError(f"'{name}' is in none of the folders above '{path}': write the path of the mesh into it.")
 
 
@@ -224,30 +220,26 @@ DIGITS = 12
 """Digits of the frames; URDF readers hold them in double precision."""
 
 
-def write_urdf(sensors: Sequence[SensorOnMesh], folder: Path) -> Written:
-    """Write for each sensor its mesh, a URDF with a frame per texel, and a macro with one frame beside the probe list."""
-    files: list[Path] = []
-    stems, links = folder_names(item.name for item in sensors), identifiers(item.name for item in sensors)
-    for item in sensors:
-        stem = stems[item.name].replace(" ", "_")
-        names = [folder / f"{stem}{ending}" for ending in (".stl", ".urdf", ".xacro", ".probes.json")]
-        mesh, robot, macro, probes = names
-        _write_stl(mesh, item.surface or item.mesh)
-        write_xml(robot, _robot(item, links[item.name], mesh.name))
-        write_xml(macro, _macro(item, links[item.name], mesh.name, probes.name))
-        write_probe_list(probes, item)
-        files += names
-    return Written(files, [_note(item) for item in sensors])
+def write_urdf(item: SensorOnMesh, path: Path, link: str) -> Written:
+    """Write the mesh, a URDF with a frame per texel, and a macro with one frame beside the probe list."""
+    import trimesh
 
-
-def _note(item: SensorOnMesh) -> str:
+    stem, surface = path.name.replace(" ", "_"), item.surface or item.mesh
+    files = [path.with_name(f"{stem}{ending}") for ending in (".stl", ".urdf", ".xacro", ".probes.json")]
+    mesh, robot, macro, probes = files
     beyond = ", ".join(["forces of texels", "mass and inertia", *unmodelled(item)])
-    return f"'{item.name}': URDF holds where the texels are; it cannot express {beyond}."
+    note = f"'{item.name}': URDF holds where the texels are; it cannot express {beyond}."
+    with atomic_write(mesh) as temporary:
+        trimesh.Trimesh(surface.vertices, surface.triangles, process=False).export(temporary, file_type="stl")
+    write_xml(robot, _robot(item, link, mesh.name, note))
+    write_xml(macro, _macro(item, link, mesh.name, probes.name))
+    write_probe_list(probes, item)
+    return Written(files, [note])
 
 
-def _robot(item: SensorOnMesh, link: str, mesh: str) -> ElementTree.Element:
+def _robot(item: SensorOnMesh, link: str, mesh: str, note: str) -> ElementTree.Element:
     root = ElementTree.Element("robot", {"name": link})
-    comment(root, f"Palpate sensor '{item.name}'. {_note(item)}")
+    comment(root, f"Palpate sensor '{item.name}'. {note}")
     _add_link(root, link, mesh)
     width = len(str(len(item.sensor.texels) - 1))
     angles = roll_pitch_yaw(item.frames)
@@ -300,14 +292,6 @@ def roll_pitch_yaw(frames: np.ndarray) -> np.ndarray:
     sine, cosine = np.sin(yaw), np.cos(yaw)
     roll = np.arctan2(sine * frames[:, 0, 2] - cosine * frames[:, 1, 2], cosine * frames[:, 1, 1] - sine * frames[:, 0, 1])
     return np.stack([roll, pitch, yaw], axis=1)
-
-
-def _write_stl(path: Path, mesh: TriangleMesh) -> None:
-    """Write a mesh as binary STL, in metres."""
-    import trimesh
-
-    with atomic_write(path) as temporary:
-        temporary.write_bytes(trimesh.exchange.stl.export_stl(trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)))
 
 
 FORMAT = SensorFormat("urdf", "URDF", "A link with the mesh, and a fixed frame for each texel", write_urdf, read_urdf, is_urdf)

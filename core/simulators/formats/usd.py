@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +14,12 @@ from ...errors import FileError, imported
 from ...geometry.mesh import TriangleMesh
 from ...geometry.point_surface import triangles_between
 from ...geometry.rotations import quaternion_of
-from ...io.bake_folder import folder_names
 from ...io.file_writing import atomic_write
 from ...io.input_files import require_regular
 from ...io.sensor_toml import MOST_TEXELS
 from ...model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters, stated_parameters
-from ..sensor_format import FoundSensor, SensorFormat, Written
-from ..sensor_on_mesh import SensorOnMesh, identifiers, texel_arrays, unmodelled
+from ..sensor_format import FoundSensor, SensorFormat, Written, numbers
+from ..sensor_on_mesh import SensorOnMesh, texel_arrays, unmodelled
 
 OWN = "palpate:"
 """Beginning of the names of attributes that Palpate writes."""
@@ -130,29 +128,23 @@ DIGITS = 15
 """Of the arrays in double precision."""
 
 
-def write_usd(sensors: Sequence[SensorOnMesh], folder: Path) -> Written:
-    """Write one file per sensor."""
-    files = []
-    stems, prims = folder_names(item.name for item in sensors), identifiers(item.name for item in sensors)
-    for item in sensors:
-        path = folder / f"{stems[item.name]}.usda"
-        with atomic_write(path) as temporary:
-            temporary.write_text("\n".join(_stage(item, prims[item.name])) + "\n", encoding="utf-8", newline="\n")
-        files.append(path)
-    return Written(files, [_note(item) for item in sensors])
+def write_usd(item: SensorOnMesh, path: Path, prim: str) -> Written:
+    """Write a file."""
+    beyond, file = ", ".join(["forces of texels", *unmodelled(item)]), Path(f"{path}.usda")
+    note = f"'{item.name}': USD carries texels and parameters as data; its physics cannot express {beyond}."
+    with atomic_write(file) as temporary:
+        temporary.write_text("\n".join(_stage(item, prim, note)) + "\n", encoding="utf-8", newline="\n")
+    return Written([file], [note])
 
 
-def _note(item: SensorOnMesh) -> str:
-    beyond = ", ".join(["forces of texels", *unmodelled(item)])
-    return f"'{item.name}': USD carries texels and parameters as data; its physics cannot express {beyond}."
-
-
-def _stage(item: SensorOnMesh, prim: str) -> list[str]:
+def _stage(item: SensorOnMesh, prim: str, note: str) -> list[str]:
     surface = item.surface or item.mesh
+    position, turn = (", ".join(repr(float(value)) for value in values) for values in (item.position, item.quaternion))
     lines = ["#usda 1.0", "(", f"    defaultPrim = {_text(prim)}", "    metersPerUnit = 1", '    upAxis = "Z"', ")", ""]
     lines += [f'def Xform "{prim}" (', f"    displayName = {_text(item.name)}", ")", "{"]
-    lines += _pose(item)
-    lines += [f"    custom string {OWN}note = {_text(_note(item))}"]
+    lines += [f"    double3 xformOp:translate = ({position})", f"    quatd xformOp:orient = ({turn})"]
+    lines += ['    uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:orient"]']
+    lines += [f"    custom string {OWN}note = {_text(note)}"]
     for name in SENSOR_PARAMETERS:
         value = getattr(item.sensor.parameters, name)
         kind = "string" if isinstance(value, str) else "int" if isinstance(value, int) else "double"
@@ -169,15 +161,6 @@ def _stage(item: SensorOnMesh, prim: str) -> list[str]:
         "    {",
     ]
     return [*lines, *(f"        {line}" for line in _points(item)), "    }", "}"]
-
-
-def _pose(item: SensorOnMesh) -> list[str]:
-    position, turn = (", ".join(repr(float(value)) for value in values) for values in (item.position, item.quaternion))
-    return [
-        f"    double3 xformOp:translate = ({position})",
-        f"    quatd xformOp:orient = ({turn})",
-        '    uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:orient"]',
-    ]
 
 
 def _points(item: SensorOnMesh) -> list[str]:
@@ -207,15 +190,11 @@ def _text(value: str) -> str:
 
 
 def _list(values: np.ndarray, digits: int = 9) -> str:
-    return "[" + ", ".join(_number(value, digits) for value in values.tolist()) + "]"
+    return f"[{numbers(values, digits).replace(' ', ', ')}]"
 
 
 def _tuples(values: np.ndarray, digits: int = 9) -> str:
-    return "[" + ", ".join(f"({', '.join(_number(value, digits) for value in row)})" for row in values.tolist()) + "]"
-
-
-def _number(value: float, digits: int) -> str:
-    return str(value) if isinstance(value, int) else f"{value + 0.0:.{digits}g}"
+    return "[" + ", ".join(f"({numbers(row, digits).replace(' ', ', ')})" for row in values) + "]"
 
 
 FORMAT = SensorFormat(

@@ -8,17 +8,17 @@ MOST_RUNS trials at the latest, and none asks anything of the host.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from ...geometry.bvh import Tree
 from ...geometry.rotations import write_rotation
-from ..load_search import DONE, PHASE, LoadSearch, advance_search, begin_search, forget_load, place_trial, residual
+from ...solver.detection.shape_contacts import write_pose
+from ...solver.pressing import are_poses
+from ..load_search import DONE, PHASE, LoadSearch, advance_search, begin_search, forget_load, place_trial
 from .block import block_sum, wait_for_block
 from .press_arrays import Jumps, Results, SensorArrays, Slots, TargetArrays, Worlds
 from .press_kernels import (
-    are_poses,
     begin_point,
     end_step,
     find_contact,
@@ -27,34 +27,13 @@ from .press_kernels import (
     place_next,
     press_points,
     sum_world,
-    write_pose,
     write_reading,
 )
 
 
-class Beginning(NamedTuple):
-    """Where E environments begin a step, and what it gives.
-
-    Attributes
-    ----------
-    engine : (E, 7) float
-        Pose of the target that the other program has.
-    residual : (E, 6) float, N and N·m
-        Part of the load that the contact does not exert.
-    """
-
-    engine: np.ndarray
-    residual: np.ndarray
-
-    @classmethod
-    def zero(cls, e: int) -> Beginning:
-        """Allocate them."""
-        return cls(np.zeros((e, 7)), np.zeros((e, 6)))
-
-
 def balance_world(
     world: int, lane: int, lanes: int, degrees: int, sensor: SensorArrays, targets: TargetArrays, tree: Tree, worlds: Worlds,
-    slots: Slots, jumps: Jumps, out: Results, start: Slots, beginning: Beginning, search: LoadSearch,
+    slots: Slots, jumps: Jumps, out: Results, start: Slots, search: LoadSearch,
 ) -> None:  # fmt: skip
     """Run a step of an environment under a load with so many components, which :attr:`.LoadSearch.given` holds.
 
@@ -67,7 +46,7 @@ def balance_world(
     wait_for_block()
     if first:
         for i in range(7):
-            beginning.engine[world, i] = worlds.poses[world, 1, i]
+            search.engine[world, i] = worlds.poses[world, 1, i]
         if begins or not whole:
             forget_load(world, search)
         worlds.valid[world] = whole
@@ -87,7 +66,7 @@ def balance_world(
             for point in range(lane, slots.pressed.shape[2], lanes):
                 _copy_slot(world, point, start, slots)
             if first:
-                place_trial(world, beginning.engine[world], worlds.poses[world, 1], search)
+                place_trial(world, worlds.poses[world, 1], search)
         wait_for_block()
         if whole:
             move_world(world, lane, lanes, sensor, worlds)
@@ -106,7 +85,8 @@ def balance_world(
     if first:
         worlds.fresh[world] = begins
         for i in range(6):
-            beginning.residual[world, i] = residual(world, i, search) if i < degrees else 0.0
+            unit = search.extent[1] if i >= 3 else 1.0
+            search.residual[world, i] = -search.excess[world, i] * unit if i < degrees else 0.0
     wait_for_block()
     for texel in range(lane, out.texels.shape[1], lanes):
         write_reading(world, texel, out.texels[world, texel, 0], sensor, worlds, slots, out)
@@ -114,7 +94,7 @@ def balance_world(
     end_step(world, lane, lanes, worlds)
     if first:
         for i in range(7):
-            worlds.poses[world, 1, i] = beginning.engine[world, i]
+            worlds.poses[world, 1, i] = search.engine[world, i]
 
 
 def _begin_search(world: int, degrees: int, begins: bool, worlds: Worlds, search: LoadSearch) -> None:
@@ -125,7 +105,7 @@ def _begin_search(world: int, degrees: int, begins: bool, worlds: Worlds, search
         write_rotation(quaternion[body], rotation[body])
     begin_search(world, degrees, rotation[0], search)
     if begins:
-        write_pose(at, rotation, 0, 1, worlds.pose[world, 0])
+        write_pose(0, 1, at, rotation, worlds.pose[world, 0])
         for body in range(2):
             place_next(worlds.poses[world, body], worlds.position[world, body], worlds.quaternion[world, body])
 

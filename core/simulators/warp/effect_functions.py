@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The effects of a sensor as three functions of numbers, written for its laws one after the other.
+"""The effects of a sensor as three functions of numbers, which apply its laws one after the other.
 
 :func:`.compiled_program.apply_force_laws` calls laws by their addresses. A Warp kernel has none, and is compiled for one
-sensor: here its laws are called by name. Functions of the same names in this module are those of a sensor without effects.
+sensor: :mod:`.translation` puts its laws in the place of the empty tuples of this module, and unrolls the loops over them.
 """
 
 from __future__ import annotations
 
-import linecache
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
@@ -20,6 +19,15 @@ from ...errors import ParameterError
 from ...laws.contact_law import LINEAR_EXPONENT, ContactLaw
 from ...laws.normal_force import damped_force_derivatives, damping_coefficient, elastic_force, elastic_stiffness
 from ...model.sensor import Effect, Sensor
+
+Laws: TypeAlias = tuple[tuple[int, Any], ...]
+"""Laws, each with its row of the constants and of the memory."""
+CLIPPED_LAWS: Laws = ()
+"""Laws of the normal force before it is clipped to zero, and then others of forces, friction and readings."""
+UNCLIPPED_LAWS: Laws = ()
+FRICTION_LAWS: Laws = ()
+LAWS_OF_FORCE: Laws = ()
+LAWS_OF_READINGS: Laws = ()
 
 
 def force_with_effects(
@@ -44,18 +52,24 @@ def force_with_effects(
     if motion.depth > 0.0:
         force = elastic_force(motion.depth, law)
         slope = elastic_stiffness(motion.depth, force, law)
-    # clipped laws
+    for i, effect in CLIPPED_LAWS:
+        force, slope = effect(TexelInput(force, slope, depth, motion.slide_step), constants[i, step_length], memory[i], commit)
     force, by_depth, by_rate = damped_force_derivatives(force, slope, damping_coefficient(law), rate, linear)
     if force <= 0.0 or depth <= 0.0:
         force, by_depth, by_rate = 0.0, 0.0, 0.0
-    # unclipped laws
+    for i, effect in UNCLIPPED_LAWS:
+        force, by_depth = effect(
+            TexelInput(force, by_depth, depth, motion.slide_step), constants[i, step_length], memory[i], commit
+        )
     return force, by_depth, by_rate
 
 
 def friction_with_effects(speed: float, force: float, constants: np.ndarray) -> tuple[float, float]:
     """Return the factor on the friction coefficients, and what is added to `ct` (N·s/m), at a sliding speed (m/s)."""
     factor, viscosity = 1.0, 0.0
-    # friction laws
+    for i, law in FRICTION_LAWS:
+        f, c = law(speed, force, constants[i, 0])
+        factor, viscosity = factor * f, viscosity + c
     return factor, viscosity
 
 
@@ -75,9 +89,11 @@ def reading_with_effects(
     memory : (laws, c) float
     """
     value = force
-    # laws of force
+    for i, law in LAWS_OF_FORCE:
+        value, _ = law(TexelInput(value, 1.0, 0.0, 0.0), constants[i, step_length], memory[i], True)
     value = zero + scale * value
-    # laws of readings
+    for i, law in LAWS_OF_READINGS:
+        value, _ = law(TexelInput(value, 1.0, 0.0, 0.0), constants[i, step_length], memory[i], True)
     return value
 
 
@@ -87,7 +103,7 @@ class EffectFunctions(NamedTuple):
     Attributes
     ----------
     instead : dict
-        By name, what stands for the functions of this module in the kernels.
+        By name, the laws that stand for the empty tuples of this module, and the number that tells whether there are some.
     force_constants, friction_constants, reading_constants : (1 or E, laws, 2, c) float
     laws, reading_laws : (int, int)
         How many laws with memory there are, at least one, and how much each of them remembers.
@@ -120,40 +136,28 @@ def functions_of(sensors: Sequence[Sensor], dt: float) -> EffectFunctions:
                 f"The effect '{item.name}' ({form.name}) of '{sensor.name}' has no Warp kernel: "
                 "take it away, or use PressedSensors."
             )
-    clipped = [i for i, (_, form) in enumerate(forces) if not form.after_clip]
-    scope = {name: value for name, value in globals().items() if not name.startswith("__")} | {"TexelInput": TexelInput}
-    for prefix, chain in (("force", forces), ("friction", frictions), ("reading", readings)):
-        scope |= {f"{prefix}_{i}": form.law or form.friction_law for i, (_, form) in enumerate(chain)}
-    before, after = (
-        [_FORCE_LAW.format(i=i, slope=slope) for i in range(len(forces)) if (i in clipped) is first]
-        for slope, first in (("slope", True), ("by_depth", False))
-    )
-    on_force, on_reading = (
-        [_READING_LAW.format(i=i) for i, (_, form) in enumerate(readings) if form.after_conversion is late]
-        for late in (False, True)
-    )
+
+    def laws(chain: Chain, chosen: Callable[[Form], bool]) -> Laws:
+        return tuple((i, form.law or form.friction_law) for i, (_, form) in enumerate(chain) if chosen(form))
+
     instead = {
         "HAS_EFFECTS": int(bool(forces or frictions)),
-        "force_with_effects": _with_laws(force_with_effects, {"clipped laws": before, "unclipped laws": after}, scope),
-        "friction_with_effects": _with_laws(
-            friction_with_effects, {"friction laws": [_FRICTION_LAW.format(i=i) for i in range(len(frictions))]}, scope
-        ),
-        "reading_with_effects": _with_laws(
-            reading_with_effects, {"laws of force": on_force, "laws of readings": on_reading}, scope
-        ),
+        "CLIPPED_LAWS": laws(forces, lambda form: not form.after_clip),
+        "UNCLIPPED_LAWS": laws(forces, lambda form: form.after_clip),
+        "FRICTION_LAWS": laws(frictions, lambda _: True),
+        "LAWS_OF_FORCE": laws(readings, lambda form: not form.after_conversion),
+        "LAWS_OF_READINGS": laws(readings, lambda form: form.after_conversion),
     }
     chains = [_chains(one) for one in sensors]
     return EffectFunctions(
         instead,
-        np.array([_constants(force, [dt, 0.0], None) for force, _, _ in chains]),
-        np.array([_constants(friction, [dt, 0.0], None) for _, friction, _ in chains]),
-        np.array([
-            _constants(chain[2], [0.0, dt], one.parameters.gain) for one, chain in zip(sensors, chains, strict=True)
-        ]),
+        np.array([_constants(force, [dt, 0.0]) for force, _, _ in chains]),
+        np.array([_constants(friction, [dt, 0.0]) for _, friction, _ in chains]),
+        np.array([_constants(chain[2], [0.0, dt], one.parameters.gain) for one, chain in zip(sensors, chains, strict=True)]),
         _memory(forces),
         _memory(readings),
         any(form.after_clip for _, form in forces),
-    )  # fmt: skip
+    )
 
 
 Chain: TypeAlias = list[tuple[Effect, Form]]
@@ -168,41 +172,12 @@ def _chains(sensor: Sensor) -> tuple[Chain, Chain, Chain]:
     return forces, frictions, list(in_signal_order(sensor.effects, readout=True))
 
 
-_FORCE_LAW = (
-    "force, {slope} = force_{i}("
-    "TexelInput(force, {slope}, depth, motion.slide_step), constants[{i}, step_length], memory[{i}], commit)"
-)
-_FRICTION_LAW = "f, c = friction_{i}(speed, force, constants[{i}, 0])\nfactor, viscosity = factor * f, viscosity + c"
-_READING_LAW = "value, _ = reading_{i}(TexelInput(value, 1.0, 0.0, 0.0), constants[{i}, step_length], memory[{i}], True)"
-
-
-def _with_laws(template: Callable[..., Any], calls: dict[str, list[str]], scope: dict[str, Any]) -> Callable[..., Any]:
-    """Return a copy of a function of this module with calls in the place of its comments."""
-    import inspect
-
-    lines = []
-    for line in inspect.getsource(template).splitlines():
-        indent, mark = line[: len(line) - len(line.lstrip())], line.strip().removeprefix("# ")
-        if line.strip().startswith("# ") and mark in calls:
-            lines += [indent + part for call in calls[mark] for part in call.split("\n")]
-        else:
-            lines.append(line)
-    text = "from __future__ import annotations\n" + "\n".join(lines) + "\n"
-    file = f"<{template.__name__} {hash(text):x} {id(scope):x}>"
-    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
-    scope = {**scope, "__name__": template.__module__}
-    exec(compile(text, file, "exec"), scope)
-    made: Callable[..., Any] = scope[template.__name__]
-    return made
-
-
-def _constants(chain: Chain, lengths: list[float], gain: float | None) -> np.ndarray:
+def _constants(chain: Chain, lengths: list[float], gain: float = 1.0) -> np.ndarray:
     """Return the constants of laws for two lengths of a step, (laws, 2, c), padded with zeros."""
     tables = []
     for item, form in chain:
         assert form.constants is not None
-        values = complete_values(item) if gain is None else complete_values(item, gain)
-        tables.append(form.constants(values, np.array(lengths)))
+        tables.append(form.constants(complete_values(item, gain), np.array(lengths)))
     width = max((table.shape[1] for table in tables), default=1)
     joined = np.zeros((max(len(tables), 1), 2, width))
     for i, table in enumerate(tables):

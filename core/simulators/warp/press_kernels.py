@@ -33,10 +33,12 @@ from ...laws.friction import (
 )
 from ...laws.normal_force import normal_force, normal_tangent
 from ...solver.detection.narrow_phase import NEARLY_TOO_DEEP
+from ...solver.detection.shape_contacts import in_sensor_axes, in_target_axes, write_pose
 from ...solver.dynamics.contact_assembly import LinearContact, Tangent, linearise_contact
 from ...solver.dynamics.effect_kernels import FULL_STEP, NO_TIME
 from ...solver.dynamics.friction_state import relative_motion, velocity_at
 from ...solver.jumps import crosses_texel, meets_sphere
+from ...solver.pressing import are_poses, write_reaction
 from .block import block_sum, wait_for_block
 from .effect_functions import force_with_effects, friction_with_effects, reading_with_effects
 from .press_arrays import BoolArray, Jumps, Results, SensorArrays, Slots, TargetArrays, Worlds
@@ -161,22 +163,8 @@ def _relate_target(world: int, end: int, target: int, dt: float, worlds: Worlds)
         _turn_motion(dt, worlds.step_motion[world, 0], worlds.rotation[world, 0], motion, turned)
         _write_row(turned, worlds.end_motion[world, target])
     else:
-        write_pose(worlds.position[world], worlds.rotation[world], row, row + 1 + target, turned)
+        write_pose(row, row + 1 + target, worlds.position[world], worlds.rotation[world], turned)
         _write_row(turned, worlds.pose[world, target])
-
-
-def are_poses(poses: np.ndarray) -> bool:
-    """Whether all of the poses (b, 7) are finite, with quaternions that are not zero."""
-    good = True
-    for body in range(poses.shape[0]):
-        size, square = 0.0, 0.0
-        for i in range(7):
-            size += abs(poses[body, i])
-        for i in range(3, 7):
-            square += poses[body, i] * poses[body, i]
-        if not (size < math.inf and 0.0 < square < math.inf):
-            good = False
-    return good
 
 
 def place_next(pose: np.ndarray, position: np.ndarray, quaternion: np.ndarray) -> None:
@@ -197,8 +185,7 @@ def _write_row(values: np.ndarray, out: np.ndarray) -> None:
 
 def _turn_motion(dt: float, step_motion: np.ndarray, rotation: np.ndarray, motion: np.ndarray, out: np.ndarray) -> None:
     """Write a relative motion (12,), given in the sensor's axes at the step's beginning, in those at its end."""
-    for i in range(12):
-        out[i] = motion[i]
+    _write_row(motion, out)
     for k in range(3):
         for m in range(3):
             turn = 0.0  # entry (m, k) of the sensor's W in its own axes
@@ -208,21 +195,6 @@ def _turn_motion(dt: float, step_motion: np.ndarray, rotation: np.ndarray, motio
             out[k] += dt * turn * motion[m]
             for j in range(3):
                 out[3 + 3 * k + j] += dt * turn * motion[3 + 3 * m + j]
-
-
-def write_pose(position: np.ndarray, rotation: np.ndarray, sensor: int, body: int, pose: np.ndarray) -> None:
-    """Write the rotation (row by row) and position of a sensor's body in the frame of a target's."""
-    for i in range(3):
-        total = 0.0
-        for k in range(3):
-            total += rotation[body, k, i] * (position[sensor, k] - position[body, k])
-        pose[9 + i] = total
-        for j in range(3):
-            pose[3 * i + j] = (
-                rotation[body, 0, i] * rotation[sensor, 0, j]
-                + rotation[body, 1, i] * rotation[sensor, 1, j]
-                + rotation[body, 2, i] * rotation[sensor, 2, j]
-            )
 
 
 # --- what a texel measures
@@ -390,9 +362,8 @@ def find_contact(
     tx = m[9] + m[0] * px + m[1] * py + m[2] * pz
     ty = m[10] + m[3] * px + m[4] * py + m[5] * pz
     tz = m[11] + m[6] * px + m[7] * py + m[8] * pz
-    dx = reach * (m[0] * ax + m[1] * ay + m[2] * az)
-    dy = reach * (m[3] * ax + m[4] * ay + m[5] * az)
-    dz = reach * (m[6] * ax + m[7] * ay + m[8] * az)
+    dx, dy, dz = in_target_axes((ax, ay, az), m)
+    dx, dy, dz = reach * dx, reach * dy, reach * dz
     segment, before = Segment(tx - dx, ty - dy, tz - dz, dx, dy, dz), slots.pressed[world, target, point]
     hint, is_mesh = -1, targets.kind[target] == MESH
     if is_mesh:
@@ -410,9 +381,7 @@ def find_contact(
         return Touch(pressed, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     pressed = 1.0 - found.t
     depth, way = pressed * abs(dx * found.nx + dy * found.ny + dz * found.nz), pressed * reach
-    nx = m[0] * found.nx + m[3] * found.ny + m[6] * found.nz
-    ny = m[1] * found.nx + m[4] * found.ny + m[7] * found.nz
-    nz = m[2] * found.nx + m[5] * found.ny + m[8] * found.nz
+    nx, ny, nz = in_sensor_axes((found.nx, found.ny, found.nz), m)
     zx, zy, zz = turned_into_plane(
         (z[world, target, 0, point], z[world, target, 1, point], z[world, target, 2, point]), (nx, ny, nz)
     )  # fmt: skip
@@ -534,29 +503,13 @@ def sum_world(world: int, lane: int, lanes: int, sensor: SensorArrays, worlds: W
         fx, fy, fz = block_sum(fx), block_sum(fy), block_sum(fz)
         mx, my, mz = block_sum(mx), block_sum(my), block_sum(mz)
         if lane == 0:
-            _write_wrench((fx, fy, fz), (mx, my, mz), 1 + target, worlds.position[world], worlds.rotation[world],
-                          out.wrench[world, target])  # fmt: skip
+            net = np.zeros(6)
+            net[0], net[1], net[2], net[3], net[4], net[5] = fx, fy, fz, mx, my, mz
+            at, turned, sensor_body = worlds.position[world], worlds.rotation[world], worlds.poses.shape[1]  # at the step's end
+            write_reaction(net, turned[sensor_body], at[sensor_body], at[sensor_body + 1 + target], out.wrench[world, target])
     too_deep = block_sum(too_deep)
     if lane == 0:
         out.too_deep[world] = int(too_deep)
-
-
-def _write_wrench(
-    force: Vector, torque: Vector, target: int, position: np.ndarray, rotation: np.ndarray, wrench: np.ndarray
-) -> None:
-    """Write what a target exerts on the sensor, given about its origin in its frame, as the wrench (6,) on the target."""
-    sensor = position.shape[0] // 2  # at the step's end
-    body = sensor + target
-    for i in range(3):
-        wrench[i] = -(rotation[sensor, i, 0] * force[0] + rotation[sensor, i, 1] * force[1] + rotation[sensor, i, 2] * force[2])
-        wrench[3 + i] = -(rotation[sensor, i, 0] * torque[0] + rotation[sensor, i, 1] * torque[1]
-                          + rotation[sensor, i, 2] * torque[2])  # fmt: skip
-    x = position[sensor, 0] - position[body, 0]
-    y = position[sensor, 1] - position[body, 1]
-    z = position[sensor, 2] - position[body, 2]
-    wrench[3] += y * wrench[2] - z * wrench[1]
-    wrench[4] += z * wrench[0] - x * wrench[2]
-    wrench[5] += x * wrench[1] - y * wrench[0]
 
 
 def mark_jumps(world: int, lane: int, lanes: int, worlds: Worlds, jumps: Jumps, out: Results) -> None:
@@ -565,10 +518,7 @@ def mark_jumps(world: int, lane: int, lanes: int, worlds: Worlds, jumps: Jumps, 
     for target in range(jumps.sphere.shape[0]):
         pose, sphere, old = worlds.pose[world, target], jumps.sphere[target], jumps.centre[world, target]
         sx, sy, sz = old[0], old[1], old[2]
-        dx, dy, dz = sphere[0] - pose[9], sphere[1] - pose[10], sphere[2] - pose[11]
-        x = pose[0] * dx + pose[3] * dy + pose[6] * dz
-        y = pose[1] * dx + pose[4] * dy + pose[7] * dz
-        z = pose[2] * dx + pose[5] * dy + pose[8] * dz
+        x, y, z = in_sensor_axes((sphere[0] - pose[9], sphere[1] - pose[10], sphere[2] - pose[11]), pose)
         if worlds.valid[world] and not worlds.fresh[world]:
             b = jumps.bound
             if meets_sphere((sx, sy, sz), (x, y, z), sphere[3] + b[3], (b[0], b[1], b[2])):

@@ -16,13 +16,15 @@ An array has as many axes as the source has indices for it.
 from __future__ import annotations
 
 import ast
+import copy
 import inspect
 import linecache
 import math
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
+from functools import reduce
 from types import GenericAlias, ModuleType
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -31,9 +33,11 @@ from .block import IN_CUDA, THREADS
 
 REAL, INTEGER, BOOLEAN, OTHER = "real", "integer", "boolean", "other"
 """Kinds of values, as far as the rewriting has to tell them apart."""
-KIND_OF_ANNOTATION = {"float": REAL, "int": INTEGER, "bool": BOOLEAN, "np.ndarray": REAL}
+KIND_OF_ANNOTATION = {"float": REAL, "int": INTEGER, "bool": BOOLEAN}
 ARRAYS = {"np.ndarray": REAL, "IntArray": INTEGER, "BoolArray": BOOLEAN}
 """Names of annotations of arrays, and the kind of what they hold."""
+Typed: TypeAlias = tuple[str, ast.expr]
+"""The kind of an expression of the source, and the expression rewritten."""
 SAME_IN_WARP = ("min", "max", "abs", "range", "len")
 NATIVE = {"expm1": "x", "log1p": "x", "hypot": "x, y", "copysign": "x, y"}
 """Functions of C that Warp does not have, and their arguments."""
@@ -83,7 +87,7 @@ class Translation:
                 alone = f"return {arguments[0]};" if arguments else ""
                 self._functions[source] = self._native(name, arguments, IN_CUDA[source], alone)
             else:
-                self._functions[source] = self._compiled(source, name, self.warp.func, None)
+                self._functions[source] = self._compiled(source, name, self.warp.func)
         return self._functions[source]
 
     def kernel(self, function: Callable[..., Any], threads: int, block: int = THREADS, registers: int | None = None) -> Any:
@@ -112,7 +116,13 @@ class Translation:
     def struct(self, kind: type, example: Any = None) -> Any:
         """Return a named tuple as a struct of Warp: of numbers or, like an example, also of arrays."""
         if kind not in self.structs:
-            fields = {name: self._field(text, name, example) for name, text in fields_of(kind).items()}
+            fields = {}
+            for name, text in fields_of(kind).items():
+                if text in ARRAYS:
+                    values = getattr(example, name)
+                    fields[name] = self.warp.array(dtype=self.type_of(values), ndim=values.ndim)
+                else:
+                    fields[name] = self.number_type(KIND_OF_ANNOTATION[text])
             made = type(kind.__name__, (), {"__annotations__": fields, "__module__": self.name})
             self.structs[kind] = self.warp.struct(made)
         return self.structs[kind]
@@ -120,14 +130,14 @@ class Translation:
     def value(self, example: Any, device: str) -> Any:
         """Return a named tuple of numbers and arrays as a value of its struct, with the arrays on a device."""
         made = self.struct(type(example), example)()
-        for name, value in zip(type(example)._fields, example, strict=True):
+        for name, value in example._asdict().items():
             setattr(made, name, self.array(value, device) if isinstance(value, np.ndarray) else value)
         return made
 
     def room(self, example: Any, count: int, device: str) -> Any:
         """Return the arrays of many environments as a value of their struct, given those of one, each full of one number."""
         made = self.struct(type(example), example)()
-        for name, values in zip(type(example)._fields, example, strict=True):
+        for name, values in example._asdict().items():
             shape, kind = (count, *values.shape[1:]), self.type_of(values)
             setattr(made, name, self.warp.full(shape, values.item(0), dtype=kind, device=device))
         return made
@@ -176,29 +186,18 @@ class Translation:
         text = f"@wp.func_native(snippet)\ndef {name}({header}){result}: ...\n"
         return self._executed(text, name, {"snippet": snippet})
 
-    def _field(self, text: str, name: str, example: Any) -> Any:
-        if text in ARRAYS:
-            values = getattr(example, name)
-            return self.warp.array(dtype=self.type_of(values), ndim=values.ndim)
-        return self.number_type(KIND_OF_ANNOTATION[text])
-
-    def _compiled(self, source: Callable[..., Any], name: str, decorate: Callable[[Any], Any], threads: int | None) -> Any:
-        tree = ast.parse(textwrap.dedent(inspect.getsource(source))).body[0]
-        assert isinstance(tree, ast.FunctionDef)
-        rewriter = _Rewriter(self, tree, {**source.__globals__, **self.instead})
-        body = rewriter.body()
-        arguments = [argument.arg for argument in tree.args.args]
-        annotations = rewriter.annotations()
-        if threads is not None:
-            index = ", ".join(arguments[:threads])
-            body = [*ast.parse(f"{index} = wp.tid()").body, *body]
-            arguments = arguments[threads:]
-        header = ast.parse(f"def {name}({', '.join(arguments)}): pass").body[0]
+    def _compiled(self, source: Callable[..., Any], name: str, decorate: Callable[[Any], Any], threads: int = 0) -> Any:
+        """Return a function, decorated; its first arguments, so many, are the index of a thread."""
+        rewriter = _Rewriter(self, source)
+        body, annotations = rewriter.body(), rewriter.annotations()
+        arguments = list(annotations)
+        if threads:
+            body = [*ast.parse(f"{', '.join(arguments[:threads])} = wp.tid()").body, *body]
+        header = ast.parse(f"def {name}({', '.join(arguments[threads:])}): pass").body[0]
         assert isinstance(header, ast.FunctionDef)
         header.body = body
-        text = ast.unparse(ast.fix_missing_locations(header)) + "\n"
-        made = self._executed(text, name, rewriter.scope)
-        made.__annotations__ = {argument: annotations[argument] for argument in arguments}
+        made = self._executed(ast.unparse(ast.fix_missing_locations(header)) + "\n", name, rewriter.scope)
+        made.__annotations__ = {argument: annotations[argument] for argument in arguments[threads:]}
         return decorate(made)
 
     def _executed(self, text: str, name: str, scope: Mapping[str, Any]) -> Any:
@@ -216,13 +215,19 @@ class _Rewriter:
     Parameters
     ----------
     translation : Translation
-    tree : ast.FunctionDef
-    outside : dict
-        The globals of the function.
+    source : callable
+
+    Attributes
+    ----------
+    scope : dict
+        Functions and types by the names that the rewritten function has for them.
     """
 
-    def __init__(self, translation: Translation, tree: ast.FunctionDef, outside: Mapping[str, Any]):
-        self._translation, self._tree, self._outside = translation, tree, outside
+    def __init__(self, translation: Translation, source: Callable[..., Any]):
+        self._translation, self._outside = translation, {**source.__globals__, **translation.instead}
+        tree = _Unrolled(self._outside).visit(ast.parse(textwrap.dedent(inspect.getsource(source))).body[0])
+        assert isinstance(tree, ast.FunctionDef)
+        self._tree = tree
         self.scope: dict[str, Any] = {}
         self._temporaries = 0
         self._text = {one.arg: self._named_text(ast.unparse(one.annotation)) for one in tree.args.args if one.annotation}
@@ -251,85 +256,33 @@ class _Rewriter:
     def _count_axes(self) -> dict[str, int]:
         """Return how many axes each array has, and how many entries each tuple that is indexed."""
         axes: dict[str, int] = {}
+
+        def expect(name: str, count: int) -> None:
+            axes[name] = max(axes.get(name, 0), count)
+
         for node in ast.walk(self._tree):
-            if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name):
-                name, index = node.value.id, node.slice
-                if self._text.get(name, "").startswith("tuple"):
-                    assert isinstance(index, ast.Constant) and isinstance(index.value, int)
-                    axes[name] = max(axes.get(name, 0), index.value + 1)
-                else:
-                    axes[name] = max(axes.get(name, 0), len(index.elts) if isinstance(index, ast.Tuple) else 1)
-            elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-                self._axes_of_callee(node, axes)
+            match node:
+                case ast.Subscript(ast.Name(name), ast.Constant(int(index))) if self._text.get(name, "").startswith("tuple"):
+                    expect(name, index + 1)
+                case ast.Subscript(ast.Name(name)):
+                    expect(name, _indices(node))
+                case ast.Call(ast.Name(name)):
+                    callee = self._outside.get(name)
+                    if not callable(callee) or isinstance(callee, type) or name in SAME_IN_WARP:
+                        continue
+                    inner = _Rewriter(self._translation, plain(callee))  # whose arguments have these axes here, too
+                    for given, argument in zip(node.args, inner._tree.args.args, strict=False):
+                        found = inner._axes.get(argument.arg, 0)
+                        if isinstance(given, ast.Name):
+                            expect(given.id, found)
+                        elif isinstance(given, ast.Subscript) and isinstance(given.value, ast.Name) and found:
+                            expect(given.value.id, found + _indices(given))
         return axes
 
-    def _axes_of_callee(self, call: ast.Call, axes: dict[str, int]) -> None:
-        """Take over the axes that a function expects of arrays it is given."""
-        assert isinstance(call.func, ast.Name)
-        callee = self._outside.get(call.func.id)
-        if not callable(callee) or isinstance(callee, type) or call.func.id in SAME_IN_WARP:
-            return
-        source = plain(callee)
-        tree = ast.parse(textwrap.dedent(inspect.getsource(source))).body[0]
-        assert isinstance(tree, ast.FunctionDef)
-        inner = _Rewriter(self._translation, tree, {**source.__globals__, **self._translation.instead})
-        for given, argument in zip(call.args, tree.args.args, strict=False):
-            found = inner._axes.get(argument.arg, 0)
-            if isinstance(given, ast.Name):
-                axes[given.id] = max(axes.get(given.id, 0), found)
-            elif isinstance(given, ast.Subscript) and isinstance(given.value, ast.Name) and found:
-                taken = len(given.slice.elts) if isinstance(given.slice, ast.Tuple) else 1
-                axes[given.value.id] = max(axes.get(given.value.id, 0), found + taken)
-
     def _constant(self, name: str) -> Any:
-        """Return a number that a name stands for outside the function, or None."""
+        """Return a number, or a tuple of them, that a name stands for outside the function, or None."""
         value = None if name in self._kinds else self._outside.get(name)
-        return value if isinstance(value, bool | int | float) else None
-
-    def _constant_entry(self, node: ast.Subscript) -> Any:
-        """Return an entry of a tuple of numbers outside the function, or None."""
-        if isinstance(node.value, ast.Name) and isinstance(node.slice, ast.Constant):
-            values = self._outside.get(node.value.id)
-            if isinstance(values, tuple) and node.value.id not in self._kinds:
-                return values[node.slice.value]  # type: ignore[index]
-        return None
-
-    def _kind(self, node: ast.expr) -> str:
-        """Return the kind of an expression of the source."""
-        if isinstance(node, ast.Constant):
-            value = node.value
-            return BOOLEAN if isinstance(value, bool) else INTEGER if isinstance(value, int) else REAL
-        if isinstance(node, ast.Name):
-            value = self._constant(node.id)
-            return self._kinds.get(node.id, OTHER) if value is None else self._kind(ast.Constant(value))
-        if isinstance(node, ast.Compare | ast.BoolOp):
-            return BOOLEAN
-        if isinstance(node, ast.UnaryOp):
-            return BOOLEAN if isinstance(node.op, ast.Not) else self._kind(node.operand)
-        if isinstance(node, ast.BinOp):
-            both = {self._kind(node.left), self._kind(node.right)}
-            return INTEGER if both == {INTEGER} and not isinstance(node.op, ast.Div) else REAL
-        if isinstance(node, ast.IfExp):
-            both = {self._kind(node.body), self._kind(node.orelse)}
-            return both.pop() if len(both) == 1 else REAL
-        if isinstance(node, ast.Subscript):
-            return self._kind_of_entry(node)
-        if isinstance(node, ast.Call):
-            return self._kind_of_call(node)
-        return self._kind_of_attribute(node) if isinstance(node, ast.Attribute) else OTHER
-
-    def _kind_of_entry(self, node: ast.Subscript) -> str:
-        """Return the kind of an entry of an array; a row of it is OTHER."""
-        value, taken = node.value, len(node.slice.elts) if isinstance(node.slice, ast.Tuple) else 1
-        if isinstance(value, ast.Name) and self._text.get(value.id, "").startswith("tuple"):
-            return REAL
-        if isinstance(value, ast.Attribute):
-            kind, axes = self._field_array(value)
-        elif isinstance(value, ast.Name):
-            kind, axes = self._arrays.get(value.id, REAL), self._axes.get(value.id, 1)
-        else:
-            return REAL
-        return kind if taken >= axes else OTHER
+        return value if isinstance(value, bool | int | float | tuple) else None
 
     def _field_array(self, node: ast.Attribute) -> tuple[str, int]:
         """Return the kind of the entries of a struct's array, and how many axes it has."""
@@ -347,24 +300,10 @@ class _Rewriter:
         kind = self._outside.get(self._text.get(node.id, "")) if isinstance(node, ast.Name) else None
         return kind if isinstance(kind, type) and hasattr(kind, "_fields") else None
 
-    def _kind_of_attribute(self, node: ast.Attribute) -> str:
+    def _field_text(self, node: ast.Attribute) -> str:
+        """Return the annotation of a struct's field; of anything else that of a number."""
         kind = self._struct_of(node.value)
-        text = "float" if kind is None else fields_of(kind).get(node.attr, "float")
-        return OTHER if text in ARRAYS else KIND_OF_ANNOTATION.get(text, OTHER)
-
-    def _kind_of_call(self, node: ast.Call) -> str:
-        name = node.func.id if isinstance(node.func, ast.Name) else ""
-        if _is_new_array(node):
-            return OTHER
-        if name in ("int", "len"):
-            return INTEGER
-        if name in ("min", "max", "abs"):
-            kinds = {self._kind(one) for one in node.args}
-            return kinds.pop() if len(kinds) == 1 else REAL
-        callee = self._outside.get(name)
-        if callee is not None and not isinstance(callee, type):
-            return KIND_OF_ANNOTATION.get(str(plain(callee).__annotations__.get("return", "")), OTHER)
-        return OTHER if name else REAL
+        return "float" if kind is None else fields_of(kind).get(node.attr, "float")
 
     # --- statements
 
@@ -372,266 +311,300 @@ class _Rewriter:
         return [new for statement in body for new in self._statement(statement)]
 
     def _statement(self, node: ast.stmt) -> list[ast.stmt]:
-        if isinstance(node, ast.Expr):
-            return [] if isinstance(node.value, ast.Constant) else [ast.Expr(self._expression(node.value))]
-        if isinstance(node, ast.Assign):
-            return [new for target in node.targets for new in self._assign(target, node.value)]
-        if isinstance(node, ast.AugAssign):
-            value = ast.BinOp(_loaded(node.target), node.op, node.value)
-            return self._assign(node.target, value)
-        if isinstance(node, ast.Return):
-            return [ast.Return(None if node.value is None else self._returned(node.value))]
-        if isinstance(node, ast.If):
-            return self._branch(node)
-        if isinstance(node, ast.While):
-            return [ast.While(self._expression(node.test), self._block(node.body), [])]
-        if isinstance(node, ast.For):
-            return self._loop(node)
-        if isinstance(node, ast.Break | ast.Continue | ast.Pass):
-            return [node]
+        match node:
+            case ast.Expr(ast.Constant()):
+                return []
+            case ast.Expr(value):
+                return [ast.Expr(self._expression(value))]
+            case ast.Assign(targets, value):
+                return [new for target in targets for new in self._assign(target, value)]
+            case ast.AugAssign(target, operator, value):
+                return self._assign(target, ast.BinOp(target, operator, value))
+            case ast.Return(value):
+                return [ast.Return(None if value is None else self._returned(value))]
+            case ast.If():
+                return self._branch(node)
+            case ast.While(test, body):
+                return [ast.While(self._expression(test), self._block(body), [])]
+            case ast.For(ast.Name(name) as target, values, body):
+                self._kinds[name] = INTEGER
+                return [ast.For(target, self._expression(values), self._block(body), [])]
+            case ast.Break() | ast.Continue() | ast.Pass():
+                return [node]
         raise TranslationError(f"'{ast.unparse(node)}' has no translation.")
 
     def _branch(self, node: ast.If) -> list[ast.stmt]:
         """Return a branch; numbers that it introduces exist before it, since Warp joins only such after a branch."""
         before, test = set(self._kinds), self._expression(node.test)
         new = ast.If(test, self._block(node.body), self._block(node.orelse))
-        zeros = {
-            REAL: _number(0.0),
-            INTEGER: ast.parse("int(0)", mode="eval").body,
-            BOOLEAN: ast.parse("bool(False)", mode="eval").body,
-        }
-        fresh = [name for name in self._kinds if name not in before and self._kinds[name] in zeros]
-        return [*(ast.Assign([ast.Name(name, ast.Store())], zeros[self._kinds[name]]) for name in fresh), new]
+        zeros = {REAL: _number(0.0), INTEGER: _called("int", ast.Constant(0)), BOOLEAN: _called("bool", ast.Constant(False))}
+        fresh = {name: kind for name, kind in self._kinds.items() if name not in before and kind in zeros}
+        return [*(ast.Assign([ast.Name(name)], zeros[kind]) for name, kind in fresh.items()), new]
 
     def _returned(self, value: ast.expr) -> ast.expr:
         value, wanted = _tuple_of_choices(value), ast.unparse(self._tree.returns) if self._tree.returns else ""
         if isinstance(value, ast.Tuple):
             kinds = _kinds_of_results(wanted, len(value.elts))
-            return ast.Tuple([self._as(kind, one) for kind, one in zip(kinds, value.elts, strict=True)], ast.Load())
+            return ast.Tuple([self._as(kind, one) for kind, one in zip(kinds, value.elts, strict=True)])
         return self._as(KIND_OF_ANNOTATION.get(wanted, OTHER), value)
-
-    def _loop(self, node: ast.For) -> list[ast.stmt]:
-        assert isinstance(node.target, ast.Name)
-        if isinstance(node.iter, ast.Name) and isinstance(self._outside.get(node.iter.id), tuple):
-            unrolled: list[ast.stmt] = []
-            for value in self._outside[node.iter.id]:
-                unrolled += self._block([_WithConstant(node.target.id, value).visit(_copy(one)) for one in node.body])
-            return unrolled
-        self._kinds[node.target.id] = INTEGER
-        return [ast.For(node.target, self._expression(node.iter), self._block(node.body), [])]
 
     def _assign(self, target: ast.expr, value: ast.expr) -> list[ast.stmt]:
         if not isinstance(target, ast.Tuple):
-            return self._assign_one(target, value)
+            return [self._assign_one(target, value)]
         value = _tuple_of_choices(value)
-        if isinstance(value, ast.Tuple):
-            return self._assign_at_once(target.elts, value.elts)
         if isinstance(value, ast.Call):
             return self._assign_call(target, value)
-        fields = self._parts(value, len(target.elts))
-        return [new for one, part in zip(target.elts, fields, strict=True) for new in self._assign(one, part)]
+        parts = value.elts if isinstance(value, ast.Tuple) else self._parts(value, len(target.elts))
+        written = {_name_of(one) for one in target.elts if not isinstance(one, ast.Tuple)}
+        before: list[ast.stmt] = []
+        if isinstance(value, ast.Tuple) and written & _names_in(value):  # all values are those before the first assignment
+            temporaries: list[ast.expr] = [ast.Name(self._temporary()) for _ in parts]
+            before = [new for one, part in zip(temporaries, parts, strict=True) for new in self._assign(one, part)]
+            parts = temporaries
+        return before + [new for one, part in zip(target.elts, parts, strict=True) for new in self._assign(one, part)]
 
     def _parts(self, value: ast.expr, count: int) -> list[ast.expr]:
         """Return the entries of a tuple that has a name."""
-        if isinstance(value, ast.Name):
-            kind = self._outside.get(self._text.get(value.id, ""))
-            if isinstance(kind, type) and hasattr(kind, "_fields"):
-                return [ast.Attribute(value, field, ast.Load()) for field in kind._fields]
-        return [ast.Subscript(value, ast.Constant(i), ast.Load()) for i in range(count)]
-
-    def _assign_at_once(self, targets: list[ast.expr], values: list[ast.expr]) -> list[ast.stmt]:
-        """Assign several values, which all are those before the first assignment."""
-        written = {_name_of(one) for one in targets if not isinstance(one, ast.Tuple)}
-        read = {node.id for value in values for node in ast.walk(value) if isinstance(node, ast.Name)}
-        if not written & read:
-            return [new for one, value in zip(targets, values, strict=True) for new in self._assign(one, value)]
-        statements: list[ast.stmt] = []
-        temporaries: list[ast.expr] = []
-        for value in values:
-            name = self._temporary()
-            statements += self._assign(ast.Name(name, ast.Store()), value)
-            temporaries.append(ast.Name(name, ast.Load()))
-        return statements + [new for one, value in zip(targets, temporaries, strict=True) for new in self._assign(one, value)]
+        kind = self._struct_of(value)
+        if kind is not None:
+            return [ast.Attribute(value, field) for field in kind._fields]
+        return [ast.Subscript(value, ast.Constant(i)) for i in range(count)]
 
     def _assign_call(self, target: ast.Tuple, value: ast.Call) -> list[ast.stmt]:
         """Assign the results of a function to names, and from there to entries of arrays."""
         callee = self._outside.get(value.func.id) if isinstance(value.func, ast.Name) else None
-        annotation = "" if callee is None else str(plain(callee).__annotations__.get("return", ""))
+        annotation = "" if callee is None else _returns(callee)
         names: list[ast.expr] = []
         after: list[ast.stmt] = []
         for one, kind in zip(target.elts, _kinds_of_results(annotation, len(target.elts)), strict=True):
             name = one.id if isinstance(one, ast.Name) and one.id != "_" else self._temporary()
             self._kinds[name] = kind
-            names.append(ast.Name(name, ast.Store()))
+            names.append(ast.Name(name))
             if not isinstance(one, ast.Name):
-                after += self._assign_one(one, ast.Name(name, ast.Load()))
-        return [ast.Assign([ast.Tuple(names, ast.Store())], self._expression(value)), *after]
+                after.append(self._assign_one(one, ast.Name(name)))
+        return [ast.Assign([ast.Tuple(names)], self._expression(value)), *after]
 
     def _temporary(self) -> str:
         self._temporaries += 1
         return f"t_{self._temporaries}"
 
-    def _assign_one(self, target: ast.expr, value: ast.expr) -> list[ast.stmt]:
+    def _assign_one(self, target: ast.expr, value: ast.expr) -> ast.stmt:
         if isinstance(target, ast.Name):
             self._note(target.id, value)
-            kind = self._kinds.get(target.id)
-            if kind not in (REAL, INTEGER, BOOLEAN) or target.id not in self._kinds:
-                kind = self._kind(value)
-                self._kinds[target.id] = kind
-            return [ast.Assign([target], self._as(kind, value))]
-        kind = self._kind(target)
-        return [ast.Assign([self._expression(target)], self._as(kind, value))]
+            typed = self._typed(value)
+            if self._kinds.get(target.id, OTHER) == OTHER:
+                self._kinds[target.id] = typed[0]
+            return ast.Assign([target], _cast(self._kinds[target.id], typed))
+        kind, place = self._typed(target)
+        return ast.Assign([place], self._as(kind, value))
 
     def _note(self, name: str, value: ast.expr) -> None:
         """Note what is known of a name for an array, a row of one, or a struct."""
         array = value.value if isinstance(value, ast.Subscript) else value
-        if isinstance(array, ast.Attribute) and self._struct_of(array.value) is not None and self._is_array(array):
+        if isinstance(array, ast.Attribute) and self._field_text(array) in ARRAYS:
             self._arrays.setdefault(name, self._field_array(array)[0])
         if _is_new_array(value):
             self._arrays[name] = REAL
         if isinstance(value, ast.Call) and isinstance(value.func, ast.Name):
-            callee = self._outside.get(value.func.id)
-            if isinstance(callee, type):
-                self._text.setdefault(name, value.func.id)
-                self._outside = {value.func.id: callee, **self._outside}
-            elif callee is not None:
-                text = str(plain(callee).__annotations__.get("return", ""))
-                found = plain(callee).__globals__.get(text)
-                if isinstance(found, type):
-                    self._text.setdefault(name, text)
-                    self._outside = {text: found, **self._outside}
-
-    def _is_array(self, node: ast.Attribute) -> bool:
-        return fields_of(self._struct_of(node.value)).get(node.attr) in ARRAYS
+            text, found = value.func.id, self._outside.get(value.func.id)
+            if found is not None and not isinstance(found, type):
+                text = _returns(found)
+                found = plain(found).__globals__.get(text)
+            if isinstance(found, type):
+                self._text.setdefault(name, text)
+                self._outside.setdefault(text, found)
 
     # --- expressions
 
     def _as(self, kind: str, node: ast.expr) -> ast.expr:
         """Return an expression with the type of a kind."""
-        if kind == REAL and self._kind(node) == INTEGER:
-            if isinstance(node, ast.Constant):
-                return _number(float(node.value))  # type: ignore[arg-type]
-            return ast.Call(ast.Name("real", ast.Load()), [self._expression(node)], [])
-        new = self._expression(node)
-        literal = new.operand if isinstance(new, ast.UnaryOp) else new
-        if kind == INTEGER and isinstance(literal, ast.Constant):
-            return ast.Call(ast.Name("int", ast.Load()), [new], [])
-        if kind == BOOLEAN and isinstance(new, ast.Constant):
-            return ast.Call(ast.Name("bool", ast.Load()), [new], [])
-        return new
+        return _cast(kind, self._typed(node))
 
     def _expression(self, node: ast.expr) -> ast.expr:
-        if isinstance(node, ast.Constant):
-            return _number(node.value) if isinstance(node.value, float) else node
-        if isinstance(node, ast.Name):
-            value = self._constant(node.id)
-            return node if value is None else self._expression(ast.Constant(value))
-        if isinstance(node, ast.BinOp):
-            return self._binary(node)
-        if isinstance(node, ast.UnaryOp):
-            return ast.UnaryOp(node.op, self._expression(node.operand))
-        if isinstance(node, ast.BoolOp):
-            return ast.BoolOp(node.op, [self._expression(one) for one in node.values])
-        if isinstance(node, ast.Compare):
-            return self._comparison(node)
-        if isinstance(node, ast.IfExp):
-            kind = self._kind(node)
-            return ast.IfExp(self._expression(node.test), self._as(kind, node.body), self._as(kind, node.orelse))
-        if isinstance(node, ast.Call):
-            return self._call(node)
-        if isinstance(node, ast.Attribute):
-            return self._attribute(node)
-        if isinstance(node, ast.Subscript):
-            entry = self._constant_entry(node)
-            if entry is not None:
-                return self._expression(ast.Constant(entry))
-            return ast.Subscript(self._expression(node.value), self._expression(node.slice), node.ctx)
-        if isinstance(node, ast.Tuple):
-            return ast.Tuple([self._expression(one) for one in node.elts], node.ctx)
+        return self._typed(node)[1]
+
+    def _typed(self, node: ast.expr) -> Typed:
+        """Return the kind of an expression of the source, and the expression rewritten."""
+        match node:
+            case ast.Constant(bool()):
+                return BOOLEAN, node
+            case ast.Constant(int()):
+                return INTEGER, node
+            case ast.Constant(float(number)):
+                return REAL, _number(number)
+            case ast.Name(name):
+                value = self._constant(name)
+                known = value is not None and not isinstance(value, tuple)
+                return self._typed(ast.Constant(value)) if known else (self._kinds.get(name, OTHER), node)
+            case ast.UnaryOp(operator, operand):
+                kind, new = self._typed(operand)
+                return BOOLEAN if isinstance(operator, ast.Not) else kind, ast.UnaryOp(operator, new)
+            case ast.BoolOp(operator, values):
+                return BOOLEAN, ast.BoolOp(operator, [self._expression(one) for one in values])
+            case ast.BinOp():
+                return self._binary(node)
+            case ast.Compare():
+                return BOOLEAN, self._comparison(node)
+            case ast.IfExp(test, body, orelse):
+                kind, (first, second) = self._alike([body, orelse])
+                return kind, ast.IfExp(self._expression(test), first, second)
+            case ast.Call():
+                return self._call(node)
+            case ast.Attribute(ast.Name("math" | "np"), name):
+                return REAL, _number(getattr(math, name))
+            case ast.Attribute(value, name):
+                return KIND_OF_ANNOTATION.get(self._field_text(node), OTHER), ast.Attribute(self._expression(value), name)
+            case ast.Subscript():
+                return self._entry(node)
+            case ast.Tuple(parts):
+                return OTHER, ast.Tuple([self._expression(one) for one in parts])
         raise TranslationError(f"'{ast.unparse(node)}' has no translation.")
 
-    def _binary(self, node: ast.BinOp) -> ast.expr:
-        kind = self._kind(node)
-        left, right = self._as(kind, node.left), self._as(kind, node.right)
-        if isinstance(node.op, ast.Pow):
-            if isinstance(node.right, ast.Constant) and node.right.value == 2:
-                return ast.BinOp(left, ast.Mult(), left)
-            return _warp("pow", left, right)
-        if kind == INTEGER and isinstance(node.op, ast.FloorDiv | ast.Mod | ast.Add | ast.Sub | ast.Mult):
-            return ast.BinOp(self._expression(node.left), node.op, self._expression(node.right))
-        return ast.BinOp(left, node.op, right)
+    def _alike(self, nodes: Sequence[ast.expr]) -> tuple[str, list[ast.expr]]:
+        """Return the kind that several expressions have in common, else real numbers, and these with its type."""
+        typed = [self._typed(one) for one in nodes]
+        kinds = {kind for kind, _ in typed}
+        kind = kinds.pop() if len(kinds) == 1 else REAL
+        return kind, [_cast(kind, one) for one in typed]
+
+    def _entry(self, node: ast.Subscript) -> Typed:
+        """Return an entry of an array or tuple; a row of an array is of no kind of number."""
+        match node:
+            case ast.Subscript(ast.Name(name), ast.Constant(int(index))) if isinstance(self._constant(name), tuple):
+                return self._typed(ast.Constant(self._constant(name)[index]))
+            case ast.Subscript(ast.Attribute() as value):
+                kind, axes = self._field_array(value)
+            case ast.Subscript(ast.Name(name)) if not self._text.get(name, "").startswith("tuple"):
+                kind, axes = self._arrays.get(name, REAL), self._axes.get(name, 1)
+            case _:
+                kind, axes = REAL, 0
+        new = ast.Subscript(self._expression(node.value), self._expression(node.slice))
+        return kind if _indices(node) >= axes else OTHER, new
+
+    def _binary(self, node: ast.BinOp) -> Typed:
+        left, right = self._typed(node.left), self._typed(node.right)
+        kind = INTEGER if left[0] == right[0] == INTEGER and not isinstance(node.op, ast.Div) else REAL
+        if kind == INTEGER and not isinstance(node.op, ast.Pow):
+            return kind, ast.BinOp(left[1], node.op, right[1])
+        first, second = _cast(kind, left), _cast(kind, right)
+        if not isinstance(node.op, ast.Pow):
+            return kind, ast.BinOp(first, node.op, second)
+        is_square = isinstance(node.right, ast.Constant) and node.right.value == 2
+        return kind, ast.BinOp(first, ast.Mult(), first) if is_square else _called("wp.pow", first, second)
 
     def _comparison(self, node: ast.Compare) -> ast.expr:
-        pairs = list(zip([node.left, *node.comparators], node.ops, node.comparators, strict=False))
+        sides = [self._typed(one) for one in (node.left, *node.comparators)]
         parts: list[ast.expr] = []
-        for left, operator, right in pairs:
-            kind = REAL if REAL in (self._kind(left), self._kind(right)) else OTHER
-            parts.append(ast.Compare(self._as(kind, left), [operator], [self._as(kind, right)]))
+        for left, operator, right in zip(sides, node.ops, sides[1:], strict=False):
+            kind = REAL if REAL in (left[0], right[0]) else OTHER
+            parts.append(ast.Compare(_cast(kind, left), [operator], [_cast(kind, right)]))
         return parts[0] if len(parts) == 1 else ast.BoolOp(ast.And(), parts)
 
-    def _attribute(self, node: ast.Attribute) -> ast.expr:
-        if isinstance(node.value, ast.Name) and node.value.id in ("math", "np"):
-            return _number(getattr(math, node.attr))
-        return ast.Attribute(self._expression(node.value), node.attr, node.ctx)
+    def _call(self, node: ast.Call) -> Typed:
+        match node.func:
+            case ast.Attribute(ast.Name("math"), name):
+                arguments = [self._as(REAL, one) for one in node.args]
+                if name in NATIVE:
+                    self.scope[name] = self._translation.native(name)
+                elif not hasattr(self._translation.warp, name):
+                    raise TranslationError(f"Warp has no function '{name}'.")
+                return REAL, _called(name if name in NATIVE else f"wp.{name}", *arguments)
+            case ast.Attribute(ast.Name("np"), "zeros"):
+                made = _called("wp.zeros")
+                made.keywords = [ast.keyword("shape", node.args[0]), ast.keyword("dtype", ast.Name("real"))]
+                return OTHER, made
+            case ast.Name("min" | "max" | "abs" as name):
+                kind, values = self._alike(node.args)
+                if name == "abs":
+                    return kind, _called("wp.abs", self._expression(node.args[0]))
+                return kind, reduce(lambda nested, one: _called(f"wp.{name}", nested, one), values)
+            case ast.Name("int" | "len" | "float" | "range" as name):
+                called = _called("real" if name == "float" else name, *map(self._expression, node.args))
+                return INTEGER if name in ("int", "len") else OTHER, called
+            case ast.Name(name):
+                return self._call_of_ours(name, node.args)
+        raise TranslationError(f"'{ast.unparse(node)}' has no translation.")
 
-    def _call(self, node: ast.Call) -> ast.expr:
-        if isinstance(node.func, ast.Attribute) and isinstance(node.func.value, ast.Name) and node.func.value.id == "math":
-            return self._math(node.func.attr, [self._as(REAL, one) for one in node.args])
-        if _is_new_array(node):
-            shape = ast.keyword("shape", node.args[0])
-            return ast.Call(ast.Attribute(ast.Name("wp", ast.Load()), "zeros", ast.Load()), [],
-                            [shape, ast.keyword("dtype", ast.Name("real", ast.Load()))])  # fmt: skip
-        assert isinstance(node.func, ast.Name)
-        name = node.func.id
-        if name in ("min", "max"):
-            kind = self._kind(node)
-            nested = self._as(kind, node.args[0])
-            for one in node.args[1:]:
-                nested = _warp(name, nested, self._as(kind, one))
-            return nested
-        if name in ("abs", "int", "float"):
-            return _warp("abs", self._expression(node.args[0])) if name == "abs" else ast.Call(
-                ast.Name("int" if name == "int" else "real", ast.Load()), [self._expression(one) for one in node.args], []
-            )  # fmt: skip
-        if name in SAME_IN_WARP:
-            return ast.Call(node.func, [self._expression(one) for one in node.args], [])
-        return self._call_of_ours(name, node.args)
-
-    def _math(self, name: str, arguments: list[ast.expr]) -> ast.expr:
-        if name in NATIVE:
-            self.scope[name] = self._translation.native(name)
-            return ast.Call(ast.Name(name, ast.Load()), arguments, [])
-        if not hasattr(self._translation.warp, name):
-            raise TranslationError(f"Warp has no function '{name}'.")
-        return _warp(name, *arguments)
-
-    def _call_of_ours(self, name: str, given: list[ast.expr]) -> ast.expr:
+    def _call_of_ours(self, name: str, given: list[ast.expr]) -> Typed:
         """Call a function or make a struct of ours."""
         callee = self._outside.get(name)
         if callee is None:
             raise TranslationError(f"'{name}' has no translation.")
         if isinstance(callee, type):
-            made = self._translation.struct(callee)
-            kinds = [KIND_OF_ANNOTATION.get(text, OTHER) for text in fields_of(callee).values()]
-            name = callee.__name__
+            made, name, kind = self._translation.struct(callee), callee.__name__, OTHER
+            texts = list(fields_of(callee).values())
         else:
-            made, source = self._translation.function(callee), plain(callee)
-            texts = [str(text) for key, text in source.__annotations__.items() if key != "return"]
-            kinds = [KIND_OF_ANNOTATION.get(text, OTHER) if text not in ARRAYS else OTHER for text in texts]
-            name = made.key
+            made = self._translation.function(callee)
+            name, kind = made.key, KIND_OF_ANNOTATION.get(_returns(callee), OTHER)
+            texts = [str(text) for key, text in plain(callee).__annotations__.items() if key != "return"]
         self.scope[name] = made
+        kinds = [KIND_OF_ANNOTATION.get(text, OTHER) for text in texts]
         arguments = [
-            self._vector(one) if isinstance(one, ast.Tuple) else self._as(kind, one)
-            for one, kind in zip(given, kinds, strict=True)
+            self._vector(one) if isinstance(one, ast.Tuple) else self._as(wanted, one)
+            for one, wanted in zip(given, kinds, strict=True)
         ]
-        return ast.Call(ast.Name(name, ast.Load()), arguments, [])
+        return kind, _called(name, *arguments)
 
     def _vector(self, node: ast.Tuple) -> ast.expr:
         """Return a tuple of numbers as a vector."""
         length = len(node.elts)
         name = f"vector_{length}"
         self.scope[name] = self._translation.warp.types.vector(length=length, dtype=self._translation.real)
-        return ast.Call(ast.Name(name, ast.Load()), [self._as(REAL, one) for one in node.elts], [])
+        return _called(name, *(self._as(REAL, one) for one in node.elts))
+
+
+def _cast(kind: str, typed: Typed) -> ast.expr:
+    """Return an expression with the type of a kind."""
+    found, new = typed
+    literal = new.operand if isinstance(new, ast.UnaryOp) else new
+    if kind == REAL and found == INTEGER:
+        return _number(float(new.value)) if isinstance(new, ast.Constant) else _called("real", new)  # type: ignore[arg-type]
+    if kind == INTEGER and isinstance(literal, ast.Constant):
+        return _called("int", new)
+    return _called("bool", new) if kind == BOOLEAN and isinstance(new, ast.Constant) else new
+
+
+class _Unrolled(ast.NodeTransformer):
+    """Repeats the body of each loop over a tuple that stands outside the function, with its entries in the place of names.
+
+    Entries are numbers, functions, or tuples of these, which the loop takes apart.
+    """
+
+    def __init__(self, outside: dict[str, Any]):
+        self._outside, self._entries = outside, dict[str, ast.expr]()
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:  # noqa: N802
+        """Return the entry for the name."""
+        return self._entries.get(node.id, node)
+
+    def visit_For(self, node: ast.For) -> Any:  # noqa: N802
+        """Return the bodies for all entries."""
+        values = self._outside.get(node.iter.id) if isinstance(node.iter, ast.Name) else None
+        if not isinstance(values, tuple):
+            return self.generic_visit(node)
+        bodies: list[ast.stmt] = []
+        for value in values:
+            names, entries = (node.target.elts, value) if isinstance(node.target, ast.Tuple) else ([node.target], [value])
+            for name, entry in zip(names, entries, strict=True):
+                known: ast.expr = ast.Constant(entry)
+                if callable(entry):
+                    known = ast.Name(f"function_{len(self._outside)}")
+                    self._outside[known.id] = entry
+                self._entries[_name_of(name)] = known
+            one = copy.deepcopy(node)
+            one.target = ast.Name("_")
+            bodies += self.generic_visit(one).body  # type: ignore[attr-defined]
+        return bodies
+
+
+def _indices(node: ast.Subscript) -> int:
+    """Return how many indices an array is given."""
+    return len(node.slice.elts) if isinstance(node.slice, ast.Tuple) else 1
+
+
+def _returns(function: Callable[..., Any]) -> str:
+    """Return the annotation of what a function returns."""
+    return str(plain(function).__annotations__.get("return", ""))
 
 
 def _is_new_array(node: ast.expr) -> bool:
@@ -644,7 +617,7 @@ def _tuple_of_choices(value: ast.expr) -> ast.expr:
     if not (isinstance(value, ast.IfExp) and isinstance(value.body, ast.Tuple) and isinstance(value.orelse, ast.Tuple)):
         return value
     pairs = zip(value.body.elts, value.orelse.elts, strict=True)
-    return ast.Tuple([ast.IfExp(value.test, first, second) for first, second in pairs], ast.Load())
+    return ast.Tuple([ast.IfExp(value.test, first, second) for first, second in pairs])
 
 
 def _kinds_of_results(annotation: str, count: int) -> list[str]:
@@ -653,26 +626,8 @@ def _kinds_of_results(annotation: str, count: int) -> list[str]:
     return [KIND_OF_ANNOTATION.get(word, REAL) for word in words] if len(words) == count else [REAL] * count
 
 
-class _WithConstant(ast.NodeTransformer):
-    """Puts a number in the place of a name."""
-
-    def __init__(self, name: str, value: float):
-        self._name, self._value = name, value
-
-    def visit_Name(self, node: ast.Name) -> ast.expr:  # noqa: N802
-        """Return the number for the name."""
-        return ast.Constant(self._value) if node.id == self._name else node
-
-
-def _copy(node: ast.stmt) -> ast.stmt:
-    return ast.parse(ast.unparse(node)).body[0]
-
-
-def _loaded(node: ast.expr) -> ast.expr:
-    """Return the target of an assignment as an expression."""
-    found = ast.parse(ast.unparse(node), mode="eval").body
-    assert isinstance(found, ast.expr)
-    return found
+def _names_in(node: ast.expr) -> set[str]:
+    return {one.id for one in ast.walk(node) if isinstance(one, ast.Name)}
 
 
 def _name_of(node: ast.expr) -> str:
@@ -684,9 +639,9 @@ def _name_of(node: ast.expr) -> str:
 
 def _number(value: float) -> ast.expr:
     """Return a number of the translation's type."""
-    text = ast.Constant(value) if math.isfinite(value) else ast.Attribute(ast.Name("wp", ast.Load()), "inf", ast.Load())
-    return ast.Call(ast.Name("real", ast.Load()), [text], [])
+    return _called("real", ast.Constant(value)) if math.isfinite(value) else ast.parse("real(wp.inf)", mode="eval").body
 
 
-def _warp(name: str, *arguments: ast.expr) -> ast.expr:
-    return ast.Call(ast.Attribute(ast.Name("wp", ast.Load()), name, ast.Load()), list(arguments), [])
+def _called(name: str, *arguments: ast.expr) -> ast.Call:
+    """Return a call of a function of Warp or of the scope."""
+    return ast.Call(ast.parse(name, mode="eval").body, list(arguments), [])

@@ -18,18 +18,15 @@ from ...geometry.mesh import TriangleMesh
 from ...geometry.rotations import rotation_matrices
 from ...geometry.shapes import MESH, Shape
 from ...laws.contact_law import contact_law
-from ...model.body import Body, Motion
-from ...model.scenario import Scenario, Target
 from ...model.sensor import Sensor
 from ...solver.detection.deformation import point_rows
-from ...solver.pressed_model import targets_of
+from ...solver.pressed_model import pressed_scenario, targets_of
 from ..environment_parameters import Columns, sensors_of
 from ..load_balance import check_targets, pulling_loads, reason_of_pulls
 from ..load_search import LoadSearch
-from ..pressed_sensors import available_memory, check_memory, fault_of
+from ..pressed_sensors import available_memory, check_memory, checked_mask, checked_numbers, fault_of
 from ..sensor_on_mesh import SensorOnMesh
 from . import balance_kernels, press_kernels
-from .balance_kernels import Beginning
 from .block import WARP
 from .effect_functions import EffectFunctions, functions_of
 from .engine import require_device, require_warp
@@ -110,16 +107,18 @@ class WarpSensors:
         _check(item.sensor, targets, dt, environments)
         self._warp, self.device = warp, require_device(warp, device, single)
         self._on_gpu = bool(warp.get_device(self.device).is_cuda)
-        self._environments, sensor = environments, item.sensor
+        sensor = item.sensor
         points = contact_points(sensor.texels, sensor.parameters.points_per_texel)
         sensors = sensors_of(sensor, parameters, environments) if parameters else [sensor]
         effects = functions_of(sensors, dt)
         e, n, t, p = environments, len(sensor.texels), len(targets), len(points.texel)
         self._size, self._of_slots = (e, n, t), (t, p, n, effects.laws, effects.reading_laws)
-        tree = build_tree([one for one in targets if isinstance(one, TriangleMesh)] or [_NO_MESH])
+        tree = build_tree(_meshes(targets))
         tree = split_leaves(tree) if self._on_gpu else tree
         translation = self._translation = _translation(warp, single, effects, sensor)
-        shared = _sensor_arrays(sensors, points, effects, dt, e), _target_arrays(targets), tree
+        kind = np.array([one.kind if isinstance(one, Shape) else MESH for one in targets])
+        sizes = np.array([one.size if isinstance(one, Shape) else (0.0, 0.0, 0.0) for one in targets])
+        shared = _sensor_arrays(sensors, points, effects, dt, e), TargetArrays(kind, sizes, np.cumsum(kind == MESH) - 1), tree
         self._sensor, self._targets, self._tree = (translation.value(part, self.device) for part in shared)
         examples = Worlds.zero(1, t), Slots.zero(1, *self._of_slots), Results.zero(1, n, t)
         self.bytes_per_environment = translation.bytes_of(*examples)
@@ -140,7 +139,7 @@ class WarpSensors:
 
     def __len__(self) -> int:
         """Return the number of environments."""
-        return self._environments
+        return int(self._size[0])
 
     def __repr__(self) -> str:
         return f"<WarpSensors: {self._size[0]} environments, {self._size[1]} texels, {self._size[2]} targets, on {self.device}>"
@@ -184,7 +183,10 @@ class WarpSensors:
             degrees = self._take_loads(wrench)
             self._launch(self._kernel_of_load, (e, adders), adders, degrees, *arrays, *ends, *self._balance)
         else:
-            self._forget_loads()
+            self.residual = None
+            if self._balance:  # go on without displacement
+                self._balance[1].at.zero_()
+                self._balance[1].state.zero_()
             self._launch(self._move, (e, movers), movers, sensor, worlds)
             self._launch(self._press, (e, n), *arrays, self._out)
             self._launch(self._finish, (e, adders), adders, sensor, worlds, slots, *ends)
@@ -205,7 +207,7 @@ class WarpSensors:
         """Reasons as :attr:`.PressedSensors.residual_reason` gives them; the loads and poses come to the host for it."""
         if self.residual is None:
             return ""
-        search, degrees = self._balance[2], self.residual.shape[1]
+        search, degrees = self._balance[1], self.residual.shape[1]
         quaternion = self.poses.numpy()[:, 0, 3:].astype(float)
         length = np.linalg.norm(quaternion, axis=1, keepdims=True)
         rotation = rotation_matrices(np.divide(quaternion, length, out=np.eye(4)[[0] * len(self)], where=length > 0.0))
@@ -230,12 +232,7 @@ class WarpSensors:
             return
         chosen = mask
         if not isinstance(mask, warp.array):
-            found = np.asarray(mask)
-            if found.dtype != np.bool_ or found.shape != (len(self),):
-                raise ParameterError(
-                    f"The mask of environments to reset is {found.dtype} of shape {found.shape}: give ({len(self)},) bool."
-                )
-            chosen = warp.array(found, dtype=warp.bool, device=self.device)
+            chosen = warp.array(checked_mask(mask, len(self)), dtype=warp.bool, device=self.device)
         elif mask.dtype is not warp.bool or mask.shape != (len(self),) or str(mask.device) != str(self.device):
             raise ParameterError(
                 f"The mask of environments to reset is {mask.dtype.__name__} of shape {mask.shape} on {mask.device}: "
@@ -246,13 +243,9 @@ class WarpSensors:
     def _take(self, sensor_poses: Any, target_poses: Any) -> None:
         """Copy poses of NumPy to the device."""
         e, _, t = self._size
-        sensor, target = np.asarray(sensor_poses), np.asarray(target_poses)
         shapes = [(e, t, 7)] if t > 1 else [(e, t, 7), (e, 7)]
-        for whose, values, wanted in (("sensor", sensor, [(e, 7)]), ("target", target, shapes)):
-            if values.shape not in wanted or values.dtype.kind not in "fiu":
-                raise ParameterError(
-                    f"The poses of the {whose} are {values.dtype} of shape {values.shape}: give numbers of shape {wanted[-1]}."
-                )
+        sensor = checked_numbers("The poses of the sensor", sensor_poses, [(e, 7)], f"{(e, 7)}")
+        target = checked_numbers("The poses of the target", target_poses, shapes, f"{shapes[-1]}")
         poses = np.concatenate([sensor[:, None], target.reshape(e, t, 7)], axis=1)
         self._warp.copy(self.poses, self._warp.array(poses, dtype=self.poses.dtype, device=self.device))
 
@@ -270,32 +263,17 @@ class WarpSensors:
         check_targets(t)
         if self._translation.real is not warp.float64:
             raise ParameterError("In float32 a load cannot be found to a millionth: make the sensors with single=False.")
-        degrees = int(load.shape[1])
+        degrees, sensor = int(load.shape[1]), self._item
         if not self._balance:
-            self._make_balance()
-        _, beginning, search = self._balance
+            found = self._translation.value(LoadSearch.of(sensor.texels, sensor.parameters.max_penetration, e), self.device)
+            self._balance = *self._room(Slots.zero(1, *self._of_slots)), found
+            self._kernel_of_load = self._translation.kernel(balance_kernels.balance_world, 2, WARP)
+        search = self._balance[1]
         if not on_device:
             load = warp.array(load, dtype=warp.float64, device=self.device)
         warp.copy(search.given[:, :degrees], load)
-        self.residual, self.displacement = beginning.residual[:, :degrees], search.at
+        self.residual, self.displacement = search.residual[:, :degrees], search.at
         return degrees
-
-    def _make_balance(self) -> None:
-        """Make the kernel of steps under loads, and its arrays."""
-        e, sensor = len(self), self._item
-        search = LoadSearch.of(sensor.texels, sensor.parameters.max_penetration, e)
-        self._balance = (
-            *self._room(Slots.zero(1, *self._of_slots), Beginning.zero(1)), self._translation.value(search, self.device)
-        )  # fmt: skip
-        self._kernel_of_load = self._translation.kernel(balance_kernels.balance_world, 2, WARP)
-
-    def _forget_loads(self) -> None:
-        """Go on without displacement."""
-        self.residual = None
-        if self._balance:
-            search = self._balance[2]
-            search.at.zero_()
-            search.state.zero_()
 
 
 _NO_MESH = TriangleMesh(np.eye(3), np.array([[0, 1, 2]]))
@@ -312,33 +290,18 @@ MOVERS = 4
 
 def _check(sensor: Sensor, targets: Sequence[TriangleMesh | Shape], dt: float, environments: int) -> None:
     """Raise :class:`.PalpateError` for what makes no run."""
-    if not (np.isfinite(dt) and dt > 0):
-        raise ParameterError(f"The step is {dt:g} s: give a number above zero.")
     if environments < 1:
         raise ParameterError(f"There are {environments} environments: ask for one at least.")
     if not targets:
         raise ParameterError(f"Nothing presses on '{sensor.name}': give a target's mesh or shape, or several.")
-    if sensor.deformation is not None:
-        raise ParameterError(f"'{sensor.name}' deforms by prescription: take a sensor that keeps its shape in this loop.")
-    meshes = []
     for number, target in enumerate(targets, start=1):
-        if isinstance(target, TriangleMesh):
-            meshes.append(target)
-        elif not isinstance(target, Shape):
+        if not isinstance(target, TriangleMesh | Shape):
             raise ParameterError(f"Target {number} is a {type(target).__name__}: give a TriangleMesh or a Shape.")
-    meshes = meshes or [_NO_MESH]
-    names = [f"target {number}" for number in range(1, len(meshes) + 1)]
-    check_scenario(
-        Scenario(
-            bodies=(Body("sensor", Motion.at_rest()), *(Body(name, Motion.at_rest()) for name in names)),
-            sensors=(sensor,),
-            targets=tuple(Target(name, 1 + i, mesh) for i, (name, mesh) in enumerate(zip(names, meshes, strict=True))),
-            frame_start=0,
-            frame_end=1,
-            fps=1.0 / dt,
-            dt=dt,
-        )
-    )
+    check_scenario(pressed_scenario(sensor, _meshes(targets), dt))
+
+
+def _meshes(targets: Sequence[TriangleMesh | Shape]) -> list[TriangleMesh]:
+    return [one for one in targets if isinstance(one, TriangleMesh)] or [_NO_MESH]
 
 
 def _translation(warp: ModuleType, single: bool, effects: EffectFunctions, sensor: Sensor) -> Translation:
@@ -370,20 +333,13 @@ def _sensor_arrays(
         first_point=np.searchsorted(points.texel, np.arange(n + 1)),
         multipliers=np.column_stack([values[points.texel] for values in painted]),
         law=np.array([contact_law(one.parameters, share) for one in sensors], float),
-        conversion=np.concatenate([_conversion(one) for one in sensors]),
+        conversion=np.concatenate(
+            [
+                np.column_stack([np.full(n, float(one.zero)), np.broadcast_to(one.gain * one.painted, n)])
+                for one in map(transducers_of, sensors)
+            ]
+        ),
         force_constants=_of_each(effects.force_constants, environments),
         friction_constants=_of_each(effects.friction_constants, environments),
         reading_constants=_of_each(effects.reading_constants, environments),
     )
-
-
-def _conversion(sensor: Sensor) -> np.ndarray:
-    """Return zero and scale of each texel's reading (n, 2)."""
-    transducers, n = transducers_of(sensor), len(sensor.texels)
-    return np.column_stack([np.full(n, float(transducers.zero)), np.broadcast_to(transducers.gain * transducers.painted, n)])
-
-
-def _target_arrays(targets: Sequence[TriangleMesh | Shape]) -> TargetArrays:
-    kind = np.array([one.kind if isinstance(one, Shape) else MESH for one in targets])
-    size = np.array([one.size if isinstance(one, Shape) else (0.0, 0.0, 0.0) for one in targets])
-    return TargetArrays(kind, size, np.cumsum(kind == MESH) - 1)

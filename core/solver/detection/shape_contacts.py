@@ -32,7 +32,12 @@ from .detection_data import BRISTLE, DEPTH, KEEP, LANES, NORMAL, POINT, ROW, Det
 def write_relative_pose(pair: int, model: SolverModel, state: State, workspace: Workspace) -> None:
     """Write the sensor's rotation (row by row) and position in the target's frame into the pair's pose."""
     a, b = model.pairs.sensor_body[pair], model.pairs.target_body[pair]
-    position, rotation, pose = state.position, workspace.bodies.rotation, workspace.pairs.pose[pair]
+    write_pose(a, b, state.position, workspace.bodies.rotation, workspace.pairs.pose[pair])
+
+
+@inlined
+def write_pose(a: int, b: int, position: np.ndarray, rotation: np.ndarray, pose: np.ndarray) -> None:
+    """Write the rotation (row by row) and position of body `a` in the frame of body `b` into `pose` (12,)."""
     for i in range(3):
         total = 0.0
         for k in range(3):

@@ -141,7 +141,7 @@ def test_the_side_by_side_example_has_its_table_and_picture(repository, tmp_path
 
     item = replace(pad(), quaternion=np.array([1.0, 0.0, 0.0, 0.0]))
     write_probe_list(tmp_path / "Pad.json", item)
-    write_mjcf([item], tmp_path)
+    write_mjcf(item, tmp_path / "Pad", "Pad")
     example = runpy.run_path(str(repository / "examples" / "mujoco_side_by_side.py"))
     example["main"].__globals__.update(LOADS=example["LOADS"][:2], SETTLING=0.4)
     example["main"](str(tmp_path / "Pad"), str(tmp_path / "picture.png"))

@@ -17,7 +17,6 @@ from palpate.core.geometry.bvh import Segment, build_tree, segment_entry
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.simulators.load_search import LoadSearch
 from palpate.core.simulators.warp import balance_kernels, block, engine, press_kernels, warp_sensors
-from palpate.core.simulators.warp.balance_kernels import Beginning
 from palpate.core.simulators.warp.press_arrays import Jumps, Results, Slots, Worlds, split_leaves
 from palpate.core.simulators.warp.warp_sensors import WarpSensors
 
@@ -85,7 +84,6 @@ class Run:
         slots, room = Slots.zero(E, *ours._of_slots), Worlds.zero(E, 1)
         self.worlds, self.slots, self.out = room, slots, Results.zero(E, self.n, 1)
         self.jumps, self.start = Jumps.of(sensor.texels, [SHAPE], E), Slots.zero(E, *ours._of_slots)
-        self.beginning = Beginning.zero(E)
         self.search = LoadSearch.of(sensor.texels, sensor.parameters.max_penetration, E)
 
     def step(self, poses, loads=None):
@@ -95,7 +93,7 @@ class Run:
         for world in range(E):
             if loads is not None:
                 self.search.given[:] = loads
-                rest = self.jumps, self.out, self.start, self.beginning, self.search
+                rest = self.jumps, self.out, self.start, self.search
                 self._block.run(balance_kernels.balance_world, world, loads.shape[1], *touching, *rest)
                 continue
             self._block.run(press_kernels.move_world, world, self.sensor, self.worlds)
