@@ -83,7 +83,7 @@ def _checked_sensor(blend: Path, found: Bake, name: str) -> SensorOnMesh:
     if manifest.effects is None or not manifest.body:
         raise FileError(
             f"'{folder / MANIFEST_NAME}' is of an older version and does not name the sensor's effects: "
-            f"run 'palpate bake {blend}' (of a compressed file it cannot be told)."
+            f"run 'palpate bake {blend}'."
         )
     if manifest.channels:
         raise FileError(

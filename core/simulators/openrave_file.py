@@ -14,7 +14,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from ..errors import FileError, PalpateError
-from ..io.file_writing import atomic_write
+from ..io.file_writing import write_text
 from ..io.input_files import read_xml, require_xml_text
 from ..model.parameter import numbers_of
 from ..model.sensor_parameters import DEPTH_PER_THICKNESS, SENSOR_PARAMETERS, SensorParameters
@@ -136,5 +136,4 @@ def openrave_xml(sensors: Iterable[OpenRaveSensor], robot: str | None = None) ->
 def write_openrave(path: str | os.PathLike, sensors: Iterable[OpenRaveSensor], robot: str | None = None) -> None:
     """Write :func:`openrave_xml` to a file, completely or not at all; raises FileError if that is impossible."""
     text = openrave_xml(sensors, robot)
-    with atomic_write(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(path, text)

@@ -18,7 +18,7 @@ from ..geometry.grid_layout import GridLayout
 from ..geometry.mesh import TriangleMesh, checked_mesh
 from ..geometry.texels import Texels
 from ..geometry.texture_maps import uv_layout
-from ..io.file_writing import atomic_write
+from ..io.file_writing import write_text
 from ..io.input_files import checked_name, read_bounded
 from ..io.schema import known_words
 from ..io.sensor_toml import MOST_TEXELS
@@ -52,8 +52,7 @@ def write_probe_list(path: str | os.PathLike, item: SensorOnMesh) -> None:
         "effects": [to_dict(effect) for effect in item.sensor.effects],
     }
     content = about | {name: values.tolist() for name, values in arrays.items()} | {"faces": item.faces.tolist()}
-    with atomic_write(path) as temporary:
-        temporary.write_text(json.dumps(content, allow_nan=False) + "\n", encoding="utf-8")
+    write_text(path, json.dumps(content, allow_nan=False) + "\n")
 
 
 def read_probe_list(path: str | os.PathLike) -> SensorOnMesh:

@@ -7,7 +7,7 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-from ...io.file_writing import atomic_write
+from ...io.file_writing import write_text
 from ..sensor_format import SensorFormat, Written
 from ..sensor_on_mesh import SensorOnMesh
 
@@ -21,8 +21,7 @@ def write_contact(item: SensorOnMesh, path: Path, _: str) -> Written:
     mujoco, newton, file = mujoco_contact(item), newton_contact(item), Path(f"{path}.contact.json")
     content = {"format": CONTACT_FORMAT, "sensor": item.name, "mujoco": asdict(mujoco)}
     content["newton"] = asdict(newton) | {"pressure": newton.pressure.tolist()}
-    with atomic_write(file) as temporary:
-        temporary.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    write_text(file, json.dumps(content, indent=1, allow_nan=False) + "\n")
     notes = [
         f"'{item.name}' in MuJoCo: {mujoco.error}; damping: {mujoco.damping_error}.",
         f"'{item.name}' in Newton: {newton.error}.",

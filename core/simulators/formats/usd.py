@@ -14,7 +14,7 @@ from ...errors import FileError, imported
 from ...geometry.mesh import TriangleMesh
 from ...geometry.point_surface import triangles_between
 from ...geometry.rotations import quaternion_of
-from ...io.file_writing import atomic_write
+from ...io.file_writing import write_text
 from ...io.input_files import require_regular
 from ...io.sensor_toml import MOST_TEXELS
 from ...model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters, stated_parameters
@@ -132,8 +132,7 @@ def write_usd(item: SensorOnMesh, path: Path, prim: str) -> Written:
     """Write a file."""
     beyond, file = ", ".join(["forces of texels", *unmodelled(item)]), Path(f"{path}.usda")
     note = f"'{item.name}': USD carries texels and parameters as data; its physics cannot express {beyond}."
-    with atomic_write(file) as temporary:
-        temporary.write_text("\n".join(_stage(item, prim, note)) + "\n", encoding="utf-8", newline="\n")
+    write_text(file, "\n".join(_stage(item, prim, note)) + "\n")
     return Written([file], [note])
 
 
