@@ -107,11 +107,13 @@ def closed_share(errors: GapErrors, use: str) -> float | None:
 def recording_errors(result: Diagnosis, use: str) -> list[dict[str, Any]]:
     """Return the NRMSE of base and amended model in each recording of one use, as under ``fitted`` in gap.json."""
     plain = result.alike or result
-    befores = (nrmse([one], plain.base.model, result.full) for one in plain.of(use))
-    afters = (nrmse([one], result.best.model, result.full) for one in result.of(use))
-    names = (one.trial.name for one in result.of(use))
     return [
-        {"trial": name, "before": before, "after": after} for name, before, after in zip(names, befores, afters, strict=True)
+        {
+            "trial": own.trial.name,
+            "before": nrmse([alike], plain.base.model, result.full),
+            "after": nrmse([own], result.best.model, result.full),
+        }
+        for alike, own in zip(plain.of(use), result.of(use), strict=True)
     ]
 
 
