@@ -96,9 +96,8 @@ def nrmse(predictors: Sequence[Predictor], model: Model, full: tuple[float, floa
     return float(np.sqrt(square / count)) if count else None
 
 
-def closed_share(errors: GapErrors, use: str) -> float | None:
-    """Return the share of the squared gap, noise removed, that closes in the recordings of one use; None without a gap."""
-    before, after, floor = errors.base[use], errors.amended[use], errors.noise_floor
+def closed_share(before: float | None, after: float | None, floor: float) -> float | None:
+    """Return the share of the squared gap, noise removed, that closes between two errors; None without a gap."""
     if before is None or after is None or before <= floor:
         return None
     return float(round(min((before**2 - after**2) / (before**2 - floor**2), 1.0), 4))

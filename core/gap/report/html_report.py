@@ -15,7 +15,7 @@ from ...model.sensor_parameters import unit_of
 from ..fitting.least_squares import BASE
 from ..forward.contact_phases import FEATURES
 from ..selection.findings import Diagnosis
-from .comparison import recording_errors
+from .comparison import closed_share, recording_errors
 from .plan_files import planned_sentence
 from .plots import CAPTIONS
 from .sentences import NOT_IDENTIFIABLE, interval_ends, said_confidence
@@ -86,7 +86,7 @@ def _gap_table(found: dict[str, Any]) -> Table:
         before, after = gap["before"][use], gap["after"][use]
         if before is None:
             continue
-        share = (gap["closed"] or {}).get(use)
+        share = closed_share(before, after, floor)
         closed = "–" if share is None else f"{share:.0%}"
         amended = [f"{after:.3%}", f"{floor:.3%}", closed] if found["found"] else ["–", f"{floor:.3%}", "–"]
         rows.append([words, *(f"{frictionless[use]:.3%}" for _ in without), f"{before:.3%}", *amended])

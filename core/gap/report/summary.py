@@ -96,7 +96,7 @@ def _closed(result: Diagnosis, errors: GapErrors) -> dict[str, Any] | None:
     then those of the errors, and nothing is known of left-out parts.
     """
     if result.between is not None:
-        shares = {use: closed_share(errors, use) for use in USES}
+        shares = {use: closed_share(errors.base[use], errors.amended[use], errors.noise_floor) for use in USES}
         known = [share for share in shares.values() if share is not None]
         return {"fit": shares["fit"], "left_out": None, "check": shares["check"], "least": min(known)} if known else None
     only_friction = all(one.name in friction_kinds() for one in result.findings)
