@@ -263,7 +263,7 @@ def _recording(path: str | os.PathLike, members: Any) -> Recording:
 
 
 def load_with_sensors(path: str | os.PathLike) -> tuple[Recording, Sensors]:
-    """Read what :func:`save_with_sensors` wrote, or a recording alone, which has no sensors.
+    """Read what :func:`save_recording` wrote with sensors, or a recording alone, which has none.
 
     Raises
     ------

@@ -187,6 +187,8 @@ class SensorFormat:
     holds : callable or None
         Tells whether a file is of this format, by its ending and its content. It raises FileError for a file that cannot be
         read.
+    blank : str
+        What a blank in the name of a sensor becomes in the names of its files.
     """
 
     name: str
@@ -195,6 +197,7 @@ class SensorFormat:
     write: Callable[[SensorOnMesh, Path, str], Written] | None = None
     read: Callable[[str | os.PathLike], list[FoundSensor]] | None = None
     holds: Callable[[str | os.PathLike], bool] | None = None
+    blank: str = " "
 
 
 @cache
@@ -231,7 +234,7 @@ def export_sensors(sensors: Sequence[SensorOnMesh], kind: str, folder: str | os.
     Raises
     ------
     PalpateError
-        The format is unknown, there is no sensor, or a file cannot be written.
+        The format is unknown, there is no sensor, two have the same name, or a file cannot be written.
     """
     known = written_formats()
     write = known[kind].write if kind in known else None
@@ -239,9 +242,11 @@ def export_sensors(sensors: Sequence[SensorOnMesh], kind: str, folder: str | os.
         raise PalpateError(f"Sensors are not written as '{kind}': choose from {', '.join(known)}.")
     if not sensors:
         raise PalpateError("There is no sensor to write: make one with Physics › Palpate › Make Sensor.")
+    stems, words = folder_names((item.name for item in sensors), known[kind].blank), identifiers(item.name for item in sensors)
+    if len(stems) < len(sensors):
+        raise PalpateError("Two of the sensors have the same name, and so would their files: rename one.")
     folder = writable_folder(folder, create=True)
     files = FileList(folder)
-    stems, words = folder_names(item.name for item in sensors), identifiers(item.name for item in sensors)
     with files.new_files("sensor") as new:
         written = [write(item, new / stems[item.name], words[item.name]) for item in sensors]
         made = files.replace(new, {f"sensor {kind}": [file for one in written for file in one.files]})

@@ -1,7 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A scenario with varied numbers: which names a study may vary, their bounds, and what each changes.
 
-``docs/sweep.md`` lists the names. Bounds and units come from the specifications that panels and files use.
+======================================  =================================================================================
+``SENSOR.k`` and every parameter        of :class:`.SensorParameters`
+``SENSOR.effect.KIND``                  true or false: whether the sensor has the effect
+``SENSOR.effect.KIND.PARAMETER``        parameter of the effect, ``form`` or ``seed``; the effect is added if need be
+``BODY.mass``                           kg, of a body that forces move; its inertia grows with it
+``BODY.shift.x``, ``y``, ``z``          m, added to the whole motion, in the world
+``BODY.turn.x``, ``y``, ``z``           rad, a rotation vector about the body's origin at the first frame, in the world
+``BODY.velocity.x``, …                  m/s, of a free body at the start; ``angular_velocity`` in rad/s
+``BODY.drive.PARAMETER``                of :class:`.Drive`; ``drive.target`` in the unit of its control, constant
+``TARGET.scale``                        factor of its shape about the body's origin
+``TARGET.mesh``                         its shape: a mesh file, in metres, in the frame of its body
+``gravity.x``, ``y``, ``z``             m/s²
+``press.NUMBER``                        of :class:`.Press`
+======================================  =================================================================================
+
+Bounds and units come from the specifications that panels and files use.
 """
 
 from __future__ import annotations

@@ -224,8 +224,8 @@ def write_urdf(item: SensorOnMesh, path: Path, link: str) -> Written:
     """Write the mesh, a URDF with a frame per texel, and a macro with one frame beside the probe list."""
     import trimesh
 
-    stem, surface = path.name.replace(" ", "_"), item.surface or item.mesh
-    files = [path.with_name(f"{stem}{ending}") for ending in (".stl", ".urdf", ".xacro", ".probes.json")]
+    surface = item.surface or item.mesh
+    files = [Path(f"{path}{ending}") for ending in (".stl", ".urdf", ".xacro", ".probes.json")]
     mesh, robot, macro, probes = files
     beyond = ", ".join(["forces of texels", "mass and inertia", *unmodelled(item)])
     note = f"'{item.name}': URDF holds where the texels are; it cannot express {beyond}."
@@ -294,4 +294,6 @@ def roll_pitch_yaw(frames: np.ndarray) -> np.ndarray:
     return np.stack([roll, pitch, yaw], axis=1)
 
 
-FORMAT = SensorFormat("urdf", "URDF", "A link with the mesh, and a fixed frame for each texel", write_urdf, read_urdf, is_urdf)
+FORMAT = SensorFormat(
+    "urdf", "URDF", "A link with the mesh, and a fixed frame for each texel", write_urdf, read_urdf, is_urdf, "_"
+)

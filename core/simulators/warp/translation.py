@@ -583,6 +583,7 @@ class _Unrolled(ast.NodeTransformer):
         if not isinstance(values, tuple):
             return self.generic_visit(node)
         bodies: list[ast.stmt] = []
+        before = dict(self._entries)
         for value in values:
             names, entries = (node.target.elts, value) if isinstance(node.target, ast.Tuple) else ([node.target], [value])
             for name, entry in zip(names, entries, strict=True):
@@ -594,6 +595,7 @@ class _Unrolled(ast.NodeTransformer):
             one = copy.deepcopy(node)
             one.target = ast.Name("_")
             bodies += self.generic_visit(one).body  # type: ignore[attr-defined]
+        self._entries = before  # behind the loop the names are variables again
         return bodies
 
 
@@ -644,4 +646,5 @@ def _number(value: float) -> ast.expr:
 
 def _called(name: str, *arguments: ast.expr) -> ast.Call:
     """Return a call of a function of Warp or of the scope."""
-    return ast.Call(ast.parse(name, mode="eval").body, list(arguments), [])
+    scope, _, own = name.rpartition(".")
+    return ast.Call(ast.Attribute(ast.Name(scope), own) if scope else ast.Name(own), list(arguments), [])

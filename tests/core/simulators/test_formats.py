@@ -32,6 +32,17 @@ def test_an_unknown_format_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize("kind", written_formats())
+def test_sensors_of_one_name_leave_the_earlier_export(kind, tmp_path):
+    export_sensors([pad()], kind, tmp_path)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
+    with pytest.raises(PalpateError, match="Two of the sensors have the same name"):
+        export_sensors([pad(), pad(4, 4)], kind, tmp_path)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
+    written = export_sensors([pad(name="a b"), pad(4, 4, name="a_b")], kind, tmp_path)  # URDF's names have no blanks
+    assert len(written.files) == 2 * len({path.name.partition(".")[2] for path in written.files})
+
+
+@pytest.mark.parametrize("kind", written_formats())
 def test_all_sensors_are_written_and_the_next_export_replaces_them(kind, tmp_path):
     written = export_sensors(SENSORS, kind, tmp_path)
     assert all(path.is_file() for path in written.files)
@@ -52,7 +63,7 @@ def test_a_full_disk_leaves_the_earlier_export(kind, tmp_path, monkeypatch):
     export_sensors(SENSORS, kind, tmp_path)
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     module = __import__(f"palpate.core.simulators.formats.{kind}", fromlist=["_"])
-    writers = ("write_xml", "write_probe_list", "write_openrave", "atomic_write")
+    writers = ("write_xml", "write_probe_list", "write_openrave", "write_text", "atomic_write")
     writer = next(name for name in writers if hasattr(module, name))
     calls = []
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.metadata
 import inspect
 import math
@@ -42,7 +43,7 @@ from palpate.core.laws.normal_force import (
 )
 from palpate.core.simulators.warp import engine
 from palpate.core.simulators.warp.press_arrays import IntArray
-from palpate.core.simulators.warp.translation import Translation, TranslationError
+from palpate.core.simulators.warp.translation import Translation, TranslationError, _Unrolled
 
 warp = pytest.importorskip("warp", reason="Warp runs the kernels: pip install warp-lang")
 COLUMNS = 40
@@ -125,6 +126,11 @@ def test_shapes_have_the_bits_of_their_source():
     for one in (shapes.SPHERE, shapes.BOX, shapes.CAPSULE, shapes.PLANE):
         met = np.isfinite(expected[kind == one, 0]).sum()
         assert 50 < met < 200 and 20 < expected[kind == one, 5].sum() < 180, (one, met)
+
+
+def test_the_name_of_an_unrolled_loop_is_a_variable_behind_it():
+    source = ast.parse("for i in PAIR:\n    a(i)\nfor i in range(3):\n    b(i)")
+    assert ast.unparse(_Unrolled({"PAIR": (0, 3)}).visit(source)) == "a(0)\na(3)\nfor i in range(3):\n    b(i)"
 
 
 def stand_in(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
