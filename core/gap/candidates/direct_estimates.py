@@ -35,18 +35,17 @@ MOST_DEAD_SHARE = 0.4
 """If a larger share of the loaded texels seems dead, the model is wrong and not the texels."""
 SAME_LEVEL = 1e-9
 """Share of the largest reading within which values are the same but for rounding."""
-LEAST_REPEATS, LEAST_LEVELS = 2.0, 3
-"""Levels are looked for if readings repeat each value so often on average, so that most levels are among them, if so many lie
-above rest, and if neighbours are apart by more than the noise, which hides finer ones."""
+LEAST_LEVELS, LEAST_REPEATS = 3, 2.0
+"""Fewest levels, and how often each is read on average: then most of them are among the readings."""
 MOST_MISFIT = 0.25
 """Most by which the number of a level is off, half of what is possible: levels are exact, so another form of converter made
 those that are off by more."""
 ROUNDING = "rounding"
-"""Name of the share of a step that a converter rounds up, which its levels do not show."""
-LEVEL_RANGE, LEAST_SHARE, GRID, MOST_ROUNDS = 10.0, 1e-3, 24, 20
-"""Bounds of the parameters of levels, as multiples of the smallest and the largest level, or as a number without a unit; points
-of the grid of first values along each; and how often levels are numbered anew. With them all levels of powers from 0.3 to 2.5
-and logarithms are numbered rightly if a tenth of 8 to 2000 is missing."""
+"""Name of the share of a step that a converter rounds up, which its levels do not show. Its levels lie about rest."""
+FINEST, COARSEST, GRID, MOST_ROUNDS = 1e-3, 10.0, 32, 20
+"""Bounds of the parameters of levels in the reading's unit, as multiples of the smallest distance and of the largest level;
+points of the grid of first values along each; and how often levels are numbered anew. With them all levels of powers from 0.3
+to 2.5 and logarithms are numbered rightly if a tenth of 8 to 2000 is missing."""
 
 
 def unresponsive_texels(views: Sequence[TrialView], model: Model, candidate: Candidate, texels: int) -> Effect | None:
@@ -102,10 +101,11 @@ def of_silent_texels(free: Sequence[FreeParameter], effect: Effect) -> Iterator[
         yield replace(item, low=np.where(silent, low, value), high=np.where(silent, item.high, value))
 
 
-def quantization_starts(values: np.ndarray, views: Sequence[TrialView], candidate: Candidate) -> list[Effect]:
+def quantization_starts(values: np.ndarray, views: Sequence[TrialView], model: Model, candidate: Candidate) -> list[Effect]:
     """Return the effect with the levels of a converter that readings show; empty if they show none, or not those of the form.
 
-    Noise repeats no value, so values that repeat are the levels of a converter.
+    Noise repeats no value, so values that repeat are the levels of a converter. Where they are nearer to each other than the
+    noise is large, they hide in it.
 
     Parameters
     ----------
@@ -113,24 +113,26 @@ def quantization_starts(values: np.ndarray, views: Sequence[TrialView], candidat
         Readings that change (see :meth:`.view_set.ViewSet.moving_readings`).
     views : sequence of TrialView
         All texels and samples.
+    model : Model
+        Whose zero is the reading without load where none was recorded.
     candidate : Candidate
         The form of the effect.
     """
-    levels = distinct(values)
+    own, is_about_rest = candidate.form.parameters, ROUNDING in candidate.form.defaults()
+    levels, count = distinct(values)
+    levels = levels[count > 1]
     if len(levels) < LEAST_LEVELS or len(values) < LEAST_REPEATS * len(levels):
         return []
-    change = levels - unloaded_reading(views)
+    change = levels - (unloaded_reading(views, model) if is_about_rest else levels[0])
     change = change if change[-1] >= -change[0] else -change[::-1]
     sizes = change[change > SAME_LEVEL * change[-1]]
-    if len(sizes) < LEAST_LEVELS or np.median(np.diff(sizes)) < views[0].noise[0]:
+    if len(sizes) < len(own) or np.median(np.diff(sizes)) < views[0].noise[0]:
         return []
     found, misfit = level_parameters(sizes, candidate.form)
     if misfit > MOST_MISFIT:
         return []
-    shares = (0.0, 0.5) if ROUNDING in candidate.form.defaults() else ()
-    return [
-        Effect(candidate.name, candidate.form.name, one) for one in [found | {ROUNDING: share} for share in shares] or [found]
-    ]
+    filled = [found | {ROUNDING: share} for share in (0.0, 0.5)] if is_about_rest else [found]
+    return [Effect(candidate.name, candidate.form.name, one) for one in filled]
 
 
 def level_parameters(sizes: np.ndarray, form: Form) -> tuple[dict[str, Value], float]:
@@ -143,12 +145,12 @@ def level_parameters(sizes: np.ndarray, form: Form) -> tuple[dict[str, Value], f
     Parameters
     ----------
     sizes : (k,) float, increasing
-        Distances of levels from the reading without load, above zero, in the sensor's unit.
+        Distances of levels from the reading without load, above zero, in the sensor's unit. Some may be missing.
     form : Form
     """
     own = [p for p in form.parameters if p.name != ROUNDING]
-    in_units = (sizes[0] / LEVEL_RANGE, sizes[-1] * LEVEL_RANGE)
-    bounds = [in_units if p.unit == "unit" else (max(p.low, LEAST_SHARE), p.high) for p in own]
+    in_units = FINEST * min(sizes[0], float(np.diff(sizes).min())), COARSEST * sizes[-1]
+    bounds = [in_units if p.unit == "unit" else (p.low or 1e-2 / len(sizes), p.high) for p in own]
     low, high = np.log(np.transpose(bounds))
 
     def values(at: np.ndarray) -> dict[str, Value]:
@@ -165,30 +167,32 @@ def level_parameters(sizes: np.ndarray, form: Form) -> tuple[dict[str, Value], f
     start = min(grid, key=lambda at: float(np.abs(distances(at)).sum()))
     at, before = least_squares(distances, start, bounds=(low, high), loss="soft_l1", f_scale=0.1).x, np.zeros(0)
     for _ in range(MOST_ROUNDS):
-        whole = np.cumsum(np.maximum(np.round(np.diff(numbers(at), prepend=0.0)), 1.0))
+        apart = np.maximum(np.round(np.diff(numbers(at))), 1.0)
+        whole = max(np.round(numbers(at)[0]), 1.0) + np.append(0.0, np.cumsum(apart))
         if np.array_equal(whole, before):
             break
         at, before = least_squares(lambda x, whole=whole: numbers(x) - whole, at, bounds=(low, high)).x, whole
     return values(at), float(np.abs(numbers(at) - np.round(numbers(at))).max())
 
 
-def unloaded_reading(views: Sequence[TrialView]) -> float:
-    """Return the median reading without load."""
+def unloaded_reading(views: Sequence[TrialView], model: Model) -> float:
+    """Return the median reading without load, or the zero of a model if none was recorded."""
     found = []
     for view in views:
         reading = view.predictor.trial.reading
         if reading is not None:
             found.append(reading[(relative_load(view.predictor.stimulus) <= 0) & np.isfinite(reading)])
-    return float(np.median(np.concatenate(found))) if any(map(len, found)) else 0.0
+    return float(np.median(np.concatenate(found))) if any(map(len, found)) else model.parameters.zero
 
 
 def few_levels(values: np.ndarray) -> bool:
     """Return whether readings have so few distinct values, and repeat them so often, that noise did not make them."""
-    count = len(distinct(values))
-    return 3 <= count <= MOST_LEVELS and len(values) >= SAMPLES_PER_LEVEL * count
+    count = len(distinct(values)[0])
+    return LEAST_LEVELS <= count <= MOST_LEVELS and len(values) >= SAMPLES_PER_LEVEL * count
 
 
-def distinct(values: np.ndarray) -> np.ndarray:
-    """Return the distinct values of readings, in order; those that rounding of numbers alone sets apart are one."""
+def distinct(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the distinct values of readings, in order, and how often each is read; values that rounding sets apart are one."""
     size = float(np.abs(values).max(initial=0.0)) or 1.0
-    return values[np.unique(np.round(values / (size * SAME_LEVEL)), return_index=True)[1]]
+    _, first, count = np.unique(np.round(values / (size * SAME_LEVEL)), return_index=True, return_counts=True)
+    return values[first], count

@@ -92,7 +92,7 @@ def _scanned_threshold(candidate: Candidate, score_test: ScoreTest, scales: Scal
 def _quantization_starts(candidate: Candidate, score_test: ScoreTest, view_set: ViewSet) -> list[tuple[float, Effect]]:
     """The best of the steps that are estimated from the readings; the other parameters follow it by half a step."""
     values = view_set.moving_readings(score_test.model)
-    starts = quantization_starts(values, view_set.whole, candidate)
+    starts = quantization_starts(values, view_set.whole, score_test.model, candidate)
     decreases = [(score_test.decrease_after_step(effect), effect) for effect in starts]
     return [max(decreases, key=lambda entry: entry[0])] if starts else []
 

@@ -61,7 +61,7 @@ def meet(center, frame, size, position, outward, reach, contact):  # type: ignor
     size : (1,) or (3,) float, metres
         Radius of a sphere, or half of the edges of a box.
     position, outward, reach
-        As in :func:`sphere_contact`.
+        As in :func:`shape_contact`.
     contact : tuple of (T, n), (T, n, 3) and (T, n, 3) float
         Depth, normal and point; written to.
     """

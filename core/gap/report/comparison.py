@@ -10,11 +10,15 @@ from typing import Any
 
 import numpy as np
 
+from ..fitting.noise_floor import SMALLEST_NOISE
 from ..forward.contact_phases import PHASES, phase_indices, relative_load
 from ..forward.predictor import Model, Predictor
 from ..selection.check_recordings import CheckedRecording
 from ..selection.findings import Diagnosis
 
+CLOSED_FROM = 0.2
+"""A closed share is given if the gap, noise removed, is at least this share of the noise floor. Which effects join is decided
+in :mod:`..selection.search`."""
 RANGE_PARTS = 5
 """Number of equal parts into which the range of loads is divided."""
 WORST_TEXELS_SHARE = 0.5
@@ -98,7 +102,7 @@ def nrmse(predictors: Sequence[Predictor], model: Model, full: tuple[float, floa
 
 def closed_share(before: float | None, after: float | None, floor: float) -> float | None:
     """Return the share of the squared gap, noise removed, that closes between two errors; None without a gap."""
-    if before is None or after is None or before <= floor:
+    if before is None or after is None or before**2 - floor**2 <= (CLOSED_FROM * floor) ** 2:
         return None
     return float(round(min((before**2 - after**2) / (before**2 - floor**2), 1.0), 4))
 
@@ -123,14 +127,15 @@ def check_errors(result: Diagnosis, one: CheckedRecording, quantity: int) -> lis
 
 
 def noise_floor_nrmse(result: Diagnosis) -> float:
-    """Return the NRMSE of noise alone on the fitted trials, at the level by which the rule judged."""
+    """Return the NRMSE of noise alone on the fitted trials, at the level by which the rule judged; never zero."""
     square = count = 0.0
     for predictor in result.of("fit"):
         channels = (predictor.trial.reading, predictor.trial.force)
         for measured, noise, level, size in zip(channels, result.noise, result.noise_level, result.full, strict=True):
             if measured is not None:
                 number = float(np.isfinite(measured).sum())
-                square, count = square + number * level * (noise.deviation / size) ** 2, count + number
+                square += number * max(level * (noise.deviation / size) ** 2, SMALLEST_NOISE**2)
+                count += number
     return float(np.sqrt(square / max(count, 1.0)))
 
 

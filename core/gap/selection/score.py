@@ -92,9 +92,9 @@ class Hypothesis:
         scanned = set()
         for index, one in enumerate(self.fit.model.effects):
             form = form_of(one.name, one.form)
-            read_off = tuple(one.values) if form.level_number is not None else ()
-            names = form.jumps_at or read_off or (IN_PLANE if form.placement is not None else ())
+            names = form.jumps_at or (IN_PLANE if form.placement is not None else ())
             scanned |= {(index, name) for name in names if one.values.get(name, 0.0) != 0.0}
+            scanned |= {(index, p.name) for p in form.parameters} if form.level_number is not None else set()
         scanned -= {(item.effect, item.name) for item in self.fit.free}
         texels = max([len(v) for e in self.fit.model.effects for v in e.values.values() if isinstance(v, tuple)] + [1])
         return len(scanned) + sum(item.number_count(texels) for item in self.fit.free if item.effect != BASE)

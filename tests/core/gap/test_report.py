@@ -23,6 +23,7 @@ from palpate.core.gap.report import summary
 from palpate.core.gap.report.comparison import gap_errors
 from palpate.core.gap.report.html_report import _evidence_table, _value_and_ends
 from palpate.core.gap.report.sentences import NOT_IDENTIFIABLE, headline, interval_text, said_confidence
+from palpate.core.model.sensor_parameters import SensorParameters
 
 
 @pytest.mark.parametrize(("gains", "levels", "odd"), [
@@ -52,6 +53,19 @@ def test_a_shifted_recording_is_named_and_its_gap_is_that_before_it_was_shifted_
     assert list(by_name) == ["t0", "t1", "t2", "t3"]
     assert max(by_name, key=lambda name: by_name[name]["before"]) == "t2"
     assert by_name["t2"]["after"] < 0.5 * by_name["t2"]["before"]
+
+
+def test_recordings_without_any_noise_have_a_floor_above_zero():
+    time = np.arange(600) / cases.RATE
+    trials = []
+    for name, use, size in (("a", "fit", 1.0e-3), ("b", "fit", 1.5e-3), ("c", "check", 2.0e-3)):
+        depth = np.maximum(size * np.sin(1.7 * time - 0.5), 0.0)
+        force = 100.0 * depth
+        trials.append(cases.depth_trial(time, depth, reading=(force / (1.0 + force / 0.15))[:, None], name=name, use=use))
+    result = cases.diagnosed(cases.grid_rig(1, 1, 4e-3, SensorParameters(k=100.0, cn=0.0), tuple(trials), given=("k",)))
+    errors = gap_errors(result)
+    assert errors.noise_floor > 0.0 and result.noise_level[0] == 0.0
+    assert headline(result, errors).startswith("Missing: saturation; the error shrinks from")
 
 
 @pytest.mark.parametrize("fades", [0.0, 0.9, 1.0])

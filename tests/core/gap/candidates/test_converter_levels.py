@@ -44,29 +44,51 @@ def test_levels_have_the_parameters_of_their_converter(form, values, count, miss
         )
 
 
+def behind(form, values, gain=1.0, change=lambda reading: reading, noise=1e-4):
+    """What is read off of a rig behind a converter, about readings up to one, after another change."""
+    rig = cases.rig(trials=2, seconds=8.0, seed=2, stated=80.0)
+    size = max(one.reading.max() for one in rig.trials)
+    pad = TransducerArray(np.zeros((24, 3)), np.ones(24), gain=gain)
+    converter = effect("quantization", form, **values)
+    trials = [replace(one, reading=change(readings((converter,), pad, one.time, one.reading / size))) for one in rig.trials]
+    views = view_set_of(predictors_of(trials, rig), (noise, 1.0))
+    model = Model(replace(rig.parameters, gain=gain * rig.parameters.gain / size))
+
+    def starts(other):
+        candidate = Candidate(kind_of("quantization"), form_of("quantization", other))
+        return quantization_starts(views.moving_readings(model), views.whole, model, candidate)
+
+    return starts
+
+
 @pytest.mark.parametrize("gain", [1.0, -1.0])
 @pytest.mark.parametrize(("form", "values"), [("round", {"step": 0.01}), ("power", {"first": 0.01, "exponent": 0.6})])
 def test_readings_behind_a_converter_show_its_levels(form, values, gain):
     """Whether readings rise or fall under load. Those that noise moves over an edge are levels, too."""
-    rig = cases.rig(trials=2, seconds=8.0, seed=2, stated=80.0)
-    behind = effect("quantization", form, **values)
-    size = max(one.reading.max() for one in rig.trials)
-    pad = TransducerArray(np.zeros((rig.trials[0].reading.shape[1], 3)), np.ones(rig.trials[0].reading.shape[1]), gain=gain)
-    trials = [replace(one, reading=readings((behind,), pad, one.time, one.reading / size)) for one in rig.trials]
-    views = view_set_of(predictors_of(trials, rig), (1e-4, 1.0))
-    model = Model(replace(rig.parameters, gain=gain * rig.parameters.gain / size))
-    candidate = Candidate(kind_of("quantization"), form_of("quantization", form))
-    found = quantization_starts(views.moving_readings(model), views.whole, candidate)
+    found = behind(form, values, gain)(form)
     for name, value in values.items():
         assert [one.values[name] for one in found] == pytest.approx([value] * len(found), rel=1e-4)
     assert [one.values["rounding"] for one in found if "rounding" in one.values] == ([0.0, 0.5] if form == "power" else [])
     assert found
 
 
+def test_three_levels_and_one_odd_reading_are_enough():
+    (found,) = behind("round", {"step": 0.45})("round")
+    assert found.values["step"] == pytest.approx(0.45)
+
+    def with_a_glitch(reading):
+        reading[len(reading) // 3, 10] += 0.045
+        return reading
+
+    (found,) = behind("round", {"step": 0.1}, change=with_a_glitch)("round")
+    assert found.values["step"] == pytest.approx(0.1)
+
+
+def test_even_steps_need_no_reading_without_load():
+    (found,) = behind("round", {"step": 0.01}, change=lambda reading: np.where(reading > 0.3, reading + 7.0, np.nan))("round")
+    assert found.values["step"] == pytest.approx(0.01)
+
+
 def test_no_levels_are_seen_in_noise_or_below_it():
-    rig = cases.rig(trials=2, seconds=8.0, seed=2, stated=80.0)
-    coarse = tuple(replace(one, reading=np.round(one.reading, 2)) for one in rig.trials)
-    candidate = Candidate(kind_of("quantization"), form_of("quantization", "round"))
-    for trials, noise in ((rig.trials, 1e-9), (coarse, 0.011)):
-        views = view_set_of(predictors_of(trials, rig), (noise, 1.0))
-        assert quantization_starts(views.moving_readings(Model(rig.parameters)), views.whole, candidate) == []
+    assert behind("round", {"step": 0.0})("round") == []
+    assert behind("round", {"step": 0.01}, noise=0.011)("round") == []

@@ -34,7 +34,7 @@ from palpate.core.model.sensor_parameters import SensorParameters
 def test_a_handful_of_values_is_seen():
     rng = np.random.default_rng(1)
     smooth = rng.uniform(0, 1, 4000)
-    np.testing.assert_allclose(distinct(0.25 * np.round(smooth / 0.25)), [0, 0.25, 0.5, 0.75, 1])
+    np.testing.assert_allclose(distinct(0.25 * np.round(smooth / 0.25))[0], [0, 0.25, 0.5, 0.75, 1])
     assert few_levels(0.25 * np.round(smooth / 0.25)) and few_levels(np.floor(4 * np.sqrt(smooth)) ** 2)
     assert not few_levels(smooth) and not few_levels(np.ones(4000))
     assert not few_levels(np.round(smooth, 2))  # a hundred values: no step is seen by eye
