@@ -236,9 +236,18 @@ class Score:
 
     @property
     def resolution(self) -> float:
-        """By how much scores may change if fits go on: the squares of a right model fall by less than the fits' tolerance."""
-        squares = FIT_TOLERANCE * self.noise.under(self.weights[0])
-        return float(0.5 * STRETCHES * (squares / self.noise.error)[self.measured].sum())
+        """By how much scores of models that leave no more than noise may change if fits go on."""
+        return self._resolution(np.zeros(2))
+
+    def predicts_better(self, one: Hypothesis, other: Hypothesis) -> bool:
+        """Return whether one model predicts unseen stretches better than another, as far as scores are known."""
+        excess, _ = self.parts(other)
+        return self.prediction(one) > self.prediction(other) + self._resolution(excess[0])
+
+    def _resolution(self, excess: np.ndarray) -> float:
+        """By how much S may change if the squares fall by the fits' tolerance, of models that leave this beyond the noise."""
+        squares = FIT_TOLERANCE * (excess + self.noise.under(self.weights[0]))
+        return float(0.5 * STRETCHES * (squares / (excess + self.noise.error))[self.measured].sum())
 
     def is_near(self, best: Hypothesis, one: Hypothesis) -> bool:
         """Return whether a model does as well as a better one, as far as chance goes, or as scores are known."""

@@ -113,7 +113,7 @@ class Search:
             yield from _in_stage(PREDICTION, self._grow(best))
             longer = [one for one in self.tried if _holds(one, best) and self.score.weight(one, best) > LEAST_WEIGHT]
             top = max(longer, key=self.score.prediction, default=best)
-            if self.score.prediction(top) <= self.score.prediction(best) + self.score.resolution:
+            if not self.score.predicts_better(top, best):
                 break
             best = top
         return best
