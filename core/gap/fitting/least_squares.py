@@ -356,18 +356,22 @@ def fit(
             break
         complete = False
         known = 0 if little else frozen  # with frozen derivatives steps may become small long before the minimum
+    equations = _equations_by_stretch(views, free, point, tables, complete) if with_equations else None
     squares = np.array([view.squares(r) for view, r in zip(views, point.residuals, strict=True)])
-    found = Fit(point.model, free, squares, np.array([view.counts for view in views]))
-    if with_equations:
-        found.equations = []
-        for view, residual, table in zip(views, point.residuals, tables, strict=True):
-            if not complete:
-                derivatives(view, point.model, free, point.at, residual, table, 0)
-            rows = view.stretches(residual)
-            found.equations.append(
-                [_equations_of(view, free, table[:, part], residual[part], GRADIENT_BLOCKS) for part in rows]
-            )
-    return found
+    return Fit(point.model, free, squares, np.array([view.counts for view in views]), equations)
+
+
+def _equations_by_stretch(
+    views: Sequence[TrialView], free: tuple[FreeParameter, ...], point: _Point, tables: list[np.ndarray], complete: bool
+) -> list[list[NormalEquations]]:
+    """Normal equations of each stretch of each trial; derivatives are computed anew unless the tables are `complete`."""
+    equations = []
+    for view, residual, table in zip(views, point.residuals, tables, strict=True):
+        if not complete:
+            derivatives(view, point.model, free, point.at, residual, table, 0)
+        rows = view.stretches(residual)
+        equations.append([_equations_of(view, free, table[:, part], residual[part], GRADIENT_BLOCKS) for part in rows])
+    return equations
 
 
 class _Point:
