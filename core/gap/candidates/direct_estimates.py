@@ -5,10 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from scipy.optimize import least_squares
 
+from ...effects.engine.registry import kind_of
 from ...effects.engine.specification import Form
 from ...model.sensor import Effect, Value
 from ..fitting.least_squares import FreeParameter, TrialView
@@ -38,8 +40,7 @@ SAME_LEVEL = 1e-9
 LEAST_LEVELS, LEAST_REPEATS = 3, 2.0
 """Fewest levels, and how often each is read on average: then most of them are among the readings."""
 MOST_MISFIT = 0.25
-"""Most by which the number of a level is off, half of what is possible: levels are exact, so another form of converter made
-those that are off by more."""
+"""Most by which the number of a level is off: levels are exact, so another form made those that are off by more."""
 ROUNDING = "rounding"
 """Name of the share of a step that a converter rounds up, which its levels do not show. Its levels lie about rest."""
 FINEST, COARSEST, GRID, MOST_ROUNDS = 1e-3, 10.0, 32, 20
@@ -102,10 +103,10 @@ def of_silent_texels(free: Sequence[FreeParameter], effect: Effect) -> Iterator[
 
 
 def quantization_starts(values: np.ndarray, views: Sequence[TrialView], model: Model, candidate: Candidate) -> list[Effect]:
-    """Return the effect with the levels of a converter that readings show; empty if they show none, or not those of the form.
+    """Return the effect with the levels of a converter that readings show; empty if they show none, or those of another form.
 
     Noise repeats no value, so values that repeat are the levels of a converter. Where they are nearer to each other than the
-    noise is large, they hide in it.
+    noise is large, they hide in it. Levels of a converter that is in no form are given to the form that comes nearest.
 
     Parameters
     ----------
@@ -118,35 +119,52 @@ def quantization_starts(values: np.ndarray, views: Sequence[TrialView], model: M
     candidate : Candidate
         The form of the effect.
     """
-    own, is_about_rest = candidate.form.parameters, ROUNDING in candidate.form.defaults()
     levels, count = distinct(values)
     levels = levels[count > 1]
-    if len(levels) < LEAST_LEVELS or len(values) < LEAST_REPEATS * len(levels):
+    hidden = len(levels) < LEAST_LEVELS or np.median(np.diff(levels)) < views[0].noise[0]
+    if hidden or len(values) < LEAST_REPEATS * len(levels):
         return []
-    change = levels - (unloaded_reading(views, model) if is_about_rest else levels[0])
-    change = change if change[-1] >= -change[0] else -change[::-1]
-    sizes = change[change > SAME_LEVEL * change[-1]]
-    if len(sizes) < len(own) or np.median(np.diff(sizes)) < views[0].noise[0]:
+    rest = unloaded_reading(views)
+    is_whole = rest is not None and few_levels(values)
+    found = _levels_by_form(levels.tobytes(), model.parameters.zero if rest is None else rest, is_whole, candidate.name)
+    least = min((misfit for _, misfit in found.values()), default=0.0)
+    own, misfit = found.get(candidate.form.name, ({}, np.inf))
+    if misfit > max(MOST_MISFIT, least):
         return []
-    found, misfit = level_parameters(sizes, candidate.form)
-    if misfit > MOST_MISFIT:
-        return []
-    filled = [found | {ROUNDING: share} for share in (0.0, 0.5)] if is_about_rest else [found]
-    return [Effect(candidate.name, candidate.form.name, one) for one in filled]
+    shares = [{ROUNDING: share} for share in (0.0, 0.5)] if ROUNDING in candidate.form.defaults() else [{}]
+    return [Effect(candidate.name, candidate.form.name, {**own, **share}) for share in shares]
 
 
-def level_parameters(sizes: np.ndarray, form: Form) -> tuple[dict[str, Value], float]:
+@lru_cache(maxsize=4)
+def _levels_by_form(raw: bytes, rest: float, is_whole: bool, kind: str) -> dict[str, tuple[dict[str, Value], float]]:
+    """Parameters and misfit (see :func:`level_parameters`) of each form of a converter, for levels given as bytes.
+
+    Even steps have no centre, so the lowest level serves as one. The other forms lie about rest.
+    """
+    levels, found = np.frombuffer(raw), {}
+    for form in kind_of(kind).forms:
+        change = levels - (rest if ROUNDING in form.defaults() else levels[0])
+        change = change if change[-1] >= -change[0] else -change[::-1]
+        sizes = change[change > SAME_LEVEL * change[-1]]
+        if form.level_number is not None and len(sizes) >= len(form.parameters) and len(sizes) > 1:
+            found[form.name] = level_parameters(sizes, form, is_whole)
+    return found
+
+
+def level_parameters(sizes: np.ndarray, form: Form, is_whole: bool) -> tuple[dict[str, Value], float]:
     """Return the parameters of a converter with which its levels have whole numbers (:attr:`.specification.Form.level_number`),
     and by how much one of them is off at most.
 
-    They start where neighbouring levels are nearest to a distance of one, by absolute deviations, because a few levels may be
-    missing. Then each distance is a whole number, and least squares fit the parameters to the sums of these.
+    If some levels may be missing, the parameters start where neighbours are nearest to a distance of one, by absolute
+    deviations. Then each distance is a whole number, and least squares fit the parameters to the sums of these.
 
     Parameters
     ----------
     sizes : (k,) float, increasing
-        Distances of levels from the reading without load, above zero, in the sensor's unit. Some may be missing.
+        Distances of levels from the reading without load, above zero, in the sensor's unit.
     form : Form
+    is_whole : bool
+        True if none is missing: they are numbered one after the other.
     """
     own = [p for p in form.parameters if p.name != ROUNDING]
     in_units = FINEST * min(sizes[0], float(np.diff(sizes).min())), COARSEST * sizes[-1]
@@ -160,29 +178,32 @@ def level_parameters(sizes: np.ndarray, form: Form) -> tuple[dict[str, Value], f
         assert form.level_number is not None
         return form.level_number(sizes, values(at))
 
-    def distances(at: np.ndarray) -> np.ndarray:
+    def miss(at: np.ndarray) -> np.ndarray:
+        if is_whole:
+            return np.log(numbers(at) / np.arange(1, len(sizes) + 1))
         return np.log(np.maximum(np.diff(numbers(at)), 1e-9))
 
     grid = np.stack(np.meshgrid(*np.linspace(low, high, GRID).T), axis=-1).reshape(-1, len(own))
-    start = min(grid, key=lambda at: float(np.abs(distances(at)).sum()))
-    at, before = least_squares(distances, start, bounds=(low, high), loss="soft_l1", f_scale=0.1).x, np.zeros(0)
+    start = min(grid, key=lambda at: float(np.abs(miss(at)).sum()))
+    at, before = least_squares(miss, start, bounds=(low, high), loss="soft_l1", f_scale=0.1).x, np.zeros(0)
     for _ in range(MOST_ROUNDS):
-        apart = np.maximum(np.round(np.diff(numbers(at))), 1.0)
-        whole = max(np.round(numbers(at)[0]), 1.0) + np.append(0.0, np.cumsum(apart))
+        apart = np.ones(len(sizes) - 1) if is_whole else np.maximum(np.round(np.diff(numbers(at))), 1.0)
+        first = 1.0 if is_whole else max(np.round(numbers(at)[0]), 1.0)
+        whole = first + np.append(0.0, np.cumsum(apart))
         if np.array_equal(whole, before):
             break
         at, before = least_squares(lambda x, whole=whole: numbers(x) - whole, at, bounds=(low, high)).x, whole
-    return values(at), float(np.abs(numbers(at) - np.round(numbers(at))).max())
+    return values(at), float(np.abs(numbers(at) - before).max())
 
 
-def unloaded_reading(views: Sequence[TrialView], model: Model) -> float:
-    """Return the median reading without load, or the zero of a model if none was recorded."""
+def unloaded_reading(views: Sequence[TrialView]) -> float | None:
+    """Return the median reading without load; None if none was recorded."""
     found = []
     for view in views:
         reading = view.predictor.trial.reading
         if reading is not None:
             found.append(reading[(relative_load(view.predictor.stimulus) <= 0) & np.isfinite(reading)])
-    return float(np.median(np.concatenate(found))) if any(map(len, found)) else model.parameters.zero
+    return float(np.median(np.concatenate(found))) if any(map(len, found)) else None
 
 
 def few_levels(values: np.ndarray) -> bool:
