@@ -38,13 +38,8 @@ def test_levels_have_the_parameters_of_their_converter(form, values, count, miss
     levels = LEVELS[form](k, values)
     found, misfit = level_parameters(levels, form_of("quantization", form), missing == 0.0)
     assert found == pytest.approx(values, rel=1e-6) and misfit < 1e-6
-    if form == "power" and count > 8:
-        assert (
-            min(
-                level_parameters(levels, form_of("quantization", other), missing == 0.0)[1] for other in ("round", "companding")
-            )
-            > MOST_MISFIT
-        )
+    others = [level_parameters(levels, form_of("quantization", one), missing == 0.0)[1] for one in ("round", "companding")]
+    assert min(others) > MOST_MISFIT or form != "power" or count == 8  # few levels have the numbers of several forms
 
 
 def behind(form, values, gain=1.0, change=lambda reading: reading, noise=1e-4):
