@@ -340,12 +340,8 @@ def fit(
             derivatives(view, point.model, free, point.at, residual, table, known)
         complete = known == 0
         total = summed_equations([_equations_of(view, free, table, residual) for view, residual, table in parts])
-        for _ in range(TRIES_PER_STEP):
-            better = _Point(views, point.model, free, _after_step(total, free, point.at, damping))
-            if better.objective < point.objective:
-                break
-            damping = max(damping * DAMPING_UP, RAISED_DAMPING)
-        else:  # no step leads down
+        better, damping = _better_point(views, free, point, total, damping)
+        if better is None:
             if complete:
                 break
             known, damping = 0, FIRST_DAMPING
@@ -361,10 +357,22 @@ def fit(
     return Fit(point.model, free, squares, np.array([view.counts for view in views]), equations)
 
 
+def _better_point(
+    views: Sequence[TrialView], free: tuple[FreeParameter, ...], point: _Point, total: NormalEquations, damping: float
+) -> tuple[_Point | None, float]:
+    """Raise the damping until a step leads down; the point after that step and the damping, or None if no step does."""
+    for _ in range(TRIES_PER_STEP):
+        tried = _Point(views, point.model, free, _after_step(total, free, point.at, damping))
+        if tried.objective < point.objective:
+            return tried, damping
+        damping = max(damping * DAMPING_UP, RAISED_DAMPING)
+    return None, damping
+
+
 def _equations_by_stretch(
     views: Sequence[TrialView], free: tuple[FreeParameter, ...], point: _Point, tables: list[np.ndarray], complete: bool
 ) -> list[list[NormalEquations]]:
-    """Normal equations of each stretch of each trial; derivatives are computed anew unless the tables are `complete`."""
+    """Normal equations of each stretch of each trial; derivatives are computed again unless the tables are `complete`."""
     equations = []
     for view, residual, table in zip(views, point.residuals, tables, strict=True):
         if not complete:

@@ -28,8 +28,6 @@ def damage_said(path: Path, kind: str) -> Iterator[None]:
     path : Path
     kind : str
         What the file should be, as in "MCAP".
-    *passing
-        Errors that the caller knows how to explain.
 
     Raises
     ------

@@ -29,7 +29,7 @@ PICTURES = (
     *("Log", "DiagnosticArray", "ParameterEvent"),
 )
 """Types of messages that hold no measurements of touch."""
-NUMBERS = (int, float, np.number, np.bool_)
+NUMBER_TYPES = (int, float, np.number, np.bool_)
 _POINT_KINDS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 _LARGEST_DIFFERENCE = 10.0
 """Seconds between the times of headers and of the recorder, above which the headers are not believed."""
@@ -135,10 +135,10 @@ def _numbers(message: Any, before: str, depth: int) -> Iterator[tuple[str, float
         full, is_list = f"{before}{name}", isinstance(value, list | tuple)
         if name in ("header", "stamp", "layout"):
             continue
-        if isinstance(value, NUMBERS):
+        if isinstance(value, NUMBER_TYPES):
             yield full, _as_float(value)
-        elif isinstance(value, np.ndarray) or is_list and value and isinstance(value[0], NUMBERS):
-            is_plain = all(isinstance(one, NUMBERS) for one in value) if is_list else value.dtype.kind in "iufb"
+        elif isinstance(value, np.ndarray) or is_list and value and isinstance(value[0], NUMBER_TYPES):
+            is_plain = all(isinstance(one, NUMBER_TYPES) for one in value) if is_list else value.dtype.kind in "iufb"
             if len(value) <= LONGEST_LIST and is_plain:
                 yield from ((f"{full}_{i}", _as_float(number)) for i, number in enumerate(np.ravel(value)))
         elif is_list:
