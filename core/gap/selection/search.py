@@ -106,11 +106,13 @@ class Search:
     def predicting(self, named: Hypothesis) -> Job[Hypothesis]:
         """Return the model that predicts best of all that hold the effects of the chosen one, while it leaves a gap.
 
-        An added effect need not pay for a name. The amended model predicts better, and the report calls the name a guess.
+        An added effect need not pay for a name, only have the least weight. The amended model predicts better, and the report
+        calls the name a guess.
         """
-        best = named
+        best, least_lead = named, float(np.log(LEAST_WEIGHT / (1.0 - LEAST_WEIGHT)))
         while self.score.leaves_gap(best) and best.components and len(best.names) < MOST_EFFECTS:
-            yield from _in_stage(PREDICTION, self._grow(best))
+            most_left = self.score.most_left(best, self.score.value(best) + least_lead)
+            self.tried += yield from _in_stage(PREDICTION, self._screening(best).with_one_more(best, most_left=most_left))
             longer = [one for one in self.tried if _holds(one, best) and self.score.weight(one, best) > LEAST_WEIGHT]
             top = max(longer, key=self.score.prediction, default=best)
             if not self.score.predicts_better(top, best):

@@ -151,13 +151,19 @@ def test_an_effect_may_help_to_predict_without_paying_for_its_name(left, helps):
     named = model(3.0, "lag/first-order", changes=(20.0,))
     more = model(left, "lag/first-order", "drift/sensitivity", changes=(20.0, 1.0))
     twice = model(1.0, "lag/first-order", "drift/sensitivity", "creep/power", changes=(20.0, 1.0, 1.0))
-    found = search.Search({})
-    found.score, found.tried, found._done = rule(), [named, more, twice], {one.key: set() for one in (named, more, twice)}
+    found, asked = search.Search({}), {}
+
+    def with_one_more(parent, most_left):
+        asked[parent] = most_left
+        return []
+        yield
+
+    found._screening = lambda _: SimpleNamespace(with_one_more=with_one_more)
+    found.score, found.tried = rule(), [named, more, twice]
     assert found.score.value(more) < found.score.value(named)
-    work = found.predicting(named)
-    with pytest.raises(StopIteration) as stop:
-        next(work)
-    assert stop.value.value is ((twice if found.score.leaves_gap(more) else more) if helps else named)
+    assert run_job(found.predicting(named)) is ((twice if found.score.leaves_gap(more) else more) if helps else named)
+    least = model(1.0 + 2.0 * asked[named], "lag/first-order", "drift/sensitivity", changes=(20.0, 0.0))
+    assert found.score.weight(least, named) == pytest.approx(rule_numbers.LEAST_WEIGHT)
 
 
 def test_alternatives_to_an_effect_are_all_fitted_models_with_the_same_other_effects():
