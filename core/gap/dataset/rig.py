@@ -6,7 +6,7 @@ Every mistake in a rig raises an error here, in one sentence, before anything is
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -364,24 +364,23 @@ def _indenter(words: dict[str, Any], path: Path) -> Indenter:
     if "mesh" in words:
         mesh = _mesh(_inside(words["mesh"], "The indenter's mesh", path), "the indenter")
         return Indenter(turned_outwards(mesh, "the indenter"))
+    from trimesh.creation import box, cylinder, icosphere
+
+    solids: dict[str, tuple[str, int, Callable[..., Any]]] = {
+        "sphere": ("radius", 1, lambda radius: icosphere(subdivisions=4, radius=radius)),
+        "box": ("size", 3, lambda *edges: box(edges)),
+        "cylinder": ("size", 2, lambda radius, height: cylinder(radius=radius, height=height, sections=256)),
+    }
     shape = words["shape"]
-    sizes = {"sphere": ("radius", 1), "box": ("size", 3), "cylinder": ("size", 2)}
-    if not isinstance(shape, dict) or len(shape) != 1 or next(iter(shape)) not in sizes:
+    if not isinstance(shape, dict) or len(shape) != 1 or next(iter(shape)) not in solids:
         raise FileError(
             f"The indenter's shape of '{path.name}' is {shape!r}: write {{ sphere = radius }}, {{ box = [x, y, z] }} or "
             "{ cylinder = [radius, height] }, in metres."
         )
-    import trimesh
-
     ((kind, size),) = shape.items()
-    what, count = sizes[kind]
+    what, count, solid_of = solids[kind]
     lengths = checked_lengths(size, count, f"The {kind}'s {what} of '{path.name}'")
-    if kind == "sphere":
-        solid = trimesh.creation.icosphere(subdivisions=4, radius=lengths[0])
-    elif kind == "box":
-        solid = trimesh.creation.box(lengths)
-    else:
-        solid = trimesh.creation.cylinder(radius=lengths[0], height=lengths[1], sections=256)
+    solid = solid_of(*lengths)
     mesh = checked_mesh(solid.vertices, solid.faces, "the indenter")[0]
     return Indenter(mesh, lengths[0] if kind == "sphere" else None, lengths if kind == "box" else None)
 
@@ -430,8 +429,9 @@ def _recorded(columns: dict[str, np.ndarray], file: Path, use: str, texels: int,
         notes.append(f"'{file.name}': {', '.join(map(repr, strangers))} mean nothing here and were left out.")
     temperature = _temperatures(columns, time, file)
     found = Trial(file.stem, use, time, kind, position, quaternion, level, travel, reading, force, temperature=temperature)
-    found = found.without(unknown)
-    found = replace(found, reading=_known(found.reading), force=_known(found.force))
+    parts = found.without(unknown)
+    answers = [None if part is None or np.isnan(part).all() else part for part in (parts.reading, parts.force)]
+    found = replace(found, reading=answers[0], force=answers[1])
     if not found.responses:
         raise FileError(
             f"No response in '{file.name}' has a stimulus at the same time: record both at the same time, or cut the file."
@@ -525,11 +525,6 @@ def _vector(columns: Mapping[str, np.ndarray], names: tuple[str, ...], missing: 
     """Columns of a vector, (T, c), with one value in those that are missing."""
     otherwise = np.full(len(columns["time"]), missing)
     return np.stack([columns.get(name, otherwise) for name in names], axis=1)
-
-
-def _known(part: np.ndarray | None) -> np.ndarray | None:
-    """Responses; None if not one of them is known."""
-    return None if part is None or np.isnan(part).all() else part
 
 
 def _turns(columns: Mapping[str, np.ndarray], file: Path) -> np.ndarray:
