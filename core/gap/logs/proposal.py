@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import FileError
-from ..dataset.column_names import FORCE, POSE, PRESSURES, QUANTITIES, READING_UNITS, SLIDE, TURN
+from ..dataset.column_names import FORCE, NUMBER, POSE, PRESSURES, QUANTITIES, READING_UNITS, SLIDE, TURN, numbered
 from .column_behaviour import LEAST_CONTACT, contact_of, correlation, finite, is_clock, is_force, is_unordered, missing_code
 from .column_meaning import Family, families, is_rate, is_since_1970, meaning_in, meaning_of, name_and_unit, time_unit, unit_of
 from .guess import UNKNOWN, Guess, Proposal
@@ -355,8 +355,8 @@ def _texel_words(names: tuple[str, ...]) -> dict[str, Any]:
     """Return the names of texels as a pattern with a number, where they are one."""
     first, last = names[0], names[-1]
     for number in re.finditer(r"[1-9]\d*|0(?!\d)", first):
-        pattern, start = first[: number.start()] + "{}" + first[number.end() :], int(number[0])
-        if first != last and [pattern.replace("{}", str(start + i)) for i in range(len(names))] == list(names):
+        pattern, start = first[: number.start()] + NUMBER + first[number.end() :], int(number[0])
+        if first != last and numbered(pattern, start, len(names)) == names:
             return {"name": pattern, "first": start, "count": len(names)}
     return {"names": list(names)}
 
