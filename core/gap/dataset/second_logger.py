@@ -23,6 +23,7 @@ import numpy as np
 from ...errors import FileError
 from ...io.schema import wanted
 from .column_names import TURN
+from .trial import LONGEST_TIME
 
 # Missing samples of what drove a sensor: which of them can be interpolated.
 #
@@ -108,10 +109,6 @@ def peak_of(values: np.ndarray) -> tuple[int, float, float]:
     return top, float(away), float(values[top] + 0.5 * slope * away)
 
 
-LARGEST_SHIFT = 1e10
-"""Seconds."""
-
-
 @dataclass(frozen=True)
 class SecondLogger:
     """The file of a second logger, by its name in the rig.
@@ -125,7 +122,7 @@ class SecondLogger:
     """
 
     file: Any = None
-    late: Annotated[float, wanted("write seconds", ge=-LARGEST_SHIFT, le=LARGEST_SHIFT)] = 0.0
+    late: Annotated[float, wanted("write seconds", ge=-LONGEST_TIME, le=LONGEST_TIME)] = 0.0
 
 
 def joined(

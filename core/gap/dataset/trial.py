@@ -195,7 +195,7 @@ ONE_CLOCK = "one clock"
 UNKNOWN_PAUSE = 1.0
 """Seconds between two recordings of a session if nothing says how long the pause was."""
 LONGEST_TIME = 1e10
-"""Seconds, three centuries: largest time of the start of a recording."""
+"""Seconds, three centuries: largest time of the start of a recording, and largest shift of two clocks."""
 
 
 Start = float | datetime | None
