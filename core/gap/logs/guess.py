@@ -147,6 +147,9 @@ def toml_value(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
-        escaped = "".join(c if c.isprintable() and c not in '"\\' else f"\\u{ord(c):04x}" for c in value if ord(c) < 0x10000)
+        escaped = "".join(
+            c if c.isprintable() and c not in '"\\' else (f"\\u{ord(c):04x}" if ord(c) < 0x10000 else f"\\U{ord(c):08x}")
+            for c in value
+        )
         return f'"{escaped}"'
     return repr(float(value)) if isinstance(value, float) else str(value)

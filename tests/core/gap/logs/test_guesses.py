@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import tomllib
+
 import numpy as np
 import pytest
 from log_rigs import new_rig, template, write_csv
@@ -12,6 +14,7 @@ from palpate.core.errors import FileError
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.logs import questions
 from palpate.core.gap.logs.column_meaning import families, unit_of
+from palpate.core.gap.logs.guess import toml_value
 from palpate.core.gap.logs.log_file import read_log
 from palpate.core.gap.logs.log_table import with_distinct_names
 from palpate.core.gap.logs.proposal import propose
@@ -215,3 +218,13 @@ def test_every_guess_is_a_line_with_its_reason_that_is_corrected_there(tmp_path,
     put = []
     questions.asked(found.confirmed(), lambda question: put.append(question) or "1")
     assert len(put) == sum(guess.is_unknown for guess in found.guesses)
+
+
+def test_signs_outside_the_basic_plane_stay_in_names(tmp_path):
+    log = write_csv(
+        tmp_path / "press \U0001f600.csv", {"time": TIME, "depth \U0001d467 (mm)": LOAD, "R1": LOAD, "R2": 2.0 * LOAD}
+    )
+    made = new_rig(tmp_path / "rig", [log], template(tmp_path, [log]))
+    assert 'name = "depth \U0001d467 (mm)"' in made.path.read_text(encoding="utf-8")
+    name = "not printed: \x00 \U000e0001"
+    assert tomllib.loads(f"value = {toml_value(name)}")["value"] == name
