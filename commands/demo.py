@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core import response
+from ..core.figures.figure_canvas import save_figure
 from ..core.figures.figure_style import FigureStyle
-from ..core.figures.picture_labels import Label, label_picture
-from ..core.figures.tactile_strip import tactile_strip
+from ..core.figures.picture_labels import label_picture
+from ..core.figures.tactile_strip import strip_figure
 from ..core.figures.time_curves import force_curves
 from ..core.io.file_writing import writable_folder
 from ..core.io.hidden_folder import remove_own_files
@@ -83,7 +84,7 @@ def _draw(scene: Any, baked: BakeResult, folder: Path, arguments: argparse.Names
     parameters = {name: sensor.parameters for name, sensor in sensors.items()}
     style = FigureStyle(scene.palpate.color_map, limit=demo.RANGE, dpi=200)
     files = {"picture": folder / "scene.png", "tactile images": folder / "tactile-strip.png", "forces": folder / "forces.png"}
-    tactile_strip(files["tactile images"], baked.recording, texels, demo.STRIP_FRAMES, style)
+    save_figure(strip_figure(baked.recording, texels, demo.STRIP_FRAMES, style), files["tactile images"], style.dpi)
     force_curves(files["forces"], baked.recording, texels, parameters, {demo.PAD_B: _weight(baked)}, style)
     if not arguments.no_render:
         _render_picture(scene, files["picture"], arguments)
@@ -130,7 +131,7 @@ def _report_on_contacts(baked: BakeResult) -> str:
     return f"{slide}\n\n{demo.CUBE} at rest on {demo.PAD_B}: required {required:.6f} N, measured {measured:.6f} N"
 
 
-def _labels(scene: Any, recording: Recording, sensors: dict[str, Sensor], demo: Any) -> list[Label]:
+def _labels(scene: Any, recording: Recording, sensors: dict[str, Sensor], demo: Any) -> list[tuple[str, tuple[float, float]]]:
     """Return labels for the ball and the cube, with the forces on their pads."""
     from ..addon.render import render
 
@@ -143,10 +144,10 @@ def _labels(scene: Any, recording: Recording, sensors: dict[str, Sensor], demo: 
         demo.BALL: f"Steel ball, slipping\n{normal:.2f} N normal, {shear:.2f} N shear",
         demo.CUBE: f"Steel cube, 1 kg, at rest\n{weight:.4f} N on {carriers} texels",
     }
-    labels = [Label("\nArrows: the force with\nwhich a pad pushes back", (0.315, 0.14))]
+    labels = [("\nArrows: the force with\nwhich a pad pushes back", (0.315, 0.14))]
     for name, text in words.items():
         box = np.array([render.image_position(scene, point) for point in render.bounding_box_corners([scene.objects[name]])])
-        labels.append(Label(text, (float(box[:, 0].min()), float(box[:, 1].max()) + 0.035)))
+        labels.append((text, (float(box[:, 0].min()), float(box[:, 1].max()) + 0.035)))
     return labels
 
 

@@ -10,10 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
+from ..core.figures.figure_canvas import save_figure
 from ..core.figures.figure_style import FigureStyle
-from ..core.figures.tactile_strip import tactile_strip
+from ..core.figures.tactile_strip import strip_figure
 from ..core.figures.texel_numbers import texel_numbers
-from ..core.figures.time_curves import time_curves
+from ..core.figures.time_curves import curves_figure
 from ..core.model.recording import Recording
 from ..core.model.scenario import Scenario
 from ..core.solver.simulation import run
@@ -161,7 +162,8 @@ def work_cycle(folder: Path, progress: Callable) -> Chapter:
     chapter.pictures.append(_strip(folder / "fig12-images", recording, texels, frames, "Both pads at each stage."))
     parameters = {sensor.name: sensor.parameters for sensor in scenario.read_out}
     forces = draw_both(
-        folder / "fig12-forces", lambda path: time_curves(path, recording, texels, parameters, ("force",), STYLE)
+        folder / "fig12-forces",
+        lambda path: save_figure(curves_figure(recording, texels, parameters, ("force",), STYLE), path, STYLE.dpi),
     )
     chapter.pictures.append(Picture(forces, "Forces over the work cycle."))
     chapter.rows += cycle_rows(recording)
@@ -214,4 +216,5 @@ def finger_and_thumb(folder: Path, progress: Callable) -> Chapter:
 
 def _strip(stem: Path, recording: Recording, texels, frames, caption: str) -> Picture:
     """Draw the tactile images of some frames."""
-    return Picture(draw_both(stem, lambda path: tactile_strip(path, recording, texels, frames, STYLE)), caption)
+    drawn = draw_both(stem, lambda path: save_figure(strip_figure(recording, texels, frames, STYLE), path, STYLE.dpi))
+    return Picture(drawn, caption)

@@ -15,10 +15,11 @@ import numpy as np
 from ...core import response
 from ...core.errors import SceneError
 from ...core.export.exporter import export
+from ...core.figures.figure_canvas import save_figure
 from ...core.figures.side_by_side import side_by_side
-from ...core.figures.tactile_strip import tactile_strip
+from ...core.figures.tactile_strip import strip_figure
 from ...core.figures.texel_numbers import texel_numbers, why_unreadable
-from ...core.figures.time_curves import time_curves
+from ...core.figures.time_curves import curves_figure
 from ...core.io.bake_folder import folder_names
 from ...core.io.bake_reader import Bake, frame_index, read_sensors
 from ...core.io.file_writing import writable_folder
@@ -118,11 +119,12 @@ def draw_figures(
         if "strip" in request.kinds:
             columns = request.frames if len(request.frames) > 1 else None
             yield steps.next("Drawing the strip", frames[0])
-            tactile_strip(folder / f"strip.{ending}", *parts, columns, request.style)
+            save_figure(strip_figure(*parts, columns, request.style), folder / f"strip.{ending}", request.style.dpi)
             written["strip"].append(folder / f"strip.{ending}")
         if "curves" in request.kinds:
             yield steps.next("Drawing curves", frames[0])
-            time_curves(folder / f"curves.{ending}", *parts, bake.parameters, style=request.style)
+            curves = curves_figure(*parts, bake.parameters, style=request.style)
+            save_figure(curves, folder / f"curves.{ending}", request.style.dpi)
             written["curves"].append(folder / f"curves.{ending}")
         if "numbers" in request.kinds:
             for name, stem in folder_names(bake.texels, "_").items():

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from ...core import response
 from ...core.errors import SensorError
-from ...core.figures.gel_image import require_grid, write_gel_image
+from ...core.figures.figure_canvas import save_pixels
+from ...core.figures.gel_image import gel_pixels, require_grid
 from ...core.geometry.grid_layout import GridLayout
 from ...core.io.bake_folder import folder_names
 from ...core.io.bake_reader import Bake, frame_index
@@ -60,6 +61,6 @@ def draw_gels(bake: Bake, folder: Path, request: FigureRequest, next_step: Calla
         for name in names:
             path = folder / f"gel_{stems[name]}_{number:04d}.png"
             sensor, sigma0 = bake.recording.sensors[name].at(i), bake.parameters[name].sigma0
-            write_gel_image(path, sensor, bake.texels[name], name, sigma0, style)
+            save_pixels(gel_pixels(sensor, bake.texels[name], name, sigma0, style), path)
             written.append(path)
     return written

@@ -36,19 +36,21 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
+def axes_in_inches(figure: Figure, x: float, y: float, across: float, up: float) -> Axes:
+    """Add axes to a figure: their lower left corner, from that of the figure, and their size."""
+    width, height = figure.get_size_inches().tolist()
+    return figure.add_axes((x / width, y / height, across / width, up / height))
+
+
 def tidy_axes(axes: Axes) -> None:
     """Leave of an axes what helps reading: two spines, a faint grid, small ticks."""
     axes.grid(True, color=RULE, lw=0.7)
     axes.set_axisbelow(True)
     axes.tick_params(labelsize=SMALL, colors=INK, length=2.5, width=0.6)
     for label in (axes.xaxis.label, axes.yaxis.label):
-        label.set_fontsize(FONT)
-        label.set_color(INK)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
-    for side in ("left", "bottom"):
-        axes.spines[side].set_color(INK)
-        axes.spines[side].set_linewidth(0.6)
+        label.set(fontsize=FONT, color=INK)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set(color=INK, linewidth=0.6)
 
 
 def file_type(path: str | Path) -> str:
@@ -85,7 +87,6 @@ def save_figure(figure: Figure, path: str | Path, dpi: float) -> None:
         for label in (axes.xaxis.label, axes.yaxis.label, *axes.get_xticklabels(), *axes.get_yticklabels()):
             if float(label.get_fontsize()) > FONT:
                 label.set_fontsize(FONT)
-    for axes in figure.axes:
         legend = axes.get_legend()
         for text in legend.get_texts() if legend else ():
             text.set_fontsize(8)

@@ -11,7 +11,6 @@ model of a camera and its lamps.
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 
@@ -21,7 +20,6 @@ from ..geometry.grid_layout import GridLayout, smooth_depth
 from ..geometry.texels import Texels
 from ..model.recording import SensorFrame
 from . import color_maps
-from .figure_canvas import save_pixels
 from .figure_style import MARKERS_ALONG, GelStyle
 from .tactile_image import SensorView
 
@@ -67,13 +65,6 @@ def lamp_directions(angle: float) -> np.ndarray:
     """
     turn, up = np.radians(LAMP_AZIMUTHS), math.radians(angle)
     return np.column_stack([math.cos(up) * np.cos(turn), math.cos(up) * np.sin(turn), np.full(3, math.sin(up))])
-
-
-def write_gel_image(
-    path: str | Path, sensor: SensorFrame, texels: Texels, name: str, sigma0: float, style: GelStyle | None = None
-) -> None:
-    """Write the image of one frame as a PNG; see :func:`gel_pixels`."""
-    save_pixels(gel_pixels(sensor, texels, name, sigma0, style), path)
 
 
 def gel_pixels(sensor: SensorFrame, texels: Texels, name: str, sigma0: float, style: GelStyle | None = None) -> np.ndarray:

@@ -4,38 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from .. import response
 from ..geometry.texels import Texels
 from ..model.recording import Recording
-from .figure_canvas import new_figure, save_figure
+from .figure_canvas import axes_in_inches, new_figure, save_figure
 from .figure_style import FONT, FigureStyle
 from .tactile_image import SensorView, draw_colour_bar
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 DPI = 160
 """Of a picture 1280 pixels wide: text then has its 8 pt when the picture is shown at eight inches."""
-
-
-@dataclass(frozen=True)
-class Label:
-    """Words on a picture.
-
-    Attributes
-    ----------
-    text : str
-        Its first line is set bold.
-    at : (2,) float
-        Where the words stand, as shares of the picture's width and height from its lower left corner.
-    """
-
-    text: str
-    at: tuple[float, float]
 
 
 def label_picture(
@@ -46,7 +25,7 @@ def label_picture(
     frame: int,
     *,
     style: FigureStyle | None = None,
-    labels: Sequence[Label] = (),
+    labels: Sequence[tuple[str, tuple[float, float]]] = (),
 ) -> None:
     """Put a colour bar, the tactile images of `frame`, and labels on a rendered picture.
 
@@ -54,6 +33,9 @@ def label_picture(
     ----------
     source, path : str or Path
         The rendered PNG and the PNG to write; they may be the same file. The size in pixels stays as it is.
+    labels : sequence of (str, (float, float)), optional
+        Words, the first line of which is set bold, and where they stand: shares of the picture's width and height from its
+        lower left corner.
     """
     from matplotlib.image import imread
 
@@ -84,20 +66,15 @@ def label_picture(
             (x + column / 2) / width, (y + 0.05) / height, name, fontsize=FONT, color="white", weight="bold", ha="center"
         )
         y -= each
-        axes = figure.add_axes((x / width, y / height, column / width, each / height))
+        axes = axes_in_inches(figure, x, y, column, each)
         values = scale.values(sensors[name], texels[name])
         view = view.at_size(min(column / view.width, each / view.height))
         image = view.draw(axes, values, sensors[name].shear, strongest, scale, edge="#ffffff80")
     if image is not None:
-        bar = figure.add_axes(((width - bar_room) / width, y / height, 0.12 / width, (y_top - y) / height))
+        bar = axes_in_inches(figure, width - bar_room, y, 0.12, y_top - y)
         draw_colour_bar(figure, image, bar, scale, ink="white")
-    for label in labels:
-        _draw_label(figure, label, width, height)
+    for words, (x, y) in labels:
+        first, _, rest = words.partition("\n")
+        figure.text(x, y, first, fontsize=FONT + 1.5, color="white", weight="bold", va="bottom", ha="left")
+        figure.text(x, y - 0.03 / height, rest, fontsize=FONT, color="#e3e8ee", va="top", ha="left", linespacing=1.35)
     save_figure(figure, path, dpi)
-
-
-def _draw_label(figure: Figure, label: Label, width: float, height: float) -> None:
-    first, _, rest = label.text.partition("\n")
-    x, y = label.at
-    figure.text(x, y, first, fontsize=FONT + 1.5, color="white", weight="bold", va="bottom", ha="left")
-    figure.text(x, y - 0.03 / height, rest, fontsize=FONT, color="#e3e8ee", va="top", ha="left", linespacing=1.35)

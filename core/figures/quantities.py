@@ -154,18 +154,14 @@ class Extent:
     high: float = -math.inf
     units: tuple[str, ...] = ()
 
-    def including(self, quantity: Quantity, source: Any, texels: Texels) -> Extent:
-        """Return the extent that also covers what a source says."""
-        values, units = quantity.values(source, texels), dict.fromkeys((*self.units, quantity.unit_of(source)))
-        low, high = float(values.min(initial=math.inf)), float(values.max(initial=-math.inf))
-        return Extent(min(self.low, low), max(self.high, high), tuple(units))
-
     @classmethod
     def of(cls, quantity: Quantity, sources: Iterable[tuple[Any, Texels]], known: Extent | None = None) -> Extent:
         """Return the extent of sources and their texels, and of what is `known` already."""
         found = known or cls()
         for source, texels in sources:
-            found = found.including(quantity, source, texels)
+            values, units = quantity.values(source, texels), dict.fromkeys((*found.units, quantity.unit_of(source)))
+            low, high = float(values.min(initial=math.inf)), float(values.max(initial=-math.inf))
+            found = cls(min(found.low, low), max(found.high, high), tuple(units))
         return found
 
 

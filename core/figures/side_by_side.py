@@ -4,9 +4,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -14,16 +13,15 @@ from .. import response
 from ..geometry.texels import Texels
 from ..io.bake_reader import frame_index
 from ..model.recording import Recording, SensorRecording
-from .figure_canvas import new_figure, save_figure, tidy_axes
+from .figure_canvas import axes_in_inches, new_figure, save_figure, tidy_axes
 from .figure_style import FONT, INK, SERIES, SMALL, FigureStyle, width_below
 from .tactile_image import (
     SCALE_KEY_LINE,
-    SMALLEST_ARROW,
     SensorView,
     draw_colour_bar,
     draw_scale_key,
-    scale_key_width,
-    widest_scale_key,
+    scale_key_widths,
+    shear_of_arrow,
 )
 
 if TYPE_CHECKING:
@@ -73,89 +71,75 @@ def side_by_side(
     pixels = 2 * round(0.5 * (wide + _SIDE) * dpi), 2 * round(0.5 * height)
     width = pixels[0] / dpi
     figure = new_figure(width, _TALL)
-
-    def axes_at(x: float, y: float, across: float, up: float) -> Axes:
-        return figure.add_axes((x / width, y / _TALL, across / width, up / _TALL))
-
-    axes = axes_at(0.0, 0.0, wide, _TALL)
+    axes = axes_in_inches(figure, 0.0, 0.0, wide, _TALL)
     axes.imshow(picture, aspect="auto", interpolation="antialiased")
     axes.set_axis_off()
 
     scale, strongest = style.scale(recording, texels), response.peak_shear(recording)
-    left, room = wide + _MARGIN, _SIDE - 2 * _MARGIN
+    left, beside = wide + _MARGIN, _SIDE - 2 * _MARGIN
     parts = [_Part.of(own, recording.sensors[name], strongest) for name, own in shown.items()]
-    places = _placed(parts, room, _TALL - _CURVE - _BAR - _MARGIN)
+    places, room = _placed(parts, beside, _TALL - _CURVE - _BAR - _MARGIN)
     image, low = None, _TALL
     for number, ((name, own), part, (x, y, inches)) in enumerate(zip(shown.items(), parts, places, strict=True)):
         sensor, view = recording.sensors[name], part.view.at_size(inches)
         x, y, across, up = left + x, _TALL - _MARGIN - y, inches * view.width, inches * view.height
         colour = SERIES[number] if len(shown) > 1 else INK
-        words = name if len(name) * _LETTER < part.room else name[: int(part.room / _LETTER) - 1] + "…"
+        words = name if len(name) * _LETTER < room else name[: int(room / _LETTER) - 1] + "…"
         figure.text(x / width, y / _TALL, words, fontsize=FONT, color=colour, weight="bold", va="top")
-        place = axes_at(x, y - _NAME - up, across, up)
+        place = axes_in_inches(figure, x, y - _NAME - up, across, up)
         image = view.draw(place, scale.values(sensor, own)[i], sensor.shear[i], strongest, scale)
-        draw_scale_key(figure, (x, y - _NAME - up - 0.1), view, part.strongest, inches, room=part.room)
-        low = min(low, y - _NAME - up - part.below(inches))
+        draw_scale_key(figure, (x, y - _NAME - up - 0.1), view, part.strongest, inches, room)
+        low = min(low, y - _NAME - up - part.below(inches, room))
     if image is not None:
-        draw_colour_bar(figure, image, axes_at(left + 0.1, low - 0.24, room - 0.2, 0.1), scale)
+        draw_colour_bar(figure, image, axes_in_inches(figure, left + 0.1, low - 0.24, beside - 0.2, 0.1), scale)
     curve = min(low - _BAR, _MOST_CURVE)
-    _force_so_far(axes_at(left + 0.3, 0.3, room - 0.38, curve - 0.5), recording, i, shown)
+    _force_so_far(axes_in_inches(figure, left + 0.3, 0.3, beside - 0.38, curve - 0.5), recording, i, shown)
     save_figure(figure, path, dpi)
 
 
-@dataclass
-class _Part:
-    """A sensor's image, with the shear that its arrow stands for (N, zero without any) and the inches it has across."""
+class _Part(NamedTuple):
+    """A sensor's image, and the shear that its arrow stands for (N, zero without any)."""
 
     view: SensorView
     strongest: float
-    room: float = 0.0
 
     @classmethod
     def of(cls, texels: Texels, sensor: SensorRecording, strongest: float) -> _Part:
-        own = float(np.linalg.norm(sensor.shear, axis=2).max(initial=0.0))
         view = SensorView.of(texels, sensor.normal_force.sum(axis=0))
-        return cls(view, strongest if own > SMALLEST_ARROW * strongest else 0.0)
+        return cls(view, shear_of_arrow(sensor.shear, strongest))
 
-    def inches(self, across: float, up: float) -> float:
-        """Return the inches per millimetre that fit into a cell with name, scale bar and arrow."""
-        self.room = across
+    def inches(self, room: float, up: float) -> float:
+        """Return the inches per millimetre that fit into a cell, `room` inches wide, with name, scale bar and arrow."""
         for lines in (1, 2):
-            size = min(across / self.view.width, (up - _NAME - 0.03 - lines * SCALE_KEY_LINE) / self.view.height)
-            if self.below(size) < 0.03 + 1.5 * SCALE_KEY_LINE:
+            size = min(room / self.view.width, (up - _NAME - 0.03 - lines * SCALE_KEY_LINE) / self.view.height)
+            if self.below(size, room) < 0.03 + 1.5 * SCALE_KEY_LINE:
                 break
         return size
 
-    def wider_line(self, inches: float) -> float:
-        """Return the inches across of scale bar or arrow, whichever is wider."""
-        return widest_scale_key(self.view.at_size(inches), self.strongest, inches)
-
-    def below(self, inches: float) -> float:
+    def below(self, inches: float, room: float) -> float:
         """Return the inches that scale bar and arrow take up."""
-        both = scale_key_width(self.view.at_size(inches), self.strongest, inches) > self.room
+        both = scale_key_widths(self.view.at_size(inches), self.strongest, inches)[0] > room
         return 0.03 + (1 + both) * SCALE_KEY_LINE
 
 
-def _placed(parts: list[_Part], across: float, up: float) -> list[tuple[float, float, float]]:
-    """Return x, y downwards and inches per millimetre of each image, in as many columns as make them largest."""
+def _placed(parts: list[_Part], across: float, up: float) -> tuple[list[tuple[float, float, float]], float]:
+    """Return x, y downwards and inches per millimetre of each image, in columns that make them largest, and their room."""
     best: list[tuple[float, float, float]] = []
-    most, room = -1.0, across
+    most, best_room = -1.0, across
     for columns in range(1, len(parts) + 1):
         rows = -(-len(parts) // columns)
-        cell = (across - (columns - 1) * _MARGIN) / columns, (up - (rows - 1) * 0.06) / rows
-        sizes = [part.inches(*cell) for part in parts]
-        area = sum(size**2 * part.view.width * part.view.height for size, part in zip(sizes, parts, strict=True))
-        legible = columns == 1 or all(part.wider_line(size) <= cell[0] for size, part in zip(sizes, parts, strict=True))
-        if legible and min(sizes) > 0 and area > most:
-            most = area
+        room, height = (across - (columns - 1) * _MARGIN) / columns, (up - (rows - 1) * 0.06) / rows
+        sized = [(part, part.inches(room, height)) for part in parts]
+        area = sum(size**2 * part.view.width * part.view.height for part, size in sized)
+        lines = (scale_key_widths(part.view.at_size(size), part.strongest, size)[1] for part, size in sized)
+        legible = columns == 1 or all(line <= room for line in lines)
+        if legible and min(size for _, size in sized) > 0 and area > most:
+            most, best_room = area, room
             best = [
-                (number % columns * (cell[0] + _MARGIN), number // columns * (cell[1] + 0.06), size)
-                for number, size in enumerate(sizes)
+                (number % columns * (room + _MARGIN), number // columns * (height + 0.06), size)
+                for number, (_, size) in enumerate(sized)
             ]
-            room = cell[0]
-    for part in parts:
-        part.room = room
-    return best
+    return best, best_room
 
 
 def _force_so_far(axes: Axes, recording: Recording, i: int, texels: Mapping[str, Texels]) -> None:

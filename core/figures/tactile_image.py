@@ -180,13 +180,8 @@ class SensorView:
             lines: dict[str, Any] = {"color": "white", "lw": 0.4, "alpha": 0.22, "zorder": 2}
             axes.vlines(np.arange(1, columns) * self.width / columns, 0.0, self.height, **lines)
             axes.hlines(np.arange(1, rows) * self.height / rows, 0.0, self.width, **lines)
-        axes.set_xlim(self.window[:2])
-        axes.set_ylim(self.window[2:])
-        axes.set_xticks([])
-        axes.set_yticks([])
-        for spine in axes.spines.values():
-            spine.set_color(edge)
-            spine.set_linewidth(0.6)
+        axes.set(xlim=self.window[:2], ylim=self.window[2:], xticks=[], yticks=[])
+        axes.spines[:].set(color=edge, linewidth=0.6)
         return image
 
     def _arrows(self, axes: Axes, shear: np.ndarray, strongest: float) -> None:
@@ -301,25 +296,25 @@ _LETTER = 0.066
 """Inches that a letter of the small text takes, on average."""
 
 
+def shear_of_arrow(shear: np.ndarray, strongest: float) -> float:
+    """Return the shear (N) that the arrow below images with some shear (…, n, 2) stands for; zero without any arrow on them."""
+    return strongest if np.linalg.norm(shear, axis=-1).max(initial=0.0) > SMALLEST_ARROW * strongest else 0.0
+
+
 def _arrow_scale(view: SensorView, strongest: float, inches: float) -> tuple[str, float]:
     """Words for the arrow below the images, and its length in inches."""
     value = float(f"{strongest:.1g}")
     return f"{value:g} N shear", value / strongest * view.arrow * inches
 
 
-def widest_scale_key(view: SensorView, strongest: float, inches: float) -> float:
-    """Return the room, in inches, that :func:`draw_scale_key` needs on two lines."""
-    alone = scale_key_width(view, 0.0, inches)
-    return max(alone, scale_key_width(view, strongest, inches) - alone - 0.2)
-
-
-def scale_key_width(view: SensorView, strongest: float, inches: float) -> float:
-    """Return the room, in inches, that :func:`draw_scale_key` needs."""
-    width = view.bar * inches + 0.07 + _LETTER * len(f"{view.bar:g} mm") if view.bar > 0 else 0.0
-    if strongest > 0:
-        words, length = _arrow_scale(view, strongest, inches)
-        width += 0.2 + length + 0.07 + _LETTER * len(words)
-    return width
+def scale_key_widths(view: SensorView, strongest: float, inches: float) -> tuple[float, float]:
+    """Return the room, in inches, that :func:`draw_scale_key` needs on one line and on two."""
+    bar = view.bar * inches + 0.07 + _LETTER * len(f"{view.bar:g} mm") if view.bar > 0 else 0.0
+    if strongest <= 0:
+        return bar, bar
+    words, length = _arrow_scale(view, strongest, inches)
+    arrow = 0.2 + length + 0.07 + _LETTER * len(words)
+    return bar + arrow, max(bar, arrow - 0.2)
 
 
 def draw_scale_key(
@@ -346,7 +341,7 @@ def draw_scale_key(
         figure.add_artist(Line2D([x / width, stop / width], [y / height] * 2, color=INK, lw=2.0, solid_capstyle="butt"))
         figure.text((stop + 0.07) / width, y / height, f"{view.bar:g} mm", **words)
         x = stop + 0.07 + _LETTER * len(f"{view.bar:g} mm") + 0.2
-    if room is not None and view.bar > 0 and scale_key_width(view, strongest, inches) > room:
+    if room is not None and view.bar > 0 and scale_key_widths(view, strongest, inches)[0] > room:
         x, y = at[0], y - SCALE_KEY_LINE
     if strongest > 0:
         label, length = _arrow_scale(view, strongest, inches)
@@ -380,5 +375,4 @@ def draw_colour_bar(figure: Figure, image: Any, axes: Axes, scale: Scale, ink: s
     long = (place.width * width if lies else place.height * height) > 1.9  # inches; else the words need two lines
     label = (" " if long or lies else "\n").join(scale.label)
     bar.set_label(label, fontsize=FONT, color=ink, labelpad=2.0 if lies else 4.0)
-    bar.outline.set_edgecolor(ink)
-    bar.outline.set_linewidth(0.5)
+    bar.outline.set(edgecolor=ink, linewidth=0.5)

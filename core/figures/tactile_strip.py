@@ -5,18 +5,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .. import response
 from ..geometry.texels import Texels
 from ..model.recording import Recording
-from .figure_canvas import new_figure, save_figure
+from .figure_canvas import axes_in_inches, new_figure
 from .figure_style import FONT, GREY, INK, SMALL, FigureStyle
-from .quantities import Scale
-from .tactile_image import SMALLEST_ARROW, SensorView, draw_colour_bar, draw_scale_key, scale_key_width
+from .tactile_image import SensorView, draw_colour_bar, draw_scale_key, scale_key_widths, shear_of_arrow
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,18 +25,6 @@ LEAST_HEIGHT, LYING_BAR = 1.9, 0.55
 """Inches: height from which on the colour bar stands at the side of a figure, and the height that it takes up below."""
 _LEFT, _RIGHT, _ABOVE, _GAP, _BELOW = 0.95, 0.9, 0.28, 0.36, 0.42
 """Inches around the images and between their rows."""
-
-
-def tactile_strip(
-    path: str | Path,
-    recording: Recording,
-    texels: Mapping[str, Texels],
-    frames: Sequence[int] | np.ndarray | None = None,
-    style: FigureStyle | None = None,
-) -> None:
-    """Write :func:`strip_figure`, whose arguments these are, as PNG, PDF or SVG, by the ending of the path."""
-    style = style or FigureStyle()
-    save_figure(strip_figure(recording, texels, frames, style), path, style.dpi)
 
 
 def strip_figure(
@@ -62,24 +48,31 @@ def strip_figure(
     chosen = response.choose_frames(recording, COLUMNS[style.width]) if frames is None else np.asarray(frames)
     views = [SensorView.of(own, recording.sensors[name].normal_force.sum(axis=0)) for name, own in texels.items()]
     page = _Page.of(style.width_inches, len(chosen), views)
-    strip = _Strip(
-        figure=new_figure(page.width, page.height),
-        page=page,
-        recording=recording,
-        index=np.searchsorted(recording.frames, chosen),
-        strongest_shear=response.peak_shear(recording),
-        scale=style.scale(recording, texels),
-    )
+    figure, index = new_figure(page.width, page.height), np.searchsorted(recording.frames, chosen)
+    strongest, scale = response.peak_shear(recording), style.scale(recording, texels)
     image, y = None, page.height - _ABOVE
-    for row, (name, view) in enumerate(zip(texels, views, strict=True)):
-        y -= page.rows[row]
-        image = strip.draw_row(row, y, name, view)
+    for row, (name, view, up) in enumerate(zip(texels, views, page.rows, strict=True)):
+        y -= up
+        sensor, across = recording.sensors[name], page.cell - 0.06
+        inches = min(across / view.width, up / view.height)
+        view, values = view.at_size(inches), scale.values(sensor, view.texels)
+        for column, i in enumerate(index):
+            axes = axes_in_inches(figure, _LEFT + column * page.cell + 0.03, y, across, up)
+            image = view.draw(axes, values[i], sensor.shear[i], strongest, scale)
+            axes.set_anchor("C")
+            if row == 0:
+                axes.set_title(f"{recording.times[i]:.2f} s", fontsize=FONT, color=INK, pad=4)
+        middle, left = (y + up / 2) / page.height, 0.06 / page.width
+        figure.text(left, middle + 0.04 / page.height, wrapped(name), fontsize=FONT, color=INK, weight="bold", va="bottom")
+        figure.text(left, middle, view.caption, fontsize=SMALL, color=GREY, va="top", linespacing=1.3)
+        shown = shear_of_arrow(sensor.shear[index], strongest)
+        centred = _LEFT + 0.5 * (page.cell - inches * view.width)
+        start = min(centred, page.width - page.right - scale_key_widths(view, shown, inches)[0])
+        draw_scale_key(figure, (max(start, 0.06), y - 0.2), view, shown, inches)
         y -= _GAP
     assert image is not None
-    x, y, across, up = page.colour_bar()
-    bar = strip.figure.add_axes((x / page.width, y / page.height, across / page.width, up / page.height))
-    draw_colour_bar(strip.figure, image, bar, strip.scale)
-    return strip.figure
+    draw_colour_bar(figure, image, axes_in_inches(figure, *page.colour_bar()), scale)
+    return figure
 
 
 @dataclass(frozen=True)
@@ -129,53 +122,6 @@ class _Page:
             return _LEFT + 0.03, LYING_BAR - 0.15, min(0.5 * self.width, 3.2), 0.11
         tall = min(self.height - 0.5, 3.2)
         return self.width - self.right + 0.1, 0.5 * (self.height - tall), 0.11, tall
-
-
-@dataclass(frozen=True)
-class _Strip:
-    """A figure while its rows are drawn.
-
-    Attributes
-    ----------
-    index : (columns,) int
-        Numbers of the chosen frames in the recording.
-    strongest_shear : float, N
-        Of the recording, which the longest arrow stands for.
-    scale : Scale
-    """
-
-    figure: Figure
-    page: _Page
-    recording: Recording
-    index: np.ndarray
-    strongest_shear: float
-    scale: Scale
-
-    def draw_row(self, row: int, y: float, name: str, view: SensorView) -> Any:
-        """Draw the images of one sensor, `y` inches above the lower edge, with its name and scale; return the last image."""
-        page, figure, sensor = self.page, self.figure, self.recording.sensors[name]
-        across, up = page.cell - 0.06, page.rows[row]
-        values = self.scale.values(sensor, view.texels)
-        inches = min(across / view.width, up / view.height)
-        view = view.at_size(inches)
-        image = None
-        for column, i in enumerate(self.index):
-            x = _LEFT + column * page.cell + 0.03
-            axes = figure.add_axes((x / page.width, y / page.height, across / page.width, up / page.height))
-            image = view.draw(axes, values[i], sensor.shear[i], self.strongest_shear, self.scale)
-            axes.set_anchor("C")
-            if row == 0:
-                axes.set_title(f"{self.recording.times[i]:.2f} s", fontsize=FONT, color=INK, pad=4)
-        middle = (y + up / 2) / page.height
-        left = 0.06 / page.width
-        figure.text(left, middle + 0.04 / page.height, wrapped(name), fontsize=FONT, color=INK, weight="bold", va="bottom")
-        figure.text(left, middle, view.caption, fontsize=SMALL, color=GREY, va="top", linespacing=1.3)
-        own = np.linalg.norm(sensor.shear[self.index], axis=2).max(initial=0.0)
-        shown = self.strongest_shear if own > SMALLEST_ARROW * self.strongest_shear else 0.0
-        centred = _LEFT + 0.5 * (page.cell - inches * view.width)
-        start = min(centred, page.width - page.right - scale_key_width(view, shown, inches))
-        draw_scale_key(figure, (max(start, 0.06), y - 0.2), view, shown, inches)
-        return image
 
 
 def wrapped(name: str) -> str:

@@ -13,7 +13,7 @@ from ..errors import SensorError
 from ..geometry.grid_layout import GridLayout
 from ..geometry.texels import Texels
 from ..model.recording import Recording
-from .figure_canvas import new_figure, save_figure
+from .figure_canvas import axes_in_inches, new_figure, save_figure
 from .figure_style import FONT, INK, SMALL, FigureStyle
 from .tactile_image import SensorView, draw_colour_bar
 
@@ -83,20 +83,19 @@ def texel_numbers(
     inches = max(inches, min((style.width_inches - _RIGHT - 2 * _SIDE) / view.width, 6.0 / view.height))
     width, height = inches * view.width + 2 * _SIDE + _RIGHT, max(inches * view.height + _ABOVE + _SIDE, 1.9)
     figure = new_figure(width, height)
-    axes = figure.add_axes(
-        (_SIDE / width, _SIDE / height, inches * view.width / width, inches * view.height / height), anchor="NW"
-    )
+    axes = axes_in_inches(figure, _SIDE, _SIDE, inches * view.width, inches * view.height)
+    axes.set_anchor("NW")
     image = view.draw(axes, values, np.zeros((len(own), 2)), 0.0, scale)
     if not isinstance(own.layout, GridLayout):  # texels lie on the very rim there: room for their numbers
         room = 0.5 * letters / inches
-        axes.set_xlim(view.window[0] - room, view.window[1] + room)
-        axes.set_ylim(view.window[2] - room, view.window[3] + room)
+        left, right, bottom, top = view.window
+        axes.set(xlim=(left - room, right + room), ylim=(bottom - room, top + room))
     _write_numbers(axes, view, words, image.cmap(image.norm(values)))
     time = recording.times[int(np.searchsorted(recording.frames, frame))]
     title = f"{name}, {time:.2f} s, numbers in {scale.unit}"
     figure.text(_SIDE / width, 1 - 0.05 / height, title, fontsize=FONT, color=INK, weight="bold", va="top")
     tall = max(inches * view.height, 1.2)
-    bar = figure.add_axes(((width - _RIGHT + 0.08) / width, _SIDE / height, 0.11 / width, tall / height))
+    bar = axes_in_inches(figure, width - _RIGHT + 0.08, _SIDE, 0.11, tall)
     draw_colour_bar(figure, image, bar, scale)
     save_figure(figure, path, style.dpi)
 

@@ -3,17 +3,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from .. import response
 from ..errors import ParameterError
 from ..geometry.texels import Texels
-from ..model.recording import Recording
+from ..model.recording import Recording, SensorRecording
 from ..model.sensor_parameters import SensorParameters
 from .figure_canvas import new_figure, save_figure, tidy_axes
 from .figure_style import FONT, INK, NORMAL_COLOUR, SERIES, SHEAR_COLOUR, SMALL, FigureStyle, width_below
@@ -22,23 +21,59 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-KINDS = ("force", "slip", "pressure centre")
 _LOADED = 1e-3
 """Share of the largest net force below which a centre of pressure is not drawn: it would jump about."""
+STROKES = ((1.0, "-"), (0.8, (0, (4, 2))))
+"""Widths, as shares of a curve's, and dashes of the first and of the second line of a sensor."""
 
 
-def time_curves(
-    path: str | Path,
-    recording: Recording,
-    texels: Mapping[str, Texels],
-    parameters: Mapping[str, SensorParameters],
-    kinds: Sequence[str] = KINDS,
-    style: FigureStyle | None = None,
-    marks: Sequence[float] = (),
-) -> None:
-    """Write :func:`curves_figure`, whose arguments these are, as PNG, PDF or SVG, by the ending of the path."""
-    style = style or FigureStyle()
-    save_figure(curves_figure(recording, texels, parameters, kinds, style, marks), path, style.dpi)
+class _Panel(NamedTuple):
+    """One kind of curves: its label, what solid and dashed lines are, the lines of a sensor, each (F,), and its limits."""
+
+    label: str
+    words: tuple[str, ...]
+    values: Callable[[SensorRecording, Texels, SensorParameters], Sequence[np.ndarray]]
+    set_limits: Callable[[Axes], object]
+
+
+def _forces(sensor: SensorRecording, texels: Texels, _: SensorParameters) -> Sequence[np.ndarray]:
+    return sensor.normal_force.sum(axis=1), np.linalg.norm(response.net_shear(sensor, texels), axis=1)
+
+
+def _centre(sensor: SensorRecording, texels: Texels, _: SensorParameters) -> Sequence[np.ndarray]:
+    load = sensor.normal_force.sum(axis=1)
+    touching = (load > _LOADED * load.max(initial=0.0))[:, None]
+    return (np.where(touching, 1e3 * sensor.centre_of_pressure, np.nan) @ _plane(texels).T).T
+
+
+def _plane(texels: Texels) -> np.ndarray:
+    """(2, 3) float: the sensor's mean x axis, and the y axis across it."""
+    x = texels.tangent.mean(axis=0)
+    y = texels.bitangent.mean(axis=0)
+    if min(np.linalg.norm(x), np.linalg.norm(y)) < 0.1:  # all around a body: its own axes
+        return np.eye(3)[:2]
+    x /= np.linalg.norm(x)
+    y -= (y @ x) * x
+    return np.stack([x, y / np.linalg.norm(y)])
+
+
+def _at_least_a_millimetre(axes: Axes) -> None:
+    low, high = axes.get_ylim()
+    middle, half = 0.5 * (low + high), max(0.5 * (high - low), 0.5)
+    axes.set_ylim(middle - half, middle + half)
+
+
+_PANELS = {
+    "force": _Panel("force (N)", ("normal", "shear"), _forces, lambda axes: axes.set_ylim(bottom=0)),
+    "slip": _Panel(
+        "slipping\n(% of load)",
+        (),
+        lambda sensor, _, parameters: [100 * response.slip_share(sensor, parameters)],
+        lambda axes: axes.set_ylim(-3, 103),
+    ),
+    "pressure centre": _Panel("centre of\npressure (mm)", ("x", "y"), _centre, _at_least_a_millimetre),
+}
+KINDS = tuple(_PANELS)
 
 
 def curves_figure(
@@ -47,7 +82,6 @@ def curves_figure(
     parameters: Mapping[str, SensorParameters],
     kinds: Sequence[str] = KINDS,
     style: FigureStyle | None = None,
-    marks: Sequence[float] = (),
 ) -> Figure:
     """Return a figure of forces, slip and centre of pressure of all sensors over time.
 
@@ -58,8 +92,6 @@ def curves_figure(
     kinds : sequence of {"force", "slip", "pressure centre"}
         "slip" is the share of the normal force that rests on slipping texels (:func:`.response.slip_share`); the centre of
         pressure is along the sensor's x and y axes, from the origin of its body.
-    marks : sequence of float, seconds
-        Times at which a thin line stands, as those of a strip's images.
     """
     style = style or FigureStyle()
     for kind in kinds:
@@ -72,16 +104,17 @@ def curves_figure(
     height = above + below + len(kinds) * each + (len(kinds) - 1) * gap
     figure = new_figure(style.width_inches, height)
     grid = figure.subplots(len(kinds), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, kind in zip(grid, kinds, strict=True):
+    for axes, panel in zip(grid, [_PANELS[kind] for kind in kinds], strict=True):
         for i, name in enumerate(names):
-            pen = _Pen(SERIES[i % len(SERIES)], width_below(len(names) - 1 - i))
-            _DRAW[kind](axes, recording, name, texels[name], parameters[name], pen)
+            width = width_below(len(names) - 1 - i)
+            lines = panel.values(recording.sensors[name], texels[name], parameters[name])
+            for line, (share, dashes) in zip(lines, STROKES, strict=False):
+                axes.plot(recording.times, line, color=SERIES[i % len(SERIES)], lw=share * width, ls=dashes)
+        axes.set_ylabel(panel.label)
         tidy_axes(axes)
         axes.margins(x=0)
-        _LIMITS[kind](axes)
-        for mark in marks:
-            axes.axvline(mark, color=INK, lw=0.6, ls=(0, (1, 2)))
-        _style_legend(axes)
+        panel.set_limits(axes)
+        _style_legend(axes, panel.words)
     grid[-1].set_xlabel("time (s)")
     figure.subplots_adjust(
         left=left / style.width_inches,
@@ -113,79 +146,15 @@ def _sensor_legend(figure: Figure, names: Sequence[str], corner: tuple[float, fl
     )
 
 
-@dataclass(frozen=True)
-class _Pen:
-    colour: str
-    width: float
-
-    @property
-    def solid(self) -> dict[str, Any]:
-        return {"color": self.colour, "lw": self.width}
-
-    @property
-    def dashed(self) -> dict[str, Any]:
-        return {"color": self.colour, "lw": 0.8 * self.width, "ls": (0, (4, 2))}
-
-
-def _force(axes: Axes, recording: Recording, name: str, texels: Texels, _: SensorParameters, pen: _Pen) -> None:
-    sensor = recording.sensors[name]
-    axes.plot(recording.times, sensor.normal_force.sum(axis=1), **pen.solid)
-    axes.plot(recording.times, np.linalg.norm(response.net_shear(sensor, texels), axis=1), **pen.dashed)
-    axes.set_ylabel("force (N)")
-
-
-def _slip(axes: Axes, recording: Recording, name: str, _: Texels, parameters: SensorParameters, pen: _Pen) -> None:
-    share = response.slip_share(recording.sensors[name], parameters)
-    axes.plot(recording.times, 100 * share, **pen.solid)
-    axes.set_ylabel("slipping\n(% of load)")
-
-
-def _centre(axes: Axes, recording: Recording, name: str, texels: Texels, _: SensorParameters, pen: _Pen) -> None:
-    sensor = recording.sensors[name]
-    load = sensor.normal_force.sum(axis=1)
-    touching = (load > _LOADED * load.max(initial=0.0))[:, None]
-    place = np.where(touching, 1e3 * sensor.centre_of_pressure, np.nan) @ _plane(texels).T
-    axes.plot(recording.times, place[:, 0], **pen.solid)
-    axes.plot(recording.times, place[:, 1], **pen.dashed)
-    axes.set_ylabel("centre of\npressure (mm)")
-
-
-def _plane(texels: Texels) -> np.ndarray:
-    """(2, 3) float: the sensor's mean x axis, and the y axis across it."""
-    x = texels.tangent.mean(axis=0)
-    y = texels.bitangent.mean(axis=0)
-    if min(np.linalg.norm(x), np.linalg.norm(y)) < 0.1:  # all around a body: its own axes
-        return np.eye(3)[:2]
-    x /= np.linalg.norm(x)
-    y -= (y @ x) * x
-    return np.stack([x, y / np.linalg.norm(y)])
-
-
-def _at_least_a_millimetre(axes: Axes) -> None:
-    low, high = axes.get_ylim()
-    middle, half = 0.5 * (low + high), max(0.5 * (high - low), 0.5)
-    axes.set_ylim(middle - half, middle + half)
-
-
-_LIMITS = {
-    "force": lambda axes: axes.set_ylim(bottom=0),
-    "slip": lambda axes: axes.set_ylim(-3, 103),
-    "pressure centre": _at_least_a_millimetre,
-}
-_DRAW = {"force": _force, "slip": _slip, "pressure centre": _centre}
-_STYLES = {"force (N)": ("normal", "shear"), "centre of\npressure (mm)": ("x", "y")}
-
-
-def _style_legend(axes: Axes) -> None:
+def _style_legend(axes: Axes, words: Sequence[str]) -> None:
     """Say what solid and dashed lines are; the colours are the sensors'."""
     from matplotlib.lines import Line2D
 
-    words = _STYLES.get(axes.get_ylabel())
-    if words is None:
+    if not words:
         return
     handles = [
-        Line2D([], [], color=INK, lw=lw, ls=ls, label=word)
-        for word, lw, ls in zip(words, (1.5, 1.2), ("-", (0, (4, 2))), strict=True)
+        Line2D([], [], color=INK, lw=1.5 * share, ls=dashes, label=word)
+        for word, (share, dashes) in zip(words, STROKES, strict=True)
     ]
     legend = axes.legend(
         handles=handles, loc="best", fontsize=SMALL, handlelength=1.8, borderaxespad=0.3, frameon=True, framealpha=0.75

@@ -65,9 +65,7 @@ def vector_figure(places: np.ndarray, images: Sequence[np.ndarray], titles: Sequ
             width=0.012,
             zorder=3,
         )
-        axes.set_xlim(low[0], high[0])
-        axes.set_ylim(low[1], high[1])
-        axes.set_aspect("equal")
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
         axes.set_title(title, fontsize=SMALL + 1, color=INK)
         axes.tick_params(labelsize=SMALL)
         axes.set_xlabel("x (mm)", fontsize=SMALL)

@@ -238,6 +238,8 @@ def readout_data(rig: Rig) -> ReadoutData:
         named = ", ".join(f"texel_{i}" for i in np.flatnonzero(~alive)[:5])
         notes.append(f"{counted(int((~alive).sum()), 'channel')} never change and are not used: {named}.")
     channels = np.flatnonzero(alive)
+    lacking = [trial.name for trial in check if not set(shared) <= set(_targets(trial))]
+    notes += [f"'{name}' is no check, because it lacks {' or '.join(shared)}." for name in lacking]
     parts = tuple(_recording(trial, shared, channels) for trial in fit)
     count = sum(int(part.is_complete.sum()) for part in parts)
     if count < FEWEST_SAMPLES:
@@ -245,13 +247,8 @@ def readout_data(rig: Rig) -> ReadoutData:
             f"The fitted recordings of '{rig.name}' have {counted(count, 'sample')} with all readings and "
             f"{' and '.join(shared)}: a read-out needs {FEWEST_SAMPLES}."
         )
-    checks = []
-    for trial in check:
-        if set(shared) <= set(_targets(trial)):
-            checks.append(_recording(trial, shared, channels))
-        else:
-            notes.append(f"'{trial.name}' is no check, because it lacks {' or '.join(shared)}.")
-    return ReadoutData(tuple(shared), len(alive), channels, parts, tuple(checks), tuple(notes))
+    checks = tuple(_recording(trial, shared, channels) for trial in check if trial.name not in lacking)
+    return ReadoutData(tuple(shared), len(alive), channels, parts, checks, tuple(notes))
 
 
 def _targets(trial: Trial) -> dict[str, np.ndarray]:

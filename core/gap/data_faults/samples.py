@@ -14,7 +14,6 @@ from functools import partial
 
 import numpy as np
 
-from ..dataset.rig import Rig
 from ..dataset.trial import Trial, runs
 from ..forward.stimulus import Stimulus
 from .data_fault import DataFault
@@ -37,7 +36,7 @@ COARSE_STEPS, MOST_LEVELS = 2.5, 1000
 converter stays while the load changes. Levels are counted up to the second number."""
 
 
-def find_sample_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
+def find_sample_faults(stimuli: Sequence[Stimulus]) -> list[DataFault]:
     """Return stuck loggers, repeated samples and saturated converters of some recordings."""
     stuck: dict[str, np.ndarray] = {}
     repeated: dict[str, np.ndarray] = {}

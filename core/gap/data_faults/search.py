@@ -30,7 +30,7 @@ def find_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
     faults = find_scale_faults(rig, judged) + find_channel_faults(rig, judged)
     if any(fault.kind == "reversed-channels" for fault in faults):
         return faults  # nothing else can be judged before the channels are those of the texels
-    samples = find_sample_faults(rig, judged)
+    samples = find_sample_faults(judged)
     stuck = {name for fault in samples if fault.kind == "stuck-logger" for name in fault.trials}
     return [*faults, *find_clock_faults(rig, [s for s in judged if s.trial.name not in stuck]), *samples]
 

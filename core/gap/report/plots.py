@@ -135,9 +135,8 @@ def _draw_errors(figure: Figure, result: Diagnosis, line: Place, maps: Place) ->
         axes = figure.add_axes(line)
         for label, values, colour in errors:
             axes.stairs(values, np.arange(len(values) + 1) - 0.5, baseline=None, color=colour, lw=0.9, label=label)
-        axes.set_xlabel("texel")
+        axes.set(xlabel="texel", ylabel="error (% of range)")
         axes.locator_params("x", integer=True)
-        axes.set_ylabel("error (% of range)")
         axes.margins(x=0)
         tidy_axes(axes)
         axes.legend(frameon=False, fontsize=8, loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2)
@@ -156,8 +155,7 @@ def _draw_errors(figure: Figure, result: Diagnosis, line: Place, maps: Place) ->
             image = axes.scatter(texels.position[:, 0], texels.position[:, 1], c=values, s=14, **colours)
             axes.set_aspect("equal")
         axes.set_title(label, fontsize=8.5, color=INK)
-        axes.set_xticks([])
-        axes.set_yticks([])
+        axes.set(xticks=[], yticks=[])
     beside = (left + 0.835 * width, bottom + 0.095 * height, 0.0365 * width, 0.81 * height)
     bar = figure.colorbar(image, cax=figure.add_axes(beside))
     bar.ax.tick_params(labelsize=8, colors=INK)
@@ -199,8 +197,7 @@ def _draw_stages(axes: Axes, result: Diagnosis, errors: GapErrors) -> None:
     floor = 100.0 * errors.noise_floor
     axes.axvline(floor, color=INK, lw=0.9, ls=(0, (4, 3)))
     axes.text(floor, 0.25 - count, f" noise floor {floor:.2f}", ha="left", va="center", fontsize=8, color=INK)
-    axes.set_ylim(min(places[-1] - 0.5, -float(count)), 0.5)
-    axes.set_xlim(0.0, 1.18 * max(*values, floor))
+    axes.set(ylim=(min(places[-1] - 0.5, -float(count)), 0.5), xlim=(0.0, 1.18 * max(*values, floor)))
     axes.set_yticks(places, [name for name, *_ in rows])
     axes.set_xlabel("error (% of range)")
     tidy_axes(axes)
@@ -244,8 +241,7 @@ def loops(result: Diagnosis) -> Figure:
     axes = figure.add_axes((0.21, 0.18, 0.76, 0.62))
     axes.plot(x, measured, ".", ms=4.0, mew=0, color=INK, alpha=0.55, zorder=3, label="measured")
     _draw_models(axes, result, x, measured, pick, lw=0.8, zorder=4)  # above the samples, which hide a line that fits them
-    axes.set_xlabel(label)
-    axes.set_ylabel(quantity)
+    axes.set(xlabel=label, ylabel=quantity)
     axes.set_title(f"{trial.name}: {name}", loc="left", fontsize=8.5, color=INK, pad=18)
     tidy_axes(axes)
     place = {"loc": "lower right", "bbox_to_anchor": (1.02, 0.98), "borderaxespad": 0.2}

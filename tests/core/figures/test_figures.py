@@ -11,12 +11,13 @@ from sample_bake import COLUMNS, ROWS, grid_texels, recording_of, round_texels
 from palpate.core import response
 from palpate.core.errors import FileError, ParameterError, SensorError
 from palpate.core.figures import figure_canvas, figure_style, tactile_image
+from palpate.core.figures.figure_canvas import save_figure
 from palpate.core.figures.figure_style import FigureStyle
-from palpate.core.figures.picture_labels import Label, label_picture
+from palpate.core.figures.picture_labels import label_picture
 from palpate.core.figures.side_by_side import side_by_side
-from palpate.core.figures.tactile_strip import tactile_strip
+from palpate.core.figures.tactile_strip import strip_figure
 from palpate.core.figures.texel_numbers import texel_numbers
-from palpate.core.figures.time_curves import force_curves, time_curves
+from palpate.core.figures.time_curves import curves_figure, force_curves
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.texels import texels_from_region
 from palpate.core.model.sensor_parameters import SensorParameters
@@ -61,7 +62,7 @@ def test_strip_is_written_and_the_same_every_time(tmp_path, texels, suffix):
     recording = recording_of(texels)
     first, second = tmp_path / f"a.{suffix}", tmp_path / f"b.{suffix}"
     for path in (first, second):
-        tactile_strip(path, recording, {"pad": texels})
+        save_figure(strip_figure(recording, {"pad": texels}), path, 300)
     assert first.stat().st_size > 2000
     assert first.read_bytes() == second.read_bytes()
 
@@ -100,8 +101,8 @@ def test_no_text_is_smaller_than_eight_points_or_leaves_the_figure(tmp_path, mon
     for width in figure_style.WIDTHS:
         for quantity in ("force", "pressure", "reading", "slip"):
             look = FigureStyle(width=width, quantity=quantity)
-            tactile_strip(tmp_path / "a.png", recording, both, style=look)
-            time_curves(tmp_path / "c.png", recording, both, parameters, style=look)
+            save_figure(strip_figure(recording, both, style=look), tmp_path / "a.png", 300)
+            save_figure(curves_figure(recording, both, parameters, style=look), tmp_path / "c.png", 300)
             texel_numbers(tmp_path / "d.png", recording, both, "pad", 5, look)
     force_curves(tmp_path / "b.png", recording, both, parameters, {"pad": 9.81})
     source = tmp_path / "scene.png"
@@ -136,7 +137,7 @@ def test_on_a_surface_each_texel_colours_its_share_of_the_area(tmp_path, monkeyp
     """A texel has its value on a third of the triangles around it; together the texels cover the surface."""
     texels = round_texels()
     recording = recording_of(texels)
-    figure = drawn(tmp_path, monkeypatch, lambda path: tactile_strip(path, recording, {"pad": texels}, [5]))
+    figure = drawn(tmp_path, monkeypatch, lambda path: save_figure(strip_figure(recording, {"pad": texels}, [5]), path, 300))
     surface, rim = figure.axes[0].collections[:2]
     parts = np.array([path.vertices[:4] for path in surface.get_paths()])
     ahead = np.roll(parts, -1, axis=1)
@@ -179,7 +180,7 @@ def test_a_closed_sensor_is_shown_from_the_side_that_bears(tmp_path, monkeypatch
     force = np.tile([0.0, 0.0, 0.03], (len(texels), 1)) * loaded[:, None]
     felt.shear[:, :, 0] = np.einsum("ij,ij->i", force, texels.tangent)
     felt.shear[:, :, 1] = np.einsum("ij,ij->i", force, texels.bitangent)
-    figure = drawn(tmp_path, monkeypatch, lambda path: tactile_strip(path, recording, {"pad": texels}, [3]))
+    figure = drawn(tmp_path, monkeypatch, lambda path: save_figure(strip_figure(recording, {"pad": texels}, [3]), path, 300))
     axes = figure.axes[0]
     _, _, arrows = axes.collections
     view = tactile_image.SensorView.of(texels, felt.normal_force.sum(axis=0))
@@ -220,7 +221,7 @@ def test_an_unknown_look_is_refused_with_what_there_is(wrong):
 def test_a_figure_of_an_unknown_kind_is_refused(tmp_path):
     texels = grid_texels()
     with pytest.raises(ParameterError, match=".png, .pdf or .svg"):
-        tactile_strip(tmp_path / "a.docx", recording_of(texels), {"pad": texels})
+        save_figure(strip_figure(recording_of(texels), {"pad": texels}), tmp_path / "a.docx", 300)
 
 
 def test_numbers_of_too_many_texels_are_refused(tmp_path):
@@ -244,7 +245,7 @@ def test_labels_keep_the_size_of_the_picture(tmp_path):
         recording_of(texels),
         {"pad": texels},
         6,
-        labels=[Label("Pad\n1 N", (0.1, 0.8))],
+        labels=[("Pad\n1 N", (0.1, 0.8))],
     )
     out = imread(tmp_path / "out.png")
     assert out.shape[:2] == (360, 640)
@@ -256,7 +257,7 @@ def test_labels_keep_the_size_of_the_picture(tmp_path):
 def test_a_missing_folder_is_one_sentence(tmp_path):
     texels = grid_texels()
     with pytest.raises(FileError, match="nowhere"):
-        tactile_strip(tmp_path / "nowhere" / "a.png", recording_of(texels), {"pad": texels})
+        save_figure(strip_figure(recording_of(texels), {"pad": texels}), tmp_path / "nowhere" / "a.png", 300)
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,9 @@ from solver_scenes import pad
 
 from palpate.core.errors import ParameterError, SensorError
 from palpate.core.figures import color_maps, gel_image
+from palpate.core.figures.figure_canvas import save_pixels
 from palpate.core.figures.figure_style import GelStyle
-from palpate.core.figures.gel_image import gel_pixels, write_gel_image
+from palpate.core.figures.gel_image import gel_pixels
 
 PITCH_X, PITCH_Y = 0.5e-3, 0.4e-3
 SIGMA0 = 40.0
@@ -153,7 +154,7 @@ def test_files_are_the_same_every_time(texels, tmp_path):
     from matplotlib.image import imread
 
     for name in ("a.png", "b.png"):
-        write_gel_image(tmp_path / name, frame_of(texels, ball), texels, "gel", SIGMA0, GelStyle(size=(300, 200)))
+        save_pixels(gel_pixels(frame_of(texels, ball), texels, "gel", SIGMA0, GelStyle(size=(300, 200))), tmp_path / name)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     picture = imread(tmp_path / "a.png")
     expected = gel_pixels(frame_of(texels, ball), texels, "gel", SIGMA0, GelStyle(size=(300, 200)))
