@@ -160,6 +160,7 @@ class Extent:
         found = known or cls()
         for source, texels in sources:
             values, units = quantity.values(source, texels), dict.fromkeys((*found.units, quantity.unit_of(source)))
+            values = values[~np.isnan(values)]
             low, high = float(values.min(initial=math.inf)), float(values.max(initial=-math.inf))
             found = cls(min(found.low, low), max(found.high, high), tuple(units))
         return found

@@ -111,6 +111,14 @@ def test_scales_end_at_round_numbers_around_their_values():
     assert low <= 512.0 < high
 
 
+def test_one_unknown_value_leaves_the_others_on_the_scale(recorded):
+    texels, recording = recorded
+    felt, source = recording.sensors["pad"], [(recording.sensors["pad"], texels)]
+    whole = quantities.Extent.of(QUANTITIES["reading"], source)
+    felt.reading[0, np.argsort(felt.reading[0])[1]] = np.nan
+    assert quantities.Extent.of(QUANTITIES["reading"], source) == whole
+
+
 def test_ends_of_a_scale_are_those_of_its_quantity(recorded):
     texels, recording = recorded
     own = {"pad": texels}
