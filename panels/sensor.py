@@ -128,31 +128,16 @@ def painted(layout, settings, key: str) -> None:
         column.prop(settings, f"{key}_factor", text=f"{name.removeprefix('Painted ')} × at Weight 1")
 
 
-class ParameterRows:
-    """Draws the parameters of one group: some at a place of their choice, and all others behind them."""
+def draw_parameters(layout, settings, *names: str) -> None:
+    """Draw parameters of a sensor in the units of the scene."""
+    for name in names:
+        layout.prop(settings, name_in_units(settings, name, bpy.context.scene))
 
-    def __init__(self, settings, group: str):
-        self._settings = settings
-        self._left = [name for name, specification in SENSOR_PARAMETERS.items() if specification.group == group]
 
-    def draw(self, layout, *names: str) -> None:
-        """Draw the parameters of these names."""
-        for name in names:
-            layout.prop(self._settings, name_in_units(self._settings, name, bpy.context.scene))
-        self.leave_out(*names)
-
-    def draw_named(self, layout, name: str, text: str = "") -> None:
-        """Draw a parameter with its name beside it."""
-        draw_named(layout, self._settings, name, text)
-        self.leave_out(name)
-
-    def leave_out(self, *names: str) -> None:
-        """Take note of parameters that are drawn, or have no meaning now."""
-        self._left = [name for name in self._left if name not in names]
-
-    def draw_others(self, layout) -> None:
-        """Draw all parameters of the group that were not drawn yet."""
-        self.draw(layout, *self._left)
+def draw_others(layout, settings, group: str, *drawn: str) -> None:
+    """Draw the parameters of a group that have no place of their own."""
+    others = [name for name, specification in SENSOR_PARAMETERS.items() if specification.group == group and name not in drawn]
+    draw_parameters(layout, settings, *others)
 
 
 class Contact(Subpanel):
@@ -163,16 +148,12 @@ class Contact(Subpanel):
 
     def draw_part(self, layout, settings, _context):
         column = layout.column()
-        rows = ParameterRows(settings, CONTACT)
-        rows.draw_named(column, "normal_law")
-        rows.draw(column, "k")
+        draw_named(column, settings, "normal_law")
         of_laws = {LINEAR: ("cn",), HUNT_CROSSLEY: ("exponent", "dissipation")}
-        rows.draw(column, *of_laws.pop(settings.normal_law))
-        for of_other_law in of_laws.values():
-            rows.leave_out(*of_other_law)
-        rows.draw(column, "max_penetration")
-        rows.draw_named(column, "points_per_texel", "Points")
-        rows.draw_others(column)
+        draw_parameters(column, settings, "k", *of_laws[settings.normal_law], "max_penetration")
+        draw_named(column, settings, "points_per_texel", "Points")
+        placed = "normal_law", "k", *sum(of_laws.values(), ()), "max_penetration", "points_per_texel"
+        draw_others(column, settings, CONTACT, *placed)
         painted(layout, settings, "k")
         layout.operator("palpate.stiffness_fit", icon="FCURVE_SNAPSHOT")
 
@@ -185,11 +166,11 @@ class Friction(Subpanel):
 
     def draw_part(self, layout, settings, _context):
         column = layout.column(align=True)
-        rows = ParameterRows(settings, FRICTION)
-        rows.draw(column, "mus", "mud", "x0")
+        limits, bristles = ("mus", "mud", "x0"), ("sigma0", "sigma1", "ct")
+        draw_parameters(column, settings, *limits)
         column = layout.column(align=True)
-        rows.draw(column, "sigma0", "sigma1", "ct")
-        rows.draw_others(column)
+        draw_parameters(column, settings, *bristles)
+        draw_others(column, settings, FRICTION, *limits, *bristles)
         painted(layout, settings, "friction")
         layout.operator("palpate.friction_fit", icon="FCURVE_SNAPSHOT")
 
@@ -203,10 +184,9 @@ class Readout(Subpanel):
 
     def draw_part(self, layout, settings, context):
         column = layout.column()
-        rows = ParameterRows(settings, READOUT)
-        rows.draw_named(column, "unit")
-        rows.draw(column, "gain", "zero")
-        rows.draw_others(column)
+        draw_named(column, settings, "unit")
+        draw_parameters(column, settings, "gain", "zero")
+        draw_others(column, settings, READOUT, "unit", "gain", "zero")
         painted(layout, settings, "gain")
         column = layout.column()
         draw_named(column, settings, "image_layout", "Image")

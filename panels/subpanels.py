@@ -45,15 +45,14 @@ class Subpanel:
 
 def in_all_places(*subpanels) -> tuple:
     """Return Blender panels that show the subpanels in all places, parents first."""
-    return tuple(_panel(subpanel, prefix, place) for prefix, place in PLACES.items() for subpanel in subpanels)
-
-
-def _panel(subpanel, prefix: str, place: dict):
-    """Return the Blender panel of a subpanel in one place."""
-    members = {**place, "__doc__": subpanel.__doc__}
-    if subpanel.parent is not None:
-        members["bl_parent_id"] = f"PALPATE_PT_{prefix}{subpanel.parent}"
-    return type(f"PALPATE_PT_{prefix}{subpanel.name}", (subpanel, bpy.types.Panel), members)
+    panels = []
+    for prefix, place in PLACES.items():
+        for subpanel in subpanels:
+            members = {**place, "__doc__": subpanel.__doc__}
+            if subpanel.parent is not None:
+                members["bl_parent_id"] = f"PALPATE_PT_{prefix}{subpanel.parent}"
+            panels.append(type(f"PALPATE_PT_{prefix}{subpanel.name}", (subpanel, bpy.types.Panel), members))
+    return tuple(panels)
 
 
 def draw_named(layout, settings, key: str, text: str = "") -> None:
