@@ -57,7 +57,9 @@ def best_view(
     corners : (m, 3) float, Blender units, world, optional
         Corners of what has to be in the picture. Directions in which it is larger are preferred.
     """
-    sights = _sights(loaded)
+    found = [(frame, texels) for frame, texels in loaded.items() if len(texels)]
+    places = np.linspace(0, len(found) - 1, min(len(found), MOST_FRAMES)).round().astype(int)
+    sights = [found[place] for place in places]
     views = [own, *((float(azimuth), float(elevation)) for elevation in ELEVATIONS for azimuth in AZIMUTHS)]
     seen = np.zeros(len(views))
     for frame, texels in sights:
@@ -84,13 +86,6 @@ def view_of(direction: Iterable[float]) -> tuple[float, float]:
     """Return azimuth and elevation in degrees of a vector towards a camera."""
     x, y, z = direction
     return math.degrees(math.atan2(y, x)), math.degrees(math.atan2(z, math.hypot(x, y)))
-
-
-def _sights(loaded: Mapping[int, LoadedTexels]) -> list[tuple[int, LoadedTexels]]:
-    """Return the frames that count, those with load, evenly chosen, and their texels."""
-    found = [(frame, texels) for frame, texels in loaded.items() if len(texels)]
-    places = np.linspace(0, len(found) - 1, min(len(found), MOST_FRAMES)).round().astype(int)
-    return [found[place] for place in places]
 
 
 def _cost(view: tuple[float, float], own: tuple[float, float]) -> float:
@@ -129,18 +124,9 @@ def _share_seen(scene, loaded: LoadedTexels, towards: np.ndarray, see_through: b
     chosen = np.linspace(0, len(loaded) - 1, min(len(loaded), MOST_TEXELS)).round().astype(int)
     facing = np.clip(loaded.normals[chosen] @ towards / FACING, 0.0, 1.0)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    seen = [
-        _clearness(
-            scene,
-            depsgraph,
-            loaded.points[i] + LIFT * loaded.radii[i] * loaded.normals[i],
-            towards,
-            see_through,
-        )
-        if share > 0.0
-        else 0.0
-        for i, share in zip(chosen, facing, strict=True)
-    ]
+    starts = loaded.points + (LIFT * loaded.radii)[:, None] * loaded.normals
+    shown = zip(starts[chosen], facing, strict=True)
+    seen = [_clearness(scene, depsgraph, start, towards, see_through) if share > 0.0 else 0.0 for start, share in shown]
     return float(np.mean(facing * seen))
 
 

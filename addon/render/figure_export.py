@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -79,7 +80,8 @@ def make_figures(scene, folder, request: FigureRequest, warn: Callable[[str], ob
     bake = read_scene_bake(scene)
     if request.sensors:
         bake = bake.select(request.sensors)
-    frames = request.frames or (_default_frame(bake, request.at_peak),)
+    usual = response.peak_frame if request.at_peak else response.settled_frame
+    frames = request.frames or (usual(bake.recording),)
     for number in frames:
         frame_index(bake.recording, number)
     if "gel" in request.kinds:
@@ -142,8 +144,10 @@ def _render_pictures(scene, folder, request, bake, frames, steps) -> Job[list[Pa
     """Render the frames, each alone and with the tactile images; return the files."""
     written = []
     with _prepared_scene(scene, request, bake, frames, request.size) as show_frame:
+        slow = scene.render.engine == "CYCLES" and not render.can_denoise()
+        stage = f"Rendering ({render.SAMPLES_WITHOUT_DENOISER} × samples: no denoiser here)" if slow else "Rendering"
         for number in frames:
-            yield steps.next(_rendering(scene), number)
+            yield steps.next(stage, number)
             show_frame(number)
             plain = folder / f"scene_{number:04d}.png"
             written.append(_render(scene, plain, number, request, bake, request.size))
@@ -161,16 +165,11 @@ def _render(scene, path, number: int, request: FigureRequest, bake: Bake, size: 
     return see_through.render_picture(scene, path, number, loaded, samples=request.samples, size=size)
 
 
-def video_size(request: FigureRequest) -> tuple[int, int]:
-    """Return width and height of the renders of a video, pixels; both are even."""
-    height = 2 * (min(request.size[1], MAX_VIDEO_HEIGHT) // 2)
-    return 2 * round(0.5 * height * request.size[0] / request.size[1]), height
-
-
 def _make_video(scene, folder, request, bake, steps) -> Job[list[Path]]:
     """Render all frames with the tactile images beside them, and encode them; return the file."""
     numbers = [int(number) for number in bake.recording.frames]
-    size = video_size(request)
+    height = 2 * (min(request.size[1], MAX_VIDEO_HEIGHT) // 2)
+    size = 2 * round(0.5 * height * request.size[0] / request.size[1]), height  # a video's sides are even
     with temporary_folder(folder, "video") as temporary:
         pictures = []
         with _prepared_scene(scene, request, bake, numbers, size) as show_frame:
@@ -190,27 +189,15 @@ def _prepared_scene(scene, request: FigureRequest, bake: Bake, frames, size) -> 
     """Prepare a scene for its pictures; yield the function to call with the frame before each of them."""
     some = [int(frames[place]) for place in np.linspace(0, len(frames) - 1, min(len(frames), SIGHTS)).round().astype(int)]
     loaded = {number: loaded_texels.loaded_texels(scene, bake, number) for number in some}
-    with render_setup.render_setup(scene, frames, request.render_options(size), loaded), ExitStack() as stack:
-        show_frame = _draw_nothing
+    with render_setup.render_setup(scene, frames, replace(request, size=size), loaded), ExitStack() as stack:
+
+        def show_frame(_number: int) -> None:
+            """Do nothing: Cycles and EEVEE draw the materials of the heat maps."""
+
         if scene.render.engine == "BLENDER_WORKBENCH":
             folders = baked_scene.bake_folders(scene)
             show_frame = stack.enter_context(workbench_colors.workbench_colors(folders, bake, request.style))
         yield show_frame
-
-
-def _rendering(scene) -> str:
-    """Return the name of the step that renders, and why it takes longer where that is so."""
-    slow = scene.render.engine == "CYCLES" and not render.can_denoise()
-    return f"Rendering ({render.SAMPLES_WITHOUT_DENOISER} × samples: no denoiser here)" if slow else "Rendering"
-
-
-def _draw_nothing(_number: int) -> None:
-    """Do nothing: Cycles and EEVEE draw the materials of the heat maps."""
-
-
-def _default_frame(bake: Bake, at_peak: bool) -> int:
-    """Return the frame of the pictures where none is named."""
-    return response.peak_frame(bake.recording) if at_peak else response.settled_frame(bake.recording)
 
 
 class _StepCounter:

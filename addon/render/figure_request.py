@@ -22,8 +22,8 @@ FORMATS = ("png", "pdf", "svg")
 
 
 @dataclass(frozen=True)
-class FigureRequest:
-    """The figures that are wanted.
+class FigureRequest(RenderOptions):
+    """The figures that are wanted, and how pictures of the scene are to be taken.
 
     Attributes
     ----------
@@ -39,10 +39,6 @@ class FigureRequest:
         File formats of the figures that are not renders.
     exports : tuple of str
         Names from :data:`.format_table.FORMATS`; each is written into a folder of its own.
-    engine, view, transparent, own_camera, own_light
-        See :class:`.render_setup.RenderOptions`.
-    see_through : bool
-        Targets become see-through where they cover loaded texels.
     at_peak : bool
         Without `frames`: the frame with the largest force, settled or not.
     size : (2,) int, pixels
@@ -59,14 +55,9 @@ class FigureRequest:
     sensors: tuple[str, ...] = ()
     formats: tuple[str, ...] = ("png", "pdf")
     exports: tuple[str, ...] = ()
-    engine: str | None = None
-    view: tuple[float, float] | None = None
-    transparent: bool = False
-    own_camera: bool = False
-    own_light: bool = False
-    see_through: bool = True
+    see_through: bool = field(default=True, kw_only=True)
     at_peak: bool = False
-    size: tuple[int, int] = (1280, 960)
+    size: tuple[int, int] = field(default=(1280, 960), kw_only=True)
     samples: int | None = None
     light_angle: float = GelStyle.light_angle
     markers: bool = True
@@ -78,10 +69,6 @@ class FigureRequest:
                 if word not in known:
                     raise ParameterError(f"There is no {what} '{word}': choose from {', '.join(known)}.")
         self.gel_style()
-
-    def render_options(self, size: tuple[int, int]) -> RenderOptions:
-        """Return how the scene's pictures are to be taken, in this size (pixels)."""
-        return RenderOptions(self.engine, self.view, self.transparent, self.own_camera, self.own_light, self.see_through, size)
 
     def gel_style(self) -> GelStyle:
         """Return how images of gels are to be made.

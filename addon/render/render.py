@@ -70,10 +70,11 @@ class TemporaryChanges:
         known = [name for other, name, _ in self._before if other == owner]
         self._before += [(owner, name, getattr(owner, name)) for name in names if name not in known]
 
-    def set(self, owner, name: str, value) -> None:
-        """Give a property another value."""
-        self.keep(owner, name)
-        setattr(owner, name, value)
+    def set(self, owner, **values) -> None:
+        """Give properties other values."""
+        for name, value in values.items():
+            self.keep(owner, name)
+            setattr(owner, name, value)
 
     def add(self, block):
         """Return a new data-block, which is removed at the end."""
@@ -107,8 +108,7 @@ def fit_camera(scene, points: np.ndarray, region=(0.05, 0.05, 0.95, 0.95)) -> No
     SceneError
         There is no perspective camera.
     """
-    camera = _camera(scene)
-    width, height = _half_angles(scene, camera)
+    camera, width, height = _camera_view(scene)
     turn = np.array(camera.matrix_world)[:3, :3]
     turn = turn / np.linalg.norm(turn, axis=0)
     local = np.asarray(points, float) @ turn  # x to the right, y up, z towards the viewer
@@ -130,23 +130,20 @@ def fit_camera(scene, points: np.ndarray, region=(0.05, 0.05, 0.95, 0.95)) -> No
 
 def image_position(scene, point) -> tuple[float, float]:
     """Return the position of a world point in the picture, as shares of its width and height from the lower left corner."""
-    camera = _camera(scene)
-    width, height = _half_angles(scene, camera)
+    camera, width, height = _camera_view(scene)
     x, y, z = camera.matrix_world.normalized().inverted() @ Vector(point)
     return 0.5 + 0.5 * x / (-z * width), 0.5 + 0.5 * y / (-z * height)
 
 
 def view_direction(scene, x: float, y: float) -> Vector:
     """Return the direction in which a place in the picture is seen, (3,) in the world: :func:`image_position` backwards."""
-    camera = _camera(scene)
-    width, height = _half_angles(scene, camera)
+    camera, width, height = _camera_view(scene)
     return camera.matrix_world.normalized().to_3x3() @ Vector(((2.0 * x - 1.0) * width, (2.0 * y - 1.0) * height, -1.0))
 
 
 def pixels_per_unit(scene, point, width: int) -> float:
     """Return how many pixels a Blender unit across the view takes at a world point, in a picture of this width."""
-    camera = _camera(scene)
-    across, _ = _half_angles(scene, camera)
+    camera, across, _ = _camera_view(scene)
     depth = -(camera.matrix_world.normalized().inverted() @ Vector(point)).z
     return 0.5 * width / (max(depth, 1e-9) * across)
 
@@ -251,14 +248,14 @@ def _camera(scene):
     return camera
 
 
-def _half_angles(scene, camera) -> tuple[float, float]:
-    """Tangents of half the horizontal and half the vertical field of view."""
-    render = scene.render
+def _camera_view(scene) -> tuple[object, float, float]:
+    """Return a scene's camera, and the tangents of half its horizontal and half its vertical field of view."""
+    render, camera = scene.render, _camera(scene)
     frame = camera.data.view_frame(scene=scene)
     depth = -frame[0].z
     if render.resolution_x <= 0 or depth <= 0:
         raise SceneError(f"The camera of '{scene.name}' has no field of view: check its lens and the render size.")
-    return max(abs(c.x) for c in frame) / depth, max(abs(c.y) for c in frame) / depth
+    return camera, max(abs(c.x) for c in frame) / depth, max(abs(c.y) for c in frame) / depth
 
 
 @contextmanager
@@ -275,19 +272,17 @@ def _settings(scene, path: Path, frame: int, samples: int | None, size) -> Itera
                 image.media_type = "IMAGE"
             image.file_format, image.color_depth = "PNG", "8"
             image.color_mode = "RGBA" if render.film_transparent else "RGB"
-            for name, value in (("filepath", str(path)), ("use_file_extension", False), ("use_overwrite", True)):
-                changes.set(render, name, value)
+            changes.set(render, filepath=str(path), use_file_extension=False, use_overwrite=True)
             if size is not None:
-                for name, value in (("x", size[0]), ("y", size[1]), ("percentage", 100)):
-                    changes.set(render, f"resolution_{name}", int(value))
+                changes.set(render, resolution_x=int(size[0]), resolution_y=int(size[1]), resolution_percentage=100)
             if render.engine == "CYCLES" and scene.cycles.use_denoising and not can_denoise():
-                changes.set(scene.cycles, "use_denoising", False)
+                changes.set(scene.cycles, use_denoising=False)
                 samples = SAMPLES_WITHOUT_DENOISER * int(scene.cycles.samples if samples is None else samples)
             if samples is not None:
                 if render.engine == "CYCLES":
-                    changes.set(scene.cycles, "samples", int(samples))
+                    changes.set(scene.cycles, samples=int(samples))
                 elif hasattr(scene, "eevee"):
-                    changes.set(scene.eevee, "taa_render_samples", int(samples))
+                    changes.set(scene.eevee, taa_render_samples=int(samples))
             scene.frame_set(frame)
             yield
     finally:

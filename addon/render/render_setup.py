@@ -72,7 +72,7 @@ def _ancestors(obj) -> Iterator:
         yield obj
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RenderOptions:
     """How pictures of a scene are to be taken.
 
@@ -134,25 +134,23 @@ def _set_colors(scene, changes: render.TemporaryChanges) -> None:
     view = scene.view_settings
     for name, value in (("view_transform", "Standard"), ("look", "None"), ("exposure", 0.0), ("gamma", 1.0)):
         if getattr(view, name) != value:
-            changes.set(view, name, value)
-    changes.set(view, "use_curve_mapping", False)
-    changes.set(scene.render, "use_compositing", False)
-    changes.set(scene.render, "use_sequencer", False)
+            changes.set(view, **{name: value})
+    changes.set(view, use_curve_mapping=False)
+    changes.set(scene.render, use_compositing=False, use_sequencer=False)
 
 
 def _set_output(scene, options: RenderOptions, changes: render.TemporaryChanges) -> None:
     """Set engine, size and background."""
     if options.engine is not None:
-        changes.set(scene.render, "engine", engine_of(scene, options.engine))
+        changes.set(scene.render, engine=engine_of(scene, options.engine))
     if options.size is not None:
-        changes.set(scene.render, "resolution_x", int(options.size[0]))
-        changes.set(scene.render, "resolution_y", int(options.size[1]))
+        changes.set(scene.render, resolution_x=int(options.size[0]), resolution_y=int(options.size[1]))
     if options.transparent:
-        changes.set(scene.render, "film_transparent", True)
+        changes.set(scene.render, film_transparent=True)
         for obj in _backdrops(scene):
-            changes.set(obj, "hide_render", True)
+            changes.set(obj, hide_render=True)
     if scene.render.engine == "CYCLES":
-        changes.set(scene.cycles, "use_denoising", True)
+        changes.set(scene.cycles, use_denoising=True)
 
 
 def _set_camera(scene, frames: Sequence[int], options: RenderOptions, loaded, changes: render.TemporaryChanges) -> None:
@@ -166,9 +164,10 @@ def _set_camera(scene, frames: Sequence[int], options: RenderOptions, loaded, ch
         towards = DEFAULT_VIEW if own is None else camera_direction.view_of(own.matrix_world.to_3x3() @ Vector((0.0, 0.0, 1.0)))
         view = camera_direction.best_view(scene, loaded, towards, options.see_through, corners)
     camera = changes.add(_camera(scene, own, view))
-    changes.set(scene, "camera", camera)
+    changes.set(scene, camera=camera)
     _frame(scene, corners, surroundings)
-    _set_clipping(scene, camera)
+    farthest = max((camera.matrix_world.translation - obj.matrix_world.translation).length for obj in subjects(scene))
+    camera.data.clip_start, camera.data.clip_end = 0.005 * farthest, 20.0 * farthest
 
 
 def _frame(scene, corners: np.ndarray, surroundings: np.ndarray) -> None:
@@ -202,27 +201,23 @@ def _set_lights(scene, frames: Sequence[int], options: RenderOptions, changes: r
     """Set studio light; where the scene's own light counts, add lamps and a bright world to a scene without light."""
     if not options.own_light:
         scene.frame_set(frames[-1])
-        corners = render.bounding_box_corners(_in_picture(scene))
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        bottom = np.array([*(0.5 * (low + high))[:2], low[2], np.linalg.norm(high - low)])
+        box = _box(_in_picture(scene))
+        bottom = np.array([*(0.5 * (box[0] + box[1]))[:2], box[0, 2], _size(box)])
         studio.set_studio(scene, changes, _backdrops(scene), frames[-1], bottom, options.transparent)
         return
     if any(obj.type == "LIGHT" and not obj.hide_render for obj in scene.objects):
         return
     studio.add_lamps(scene, changes)
     if scene.world is None or not options.transparent and _is_dark(scene.world):
-        changes.set(scene, "world", changes.add(studio.bright_world()))
+        changes.set(scene, world=changes.add(studio.bright_world()))
 
 
 def _set_workbench(scene, changes: render.TemporaryChanges) -> None:
     """Let Workbench show the colours of the vertices, unshaded."""
     shading = scene.display.shading
-    changes.set(shading, "light", "FLAT")  # shading would make a heat map darker than its colour bar
-    changes.set(shading, "color_type", "VERTEX")
-    changes.set(shading, "show_cavity", True)
-    changes.set(shading, "cavity_type", "BOTH")
-    changes.set(shading, "show_object_outline", True)
-    changes.set(scene.display, "render_aa", "16")
+    changes.set(shading, light="FLAT", color_type="VERTEX")  # light would make a heat map darker than its colour bar
+    changes.set(shading, show_cavity=True, cavity_type="BOTH", show_object_outline=True)
+    changes.set(scene.display, render_aa="16")
 
 
 def _in_picture(scene) -> list:
@@ -230,34 +225,36 @@ def _in_picture(scene) -> list:
     seen = subjects(scene)
     if not seen:
         return seen
-    corners = render.bounding_box_corners(seen)
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    size = float(np.linalg.norm(high - low))
-    others = {obj: _box(obj) for obj in scene.objects if render.is_rendered(obj) and obj not in seen}
-    small = {obj: box for obj, box in others.items() if np.linalg.norm(box[1] - box[0]) <= NEARBY_RATIO * size}
-    touching = {
-        obj for obj, box in small.items() if (box[0] <= high + NEARBY * size).all() and (box[1] >= low - NEARBY * size).all()
-    }
+    around = _box(seen)
+    others = {obj: _box([obj]) for obj in scene.objects if render.is_rendered(obj) and obj not in seen}
+    small = {obj: box for obj, box in others.items() if _size(box) <= NEARBY_RATIO * _size(around)}
+    touching = {obj for obj, box in small.items() if _touch(box, around)}
     return [*seen, *(obj for obj in small if obj in touching or touching & set(_ancestors(obj)))]
 
 
-def _box(obj) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lower and upper corner of an object's bounding box, (3,) each, world."""
-    corners = render.bounding_box_corners([obj])
-    return corners.min(axis=0), corners.max(axis=0)
+def _box(objects) -> np.ndarray:
+    """Return the lower and the upper corner of the bounding box of objects, (2, 3), world."""
+    corners = render.bounding_box_corners(objects)
+    return np.array([corners.min(axis=0), corners.max(axis=0)])
+
+
+def _size(box: np.ndarray) -> float:
+    return float(np.linalg.norm(box[1] - box[0]))
+
+
+def _touch(box: np.ndarray, around: np.ndarray) -> bool:
+    """Return True for a box that is not away from another one by more than :data:`NEARBY`."""
+    room = NEARBY * _size(around)
+    return bool((box[0] <= around[1] + room).all() and (box[1] >= around[0] - room).all())
 
 
 def _backdrops(scene) -> list:
     """Return floors and backdrops: objects outside the simulation, without subjects on them and far larger than these."""
     seen = subjects(scene)
     carriers = {ancestor for obj in seen for ancestor in _ancestors(obj)}
-    size = float(np.linalg.norm(np.ptp(render.bounding_box_corners(seen), axis=0))) if seen else 0.0
+    size = _size(_box(seen)) if seen else 0.0
     others = [obj for obj in scene.objects if render.is_rendered(obj) and obj not in seen and obj not in carriers]
-    return [
-        obj
-        for obj in others
-        if np.linalg.norm(np.ptp(render.bounding_box_corners([obj]), axis=0)) > _BACKDROP_SIZE_RATIO * size
-    ]
+    return [obj for obj in others if _size(_box([obj])) > _BACKDROP_SIZE_RATIO * size]
 
 
 def _camera(scene, own, view):
@@ -291,18 +288,11 @@ def _corners(scene, frames) -> tuple[np.ndarray, np.ndarray]:
         seen = _in_picture(scene)
         central = [obj for obj in seen if _is_central(obj)] or seen
         found.append(render.bounding_box_corners(central))
-        others = _near([obj for obj in seen if obj not in central], found[-1])
+        middle = np.array([found[-1].min(axis=0), found[-1].max(axis=0)])
+        # without pads that are away, as a table that sinks away
+        others = [obj for obj in seen if obj not in central and (obj.palpate.role != "PAD" or _touch(_box([obj]), middle))]
         around += [render.bounding_box_corners(others)] if others else []
     return np.concatenate(found), np.concatenate(around)
-
-
-def _near(objects, corners: np.ndarray) -> list:
-    """Return objects without the pads whose bounding boxes are away from (n, 3) corners, as a table that sinks away."""
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    room = NEARBY * float(np.linalg.norm(high - low))
-    boxes = {obj: _box(obj) for obj in objects if obj.palpate.role == "PAD"}
-    away = {obj for obj, box in boxes.items() if (box[0] > high + room).any() or (box[1] < low - room).any()}
-    return [obj for obj in objects if obj not in away]
 
 
 def _is_central(obj) -> bool:
@@ -313,12 +303,6 @@ def _is_central(obj) -> bool:
         or materials.SENSOR_KEY in obj
         or (obj.palpate.role == "NONE" and hangs_on_target)
     )
-
-
-def _set_clipping(scene, camera) -> None:
-    """Set the clipping distances by the distance of the farthest subject."""
-    distance = max((camera.matrix_world.translation - obj.matrix_world.translation).length for obj in subjects(scene))
-    camera.data.clip_start, camera.data.clip_end = 0.005 * distance, 20.0 * distance
 
 
 def _is_dark(world) -> bool:

@@ -9,7 +9,7 @@ material is touched.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import bpy
@@ -57,7 +57,9 @@ def render_picture(
     path = render.render_frame(scene, path, frame, samples=samples, size=size)
     with fcurves.frame_kept(scene):
         scene.frame_set(frame)
-        hidden = _target_parts(scene)
+        targets = [obj for obj in scene.objects if obj.palpate.role == "TARGET"]
+        targets += [child for obj in targets for child in obj.children_recursive if child.palpate.role == "NONE"]
+        hidden = [obj for obj in dict.fromkeys(targets) if render.is_rendered(obj)]  # with what hangs on them
         if not len(loaded) or not hidden or not _cover(scene, hidden, loaded):
             return path
         weights = clear_weights(scene, loaded, size)
@@ -68,13 +70,6 @@ def render_picture(
         clear = render.render_frame(scene, folder / "clear.png", frame, samples=samples, size=size)
         _blend(path, clear, weights)
     return path
-
-
-def _target_parts(scene) -> list:
-    """Return the targets and what hangs on them, as far as it is rendered and no sensor or pad."""
-    found = [obj for obj in scene.objects if obj.palpate.role == "TARGET"]
-    found += [child for obj in found for child in obj.children_recursive if child.palpate.role == "NONE"]
-    return [obj for obj in dict.fromkeys(found) if render.is_rendered(obj)]
 
 
 def _cover(scene, objects, loaded: LoadedTexels) -> bool:
@@ -171,26 +166,17 @@ def _patch(pixels: np.ndarray, width: int, height: int) -> np.ndarray:
         Pixels to the right and downwards; places beyond the picture's edge count for the hull alone.
     """
     from PIL import Image, ImageDraw
+    from scipy.spatial import ConvexHull, QhullError
 
     image = Image.new("1", (width, height))
-    corners = [(float(x), float(y)) for x, y in pixels[_hull(pixels)]]
-    if len(corners) > 2:
+    with suppress(QhullError, ValueError):  # fewer than three points, or all on a line
+        corners = [(float(x), float(y)) for x, y in pixels[ConvexHull(pixels).vertices]]
         ImageDraw.Draw(image).polygon(corners, fill=1, outline=1)
     inside = np.array(image, dtype=bool)
     for x, y in np.floor(pixels).astype(int):
         if 0 <= x < width and 0 <= y < height:
             inside[y, x] = True
     return inside
-
-
-def _hull(points: np.ndarray) -> np.ndarray:
-    """Return the indices of the corners of the convex hull of (n, 2) points in order; of points on a line, none."""
-    from scipy.spatial import ConvexHull, QhullError
-
-    try:
-        return ConvexHull(points).vertices
-    except (QhullError, ValueError):  # fewer than three points, or all on a line
-        return np.zeros(0, dtype=int)
 
 
 @contextmanager
@@ -206,10 +192,9 @@ def _without(scene, objects, rows: np.ndarray, columns: np.ndarray, shape: tuple
         "use_crop_to_border": False,
     }
     with render.TemporaryChanges() as changes:
-        for name, value in border.items():
-            changes.set(scene.render, name, value)
+        changes.set(scene.render, **border)
         for obj in objects:
-            changes.set(obj, "hide_render", True)
+            changes.set(obj, hide_render=True)
         yield
 
 

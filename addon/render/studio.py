@@ -66,10 +66,10 @@ def set_studio(scene, changes, backdrops, frame: int, bottom: np.ndarray, transp
     """
     for obj in [*backdrops, *(obj for obj in scene.objects if obj.type == "LIGHT")]:
         if not obj.hide_render:
-            changes.set(obj, "hide_render", True)
+            changes.set(obj, hide_render=True)
     add_lamps(scene, changes)
     world = changes.add(bpy.data.worlds.new("Palpate World"))
-    changes.set(scene, "world", world)
+    changes.set(scene, world=world)
     set_background = _fill_world(world)
     if transparent:
         return
@@ -112,7 +112,7 @@ def _brightness(scene, frame: int) -> float:
     from matplotlib.image import imread
 
     with render.TemporaryChanges() as changes, temporary_folder(Path(bpy.app.tempdir), "studio") as folder:
-        changes.set(scene.render, "film_transparent", True)
+        changes.set(scene.render, film_transparent=True)
         picture = imread(render.render_frame(scene, folder / "small.png", frame, samples=PREVIEW_SAMPLES, size=PREVIEW_SIZE))
     seen = picture[..., 3] > 0.5
     return float(picture[seen][:, :3].mean()) if seen.any() else 0.0

@@ -197,7 +197,7 @@ def test_colours_are_those_of_the_colour_bar(scene, tmp_path, engine):
     scene.frame_set(3)
     matrix = np.array(scene.objects["Pad"].matrix_world)
     free = readings.normal_force == 0.0
-    with render_setup.render_setup(scene, [3], request.render_options(size), {}):
+    with render_setup.render_setup(scene, [3], request, {}):
         places = places_of(scene, texels.position @ matrix[:3, :3].T + matrix[:3, 3])
     columns, rows = (places * size).astype(int).T
     seen = picture[size[1] - 1 - rows, columns, :3]

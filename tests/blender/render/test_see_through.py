@@ -46,7 +46,7 @@ def picture_of(scene, folder, **options):
 def loaded_pixels(scene, pad):
     """Return the loaded texels, rows and columns of the most loaded one and of the ball beside the arrow, and the weights."""
     bake = figure_export.read_scene_bake(scene)
-    with render_setup.render_setup(scene, [3], FigureRequest(view=VIEW).render_options(SIZE)):
+    with render_setup.render_setup(scene, [3], FigureRequest(view=VIEW, size=SIZE)):
         scene.frame_set(3)
         loaded = loaded_texels.loaded_texels(scene, bake, 3)
         points = [loaded.points[loaded.forces.argmax()], (0.007, 0.0, 0.0125 + 0.0105)]
@@ -121,7 +121,7 @@ def test_an_arrow_is_seen_through_the_target_in_one_piece(pressed):
     scene, pad, *_ = pressed
     weights = loaded_pixels(scene, pad)[3]
     arrow = scene.objects["Net Force Pad"]
-    with render_setup.render_setup(scene, [3], FigureRequest(view=VIEW).render_options(SIZE)):
+    with render_setup.render_setup(scene, [3], FigureRequest(view=VIEW, size=SIZE)):
         scene.frame_set(3)
         matrix = arrow.matrix_world
         spots = places_of(scene, [matrix @ Vector((0.0, 0.0, height)) for height in np.linspace(0.1, 0.9, 20)])
@@ -143,7 +143,7 @@ def test_a_map_has_no_hole_between_two_places_of_contact(tmp_path):
     pad.palpate.role, target.palpate.role = "SENSOR", "TARGET"
     baked(scene, tmp_path)
     found = figure_export.read_scene_bake(scene)
-    with render_setup.render_setup(scene, [3], FigureRequest(view=(-90.0, 60.0)).render_options(SIZE)):
+    with render_setup.render_setup(scene, [3], FigureRequest(view=(-90.0, 60.0), size=SIZE)):
         scene.frame_set(3)
         loaded = loaded_texels.loaded_texels(scene, found, 3)
         weights = see_through.clear_weights(scene, loaded, SIZE)
