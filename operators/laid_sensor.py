@@ -59,11 +59,7 @@ class PALPATE_OT_skin_add(support.PalpateOperator, object_properties.PatternProp
         name="Region",
         description="Where on the surface texels are laid",
         items=(
-            (
-                "AUTO",
-                "Automatic",
-                "Selection in Edit Mode, painted group in Weight Paint, sensor's region, or whole mesh",
-            ),
+            ("AUTO", "Automatic", "Selection in Edit Mode, painted group in Weight Paint, sensor's region, or whole mesh"),
             ("OWN", "Sensor's Region", "The region that the object has as a sensor"),
             ("SELECTION", "Selection", "Selected faces; they are kept in a vertex group"),
             ("GROUP", "Active Vertex Group", "Vertices whose weight reaches the threshold"),
@@ -146,7 +142,4 @@ class PALPATE_OT_object_activate(support.PalpateOperator, bpy.types.Operator):
         obj = context.scene.objects.get(self.name)
         if obj is not None:
             support.leave_edit_mode(context)
-            for other in context.selected_objects:
-                other.select_set(False)
-            obj.select_set(True)
-            context.view_layer.objects.active = obj
+            sensors.choose_alone(context, obj)

@@ -34,16 +34,12 @@ class PALPATE_MT_presets(bpy.types.Menu):
     preset_operator = "palpate.preset_load"
 
     def draw(self, context):
+        layout = self.layout
         self.draw_preset(context)
-        _draw_files(self.layout)
-
-
-def _draw_files(layout) -> None:
-    """Draw the buttons for presets that are only data."""
-    layout.separator()
-    layout.operator_context = "INVOKE_DEFAULT"
-    layout.operator("palpate.sensor_toml_import", text="Load from TOML…", icon="IMPORT")
-    layout.operator("palpate.sensor_toml_export", text="Save as TOML…", icon="EXPORT")
+        layout.separator()
+        layout.operator_context = "INVOKE_DEFAULT"
+        layout.operator("palpate.sensor_toml_import", text="Load from TOML…", icon="IMPORT")
+        layout.operator("palpate.sensor_toml_export", text="Save as TOML…", icon="EXPORT")
 
 
 class PALPATE_OT_preset_load(support.PalpateOperator, bpy.types.Operator):

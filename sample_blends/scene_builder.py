@@ -411,7 +411,7 @@ def add_normal_needles(scene, sensor, length: float, look, radius: float = 0.26)
     mesh, _ = checked_mesh(
         np.array([v.co[:] for v in data.vertices]) * 1e-3, np.array(triangles), sensor.name, np.array(quads, int).reshape(-1, 4)
     )
-    texels = texels_from_region(mesh, sensor_regions.region_vertices(sensor, len(data.vertices)), sensor.name)
+    texels = texels_from_region(mesh, sensor_regions.region_vertices(sensor), sensor.name)
     side = np.array([[1.0, 0.0], [-0.5, 0.866], [-0.5, -0.866]]) * radius
     foot = texels.position * 1e3  # sample scenes are in mm
     corners = [foot + a * texels.tangent + b * texels.bitangent for a, b in side]

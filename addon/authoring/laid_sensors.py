@@ -58,7 +58,9 @@ def pad_mesh(context, rows: int, columns: int, pitch: tuple[float, float], radiu
     radius : float, metres
         The pad is bent to it; 0: flat, below 0: inwards.
     """
-    return _mesh_of(pad_array(rows, columns, pitch, radius), "Tactile Pad", 1.0 / transforms.metres_per_unit(context.scene))
+    texels = pad_array(rows, columns, pitch, radius)
+    scale = 1.0 / transforms.metres_per_unit(context.scene)
+    return mesh_arrays.new_mesh("Tactile Pad", texels.vertices * scale, texels.faces)
 
 
 def lay_texels(context, carrier, source: str, pattern: dict):
@@ -83,13 +85,13 @@ def lay_texels(context, carrier, source: str, pattern: dict):
     """
     region = sensors.describe_region(carrier, source)
     try:
-        texels = _texels_on(context, carrier, _region_vertices(carrier, region), pattern)
+        texels = _texels_on(context, carrier, sensor_regions.vertices_of_region(carrier, **region), pattern)
     except SensorError:
         if source == "SELECTION":
             carrier.vertex_groups.remove(carrier.vertex_groups[region["vertex_group"]])
         raise
     name = f"{carrier.name} Skin"
-    obj = bpy.data.objects.new(name, _mesh_of(texels, name))
+    obj = bpy.data.objects.new(name, mesh_arrays.new_mesh(name, texels.vertices, texels.faces))
     for collection in carrier.users_collection[:1] or [context.scene.collection]:
         collection.objects.link(obj)
     obj.parent = carrier
@@ -100,10 +102,7 @@ def lay_texels(context, carrier, source: str, pattern: dict):
     surface_binding.bind(context, obj, carrier)
     obj.palpate.body = "PARENT"
     obj.palpate.role = "SENSOR"
-    for other in context.selected_objects:
-        other.select_set(False)
-    obj.select_set(True)
-    context.view_layer.objects.active = obj
+    sensors.choose_alone(context, obj)
     return obj
 
 
@@ -131,10 +130,12 @@ def update_texels(context, obj) -> int:
         The object is no laid sensor, its carrier is gone, or the texels do not fit any more.
     """
     carrier = carrier_of(obj)
-    region, pattern = _stored_region(obj.palpate.skin), pattern_of(obj)
-    texels = _texels_on(context, carrier, _region_vertices(carrier, region), pattern)
+    own, region = obj.palpate.skin, _stored_region(obj.palpate.skin)
+    stored = {key: getattr(own, key) for key in PATTERN_PROPERTIES}
+    pattern = {key: transforms.as_typed(value) if isinstance(value, float) else value for key, value in stored.items()}
+    texels = _texels_on(context, carrier, sensor_regions.vertices_of_region(carrier, **region), pattern)
     old, painted = obj.data, surface_binding.painted_values(obj)
-    obj.data = _mesh_of(texels, old.name)
+    obj.data = mesh_arrays.new_mesh(old.name, texels.vertices, texels.faces)
     surface_binding.transfer_painted_values(obj, painted)
     for material in old.materials:
         obj.data.materials.append(material)
@@ -143,12 +144,6 @@ def update_texels(context, obj) -> int:
     surface_binding.bind(context, obj, carrier)
     _store_pattern(obj, carrier, region, pattern)
     return len(texels.vertices)
-
-
-def pattern_of(obj) -> dict:
-    """Return the pattern with which the texels of a laid sensor were made: values of :data:`PATTERN_PROPERTIES`."""
-    own = obj.palpate.skin
-    return {key: transforms.as_typed(v) if isinstance(v := getattr(own, key), float) else v for key in PATTERN_PROPERTIES}
 
 
 def is_laid(obj) -> bool:
@@ -202,15 +197,8 @@ def _store_pattern(obj, carrier, region: dict, pattern: dict) -> None:
 
 def _stored_region(own) -> dict:
     """Return the region on the carrier that a laid sensor's properties hold, for :func:`.sensor_regions.vertices_of_region`."""
-    name = own.region_name
-    threshold = transforms.as_typed(own.region_threshold)
-    return {
-        "region": own.region,
-        "vertex_group": name,
-        "threshold": threshold,
-        "material": name,
-        "face_set": own.region_number,
-    }
+    names = {"vertex_group": own.region_name, "material": own.region_name, "face_set": own.region_number}
+    return {"region": own.region, "threshold": transforms.as_typed(own.region_threshold), **names}
 
 
 def _surface_fingerprint(carrier, own) -> str:
@@ -219,15 +207,10 @@ def _surface_fingerprint(carrier, own) -> str:
     digest.update(mesh_arrays.vertices(carrier.data).tobytes())
     digest.update(np.round(np.array(carrier.scale), 6).tobytes())
     try:
-        digest.update(np.packbits(_region_vertices(carrier, _stored_region(own))).tobytes())
+        digest.update(np.packbits(sensor_regions.vertices_of_region(carrier, **_stored_region(own))).tobytes())
     except SensorError:
         digest.update(b"gone")
     return digest.hexdigest()
-
-
-def _region_vertices(carrier, region: dict) -> np.ndarray:
-    """Return which vertices of the carrier belong to a region, (nv,) bool."""
-    return sensor_regions.vertices_of_region(carrier, len(carrier.data.vertices), **region)
 
 
 def _texels_on(context, carrier, chosen: np.ndarray, pattern: dict) -> TexelMesh:
@@ -244,7 +227,8 @@ def _texels_on(context, carrier, chosen: np.ndarray, pattern: dict) -> TexelMesh
         raise SensorError(f"The region on '{carrier.name}' spans no face: choose all corners of at least one face.")
     mesh, _ = checked_mesh(arrays.vertices @ stretch.T, triangles[:, ::-1] if is_mirrored else triangles, carrier.name)
     texels = make_texels(mesh, pattern)
-    lifted = texels.vertices + pattern["lift"] * vertex_normals(_triangulated(texels))
+    fans = [(face[0], face[i], face[i + 1]) for face in texels.faces for i in range(1, len(face) - 1)]
+    lifted = texels.vertices + pattern["lift"] * vertex_normals(TriangleMesh(texels.vertices, np.array(fans)))
     faces = [face[::-1] for face in texels.faces] if is_mirrored else texels.faces
     return TexelMesh(lifted @ np.linalg.inv(stretch).T, faces)
 
@@ -269,20 +253,6 @@ def make_texels(mesh: TriangleMesh, pattern: dict) -> TexelMesh:
     middle = shifted_pose(mesh, region_middle(mesh), (pattern["shift_x"], pattern["shift_y"]))
     pitch = pattern["pitch_x"], pattern["pitch_y"]
     return wrapped_array(mesh, pattern["rows"], pattern["columns"], pitch, middle, pattern["angle"])
-
-
-def _triangulated(texels: TexelMesh) -> TriangleMesh:
-    """Return the mesh of texels with its faces divided into triangles."""
-    triangles = [(face[0], face[i], face[i + 1]) for face in texels.faces for i in range(1, len(face) - 1)]
-    return TriangleMesh(texels.vertices, np.array(triangles))
-
-
-def _mesh_of(texels: TexelMesh, name: str, scale: float = 1.0):
-    """Return a new mesh data-block whose vertices are the texels, times `scale`."""
-    mesh = bpy.data.meshes.new(name)
-    mesh.from_pydata((texels.vertices * scale).tolist(), [], texels.faces)
-    mesh.update()
-    return mesh
 
 
 def usual_spacing(obj, scene) -> float:

@@ -59,7 +59,8 @@ def add_probe(context, obj, shape: str, size: float, depth: float):
     rotation = transforms.rotation(quaternion)
     normal, ground = rotation @ mean_normal, location + rotation @ foot / unit
     probe = bpy.data.objects.new("Probe", _mesh(shape, size / unit))
-    _collection_of(context.scene, obj).objects.link(probe)
+    collections = (found for found in obj.users_collection if found.is_editable)  # shown and baked where the sensor is
+    next(collections, context.scene.collection).objects.link(probe)
     turn = Vector(normal).to_track_quat("Z", "Y")
     probe.rotation_euler = turn.to_euler()
     around = (texels.position - foot) / unit @ rotation.T @ transforms.as_array(turn.to_matrix())
@@ -96,11 +97,6 @@ def _middle(texels) -> tuple[np.ndarray, np.ndarray]:
     across = np.linalg.norm((texels.position - weights @ texels.position) @ flat, axis=1)
     facing = texels.normal @ mean > 0.5 * (texels.normal @ mean).max()  # not those on the back of a closed sensor
     return texels.position[np.argmin(np.where(facing, across, np.inf))], mean
-
-
-def _collection_of(scene, obj):
-    """Return the collection of the sensor, so that the probe is shown and baked where the sensor is."""
-    return next((found for found in obj.users_collection if found.is_editable), scene.collection)
 
 
 def _first_contact(mesh, points: np.ndarray, size: float) -> float:

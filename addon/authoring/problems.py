@@ -75,11 +75,8 @@ def texel_problems(obj, mesh: TriangleMesh, texels: Texels, reach: float, around
         found.append(Problem("INSIDE", text, np.flatnonzero(inside)))
     near = _overlapping(texels, spacing)
     if len(near):
-        found.append(
-            Problem(
-                "OVERLAP", f"{len(near)} texels of '{obj.name}' coincide with another and measure the same force twice.", near
-            )
-        )
+        text = f"{len(near)} texels of '{obj.name}' coincide with another and measure the same force twice."
+        found.append(Problem("OVERLAP", text, near))
     if not inside.any() and not mixed:
         thickness = _thickness(body, texels, TEST_DISTANCE * spacing)
         thin = np.flatnonzero(thickness < reach)
@@ -100,20 +97,17 @@ def object_problems(obj, notes: list[str]) -> list[Problem]:
             if obj.palpate.body == "PARENT":
                 found.append(Problem("ORPHAN", f"'{obj.name}' has lost its parent: it no longer moves with an object."))
         elif laid_sensors.is_outdated(obj):
-            found.append(
-                Problem("OUTDATED", f"The surface of '{obj.parent.name}' has changed since '{obj.name}' was laid on it.")
-            )
+            text = f"The surface of '{obj.parent.name}' has changed since '{obj.name}' was laid on it."
+            found.append(Problem("OUTDATED", text))
         elif surface_binding.is_needed(obj.parent) and not surface_binding.is_bound(obj):
             found.append(Problem("STILL", f"'{obj.parent.name}' may change its shape, and the texels of '{obj.name}' stay."))
     made = obj.palpate.made_vertices
     if obj.palpate.region == "MESH" and made and made != len(obj.data.vertices):
-        found.append(
-            Problem(
-                "GROWN",
-                f"'{obj.name}' had {made} vertices when its whole mesh became a sensor and has {len(obj.data.vertices)} now: "
-                "all of them are texels.",
-            )
+        text = (
+            f"'{obj.name}' had {made} vertices when its whole mesh became a sensor and has {len(obj.data.vertices)} now: "
+            "all of them are texels."
         )
+        found.append(Problem("GROWN", text))
     return found
 
 
@@ -193,20 +187,16 @@ def _edit(obj, work: Callable) -> None:
     obj.data.update()
 
 
-def _turn_alike(obj, _problem, _report) -> None:
-    _edit(obj, lambda mesh: bmesh.ops.recalc_face_normals(mesh, faces=mesh.faces))
-
-
-def _flip(obj, _problem, _report) -> None:
-    _edit(obj, lambda mesh: bmesh.ops.reverse_faces(mesh, faces=mesh.faces))
+def _edit_faces(obj, change: Callable) -> None:
+    """Change all faces of an object's own mesh by an operator of bmesh."""
+    _edit(obj, lambda mesh: change(mesh, faces=mesh.faces))
 
 
 def _merge(obj, _problem, report) -> None:
-    scale = report.metres
-    distance = OVERLAP_DISTANCE * _spacing(report.texels) / scale
+    distance = OVERLAP_DISTANCE * _spacing(report.texels) / report.metres
     _edit(obj, lambda mesh: bmesh.ops.remove_doubles(mesh, verts=mesh.verts, dist=distance))
     if obj.palpate.made_vertices:
-        obj.palpate.made_vertices = len(obj.data.vertices)
+        _accept(obj)
 
 
 def _leave_out(obj, problem, report) -> None:
@@ -238,32 +228,25 @@ def _apply_modifiers(obj, _problem, _report) -> None:
     if old.users == 0:
         bpy.data.meshes.remove(old)
     mesh.name = name
-    obj.palpate.made_vertices = len(mesh.vertices)
+    _accept(obj)
 
 
-def _accept(obj, _problem, _report) -> None:
+def _accept(obj, *_) -> None:
     obj.palpate.made_vertices = len(obj.data.vertices)
-
-
-def _lay_anew(obj, _problem, _report) -> None:
-    laid_sensors.update_texels(bpy.context, obj)
-
-
-def _cling(obj, _problem, _report) -> None:
-    surface_binding.bind(bpy.context, obj, obj.parent)
 
 
 def _whole_mesh(obj, _problem, _report) -> None:
     obj.palpate.region = "MESH"
-    obj.palpate.made_vertices = len(obj.data.vertices)
+    _accept(obj)
 
 
 def _active_group(obj, _problem, _report) -> None:
     obj.palpate.vertex_group = obj.vertex_groups.active.name
 
 
-def _automatic_image(obj, _problem, _report) -> None:
-    obj.palpate.image_layout = "AUTO"
+def _setting(name: str, value: str) -> Callable:
+    """Return the fix that gives a setting of the object a value."""
+    return lambda obj, *_: setattr(obj.palpate, name, value)
 
 
 def _nothing_painted(obj, _problem, _report) -> None:
@@ -275,29 +258,21 @@ def _nothing_painted(obj, _problem, _report) -> None:
             setattr(obj.palpate, f"{key}_map", "")
 
 
-def _on_its_own(obj, _problem, _report) -> None:
-    obj.palpate.body = "KEYFRAMED"
-
-
-def _show(_obj, _problem, _report) -> None:
-    participants.show_hidden(bpy.context.scene)
-
-
 FIXES: dict[str, tuple[str, Callable]] = {
-    "HIDDEN": ("Show Hidden Objects", _show),
-    "NORMALS": ("Turn Faces Alike", _turn_alike),
-    "FLIPPED": ("Flip Normals", _flip),
+    "HIDDEN": ("Show Hidden Objects", lambda *_: participants.show_hidden(bpy.context.scene)),
+    "NORMALS": ("Turn Faces Alike", lambda obj, *_: _edit_faces(obj, bmesh.ops.recalc_face_normals)),
+    "FLIPPED": ("Flip Normals", lambda obj, *_: _edit_faces(obj, bmesh.ops.reverse_faces)),
     "INSIDE": ("Leave Them Out", _leave_out),
     "OVERLAP": ("Merge Them", _merge),
     "THROUGH": ("Shorten Max Penetration", _shorten),
     "MODIFIER": ("Apply Modifiers", _apply_modifiers),
-    "OUTDATED": ("Lay Again", _lay_anew),
-    "STILL": ("Bind to Surface", _cling),
-    "ORPHAN": ("Keyframed Body", _on_its_own),
+    "OUTDATED": ("Lay Again", lambda obj, *_: laid_sensors.update_texels(bpy.context, obj)),
+    "STILL": ("Bind to Surface", lambda obj, *_: surface_binding.bind(bpy.context, obj, obj.parent)),
+    "ORPHAN": ("Keyframed Body", _setting("body", "KEYFRAMED")),
     "GROWN": ("That Is Meant", _accept),
     "REGION": ("Use Whole Mesh", _whole_mesh),
     "GROUP": ("Use Active Group", _active_group),
-    "IMAGE": ("Automatic Image", _automatic_image),
+    "IMAGE": ("Automatic Image", _setting("image_layout", "AUTO")),
     "PAINTED": ("Empty the Field", _nothing_painted),
 }
 """By kind of problem: the label of the button, and the function that it calls with (object, problem, report)."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...core.errors import FileError, SceneError
 from ...core.geometry.mesh import TriangleMesh, vertex_normals
-from ...core.simulators.sensor_format import require_sensor_size
+from ...core.simulators.sensor_format import FoundSensor, import_sensors, require_sensor_size
 from ..properties import effect_stack
 from ..scene import mesh_arrays
 from ..scene.stored_names import STATED_NORMAL
@@ -45,7 +45,7 @@ def import_file(context, path, names=()) -> tuple[list, list[str]]:
     PalpateError
         The file is damaged or holds no sensor. Nothing was changed then.
     """
-    found = _found_in(context, path)
+    found = _read_gentact(context, path) if Path(path).suffix.lower() == ".blend" else import_sensors(path)[1]
     for name in names:
         if name not in [item.name for item in found]:
             known = ", ".join(f"'{item.name}'" for item in found)
@@ -69,14 +69,6 @@ def import_file(context, path, names=()) -> tuple[list, list[str]]:
     return objects, notes
 
 
-def _found_in(context, path) -> list:
-    if Path(path).suffix.lower() == ".blend":
-        return _read_gentact(context, path)
-    from ...core.simulators.sensor_format import import_sensors
-
-    return import_sensors(path)[1]
-
-
 def _owner(context, item):
     """Return the sensor that gets the parameters of a file without texels: the one of its name, else the active one."""
     obj = {one.name: one for one in context.scene.objects}.get(item.name)
@@ -97,19 +89,13 @@ def _new_sensor(context, item):
     top.location = item.frame_position * scale
     top.rotation_mode, top.rotation_quaternion = "QUATERNION", item.frame_quaternion
     sensors.make_sensor(obj, "MESH")
-    for other in context.selected_objects:
-        other.select_set(False)
     context.view_layer.update()
-    obj.select_set(True)
-    context.view_layer.objects.active = obj
+    sensors.choose_alone(context, obj)
     return obj
 
 
 def _new_object(context, name: str, vertices: np.ndarray, faces: np.ndarray):
-    mesh = bpy.data.meshes.new(name)
-    mesh.from_pydata(vertices.tolist(), [], faces.tolist())
-    mesh.update()
-    obj = bpy.data.objects.new(name, mesh)
+    obj = bpy.data.objects.new(name, mesh_arrays.new_mesh(name, vertices, faces.tolist()))
     context.collection.objects.link(obj)
     return obj
 
@@ -124,8 +110,6 @@ def _keep_normals(obj, item) -> None:
 
 def _read_gentact(context, path) -> list:
     """Return the sensors of a .blend of GenTact: each object with points that are flagged as sensors."""
-    from ...core.simulators.sensor_format import FoundSensor
-
     found = []
     with _linked_objects(context, path) as objects:
         depsgraph = context.evaluated_depsgraph_get()
@@ -141,17 +125,8 @@ def _read_gentact(context, path) -> list:
             scale = transforms.metres_per_unit(context.scene)
             normal = normal @ np.linalg.inv(stretch)
             normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-            found.append(
-                FoundSensor(
-                    obj.name,
-                    position @ stretch.T * scale,
-                    normal,
-                    faces,
-                    frame_position=place * scale,
-                    frame_quaternion=turn,
-                    notes=notes,
-                )
-            )
+            where, at = position @ stretch.T * scale, place * scale
+            found.append(FoundSensor(obj.name, where, normal, faces, frame_position=at, frame_quaternion=turn, notes=notes))
     if not found:
         raise FileError(
             f"'{path}' has no object with three or more points flagged by the attribute '{FLAG}': see GenTact's guide."

@@ -27,6 +27,14 @@ def automatic_source(obj, mode: str) -> str:
     return "MESH"
 
 
+def choose_alone(context, obj) -> None:
+    """Make an object the active one, and the only one that is selected."""
+    for other in context.selected_objects:
+        other.select_set(False)
+    obj.select_set(True)
+    context.view_layer.objects.active = obj
+
+
 def selected_vertices(obj) -> np.ndarray:
     """Return which vertices were selected when the object was last updated from Edit Mode, (nv,) bool."""
     return transforms.values_of(obj.data.vertices, "select", bool)
@@ -80,7 +88,7 @@ def follow_size(scene, obj) -> str:
     if settings.is_property_set("max_penetration") or not obj.is_editable:
         return ""
     try:
-        chosen = mesh_arrays.positions(obj.data).reshape(-1, 3)[sensor_regions.region_vertices(obj, len(obj.data.vertices))]
+        chosen = mesh_arrays.positions(obj.data).reshape(-1, 3)[sensor_regions.region_vertices(obj)]
     except SensorError:
         return ""  # nothing is painted yet
     scale = np.abs(obj.matrix_world.to_scale()) * transforms.metres_per_unit(scene)
@@ -102,22 +110,15 @@ def describe_region(obj, source: str) -> dict:
     source : {"OWN", "SELECTION", "GROUP", "MATERIAL", "FACE_SET", "MESH"}
         OWN is the region that the object has as a sensor.
     """
-    own = obj.palpate
     if source == "OWN":
-        return {
-            "region": own.region,
-            "vertex_group": own.vertex_group,
-            "threshold": transforms.as_typed(own.threshold),
-            "material": own.material,
-            "face_set": own.face_set,
-        }
+        return sensor_regions.region_of(obj)
     chosen, region = _region(obj, source)
     if source == "SELECTION":
         _check(obj, chosen, source)
         # a new group, because another laid sensor may have another selection
         region |= {"vertex_group": _fill(obj.vertex_groups.new(name=GROUP_NAME), chosen), "threshold": 1.0}
     elif source == "GROUP":
-        region["threshold"] = transforms.as_typed(own.threshold)
+        region["threshold"] = transforms.as_typed(obj.palpate.threshold)
     return region
 
 

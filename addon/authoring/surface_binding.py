@@ -30,16 +30,12 @@ WEIGHTS, OFFSET = "palpate_shares", "palpate_offset"
 
 def is_needed(carrier) -> bool:
     """Return True when a surface may change its shape other than by its scale, which its children follow anyway."""
-    return deforming_objects.may_deform(carrier) and not (
-        deforming_objects.has_animated_scale(carrier) and not _deforms_without_scale(carrier)
-    )
-
-
-def _deforms_without_scale(carrier) -> bool:
-    """Return True when anything but an animated scale may change the shape of a surface."""
-    data = carrier.data
+    if not deforming_objects.may_deform(carrier):
+        return False
+    data, moved_by = carrier.data, carrier.parent_type in {"ARMATURE", "LATTICE"}
     keys = getattr(data, "shape_keys", None) is not None
-    return bool(carrier.modifiers) or keys or data.animation_data is not None or carrier.parent_type in {"ARMATURE", "LATTICE"}
+    without_scale = bool(carrier.modifiers) or keys or data.animation_data is not None or moved_by
+    return without_scale or not deforming_objects.has_animated_scale(carrier)
 
 
 def is_bound(sensor) -> bool:
@@ -50,7 +46,10 @@ def is_bound(sensor) -> bool:
 
 def bind(context, sensor, carrier) -> None:
     """Bind the texels of a laid sensor to its carrier in their present shapes, if the carrier's shape may change."""
-    unbind(sensor)
+    modifier = sensor.modifiers.get(MODIFIER)
+    if modifier is not None:
+        sensor.modifiers.remove(modifier)
+    mesh_arrays.remove_attributes(sensor.data, (*CORNER_ATTRIBUTES, WEIGHTS, OFFSET))
     if is_needed(carrier):
         _store_bound_positions(context, sensor, carrier)
         modifier = sensor.modifiers.new(MODIFIER, "NODES")
@@ -60,26 +59,14 @@ def bind(context, sensor, carrier) -> None:
         sensor.update_tag()
 
 
-def unbind(sensor) -> None:
-    """Remove the binding: the texels keep their positions in the carrier's coordinates."""
-    modifier = sensor.modifiers.get(MODIFIER)
-    if modifier is not None:
-        sensor.modifiers.remove(modifier)
-    mesh_arrays.remove_attributes(sensor.data, (*CORNER_ATTRIBUTES, WEIGHTS, OFFSET))
-
-
-def _surface_input(modifier) -> str:
-    """Return the identifier of the modifier's input for the surface."""
-    items = modifier.node_group.interface.items_tree
-    return next(item.identifier for item in items if item.in_out == "INPUT" and item.socket_type == "NodeSocketObject")
-
-
 def _set_surface(modifier, carrier) -> None:
     """Set the surface of the nodes. Blender 5.2 and later has properties for inputs, older versions custom properties."""
+    items = modifier.node_group.interface.items_tree
+    key = next(item.identifier for item in items if item.in_out == "INPUT" and item.socket_type == "NodeSocketObject")
     if hasattr(modifier, "properties"):
-        getattr(modifier.properties.inputs, _surface_input(modifier)).value = carrier
+        getattr(modifier.properties.inputs, key).value = carrier
     else:
-        modifier[_surface_input(modifier)] = carrier
+        modifier[key] = carrier
 
 
 def _store_bound_positions(context, sensor, carrier) -> None:
@@ -108,12 +95,9 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 def _binding_nodes():
     """Return new geometry nodes that move points to where :func:`_store_bound_positions` has bound them."""
     tree = bpy.data.node_groups.new(NODES, "GeometryNodeTree")
-    for name, kind, direction in (
-        ("Geometry", "Geometry", "INPUT"),
-        ("Surface", "Object", "INPUT"),
-        ("Geometry", "Geometry", "OUTPUT"),
-    ):
-        tree.interface.new_socket(name, in_out=direction, socket_type=f"NodeSocket{kind}")
+    tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    tree.interface.new_socket("Surface", in_out="INPUT", socket_type="NodeSocketObject")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     add = materials.NodeAdder(tree)
     given = add.end("NodeGroupInput").outputs
     surface = add("GeometryNodeObjectInfo", {"Object": given["Surface"]}, "Geometry", transform_space="RELATIVE")

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
+from mathutils import Matrix, Vector
 
 from ...core.geometry.grid_layout import GridLayout
 from ..scene.stored_names import GAP_COLORS
@@ -84,9 +85,7 @@ def _present():
     return (obj, own, report) if report is not None and report.texels is not None else None
 
 
-def _frame(obj):
-    from mathutils import Matrix
-
+def _frame(obj) -> Matrix:
     location, quaternion, _ = transforms.decompose(transforms.as_array(obj.matrix_world))
     return Matrix(transforms.pose_matrix(location, quaternion))
 
@@ -161,7 +160,6 @@ def draw_numbers() -> None:
         return
     import blf
     from bpy_extras.view3d_utils import location_3d_to_region_2d
-    from mathutils import Vector
 
     obj, _, report = found
     context, frame = bpy.context, _frame(obj)

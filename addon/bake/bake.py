@@ -6,6 +6,7 @@ open → read scene → scenario → model → step, forces, readings, images of
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,8 +15,9 @@ import bpy
 
 from ...core.errors import SceneError
 from ...core.io.bake_folder import BakeOwner
+from ...core.io.file_writing import writable_folder
 from ...core.jobs import Job, Progress, part_of_job
-from ...core.model.recording import Frame, Recording
+from ...core.model.recording import Recording
 from ...core.model.scenario import Scenario
 from ...core.skins.channel_readouts import with_clipping_warnings
 from ..scene import scene_fingerprint, scene_reader
@@ -70,11 +72,11 @@ def bake(scene, into_scene: bool = True, images: bool = True, blend: bake_files.
     """
     if into_scene and not images:
         raise ValueError("a scene shows a bake by its images")
-    name = scene.name
-    steps = _Steps(scene)
+    name, first, total = scene.name, scene.frame_start, _total(scene)
     with session_state.suspended():
-        folder = bake_files.writable_bake_folder(scene)
-        reading = yield from part_of_job(scene_reader.read_scene(scene), steps.reading)
+        folder = bake_files.bake_folder(scene)  # it need not exist yet, and is not made before the scene is read
+        writable_folder(folder if os.path.exists(folder) else folder.parent)
+        reading = yield from _read(scene)
         scenario = reading.scenario
         if into_scene:
             _scene_writer().check_writable(scene, reading)
@@ -85,7 +87,7 @@ def bake(scene, into_scene: bool = True, images: bool = True, blend: bake_files.
         with bake_files.BakeFiles(folder, scenario, owner, images) as files:
             for frame in simulation.frames():  # a step, its forces and readings
                 files.write(frame)
-                yield steps.solved(frame)
+                yield Progress("Computing forces", total // 2 + frame.frame - first + 1, total, frame.frame)
                 reading.objects(_scene_called(name))  # raises if the user has deleted one
             warnings = (*reading.warnings, *simulation.warnings)
             recording = with_clipping_warnings(files.recording(simulation.dt, warnings, simulation.step_reason))
@@ -130,7 +132,7 @@ def show_bake(scene, found: Bake) -> Job[None]:
             if name not in found.manifests:
                 obj.palpate.role = "PAD"
         scene.frame_start, scene.frame_end = (int(found.recording.frames[end]) for end in (0, -1))
-        reading = yield from part_of_job(scene_reader.read_scene(scene), _Steps(scene).reading)
+        reading = yield from _read(scene)
         if reading.scenario.digest() != manifest.digest:
             raise SceneError(
                 f"The bake in '{place}' is not of '{scene.name}' as it is now: something that forces depend on has "
@@ -140,20 +142,15 @@ def show_bake(scene, found: Bake) -> Job[None]:
         _show(scene, reading, found.recording, found.folders, manifest.bake_id, identity.scene_id(scene))
 
 
-class _Steps:
-    """Progress of a bake, which reads every frame and then solves it."""
+def _total(scene) -> int:
+    """Return the number of steps of a bake, which reads every frame and then solves it."""
+    return 2 * max(1, scene.frame_end - scene.frame_start + 1)
 
-    def __init__(self, scene):
-        self._first, self._total = scene.frame_start, 2 * max(1, scene.frame_end - scene.frame_start + 1)
 
-    def reading(self, progress: Progress) -> Progress:
-        """Return how far the bake is, from how far the reading of its scene is."""
-        return replace(progress, stage="Reading the scene", total=self._total)
-
-    def solved(self, frame: Frame) -> Progress:
-        """Return how far the bake is when a frame is solved."""
-        done = self._total // 2 + frame.frame - self._first + 1
-        return Progress("Computing forces", done, self._total, frame.frame)
+def _read(scene) -> Job[SceneReading]:
+    """Read a scene as the first half of a bake."""
+    total = _total(scene)
+    return part_of_job(scene_reader.read_scene(scene), lambda step: replace(step, stage="Reading the scene", total=total))
 
 
 def _scene_writer():

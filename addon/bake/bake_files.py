@@ -62,19 +62,6 @@ def bake_folder(scene) -> Path:
     return Path(bpy.path.abspath(text))
 
 
-def writable_bake_folder(scene) -> Path:
-    """Return the absolute bake folder of a scene, which need not exist yet. Nothing is created.
-
-    Raises
-    ------
-    FileError
-        As :func:`bake_folder`, or a bake could not be written there.
-    """
-    folder = bake_folder(scene)
-    writable_folder(folder if os.path.exists(folder) else folder.parent)
-    return folder
-
-
 def check_space(folder: Path, scenario: Scenario, images: bool = True) -> None:
     """Raise FileError if the disk cannot hold a new bake: its frames as they grow, recordings and images, uncompressed."""
     motion = 8 * (2 + 13 * len(scenario.bodies))  # bytes of a frame: its number and time, poses and velocities
@@ -249,25 +236,20 @@ class BakeFiles:
                 blend.waiting.unlink(missing_ok=True)
 
     def _check_replaceable(self) -> None:
+        """Raise FileError if a sensor's folder holds other files than a bake, or the bake of another scene."""
         for folder in self.folders.values():
-            _check_replaceable(folder, self._owner)
-
-
-def _check_replaceable(folder: Path, owner: BakeOwner) -> None:
-    """Raise FileError if a sensor's folder holds other files than a bake, or the bake of another scene."""
-    if not folder.exists():
-        return
-    if not _is_bake(folder):
-        if not folder.is_dir() or any(folder.iterdir()):
-            raise FileError(f"'{folder}' holds other files than a bake: rename it, or choose another bake folder.")
-        return
-    try:
-        manifest = read_manifest(folder)
-    except FileError:
-        return  # a bake that cannot be read may be replaced
-    other = other_owner(manifest, folder.parent, owner)
-    if other:
-        raise FileError(f"'{folder}' holds the bake of {other}: choose another bake folder, or rename this one.")
+            if not folder.exists():
+                continue
+            if not _is_bake(folder):
+                if not folder.is_dir() or any(folder.iterdir()):
+                    raise FileError(f"'{folder}' holds other files than a bake: rename it, or choose another bake folder.")
+                continue
+            try:
+                manifest = read_manifest(folder)
+            except FileError:
+                continue  # a bake that cannot be read may be replaced
+            if other := other_owner(manifest, folder.parent, self._owner):
+                raise FileError(f"'{folder}' holds the bake of {other}: choose another bake folder, or rename this one.")
 
 
 def _is_bake(folder: Path) -> bool:

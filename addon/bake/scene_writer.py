@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,9 @@ from ...core.model.recording import Recording
 from ..display import bake_display, baked_scene
 from ..display.baked_sensor import BakedSensor
 from ..properties.migrations import VERSION
-from ..scene import moved_bodies, participants, scene_fingerprint, stored_names
+from ..scene import moved_bodies, participants, scene_fingerprint
 from ..scene.scene_reading import SceneReading
+from ..session import identity
 
 MANY_KEYFRAMES = 100_000
 """Keyframes from which a warning comes before a bake. A keyframe of an object, location and rotation together, takes 94 bytes
@@ -90,7 +92,9 @@ def write(scene, reading: SceneReading, recording: Recording, folders: dict[str,
         if obj.palpate.is_baked and obj not in taking_part:
             baked_scene.clear_object(scene, obj)
     for index in reading.start_matrices:
-        _keyframe_body(objects[index], index, reading, recording)
+        obj, parents = objects[index], np.array(reading.parent_matrices[index])
+        placement = moved_bodies.BodyPlacement.of(obj, reading.start_matrices[index], parents[0], reading.metres_per_unit)
+        moved_bodies.keyframe_motion(obj, placement, recording.frames, recording.poses[:, index], parents)
     moved = {objects[index] for index in reading.start_matrices}
     baked_sensors = []
     for sensor, obj in zip(scenario.sensors, sensors):
@@ -105,15 +109,8 @@ def write(scene, reading: SceneReading, recording: Recording, folders: dict[str,
     settings.schema_version = VERSION
     settings.baked_digest = recording.digest
     settings.baked_shapes = scene_fingerprint.pack_fingerprints(reading.mesh_fingerprints)
-    settings.baked_names = stored_names.pack_names(participants.find_participants(scene)[0])
+    settings.baked_names = json.dumps({identity.key(obj): obj.name for obj in participants.find_participants(scene)[0]})
     settings.baked_start, settings.baked_end = scenario.frame_start, scenario.frame_end
-
-
-def _keyframe_body(obj, index: int, reading: SceneReading, recording: Recording) -> None:
-    """Write the motion of a body that forces have moved as keyframes of its object."""
-    parents = np.array(reading.parent_matrices[index])
-    placement = moved_bodies.BodyPlacement.of(obj, reading.start_matrices[index], parents[0], reading.metres_per_unit)
-    moved_bodies.keyframe_motion(obj, placement, recording.frames, recording.poses[:, index], parents)
 
 
 def _baked_sensor(obj, body, sensor, reading: SceneReading, recording: Recording, folder: Path) -> BakedSensor:

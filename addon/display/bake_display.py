@@ -7,7 +7,6 @@ settings of the display have changed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import combinations
 
 import bpy
@@ -33,46 +32,29 @@ FACING_ARROWS_SHARE = 0.94
 """Share of the distance between two sensors facing each other that their arrows may take up together."""
 
 
-@dataclass(frozen=True)
-class Scales:
-    """Scales that all sensors of a scene share.
+def _scales(settings, baked_sensors: list[BakedSensor]) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
+    """Return the scales that all sensors of a scene share: as the settings name them, or chosen automatically.
 
-    Attributes
-    ----------
-    force, moment : float
-        Blender units per newton and per newton metre, for the markers.
-    texel : dict of str to float
-        Blender units per newton for the arrows at the texels, by kind. Each kind has its own, because shear forces are much
-        smaller than normal forces.
-    longest : dict of str to float
-        Length of the longest of these arrows by kind, Blender units.
+    By kind: Blender units per newton and per newton metre, for the markers; Blender units per newton, for the arrows at the
+    texels; and the length of the longest of these arrows, Blender units. Each kind of arrows at the texels has a scale of its
+    own, because shear forces are much smaller than normal forces.
     """
-
-    force: float
-    moment: float
-    texel: dict[str, float]
-    longest: dict[str, float]
-
-    @classmethod
-    def of(cls, settings, baked_sensors: list[BakedSensor]) -> Scales:
-        """Return the scales that the settings name, or choose them automatically."""
-        size = max((item.size for item in baked_sensors), default=1.0)
-        unit = baked_sensors[0].scale if baked_sensors else 1.0
-        largest_force = _largest(np.linalg.norm(item.readings.net_force, axis=1) for item in baked_sensors)
-        largest_moment = _largest(np.linalg.norm(response.free_moment(item.readings), axis=1) for item in baked_sensors)
+    size = max((item.size for item in baked_sensors), default=1.0)
+    unit = baked_sensors[0].scale if baked_sensors else 1.0
+    largest_force = _largest(np.linalg.norm(item.readings.net_force, axis=1) for item in baked_sensors)
+    largest_moment = _largest(np.linalg.norm(response.free_moment(item.readings), axis=1) for item in baked_sensors)
+    peaks = {
+        "NORMALS": _largest(item.readings.normal_force for item in baked_sensors),
+        "SHEARS": _largest(np.linalg.norm(item.readings.shear, axis=2) for item in baked_sensors),
+    }
+    if settings.use_auto_arrow:
+        force = min(size / largest_force, _max_scale_of_facing_arrows(baked_sensors)) if largest_force > 0 else 0.0
+        texel = {kind: LONGEST_TEXEL_ARROW * size / peak if peak > 0 else 0.0 for kind, peak in peaks.items()}
+    else:
         force = transforms.as_typed(settings.arrow_scale) / unit
-        if settings.use_auto_arrow:
-            force = min(size / largest_force, _max_scale_of_facing_arrows(baked_sensors)) if largest_force > 0 else 0.0
-        peaks = {
-            "NORMALS": _largest(item.readings.normal_force for item in baked_sensors),
-            "SHEARS": _largest(np.linalg.norm(item.readings.shear, axis=2) for item in baked_sensors),
-        }
         texel = dict.fromkeys(peaks, transforms.as_typed(settings.texel_arrow_scale) / unit)
-        if settings.use_auto_arrow:
-            texel = {kind: LONGEST_TEXEL_ARROW * size / peak if peak > 0 else 0.0 for kind, peak in peaks.items()}
-        longest = {kind: texel[kind] * peak for kind, peak in peaks.items()}
-        moment = 0.6 * size / largest_moment if largest_moment > 0 else 0.0
-        return cls(force, moment, texel, longest)
+    moment = 0.6 * size / largest_moment if largest_moment > 0 else 0.0
+    return {"FORCE": force, "TORQUE": moment}, texel, {kind: texel[kind] * peak for kind, peak in peaks.items()}
 
 
 def _max_scale_of_facing_arrows(baked_sensors: list[BakedSensor]) -> float:
@@ -121,7 +103,7 @@ def take_style(scene, style: FigureStyle) -> None:
 def show_bake(scene, baked_sensors: list[BakedSensor]) -> None:
     """Put heat maps, markers and arrows on the sensors of a finished bake; they replace earlier ones."""
     settings = scene.palpate
-    scales = Scales.of(settings, baked_sensors)
+    of_markers, of_texels, longest = _scales(settings, baked_sensors)
     style = figure_style(scene)
     sources = ((item.readings, item.texels) for item in baked_sensors if style.shown.is_in(item.readings))
     scale = style.scale_of(Extent.of(style.shown, sources))
@@ -130,8 +112,8 @@ def show_bake(scene, baked_sensors: list[BakedSensor]) -> None:
         obj, frames = item.obj, (int(item.frames[0]), int(item.frames[-1]))
         image = materials.load_sequence(obj.palpate.uid, item.folder / frame_file(frames[0]), relative)
         heat_map.apply(item, image, scale)
-        markers.keyframe_markers(scene, item, settings.overlays, {"FORCE": scales.force, "TORQUE": scales.moment})
-        texel_arrows.build_arrows(scene, item, image, settings.overlays, scales.texel, scales.longest)
+        markers.keyframe_markers(scene, item, settings.overlays, of_markers)
+        texel_arrows.build_arrows(scene, item, image, settings.overlays, of_texels, longest)
         obj.palpate.tactile_images = image
         obj.palpate.bake_folder = bpy.path.relpath(str(item.folder)) if relative else str(item.folder)
     indentation.show(baked_sensors, settings.indentation_factor if settings.show_indentation else None)

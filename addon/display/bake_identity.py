@@ -8,15 +8,13 @@ so manifests are kept in memory until their files change.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 
 from ...core.errors import FileError, SceneError
 from ...core.io.bake_folder import MANIFEST_NAME, Manifest, read_manifest
 from ...core.io.bake_reader import Bake
 from . import baked_scene
-
-_manifests: dict[Path, tuple[tuple[int, ...], Manifest | None]] = {}
-"""By folder of a sensor's bake: size, time and inode of its manifest, and the manifest; None when it cannot be read."""
 
 
 def other_bake(scene) -> str:
@@ -26,7 +24,7 @@ def other_bake(scene) -> str:
     """
     settings = scene.palpate
     for folder in sorted(baked_scene.bake_folders(scene).values()):
-        found = _manifest(folder)
+        found = _manifest(folder, manifest_stamp(folder))
         if found is None or not settings.baked_digest:
             continue
         same_id = not (settings.baked_id and found.bake_id) or found.bake_id == settings.baked_id
@@ -64,14 +62,10 @@ def manifest_stamp(folder: Path) -> tuple[int, ...]:
     return about.st_size, about.st_mtime_ns, about.st_ino
 
 
-def _manifest(folder: Path) -> Manifest | None:
-    """Return the manifest in a sensor's folder; None when it cannot be read."""
-    stamp = manifest_stamp(folder)
-    if folder not in _manifests or _manifests[folder][0] != stamp:
-        try:
-            _manifests[folder] = stamp, read_manifest(folder)
-        except FileError:  # who reads the bake says so
-            _manifests[folder] = stamp, None
-        except OSError:
-            return None
-    return _manifests[folder][1]
+@lru_cache(maxsize=64)
+def _manifest(folder: Path, _stamp: tuple[int, ...]) -> Manifest | None:
+    """Return the manifest in a sensor's folder, as long as its stamp stays; None when it cannot be read."""
+    try:
+        return read_manifest(folder)
+    except (FileError, OSError):  # who reads the bake says so
+        return None

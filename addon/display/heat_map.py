@@ -37,7 +37,7 @@ def apply(sensor: BakedSensor, image, scale: Scale) -> None:
     is_in_image = scale.quantity.channel == materials.IMAGE_CHANNEL
     user_map = is_in_image and isinstance(layout, UVLayout) and layout.map_name
     uv = None if user_map else _one_uv_per_texel(texels)
-    mapping = materials.ImageMapping(user_map, not layout.nearest) if user_map else materials.ImageMapping()
+    coordinates, smooth = (user_map, not layout.nearest) if user_map else (UV_MAP, False)
     if uv is not None and is_in_image:
         _write_uv(mesh, texels, uv)
     elif not user_map:
@@ -50,10 +50,11 @@ def apply(sensor: BakedSensor, image, scale: Scale) -> None:
             column, _ = _table_attributes(uid)
             mesh_arrays.store(mesh, column, np.column_stack([uv, np.zeros(len(uv))]), texels.vertex)
             value = pictures.place(add, add.attribute(column))
-            image, mapping = pictures.image, materials.ImageMapping(attribute)
+            image, coordinates = pictures.image, attribute
         elif is_in_image:
             mesh_arrays.store(mesh, materials.TEXEL_UV, np.column_stack([layout.uv(), np.zeros(len(texels))]), texels.vertex)
-            value, image = materials.image_values(add, image, frames), None
+            color = materials.add_image_lookup(add, image, frames)
+            value, image = add("FunctionNodeSeparateColor", {"Color": color}, materials.IMAGE_OUTPUT), None
         else:
             value, image = _table(sensor, scale).lookup(add), None
         shown = add.stored(start, attribute, value, "FLOAT" if image is None else "FLOAT_VECTOR")
@@ -61,7 +62,7 @@ def apply(sensor: BakedSensor, image, scale: Scale) -> None:
         modifier = obj.modifiers.new(HEAT_MAP_MODIFIER, "NODES")
         modifier.node_group = group
         obj.modifiers.move(len(obj.modifiers) - 1, 0)  # before modifiers that would change the vertices
-    material = materials.heat_map_material(uid, obj.name, image, frames, scale, mapping)
+    material = materials.heat_map_material(uid, obj.name, image, frames, scale, coordinates, smooth)
     _assign(obj, texels, material)
 
 

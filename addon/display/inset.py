@@ -146,10 +146,7 @@ def show(scene, content: InsetContent) -> None:
 
 def clear(scene=None) -> None:
     """Stop showing the inset of a scene, or of all scenes."""
-    if scene is None:
-        _contents.clear()
-    else:
-        _contents.pop(scene.session_uid, None)
+    session_state.forget(_contents, scene)
     session_state.redraw_views()
 
 

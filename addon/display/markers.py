@@ -58,7 +58,10 @@ def keyframe_markers(scene, sensor: BakedSensor, kinds, lengths: dict[str, float
             if marker is not None:
                 remove(marker)
             continue
-        marker = marker or _make(scene, sensor.obj, kind)
+        if marker is None:
+            name, shape = KINDS[kind]
+            marker = bpy.data.objects.new(f"{name} {sensor.obj.name}", marker_meshes.shared_mesh(shape))
+            link(scene, sensor.obj, marker, kind)
         marker.rotation_mode = "QUATERNION"
         table = channels(sensor, kind, lengths.get(kind, 1.0))
         found, _ = fcurves.ensure(marker, f"{marker.name} Palpate")
@@ -71,7 +74,7 @@ def channels(sensor: BakedSensor, kind: str, length: float = 1.0) -> np.ndarray:
 
     `length` is the length of an arrow for one newton or newton metre, in Blender units.
     """
-    direction, size = _DIRECTION_AND_SIZE[kind](sensor)
+    direction, size = _direction_and_size(sensor, kind)
     size = np.where(sensor.in_contact, size * length, 0.0)
     points, axes = sensor.reactions()[0], sensor.to_world(direction)
     turns, last = [], Quaternion()
@@ -84,33 +87,18 @@ def channels(sensor: BakedSensor, kind: str, length: float = 1.0) -> np.ndarray:
     return np.hstack([points, turns, np.repeat(size[:, None], 3, axis=1)])
 
 
-def _force(sensor: BakedSensor) -> tuple[np.ndarray, np.ndarray]:
-    return -sensor.readings.net_force, np.linalg.norm(sensor.readings.net_force, axis=1)
-
-
-def _torque(sensor: BakedSensor) -> tuple[np.ndarray, np.ndarray]:
-    moment = response.free_moment(sensor.readings)
-    return -moment, np.linalg.norm(moment, axis=1)
-
-
-def _centre(sensor: BakedSensor) -> tuple[np.ndarray, np.ndarray]:
-    return _outward_direction(sensor), np.full(len(sensor.frames), BALL_SHARE * sensor.size)
-
-
-def _slip(sensor: BakedSensor) -> tuple[np.ndarray, np.ndarray]:
-    share = response.slip_share(sensor.readings, sensor.parameters, sensor.painted)
-    return _outward_direction(sensor), share * RING_SHARE * sensor.size
-
-
-def _outward_direction(sensor: BakedSensor) -> np.ndarray:
-    """(F, 3) float: mean normal of the texels, weighted with their normal forces, in the body's frame."""
-    mean = sensor.readings.normal_force @ sensor.texels.normal
-    flat = np.linalg.norm(mean, axis=1) == 0.0
-    mean[flat] = sensor.texels.normal[0]
-    return mean
-
-
-_DIRECTION_AND_SIZE = {"FORCE": _force, "TORQUE": _torque, "CENTRE": _centre, "SLIP": _slip}
+def _direction_and_size(sensor: BakedSensor, kind: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return the direction of a marker in the body's frame, (F, 3), and its size, (F,); of an arrow, N or N·m."""
+    if kind == "FORCE":
+        return -sensor.readings.net_force, np.linalg.norm(sensor.readings.net_force, axis=1)
+    if kind == "TORQUE":
+        moment = response.free_moment(sensor.readings)
+        return -moment, np.linalg.norm(moment, axis=1)
+    outward = sensor.readings.normal_force @ sensor.texels.normal  # mean normal of the texels, weighted with their forces
+    outward[np.linalg.norm(outward, axis=1) == 0.0] = sensor.texels.normal[0]
+    if kind == "CENTRE":
+        return outward, np.full(len(sensor.frames), BALL_SHARE * sensor.size)
+    return outward, response.slip_share(sensor.readings, sensor.parameters, sensor.painted) * RING_SHARE * sensor.size
 
 
 def follow_names(scene, sensors) -> None:
@@ -169,13 +157,6 @@ def remove(marker) -> None:
     for material in used:
         if material is not None and material.users == 0:
             bpy.data.materials.remove(material)
-
-
-def _make(scene, obj, kind: str):
-    name, shape = KINDS[kind]
-    marker = bpy.data.objects.new(f"{name} {obj.name}", marker_meshes.shared_mesh(shape))
-    link(scene, obj, marker, kind)
-    return marker
 
 
 def link(scene, obj, marker, kind: str) -> None:

@@ -10,7 +10,6 @@ the image is in one piece pixel by pixel, and geometry nodes choose the picture 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
@@ -76,25 +75,8 @@ def load_sequence(uid: str, first: Path, relative: bool):
     return image
 
 
-def set_image_frames(user, frame_start: int, frame_end: int) -> None:
-    """Make an image user show file f at frame f and keep the last file afterwards; before the first frame it finds no file."""
-    user.frame_duration = frame_end - frame_start + 1
-    user.frame_start = frame_start
-    user.frame_offset = frame_start - 1
-    user.use_cyclic = False
-    user.use_auto_refresh = True
-
-
-@dataclass(frozen=True)
-class ImageMapping:
-    """How an image lies on a sensor: its UV map or another attribute with texture coordinates, and if pixels are blended."""
-
-    coordinates: str = UV_MAP
-    smooth: bool = False
-
-
 def heat_map_material(
-    uid: str, name: str, image, frames: tuple[int, int], scale: Scale, mapping: ImageMapping = ImageMapping()
+    uid: str, name: str, image, frames: tuple[int, int], scale: Scale, coordinates: str = UV_MAP, smooth: bool = False
 ):
     """Create a sensor's heat-map material, or rebuild the nodes of the existing one.
 
@@ -107,7 +89,10 @@ def heat_map_material(
     frames : (int, int)
         First and last frame of the bake.
     scale : Scale
-    mapping : ImageMapping
+    coordinates : str
+        UV map of the image, or another attribute with texture coordinates.
+    smooth : bool
+        Pixels of the image are blended.
 
     Returns
     -------
@@ -118,7 +103,7 @@ def heat_map_material(
     tree = tree_of(material)
     tree.nodes.clear()
     add = NodeAdder(tree)
-    value, missing = _value(add, image, frames, scale, mapping)
+    value, missing = _value(add, image, frames, scale, coordinates, smooth)
     color = _colors(add, value, scale)
     if missing is not None:
         color = add.mix(missing, color, (*MISSING_COLOR, 1.0), label="Magenta: no image")
@@ -126,17 +111,19 @@ def heat_map_material(
     return material
 
 
-def _value(add, image, frames: tuple[int, int], scale: Scale, mapping: ImageMapping):
+def _value(add, image, frames: tuple[int, int], scale: Scale, coordinates: str, smooth: bool):
     """Return the sockets of the value and, where it comes from an image, of a test that the image is missing."""
     if image is None:
         return add("ShaderNodeAttribute", output="Fac", attribute_name=attribute_of(scale.quantity)), None
-    place = add("ShaderNodeAttribute", output="Vector", attribute_name=mapping.coordinates)
-    interpolation = "Linear" if mapping.smooth else "Closest"
+    place = add("ShaderNodeAttribute", output="Vector", attribute_name=coordinates)
+    interpolation = "Linear" if smooth else "Closest"
     color = add("ShaderNodeTexImage", {"Vector": place}, image=image, interpolation=interpolation, extension="EXTEND")
     value = add("ShaderNodeSeparateColor", {"Color": color}, IMAGE_OUTPUT)
     if image.source != "SEQUENCE":
         return value, None  # it is in the .blend
-    set_image_frames(color.node.image_user, *frames)
+    user, (first, last) = color.node.image_user, frames  # file f at frame f; before the first no file, afterwards the last
+    user.frame_duration, user.frame_start, user.frame_offset = last - first + 1, first, first - 1
+    user.use_cyclic, user.use_auto_refresh = False, True
     return value, add_missing_test(add, color)
 
 
@@ -145,7 +132,12 @@ def _colors(add, value, scale: Scale):
     ends = {"From Min": scale.low, "From Max": scale.high}
     share = add("ShaderNodeMapRange", {"Value": value, **ends}, clamp=True, label=f"{scale.quantity.title} ({scale.unit})")
     color = add("ShaderNodeValToRGB", {"Fac": share})
-    _fill_ramp(color.node.color_ramp, scale.colour_map)
+    ramp, at = color.node.color_ramp, np.linspace(0.0, 1.0, RAMP_STOPS)
+    while len(ramp.elements) < RAMP_STOPS:
+        ramp.elements.new(1.0)
+    colors = color_maps.linear(color_maps.colors(scale.colour_map, at))
+    for element, position, rgb in zip(ramp.elements, at, colors, strict=True):
+        element.position, element.color = position, (*rgb, 1.0)
     return color
 
 
@@ -222,16 +214,6 @@ class NodeAdder:
         return self("GeometryNodeStoreNamedAttribute", given, data_type=data_type, domain="POINT")
 
 
-def _fill_ramp(ramp, color_map: str) -> None:
-    at = np.linspace(0.0, 1.0, RAMP_STOPS)
-    colors = color_maps.linear(color_maps.colors(color_map, at))
-    while len(ramp.elements) < RAMP_STOPS:
-        ramp.elements.new(1.0)
-    for element, position, color in zip(ramp.elements, at, colors, strict=True):
-        element.position = position
-        element.color = (*color, 1.0)
-
-
 def empty_node_group(mark: str, name: str):
     """Return an empty group of geometry nodes with this mark as its :data:`SENSOR_KEY`; an existing one is emptied."""
     group = find_block(bpy.data.node_groups, mark)
@@ -251,11 +233,6 @@ def add_image_lookup(add, image, frames: tuple[int, int]):
     frame = add("ShaderNodeClamp", {"Value": time, "Min": frames[0], "Max": frames[1]})
     given = {"Image": image, "Vector": add.attribute(TEXEL_UV), "Frame": frame}
     return add("GeometryNodeImageTexture", given, interpolation="Closest", extension="EXTEND")
-
-
-def image_values(add, image, frames: tuple[int, int]):
-    """Return the socket of the image's channel :data:`IMAGE_CHANNEL` at each texel."""
-    return add("FunctionNodeSeparateColor", {"Color": add_image_lookup(add, image, frames)}, IMAGE_OUTPUT)
 
 
 def remove_blocks(uid: str, keep_image: bool = False) -> None:

@@ -99,9 +99,7 @@ def show(scene, run, frame) -> None:
 def sensor_overlays(scene, run, frame) -> list[SensorOverlay]:
     """Return the heat maps and arrows of one frame of a live simulation; all sensors share one scale."""
     scale, metres, overlays = live_scale(scene, run), run.reading.metres_per_unit, []
-    length = (
-        ARROW_SHARE * max((_size(sensor.texels) for sensor in run.scenario.read_out), default=0.0) / run.largest_net_force()
-    )
+    length = ARROW_SHARE * max((_size(sensor.texels) for sensor in run.scenario.read_out), default=0.0) / run.largest_net_force
     settings = scene.palpate
     factor = settings.indentation_factor if settings.show_indentation else 0.0
     for sensor, obj in zip(run.scenario.sensors, run.reading.sensor_objects(scene), strict=True):
@@ -157,7 +155,7 @@ def inset_content(scene, run, frame) -> inset.InsetContent:
     """Return the tactile images and curves of one frame of a live simulation."""
     known = sorted(run.frames)
     texels = {sensor.name: sensor.texels for sensor in run.scenario.read_out}
-    loads = {name: np.array([run.total_forces(number)[name] for number in known]) for name in texels}
+    loads = {name: np.array([run.loads[number][name] for number in known]) for name in texels}
     return inset.inset_content(scene, frame, texels, np.array(known, float), loads, live_scale(scene, run))
 
 
@@ -231,15 +229,9 @@ def _size(texels) -> float:
 
 def clear(scene=None) -> None:
     """Stop showing the overlays of a scene, or of all scenes."""
-    if scene is None:
-        _overlays.clear()
-        _shown.clear()
-        inset.clear()
-    else:
-        _overlays.pop(scene.session_uid, None)
-        _shown.pop(scene.session_uid, None)
-        inset.clear(scene)
-    session_state.redraw_views()
+    session_state.forget(_overlays, scene)
+    session_state.forget(_shown, scene)
+    inset.clear(scene)
 
 
 def draw() -> None:

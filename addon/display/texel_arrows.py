@@ -56,16 +56,9 @@ def build_arrows(scene, sensor: BakedSensor, image, kinds, lengths: dict, longes
         arrows.hide_select = True
         arrows.color = (*marker_meshes.COLORS[material], 1.0)  # Workbench shows these of what nodes make
         modifier = arrows.modifiers.new(ARROWS_MODIFIER, "NODES")
-        modifier.node_group = _nodes(
-            f"{uid}:{kind}",
-            arrows.name,
-            image,
-            frames,
-            kind,
-            lengths[kind],
-            longest[kind],
-            marker_meshes.marker_material(material),
-        )
+        made_of = marker_meshes.marker_material(material)
+        scales = lengths[kind], longest[kind]
+        modifier.node_group = _nodes(f"{uid}:{kind}", arrows.name, image, frames, kind, *scales, made_of)
 
 
 def _points(sensor: BakedSensor, name: str):

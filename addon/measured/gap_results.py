@@ -22,7 +22,7 @@ from ..authoring import exchange
 from ..properties import effect_stack
 from ..scene import participants, sensor_reader
 from ..scene.stored_names import GAP_COLORS
-from ..session import first_use, identity
+from ..session import first_use, identity, transforms
 
 if TYPE_CHECKING:
     from ...core.gap.report.comparison import GapErrors
@@ -96,9 +96,9 @@ def find(obj):
     Result
     """
     from ...api.gap import read_rig, search
+    from ...core.figures.figure_canvas import save_figure
     from ...core.gap.report import sentences
     from ...core.gap.report.plots import picture
-    from ...core.gap.report.sentences import next_experiment
 
     yield from first_use.wait()
     yield Progress("Reading the recordings", 0, 1000)
@@ -106,15 +106,13 @@ def find(obj):
     gap = yield from part_of_job(search(rig), lambda step: replace(step, stage=f"Finding the gap: {step.stage}"))
     diagnosis, errors = gap.diagnosis, gap.errors
     folder, pictures = Path(tempfile.mkdtemp(prefix="gap-", dir=bpy.app.tempdir)), {}
-    from ...core.figures.figure_canvas import save_figure
-
     for name in ("curves", "gap", "loops"):
         yield Progress("Drawing", 990, 1000)
         pictures[name] = folder / f"{name}.png"
         save_figure(picture(name, diagnosis, errors), pictures[name], 150)
     identity.ensure_uid(obj)
     evidence = sentences.evidence(diagnosis, errors)
-    advice, caution = next_experiment(diagnosis), sentences.caution(diagnosis)
+    advice, caution = sentences.next_experiment(diagnosis), sentences.caution(diagnosis)
     result = Result(diagnosis, errors, gap.headline, evidence, advice, caution, pictures)
     _shown.pop(identity.key(obj), None)
     _results[identity.key(obj)] = result
@@ -197,19 +195,13 @@ def mark_phases(scene, obj) -> int:
     predictor = result.diagnosis.of("fit")[0]
     texel = int(relative_load(predictor.stimulus).sum(axis=0).argmax())
     at, time = phase_indices(predictor.stimulus)[:, texel], predictor.trial.time
-    clear_marks(scene)
-    fps = scene.render.fps / scene.render.fps_base
+    for marker in [marker for marker in scene.timeline_markers if marker.name.startswith(MARK)]:
+        scene.timeline_markers.remove(marker)
     changes = [0, *(int(i) for i in np.flatnonzero(np.diff(at)) + 1)]
     last, count = -1, 0
     for i in changes:
-        frame = scene.frame_start + round(float(time[i] - time[0]) * fps)
+        frame = scene.frame_start + round(float(time[i] - time[0]) * transforms.frames_per_second(scene))
         if frame > last:
             scene.timeline_markers.new(f"{MARK}{PHASES[at[i]]}", frame=frame)
             last, count = frame, count + 1
     return count
-
-
-def clear_marks(scene) -> None:
-    """Take the markers of phases off the timeline."""
-    for marker in [m for m in scene.timeline_markers if m.name.startswith(MARK)]:
-        scene.timeline_markers.remove(marker)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import bpy
@@ -11,6 +11,7 @@ import numpy as np
 
 from ...core.errors import SceneError
 from ...core.jobs import Progress, part_of_job
+from ..scene import mesh_arrays
 from ..session import fcurves, first_use, identity, transforms
 from . import gap_results
 
@@ -22,24 +23,14 @@ MARK = "palpate_planned_probe"
 """Custom property of probes that were made for a plan."""
 
 
-@dataclass(frozen=True)
-class _Planned:
-    """Last plan of a sensor, with its rig and probe."""
-
-    rig: str
-    probe: str
-    sentence: str
-
-
-_planned: dict[str, _Planned] = {}
-"""By key of the sensor, in this session."""
+_planned: dict[str, tuple[str, str, str]] = {}
+"""By key of the sensor, in this session: rig, probe and sentence of its last plan."""
 
 
 def sentence_of(obj) -> str:
     """Return the kinds that the last plan of a sensor's rig separates; empty without a plan, and once its probe is gone."""
-    planned = _planned.get(identity.key(obj))
-    is_shown = planned is not None and planned.rig == obj.palpate.measured and planned.probe in bpy.data.objects
-    return planned.sentence if is_shown else ""
+    rig, probe, sentence = _planned.get(identity.key(obj), ("", "", ""))
+    return sentence if rig == obj.palpate.measured and probe in bpy.data.objects else ""
 
 
 def plan(obj, wishes: Wishes):
@@ -110,7 +101,7 @@ def put_on_probe(context, obj, experiment: PlannedExperiment, rig):
     scene.frame_set(scene.frame_start)
     identity.ensure_uid(obj)
     sentence = planned_sentence(experiment_words(experiment, f"'{probe.name}'"))
-    _planned[identity.key(obj)] = _Planned(obj.palpate.measured, probe.name, sentence)
+    _planned[identity.key(obj)] = obj.palpate.measured, probe.name, sentence
     return probe
 
 
@@ -148,8 +139,7 @@ def _probe(context, obj, rig, metres: float):
     if earlier is not None:
         return earlier
     shape = rig.indenter.mesh
-    mesh = bpy.data.meshes.new("Planned Probe")
-    mesh.from_pydata((shape.vertices / metres).tolist(), [], shape.triangles.tolist())
+    mesh = mesh_arrays.new_mesh("Planned Probe", shape.vertices / metres, shape.triangles.tolist())
     probe = bpy.data.objects.new("Planned Probe", mesh)
     next((found for found in obj.users_collection if found.is_editable), context.scene.collection).objects.link(probe)
     probe.display_type = "WIRE"

@@ -48,16 +48,12 @@ def title(name: str) -> str:
     return name.replace("-", " ").title()
 
 
-def _tooltip(form: Form, parameter: Parameter) -> str:
-    """Say what a parameter does, its unit and bounds, and where the formula comes from."""
-    bounds = "" if parameter.unit.startswith("unit") else f"; {parameter.low:g} to {parameter.high:g}"
-    text, reference = parameter.text.removesuffix("."), form.reference.removesuffix(".")
-    return f"{text} ({unit_in_words(parameter)}{bounds}). Source: {reference}. {CONSTANT}"
-
-
 def _property(form: Form, parameter: Parameter):
     """Return the property that holds a parameter of a form."""
-    label, text = title(parameter.name.replace("_", "-")), _tooltip(form, parameter)
+    bounds = "" if parameter.unit.startswith("unit") else f"; {parameter.low:g} to {parameter.high:g}"
+    text, reference = parameter.text.removesuffix("."), form.reference.removesuffix(".")
+    text = f"{text} ({unit_in_words(parameter)}{bounds}). Source: {reference}. {CONSTANT}"
+    label = title(parameter.name.replace("_", "-"))
     if parameter.per_texel:
         text = f"Numbers separated by commas, one per texel or one for all. {text}"
         return StringProperty(name=with_unit(label, parameter), description=text, **FIXED)

@@ -21,7 +21,7 @@ from ..session import first_use, identity, session_state
 from . import effect_stack
 from .migrations import VERSION
 from .parameter_properties import FIXED, DriveParameterProperties, PaintedProperties, SensorParameterProperties
-from .scene_units import in_units, units_of_lengths
+from .scene_units import ENDING, in_units
 
 # Where a free or driven body starts: its location and rotation at the first frame.
 #
@@ -91,24 +91,26 @@ FIELDS = {
 """Settings that each pattern is made from."""
 
 
-def _length(name: str, text: str, **more):
+LENGTHS = {
+    "pitch_x": ("Column Pitch", "Distance between columns"),
+    "pitch_y": ("Row Pitch", "Distance between rows"),
+    "shift_x": ("Shift Across", "Displacement of the middle of the array along its rows"),
+    "shift_y": ("Shift Along", "Displacement of the middle of the array across its rows"),
+    "spacing": ("Spacing", "Distance between texels"),
+    "lift": ("Lift", "Height of the texels above the surface"),
+}
+
+
+def _length(name: str, **more):
     """Return a property that is a length in metres."""
-    return FloatProperty(name=name, description=text, precision=5, step=0.01, options=set(), **more)
+    label, text = LENGTHS[name]
+    return FloatProperty(name=f"{label} (m)", description=f"{text}, m", precision=5, step=0.01, options=set(), **more)
 
 
 class LengthsInUnits:
     """The lengths of a pattern in the units of the scene."""
 
-    __annotations__ = units_of_lengths(
-        {
-            "pitch_x": ("Column Pitch", "Distance between columns"),
-            "pitch_y": ("Row Pitch", "Distance between rows"),
-            "shift_x": ("Shift Across", "Displacement of the middle of the array along its rows"),
-            "shift_y": ("Shift Along", "Displacement of the middle of the array across its rows"),
-            "spacing": ("Spacing", "Distance between texels"),
-            "lift": ("Lift", "Height of the texels above the surface"),
-        }
-    )
+    __annotations__ = {name + ENDING: in_units(name, "m", *words, step=0.1) for name, words in LENGTHS.items()}
 
 
 class PatternProperties:
@@ -118,15 +120,15 @@ class PatternProperties:
     columns: IntProperty(
         name="Columns", description="Number of columns of the array", default=6, min=2, soft_max=128, options=set()
     )
-    pitch_x: _length("Column Pitch (m)", "Distance between columns, m", default=0.0034, min=1e-6)
-    pitch_y: _length("Row Pitch (m)", "Distance between rows, m", default=0.0034, min=1e-6)
-    shift_x: _length("Shift Across (m)", "Displacement of the middle of the array along its rows, m")
-    shift_y: _length("Shift Along (m)", "Displacement of the middle of the array across its rows, m")
+    pitch_x: _length("pitch_x", default=0.0034, min=1e-6)
+    pitch_y: _length("pitch_y", default=0.0034, min=1e-6)
+    shift_x: _length("shift_x")
+    shift_y: _length("shift_y")
     angle: FloatProperty(
         name="Turn", description="Angle of the rows, anticlockwise seen from outside", subtype="ANGLE", options=set()
     )
     seed: IntProperty(name="Seed", description="Seed of the random pattern", min=0, options=set())
-    lift: _length("Lift (m)", "Height of the texels above the surface, m", min=0.0)
+    lift: _length("lift", min=0.0)
 
 
 class PALPATE_PG_skin(PatternProperties, LengthsInUnits, bpy.types.PropertyGroup):
@@ -139,7 +141,7 @@ class PALPATE_PG_skin(PatternProperties, LengthsInUnits, bpy.types.PropertyGroup
         options=set(),
         override={"LIBRARY_OVERRIDABLE"},
     )
-    spacing: _length("Spacing (m)", "Distance between texels, m", default=0.002, min=1e-6)
+    spacing: _length("spacing", default=0.002, min=1e-6)
     region: StringProperty(options={"HIDDEN"})
     region_name: StringProperty(options={"HIDDEN"})
     region_number: IntProperty(options={"HIDDEN"})

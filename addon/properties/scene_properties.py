@@ -158,11 +158,7 @@ FOLDER, EARLIER_FOLDER = "//palpate-bake", "//palpate"
 the name of the package would hide it from a Python that is started there."""
 COLOR_MAPS = tuple((name, *words) for name, words in color_maps.NAMES.items())
 OVERLAYS = (
-    (
-        "FORCE",
-        "Net Force",
-        "Arrow at the centre of pressure: the reaction to the net force on the sensor",
-    ),
+    ("FORCE", "Net Force", "Arrow at the centre of pressure: the reaction to the net force on the sensor"),
     ("TORQUE", "Free Moment", "Double arrow: the reaction torque on the target about the centre of pressure"),
     ("CENTRE", "Centre of Pressure", "Ball at the centre of pressure"),
     ("SLIP", "Slip", "Ring around the centre of pressure, as wide as the share of the load on slipping texels"),

@@ -8,8 +8,6 @@ numbers stay as they are, with the unit in their name.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import bpy
 from bpy.props import FloatProperty, FloatVectorProperty
 
@@ -74,8 +72,3 @@ def name_in_units(group, name: str, scene) -> str:
     shown = name + ENDING
     has_units = scene.unit_settings.system != "NONE"
     return shown if has_units and shown in group.bl_rna.properties else name
-
-
-def units_of_lengths(lengths: Mapping[str, tuple[str, str]]) -> dict:
-    """Return properties for some lengths, by name: those with (label, description) under each name."""
-    return {name + ENDING: in_units(name, "m", *words, step=0.1) for name, words in lengths.items()}

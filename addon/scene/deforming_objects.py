@@ -98,11 +98,6 @@ class DeformingSurface:
             before, values = self._last
             if before[0] is snapshot and np.array_equal(before[1], linear) and np.array_equal(before[2], offset):
                 return values
-        values = self._compute(snapshot, frame, linear, offset)
-        self._last = (snapshot, linear, offset), values
-        return values
-
-    def _compute(self, snapshot: MeshSnapshot, frame: int, linear: np.ndarray, offset: np.ndarray) -> np.ndarray:
         vertices = snapshot.vertices
         if len(vertices) != self.vertex_count:
             raise SceneError(
@@ -116,7 +111,9 @@ class DeformingSurface:
         if np.linalg.det(linear) * np.linalg.det(self.linear) < 0:
             raise SceneError(f"The scale of '{self.name}' turns it inside out at frame {frame}: keep the signs of its scale.")
         values = vertices @ linear.T + offset
-        return values if self.follower is None else self.follower.local_frames(values, self.name)
+        values = values if self.follower is None else self.follower.local_frames(values, self.name)
+        self._last = (snapshot, linear, offset), values
+        return values
 
 
 def deforming_surface_of(

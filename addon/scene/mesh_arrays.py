@@ -8,6 +8,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cached_property
 
+import bpy
 import numpy as np
 
 from ...core.errors import MeshError, SensorError
@@ -121,6 +122,13 @@ def point_vectors(mesh, name: str) -> np.ndarray | None:
     return transforms.values_of(attribute.data, "vector", width=3).astype(float).reshape(-1, 3)
 
 
+def new_mesh(name: str, vertices: np.ndarray, faces):
+    """Return a new data-block of a mesh; `faces` are sequences of numbers of vertices."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(vertices.tolist(), [], faces)
+    return mesh
+
+
 def remove_attributes(mesh, names) -> None:
     """Remove the attributes of these names, as far as the mesh has them."""
     for name in names:
@@ -188,7 +196,7 @@ def region_bytes(obj) -> bytes:
         return b""
     parts = []
     with suppress(SensorError):  # reading the scene reports it
-        parts.append(np.packbits(sensor_regions.region_vertices(obj, len(obj.data.vertices))).tobytes())
+        parts.append(np.packbits(sensor_regions.region_vertices(obj)).tobytes())
         for key in parameter_properties.PAINTED_PARAMETERS:
             values = sensor_regions.painted_multipliers(obj, key)
             parts.append(b"" if values is None else values.tobytes())
@@ -214,10 +222,13 @@ class MeshSnapshot:
     positions : (3 · nv,) float32, Blender units, in the object's frame
     corners : (nc,) int32
         Vertex of each corner of the faces.
+    fingerprint : str
+        Empty until it is asked for.
     """
 
     positions: np.ndarray
     corners: np.ndarray
+    fingerprint: str = ""
 
     @cached_property
     def vertices(self) -> np.ndarray:
@@ -230,7 +241,6 @@ class MeshSnapshots:
 
     def __init__(self):
         self._snapshots: dict[int, MeshSnapshot] = {}
-        self._fingerprints: dict[int, tuple[MeshSnapshot, str]] = {}
         self._regions: dict[int, bytes] = {}
         self._read: set[int] = set()
 
@@ -254,12 +264,9 @@ class MeshSnapshots:
         key, snapshot = obj.session_uid, self.snapshot(obj, depsgraph)
         if key not in self._regions:
             self._regions[key] = region_bytes(obj)
-        if key not in self._fingerprints or self._fingerprints[key][0] is not snapshot:
-            self._fingerprints[key] = (
-                snapshot,
-                arrays_fingerprint(snapshot.positions, snapshot.corners, self._regions[key]),
-            )
-        return self._fingerprints[key][1]
+        if not snapshot.fingerprint:
+            snapshot.fingerprint = arrays_fingerprint(snapshot.positions, snapshot.corners, self._regions[key])
+        return snapshot.fingerprint
 
 
 def _same_bits(one: np.ndarray, other: np.ndarray) -> bool:

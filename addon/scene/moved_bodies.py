@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+import bpy
 import numpy as np
 from mathutils import Euler, Matrix, Quaternion
 
@@ -69,7 +70,7 @@ def _parent_rotation(obj, depsgraph) -> np.ndarray:
     """Return the rotation of an object's parent in the world, (3, 3) float."""
     if obj.parent is None:
         return np.eye(3)
-    matrix = transforms.as_array(obj.parent.evaluated_get(depsgraph).matrix_world)
+    matrix = world_matrix(obj.parent, depsgraph)
     if transforms.is_singular(matrix):
         raise SceneError(f"The scale of '{obj.parent.name}', parent of driven body '{obj.name}', is zero: give it a scale.")
     return transforms.rotation(transforms.decompose(matrix)[1])
@@ -143,16 +144,11 @@ SAME_MATRIX = 1e-4
 """Largest relative change over time of an attached object's matrix that is put down to rounding."""
 
 
-def body_objects(objects) -> dict:
-    """Return, for each of the participating objects, the object whose body it belongs to.
+def body_object(obj, objects):
+    """Return the object whose body an object belongs to; `objects` are those of the simulation.
 
     An attached object whose parent is not simulated is a body of its own, which its parents move like any other object.
     """
-    return {obj: body_object(obj, set(objects)) for obj in objects}
-
-
-def body_object(obj, objects):
-    """Return the object whose body an object belongs to; `objects` are those of the simulation."""
     while obj.palpate.body == "PARENT" and obj.parent in objects:
         obj = obj.parent
     return obj
@@ -179,7 +175,7 @@ def check_parents(objects, body_objects: dict) -> None:
 
 def matrix_on_body(obj, body_object, depsgraph) -> np.ndarray:
     """Return the matrix from an attached object's coordinates to those of the object whose body it belongs to, (4, 4) float."""
-    above, below = (transforms.as_array(item.evaluated_get(depsgraph).matrix_world) for item in (body_object, obj))
+    above, below = world_matrix(body_object, depsgraph), world_matrix(obj, depsgraph)
     if transforms.is_singular(above) or transforms.is_singular(below):
         raise SceneError(f"The scale of '{body_object.name}' or its part '{obj.name}' is zero: give it a scale.")
     return np.linalg.inv(above) @ below
@@ -232,9 +228,7 @@ def parent_matrix(obj, depsgraph) -> np.ndarray:
     if obj.parent is None:
         return np.eye(4)
     if obj.parent_type == "OBJECT" and obj.parent.type != "CURVE":  # the same bits wherever playing has moved the body
-        return transforms.as_array(obj.parent.evaluated_get(depsgraph).matrix_world) @ transforms.as_array(
-            obj.matrix_parent_inverse
-        )
+        return world_matrix(obj.parent, depsgraph) @ transforms.as_array(obj.matrix_parent_inverse)
     found = obj.evaluated_get(depsgraph)
     return transforms.as_array(found.matrix_world @ found.matrix_basis.inverted())
 
@@ -244,7 +238,7 @@ def start_matrix(obj, depsgraph) -> np.ndarray:
     settings = obj.palpate
     if settings.has_start:
         return np.array(settings.start_matrix, dtype=float).reshape(4, 4)
-    return transforms.as_array(obj.evaluated_get(depsgraph).matrix_world)
+    return world_matrix(obj, depsgraph)
 
 
 @dataclass(frozen=True)
@@ -363,8 +357,6 @@ def keyframe_motion(obj, placement: BodyPlacement, frames: np.ndarray, poses: np
 
 def remove_motion(obj) -> None:
     """Remove the keyframes of a bake and move the body back to its start."""
-    import bpy
-
     found = fcurves.of_object(obj)
     if found is not None:
         fcurves.remove(found, TRANSFORM_PATHS)

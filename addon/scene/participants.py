@@ -7,6 +7,8 @@ Instances of collections never are.
 
 from __future__ import annotations
 
+import bpy
+
 from ...core.errors import SceneError
 
 OBJECT_TYPES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
@@ -15,8 +17,6 @@ OBJECT_TYPES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 
 def view_layer_of(scene):
     """Return the view layer that decides which objects participate: the window's, else the scene's first."""
-    import bpy
-
     context = bpy.context
     return context.view_layer if context.scene == scene and context.view_layer else scene.view_layers[0]
 

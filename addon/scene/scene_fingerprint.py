@@ -6,7 +6,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator
-from functools import cache, lru_cache, partial
+from functools import cache, partial
 from operator import attrgetter
 
 import bpy
@@ -55,20 +55,10 @@ def fingerprint_of_animation(objects) -> str:
                 _feed_curve(digest, curve)
         for track in data.nla_tracks:
             for strip in track.strips:
-                if target is None or target in _strip_paths(strip):
+                curves = fcurves.of_animation_data(strip) or ()
+                if target is None or any(curve.data_path == target for curve in curves):
                     _feed_strip(digest, track, strip)
     return digest.hexdigest()
-
-
-def animated_paths(obj) -> set[str]:
-    """Return the data paths of the properties of an object that keyframes, drivers or NLA strips animate."""
-    data = obj.animation_data
-    strips = () if data is None else (strip for track in data.nla_tracks for strip in track.strips)
-    return fcurves.animated_paths(obj).union(*map(_strip_paths, strips))
-
-
-def _strip_paths(strip) -> set[str]:
-    return {curve.data_path for curve in fcurves.of_animation_data(strip) or ()}
 
 
 def _feed_strip(digest, track, strip) -> None:
@@ -167,12 +157,10 @@ def _feed_curve(digest, curve) -> None:
 
 
 def _driver(driver) -> tuple:
-    variables = [(_values(item), [(_block_name(t.id), _values(t)) for t in item.targets]) for item in driver.variables]
+    variables = [
+        (_values(item), [(t.id.name_full if t.id else "", _values(t)) for t in item.targets]) for item in driver.variables
+    ]
     return driver.type, driver.expression, driver.use_self, variables
-
-
-def _block_name(block) -> str:
-    return "" if block is None else block.name_full
 
 
 def _values(item) -> list[tuple]:
@@ -276,7 +264,8 @@ def _constant_scales(obj) -> str:
 def _constant_drive_target(obj) -> str:
     """Return the target of an object's drive as text; empty without a drive, and where the target is animated."""
     path = moved_bodies.target_path(obj)
-    return "" if path is None or path in animated_paths(obj) else repr((path, obj.path_resolve(path)))
+    is_animated = any(curve.data_path == path for curve in fcurves.curves_of(obj))
+    return "" if path is None or is_animated else repr((path, obj.path_resolve(path)))
 
 
 def _digest(*parts: str) -> str:
@@ -294,11 +283,7 @@ def pack_fingerprints(fingerprints: dict[str, list[str]]) -> str:
     return json.dumps(changes)
 
 
-@lru_cache(maxsize=8)
-def _unpacked(text: str) -> dict[str, list]:
-    return json.loads(text) if text else {}
-
-
 def fingerprints_at(text: str, index: int) -> dict[str, str]:
     """Return the fingerprints in a packed text at a frame, counted from the first, by object name."""
-    return {name: next(one for start, one in reversed(changes) if start <= index) for name, changes in _unpacked(text).items()}
+    packed = stored_names.unpacked(text).items()
+    return {name: next(one for start, one in reversed(changes) if start <= index) for name, changes in packed}

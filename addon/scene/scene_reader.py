@@ -44,7 +44,10 @@ _LENGTHS = ("location", "delta_location", f"palpate.{TARGET_PROPERTIES['POSITION
 def distance_warnings(scenario: Scenario) -> tuple[str, ...]:
     """Return a warning for the body that is so far from the origin that rounding changes forces."""
     skin = _thinnest_skin(scenario)
-    distances = {body.name: _largest_distance(body.motion.positions) for body in scenario.bodies}
+    distances = {}
+    for body in scenario.bodies:
+        blocks = (body.motion.positions[rows] for rows in row_blocks(body.motion.positions))
+        distances[body.name] = max(float(np.linalg.norm(places, axis=1).max()) for places in blocks)
     for target in scenario.targets:
         name = scenario.bodies[target.body].name
         distances[name] += float(np.linalg.norm(target.mesh.vertices, axis=1).max())
@@ -103,10 +106,6 @@ def _thinnest_skin(scenario: Scenario) -> float:
     return min(sensor.parameters.max_penetration for sensor in scenario.sensors)
 
 
-def _largest_distance(positions: np.ndarray) -> float:
-    return max(float(np.linalg.norm(positions[rows], axis=1).max()) for rows in row_blocks(positions))
-
-
 def read_scene(scene) -> Generator[Progress, None, SceneReading]:
     """Read a scene over its whole frame range, frame by frame, and return it to the frame where it stood.
 
@@ -151,7 +150,7 @@ class _StartReader:
         self.objects, self.warnings = participants.find_participants(scene)
         for obj in self.objects:
             identity.ensure_uid(obj)
-        self.body_objects = moved_bodies.body_objects(self.objects)
+        self.body_objects = {obj: moved_bodies.body_object(obj, set(self.objects)) for obj in self.objects}
         moved_bodies.check_parents(self.objects, self.body_objects)
         self.owners = [obj for obj in self.objects if self.body_objects[obj] == obj]
         # By body index: body, mesh in the body's frame, world matrix and stretch of the object.
@@ -172,9 +171,9 @@ class _StartReader:
             self._read_body(index, obj)
         for obj in self.objects:
             self._read_surface(obj)
-        driven = tuple(index for index in self.start_matrices if self.owners[index].palpate.body == "DRIVEN")
-        for index in driven:
-            self._read_drive(index)
+        for index in self.start_matrices:
+            if self.owners[index].palpate.body == "DRIVEN":
+                self._read_drive(index)
         return SceneReading(
             scenario=self._scenario(),
             object_keys=tuple(identity.key(obj) for obj in self.owners),
@@ -186,7 +185,6 @@ class _StartReader:
             parent_matrices={
                 index: [moved_bodies.parent_matrix(self.owners[index], self.depsgraph)] for index in self.start_matrices
             },
-            driven_bodies=driven,
             warnings=tuple(self.warnings),
             attachments=self.attachments,
             surfaces=tuple(self.surfaces),
@@ -307,7 +305,7 @@ class _MotionHistory:
             for i, b in enumerate(bodies)
             if not b.free
         }
-        self._drive_targets = {i: motion_table(bodies[i].drive.target.values[0]) for i in reading.driven_bodies}
+        self._drive_targets = {i: motion_table(b.drive.target.values[0]) for i, b in enumerate(bodies) if b.drive is not None}
         self._shapes = deforming_objects.ShapeHistory(reading.scenario)
 
     def append(self, sample: FrameSample) -> None:
@@ -335,20 +333,23 @@ class _MotionHistory:
 def _read_frames(scene) -> Generator[Progress, None, SceneReading]:
     """Read the first frame, then sample the others."""
     _check_frame_range(scene)
-    _check_modes(participants.find_participants(scene)[0])
+    for obj in participants.find_participants(scene)[0]:
+        if obj.mode == "EDIT":  # what a bake writes on its mesh would be lost when the edit ends
+            raise SceneError(f"'{obj.name}' is in Edit Mode: leave it (Tab) before you bake.")
     samples_per_frame = scene.palpate.subframes
     frames = range(scene.frame_start, scene.frame_end + 1)
     scene.frame_set(frames[0])
     depsgraph = participants.depsgraph_of(scene)
     reading = read_start(scene, depsgraph)
-    watched = _objects_to_fingerprint(scene, reading)
+    deforming = {surface.name for surface in reading.surfaces}  # only these, curves and texts may differ from their own mesh
+    watched = [obj for obj in participants.find_participants(scene)[0] if obj.name in deforming or obj.type != "MESH"]
     reading.record_fingerprints(watched, depsgraph)
     history = _MotionHistory(reading)
     yield Progress("Reading", 1, len(frames), frames[0])
     for frame in frames[1:]:
         for number in range(1, samples_per_frame + 1):
-            whole, part = _sample_time(frame - 1, number, samples_per_frame)
-            scene.frame_set(whole, subframe=part)
+            is_whole = number == samples_per_frame
+            scene.frame_set(frame if is_whole else frame - 1, subframe=0.0 if is_whole else number / samples_per_frame)
             depsgraph = participants.depsgraph_of(scene)
             sample = reading.sample(scene, depsgraph)
             history.append(sample)
@@ -363,17 +364,6 @@ def _read_frames(scene) -> Generator[Progress, None, SceneReading]:
     warnings = _mass_warnings(scenario) + distance_warnings(scenario)
     warnings += keyframe_warnings(participants.find_participants(scene)[0], scenario, reading.metres_per_unit)
     return replace(reading, scenario=scenario, warnings=reading.warnings + warnings)
-
-
-def _sample_time(frame: int, number: int, samples_per_frame: int) -> tuple[int, float]:
-    """Return frame and subframe of the sample with a number, 1 to `samples_per_frame`, after a frame."""
-    return (frame + 1, 0.0) if number == samples_per_frame else (frame, number / samples_per_frame)
-
-
-def _objects_to_fingerprint(scene, reading: SceneReading) -> list:
-    """Return the objects whose evaluated mesh may differ from their own: those that may deform, curves and texts."""
-    deforming = {surface.name for surface in reading.surfaces}
-    return [obj for obj in participants.find_participants(scene)[0] if obj.name in deforming or obj.type != "MESH"]
 
 
 def _mass_warnings(scenario: Scenario) -> tuple[str, ...]:
@@ -392,10 +382,3 @@ def _check_frame_range(scene) -> None:
             f"The frame range of '{scene.name}' runs backwards ({scene.frame_start} to {scene.frame_end}): "
             "set the end frame after the start frame."
         )
-
-
-def _check_modes(objects) -> None:
-    """Refuse meshes that are being edited: what a bake writes on them would be lost when the edit ends."""
-    for obj in objects:
-        if obj.mode == "EDIT":
-            raise SceneError(f"'{obj.name}' is in Edit Mode: leave it (Tab) before you bake.")

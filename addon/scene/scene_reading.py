@@ -33,22 +33,14 @@ class FrameSample:
         By index of a free or driven body: the share of its parents in its world matrix.
     drive_targets : dict of int to float
         By index of a driven body.
-    target_vertices, texel_frames : dict of int to (n, 3) and (n, 9) float
-        By target and sensor index: shapes of those that may deform (:class:`.Deformation`).
+    shapes : dict of (str, int) to (n, 3) or (n, 9) float
+        By ("target" or "sensor", index): shapes of those that may deform (:class:`.Deformation`).
     """
 
     poses: dict[int, Pose]
     parent_matrices: dict[int, np.ndarray]
     drive_targets: dict[int, float]
-    target_vertices: dict[int, np.ndarray]
-    texel_frames: dict[int, np.ndarray]
-
-    @property
-    def shapes(self) -> dict[tuple[str, int], np.ndarray]:
-        """Shapes of targets and sensors, by ("target" or "sensor", index)."""
-        return {("target", i): found for i, found in self.target_vertices.items()} | {
-            ("sensor", i): found for i, found in self.texel_frames.items()
-        }
+    shapes: dict[tuple[str, int], np.ndarray]
 
 
 @dataclass
@@ -69,8 +61,6 @@ class SceneReading:
         World matrices at the first frame of the bodies that forces move, by body index.
     parent_matrices : dict of int to list of (4, 4) float
         By index of such a body: the share of its parents in its world matrix, frame by frame.
-    driven_bodies : tuple of int
-        Indices of driven bodies.
     warnings : tuple of str
     attachments : dict of str to (4, 4) float
         By key of an object that is part of another object's body: its matrix in that object's coordinates.
@@ -88,7 +78,6 @@ class SceneReading:
     stretches: np.ndarray
     start_matrices: dict[int, np.ndarray]
     parent_matrices: dict[int, list[np.ndarray]]
-    driven_bodies: tuple[int, ...]
     warnings: tuple[str, ...]
     attachments: dict[str, np.ndarray]
     surfaces: tuple[DeformingSurface, ...]
@@ -134,7 +123,7 @@ class SceneReading:
             if index in self.start_matrices:
                 matrices[index] = self.start_matrices[index]
                 parents[index] = moved_bodies.parent_matrix(obj, depsgraph)
-                if index not in self.driven_bodies:
+                if self.scenario.bodies[index].drive is None:
                     continue
                 targets[index] = moved_bodies.drive_target(obj, depsgraph)
                 # where its parents alone would have carried it
@@ -144,7 +133,7 @@ class SceneReading:
             poses[index] = self._pose(scene, index, obj, matrix)
         if self.attachments:
             moved_bodies.check_attachments(scene, depsgraph, self.attachments)
-        return FrameSample(poses, parents, targets, *self._shapes(scene, depsgraph, matrices))
+        return FrameSample(poses, parents, targets, self._shapes(scene, depsgraph, matrices))
 
     def record_fingerprints(self, objects, depsgraph) -> None:
         """Append the fingerprints of some evaluated meshes at the present frame, which has been sampled before."""
@@ -170,10 +159,9 @@ class SceneReading:
         self._last_poses[index] = matrix.tobytes(), pose
         return pose
 
-    def _shapes(self, scene, depsgraph, matrices: dict[int, np.ndarray]) -> tuple[dict, dict]:
-        """Return vertices by target index and frames of texels by sensor index, of the surfaces that may deform."""
-        vertices: dict[int, np.ndarray] = {}
-        texels: dict[int, np.ndarray] = {}
+    def _shapes(self, scene, depsgraph, matrices: dict[int, np.ndarray]) -> dict:
+        """Return the shapes of the surfaces that may deform: vertices of targets, and frames of sensors' texels."""
+        found = {}
         self._snapshots.begin_frame()
         objects = identity.find_objects(scene, {surface.key for surface in self.surfaces})
         for surface in self.surfaces:
@@ -181,9 +169,9 @@ class SceneReading:
                 raise _deleted(surface.name)
             linear, offset = self._to_body(surface, matrices[surface.body])
             snapshot = self._snapshots.snapshot(objects[surface.key], depsgraph)
-            found = vertices if surface.follower is None else texels
-            found[surface.index] = surface.shape_at(snapshot, scene.frame_current, linear, offset)
-        return vertices, texels
+            place = "target" if surface.follower is None else "sensor", surface.index
+            found[place] = surface.shape_at(snapshot, scene.frame_current, linear, offset)
+        return found
 
     def _to_body(self, surface: DeformingSurface, matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return (3, 3) and (3,): what takes a surface's vertices to the frame of its body, whose object has a world matrix."""

@@ -152,11 +152,12 @@ def read_sensor(obj, body: int, mesh: TriangleMesh, linear: np.ndarray) -> Senso
     parameters = parameter_properties.sensor_parameters(obj.palpate)
     parameters.check(obj.name)
     is_read_out = obj.palpate.role == "SENSOR"
-    texels = texels_from_region(mesh, sensor_regions.region_vertices(obj, len(mesh.vertices)), obj.name)
+    texels = texels_from_region(mesh, sensor_regions.region_vertices(obj), obj.name)
     texels = _with_stated_normals(obj.data, texels, linear)
     if is_read_out:
         texels = uv_layouts.with_uv_layout(obj, texels)
-    painted = _painted_at(obj, texels.vertex)
+    maps = {key: sensor_regions.painted_multipliers(obj, key) for key in parameter_properties.PAINTED_PARAMETERS}
+    painted = Painted(**{key: None if values is None else values[texels.vertex] for key, values in maps.items()})
     return Sensor(obj.name, body, texels, parameters, readout=is_read_out, painted=painted, effects=effect_stack.stack(obj))
 
 
@@ -170,9 +171,3 @@ def _with_stated_normals(data, texels: Texels, linear: np.ndarray) -> Texels:
     frames = texels.local_frames
     frames[has_one, FRAME_NORMAL] = normal[has_one]
     return texels.with_local_frames(frames)
-
-
-def _painted_at(obj, vertex: np.ndarray) -> Painted:
-    """Return the painted values at the vertices on which texels stand."""
-    maps = {key: sensor_regions.painted_multipliers(obj, key) for key in parameter_properties.PAINTED_PARAMETERS}
-    return Painted(**{key: None if values is None else values[vertex] for key, values in maps.items()})

@@ -11,40 +11,32 @@ from ..session import transforms
 from . import stored_names
 
 
-def region_vertices(obj, count: int) -> np.ndarray:
+def region_vertices(obj) -> np.ndarray:
     """Return which vertices belong to a sensor, (nv,) bool.
-
-    Parameters
-    ----------
-    obj : Object
-    count : int
-        Number of vertices nv.
 
     Raises
     ------
     SensorError
         The vertex group, material or face set of the region does not exist.
     """
+    return vertices_of_region(obj, **region_of(obj))
+
+
+def region_of(obj) -> dict:
+    """Return the region that an object has as a sensor, as arguments of :func:`vertices_of_region`."""
     own = obj.palpate
-    return vertices_of_region(
-        obj,
-        count,
-        region=own.region,
-        vertex_group=own.vertex_group,
-        material=own.material,
-        face_set=own.face_set,
-        threshold=own.threshold,
-    )
+    values = {name: getattr(own, name) for name in ("region", "vertex_group", "material", "face_set")}
+    return {**values, "threshold": transforms.as_typed(own.threshold)}
 
 
 def vertices_of_region(
-    obj, count: int, region: str, vertex_group: str = "", material: str = "", face_set: int = 1, threshold: float = 0.5
+    obj, region: str, vertex_group: str = "", material: str = "", face_set: int = 1, threshold: float = 0.5
 ) -> np.ndarray:
     """Return the vertices of any region on an object, (nv,) bool; parameters are those in its settings, errors as in
     :func:`region_vertices`.
     """
     if region == "MESH":
-        return np.ones(count, dtype=bool)
+        return np.ones(len(obj.data.vertices), dtype=bool)
     if region == "GROUP":
         group = obj.vertex_groups.get(vertex_group)
         if group is None:

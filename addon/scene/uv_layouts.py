@@ -32,8 +32,9 @@ def with_uv_layout(obj, texels: Texels) -> Texels:
     layer = uv_layer(obj)
     texel_of_vertex = np.full(len(obj.data.vertices), -1)
     texel_of_vertex[texels.vertex] = np.arange(len(texels))
-    loops, corner = _triangles(obj.data)
-    triangles = texel_of_vertex[corner[loops]]
+    obj.data.calc_loop_triangles()
+    loops = transforms.values_of(obj.data.loop_triangles, "loops", np.int32, 3).reshape(-1, 3)
+    triangles = texel_of_vertex[mesh_arrays.corner_vertices(obj.data)[loops]]
     inside = (triangles >= 0).all(axis=1)
     uv = transforms.values_of(layer.uv, "vector", width=2)
     triangles, corner_uv = triangles[inside], uv.reshape(-1, 2).astype(float)[loops[inside]]
@@ -86,10 +87,3 @@ def _layout(triangles: bytes, corner_uv: bytes, size: int, name: str, nearest: b
     """Compute a layout, which takes a while; panels ask for the same one repeatedly."""
     corners, uv = np.frombuffer(triangles, int).reshape(-1, 3), np.frombuffer(corner_uv).reshape(-1, 3, 2)
     return mapped_layout(corners, uv, size, map_name=name, nearest=nearest, sensor=sensor)
-
-
-def _triangles(mesh) -> tuple[np.ndarray, np.ndarray]:
-    """Return the (m, 3) corners of the mesh's triangles, and the vertex of each corner."""
-    mesh.calc_loop_triangles()
-    loops = transforms.values_of(mesh.loop_triangles, "loops", np.int32, 3)
-    return loops.reshape(-1, 3), mesh_arrays.corner_vertices(mesh)

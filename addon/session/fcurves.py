@@ -107,6 +107,15 @@ def animated_paths(obj) -> set[str]:
     return paths
 
 
+def curves_of(block) -> list:
+    """Return all F-curves that animate properties of a data-block: those of its action, drivers, and those of NLA strips."""
+    data = block.animation_data
+    if data is None:
+        return []
+    players = [data, *(strip for track in data.nla_tracks for strip in track.strips)]
+    return [*data.drivers, *(curve for player in players for curve in of_animation_data(player) or ())]
+
+
 # The frame of the animation at which a scene stands. Keyframes, images and computed frames are counted in these frames.
 #
 # Blender's Time Stretching (Output › Frame Range) makes the timeline run slower or faster than the animation. It changes how
@@ -116,14 +125,10 @@ WHOLE_FRAME_TOLERANCE = 1e-4
 """A time that is nearer than this many frames to a whole frame counts as that frame."""
 
 
-def frames_per_timeline_frame(scene) -> float:
-    """Return how many frames of the animation pass in one frame of the timeline."""
-    return scene.render.frame_map_old / scene.render.frame_map_new
-
-
 def current_frame(scene) -> tuple[int, float]:
     """Return the last whole frame of the animation that a scene has reached, and the part of the next one, 0 to 1."""
-    time = (scene.frame_current + scene.frame_subframe) * frames_per_timeline_frame(scene)
+    passing = scene.render.frame_map_old / scene.render.frame_map_new  # frames of the animation in one of the timeline
+    time = (scene.frame_current + scene.frame_subframe) * passing
     number = math.floor(time + WHOLE_FRAME_TOLERANCE)
     part = time - number
     return number, part if part > WHOLE_FRAME_TOLERANCE else 0.0

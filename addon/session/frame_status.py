@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ...core.model.recording import Frame
+from . import session_state
 
 
 @dataclass(frozen=True)
@@ -43,11 +44,6 @@ def set_status(scene, text: str, frame: Frame | None = None, step: str = "", war
     _statuses[scene.session_uid] = FrameStatus(text, frame, step, warnings)
 
 
-def forget(scene) -> None:
-    """Forget the status of one scene."""
-    _statuses.pop(scene.session_uid, None)
-
-
-def forget_all() -> None:
-    """Forget the status of every scene."""
-    _statuses.clear()
+def forget(scene=None) -> None:
+    """Forget the status of a scene, or of every scene."""
+    session_state.forget(_statuses, scene)

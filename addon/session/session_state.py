@@ -16,17 +16,14 @@ class Session:
 
     file_examined: bool = False
     """True once the objects of the open file were examined, also when the file was open before the add-on was enabled."""
-    participants_known: bool = False
-    """False when an object may have got or lost a role since `has_roles` was filled."""
     changed_geometry: set[str] = field(default_factory=set)
     """Names of objects whose geometry Blender reported as changed, and that were not compared since."""
     geometry_version: int = 0
     """Number of geometry changes of any object; reports on sensors are outdated when it grows."""
     changed_motion: set[str] = field(default_factory=set)
     """Names of objects that the user, a script or an edited animation moved since a live run started."""
-    has_roles: dict[int, bool] = field(default_factory=dict)
-    object_counts: dict[int, int] = field(default_factory=dict)
-    """By scene: whether any object participates, and the number of objects when this was found out."""
+    has_roles: dict[int, tuple[int, bool]] = field(default_factory=dict)
+    """By scene: the number of its objects, and whether any of them participates. Empty when a role may have changed since."""
     suspension_depth: int = 0
     """Above zero while a bake or another reader of the scene runs: the timeline must not simulate then."""
     rendering: bool = False
@@ -59,7 +56,7 @@ def settings_changed(_settings=None, _context=None) -> None:
 
 def participants_changed() -> None:
     """Note that an object may have got or lost its role."""
-    session.participants_known = False
+    session.has_roles.clear()
 
 
 @contextmanager
@@ -71,6 +68,14 @@ def suspended() -> Iterator[None]:
     finally:
         # It is already zero when another file was opened meanwhile.
         session.suspension_depth = max(0, session.suspension_depth - 1)
+
+
+def forget(states: dict, scene=None) -> None:
+    """Forget a state by the numbers of scenes (`session_uid`): that of one scene, or of all."""
+    if scene is None:
+        states.clear()
+    else:
+        states.pop(scene.session_uid, None)
 
 
 def reset() -> None:

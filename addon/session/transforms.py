@@ -102,11 +102,6 @@ def is_singular(matrix: np.ndarray) -> bool:
     return not size[2] > 1e-6 * size[0]
 
 
-def quaternion(rotation: np.ndarray) -> np.ndarray:
-    """(4,) unit quaternion with w ≥ 0 of a (3, 3) rotation matrix."""
-    return np.array(_quaternion(rotation.tolist()))
-
-
 def _quaternion(rotation) -> list[float]:
     (a, b, c), (d, e, f), (g, h, i) = rotation
     # The rows of 4 q qᵀ, each parallel to q; the longest loses the fewest digits.

@@ -176,15 +176,8 @@ def _bounds(low: float, high: float) -> tuple[float | None, float | None]:
 
 def _refuse_animated(found: Found) -> None:
     """Raise ParameterError for a property that keyframes or a driver would set again at the next frame."""
-    block = found.owner.id_data
-    data = block.animation_data
-    if data is None:
-        return
-    strips = [strip for track in data.nla_tracks for strip in track.strips]
-    curves = [*(fcurves.of_animation_data(data) or ()), *data.drivers]
-    curves += [curve for strip in strips for curve in fcurves.of_animation_data(strip) or ()]
     path = found.data_path
-    for curve in curves:
+    for curve in fcurves.curves_of(found.owner.id_data):
         if curve.data_path == path and (found.index is None or curve.array_index == found.index):
             raise ParameterError(
                 f"'{found.path}' has keyframes or a driver, which would set it again at the next frame: delete them, or vary "

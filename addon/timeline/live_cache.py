@@ -43,6 +43,10 @@ class LiveRun:
         What was computed.
     samples : dict of int to FrameSample
         What was read of the scene at those frames.
+    loads : dict of int to dict of str to float, N
+        Sum of the normal forces at those frames, by sensor.
+    largest_net_force : float, N
+        On a sensor in those frames; a billionth without any contact.
     placed_channels : dict of int to (14,) float
         Channels that bodies were last given, by body index.
     """
@@ -54,30 +58,22 @@ class LiveRun:
     mesh_fingerprints: dict[str, str]
     frames: dict[int, Frame] = field(default_factory=dict)
     samples: dict[int, scene_reading.FrameSample] = field(default_factory=dict)
+    loads: dict[int, dict[str, float]] = field(default_factory=dict)
+    largest_net_force: float = 1e-9
     placed_channels: dict[int, np.ndarray] = field(default_factory=dict)
-    _total_forces: dict[int, dict[str, float]] = field(default_factory=dict)
     _extents: dict[str, tuple[int, Extent]] = field(default_factory=dict)
-    _largest_net: tuple[int, float] = (0, 1e-9)
 
     @property
     def scenario(self) -> Scenario:
         """The scenario that is simulated."""
         return self.reading.scenario
 
-    def total_forces(self, number: int) -> dict[str, float]:
-        """Return the sum of the normal forces at a computed frame, by sensor, N."""
-        if number not in self._total_forces:
-            sensors = self.frames[number].sensors
-            self._total_forces[number] = {name: float(readings.normal_force.sum()) for name, readings in sensors.items()}
-        return self._total_forces[number]
-
-    def largest_net_force(self) -> float:
-        """Return the largest net force on a sensor in the frames that were computed, N; a billionth without any contact."""
-        done, known = self._largest_net
-        frames = list(self.frames.values())
-        new = (float(np.linalg.norm(own.net_force)) for frame in frames[done:] for own in frame.sensors.values())
-        self._largest_net = len(frames), max((known, *new))
-        return self._largest_net[1]
+    def add(self, number: int, frame: Frame) -> None:
+        """Add a frame that was computed."""
+        self.frames[number] = frame
+        self.loads[number] = {name: float(readings.normal_force.sum()) for name, readings in frame.sensors.items()}
+        forces = (float(np.linalg.norm(readings.net_force)) for readings in frame.sensors.values())
+        self.largest_net_force = max((self.largest_net_force, *forces))
 
     def extent(self, quantity: Quantity) -> Extent:
         """Return the extent of a quantity in the frames that were computed."""
@@ -98,14 +94,9 @@ def get(scene) -> LiveRun | None:
     return _runs.get(scene.session_uid)
 
 
-def drop(scene) -> None:
-    """Forget the run of a scene."""
-    _runs.pop(scene.session_uid, None)
-
-
-def drop_all() -> None:
-    """Forget all runs."""
-    _runs.clear()
+def drop(scene=None) -> None:
+    """Forget the run of a scene, or all runs."""
+    session_state.forget(_runs, scene)
 
 
 def start(scene, depsgraph) -> LiveRun | None:
@@ -133,7 +124,7 @@ def start(scene, depsgraph) -> LiveRun | None:
         mesh_fingerprints={obj.name: mesh_arrays.evaluated_fingerprint(obj, depsgraph) for obj in everyone},
     )
     first = reading.scenario.frame_start
-    run.frames[first] = run.simulation.observe()
+    run.add(first, run.simulation.observe())
     run.samples[first] = reading.sample(scene, depsgraph)
     session_state.session.changed_geometry.difference_update(run.mesh_fingerprints)
     session_state.session.changed_motion.clear()
@@ -145,26 +136,23 @@ def advance(scene, depsgraph, run: LiveRun) -> LiveRun:
     """Compute the frame at which the scene stands, which must be the frame after the last computed one."""
     frame, _ = fcurves.current_frame(scene)
     sample = run.samples[frame] = run.reading.sample(scene, depsgraph)
-    if scene.palpate.subframes > 1:
-        _sample_between_frames(scene, run, frame)
+    if (parts := scene.palpate.subframes) > 1:  # read the scene between the last frame and this one, as a bake does
+        with at_other_frames(scene):
+            for part in range(1, parts):
+                scene.frame_set(frame - 1, subframe=part / parts)
+                between = run.reading.sample(scene, participants.depsgraph_of(scene))
+                _extend(run, between, share=part / parts)
     _extend(run, sample)
-    run.frames[frame] = run.simulation.advance()
+    run.add(frame, run.simulation.advance())
     return run
 
 
 def _extend(run: LiveRun, sample: scene_reading.FrameSample, **share) -> None:
     """Tell the simulation how animation goes on, up to the next frame or to a `share` of the way to it."""
-    run.simulation.extend(sample.poses, sample.drive_targets, sample.target_vertices, sample.texel_frames, **share)
-
-
-def _sample_between_frames(scene, run: LiveRun, frame: int) -> None:
-    """Read the scene between the last frame and this one, as a bake does."""
-    parts = scene.palpate.subframes
-    with at_other_frames(scene):
-        for part in range(1, parts):
-            scene.frame_set(frame - 1, subframe=part / parts)
-            sample = run.reading.sample(scene, participants.depsgraph_of(scene))
-            _extend(run, sample, share=part / parts)
+    shapes: dict[str, dict] = {"target": {}, "sensor": {}}
+    for (kind, index), found in sample.shapes.items():
+        shapes[kind][index] = found
+    run.simulation.extend(sample.poses, sample.drive_targets, shapes["target"], shapes["sensor"], **share)
 
 
 @contextmanager

@@ -25,9 +25,9 @@ _waiting: set[int] = set()
 
 def forget() -> None:
     """Forget everything, because another file is open or undo has changed it."""
-    live_cache.drop_all()
+    live_cache.drop()
     overlays.clear()
-    frame_status.forget_all()
+    frame_status.forget()
     _errors.clear()
     _waiting.clear()
     baked_frames.forget()
@@ -36,14 +36,10 @@ def forget() -> None:
 
 def has_participants(scene) -> bool:
     """Return True when any object has a role; looked up again only when a role may have changed."""
-    session, key = session_state.session, scene.session_uid
-    if not session.participants_known or session.object_counts.get(key) != len(scene.objects):
-        if not session.participants_known:
-            session.has_roles.clear()
-        session.has_roles[key] = any(obj.palpate.role != "NONE" for obj in scene.objects)
-        session.object_counts[key] = len(scene.objects)
-        session.participants_known = True
-    return session.has_roles.get(key, True)
+    known, count = session_state.session.has_roles, len(scene.objects)
+    if known.get(scene.session_uid, (None,))[0] != count:
+        known[scene.session_uid] = count, any(obj.palpate.role != "NONE" for obj in scene.objects)
+    return known[scene.session_uid][1]
 
 
 def on_frame(scene, depsgraph) -> None:
@@ -87,7 +83,9 @@ def _note_missing(scene) -> None:
 
 def _updated_run(scene, depsgraph, run, frame: int):
     """Return the run of a scene after its arrival at a frame: started, advanced, as it was, or None if it was dropped."""
-    if run is not None and (live_cache.is_stale(scene, depsgraph, run) or _has_moved(scene, depsgraph, run)):
+    if run is not None and (
+        live_cache.is_stale(scene, depsgraph, run) or frame in run.frames and live_cache.has_moved(scene, depsgraph, run)
+    ):
         live_cache.drop(scene)
         run = None
     if run is None and frame == scene.frame_start:
@@ -130,10 +128,10 @@ def solver_is_ready() -> None:
 def _not_computed(scene, run) -> str:
     """Return why the present frame cannot be shown, and what to do."""
     frame, _ = fcurves.current_frame(scene)
-    if run is not None:
-        return f"Frame {frame} is not computed: play from frame {run.simulation.frame}, or use Compute to Here."
-    reason = _errors.get(scene.session_uid)
-    return reason or f"Frame {frame} is not computed: play from the first frame, or use Compute to Here."
+    if run is None and scene.session_uid in _errors:
+        return _errors[scene.session_uid]
+    start = "the first frame" if run is None else f"frame {run.simulation.frame}"
+    return f"Frame {frame} is not computed: play from {start}, or use Compute to Here."
 
 
 def missing_frames(scene) -> range:
@@ -216,11 +214,6 @@ def _renders_beside_window(scene) -> bool:
     return session_state.session.rendering and not bpy.app.background and not scene.render.use_lock_interface
 
 
-def _has_moved(scene, depsgraph, run) -> bool:
-    """Return True when animation differs from that with which the present frame was computed."""
-    return fcurves.current_frame(scene)[0] in run.frames and live_cache.has_moved(scene, depsgraph, run)
-
-
 def _start(scene, depsgraph):
     run = _attempt(scene, lambda: live_cache.start(scene, depsgraph))
     if run is None and scene.session_uid not in _errors:
@@ -252,8 +245,10 @@ def show(scene, run) -> None:
             _place(run, objects[index], placement, index, number, part)
         run.placed_channels[index] = object_properties.transform_channels(objects[index])
     for sensor, obj in zip(run.scenario.sensors, run.reading.sensor_objects(scene), strict=True):
-        if sensor.readout and obj is not None:
-            _write_force(obj, sensor.texels.vertex, frame.sensors[sensor.name].normal_force)
+        if sensor.readout and obj is not None and obj.mode != "EDIT" and obj.data.is_editable:
+            force = frame.sensors[sensor.name].normal_force  # for the live heat map, at the vertices of the texels
+            mesh_arrays.store(obj.data, stored_names.FORCE, force, sensor.texels.vertex, "FLOAT")
+            obj.data.update_tag()
     overlays.show(scene, run, frame)
     warnings = run.reading.warnings + tuple(run.simulation.warnings)
     frame_status.set_status(scene, f"Frame {number} computed.", frame, run.simulation.step_reason, " ".join(warnings))
@@ -270,15 +265,6 @@ def _place(run, obj, placement, index: int, number: int, part: float) -> None:
     if part and number + 1 in run.frames:
         here = here + part * (channels(number + 1, here) - here)
     placement.move(obj, here)
-
-
-def _write_force(obj, vertex: np.ndarray, force: np.ndarray) -> None:
-    """Write the normal forces of texels to the attribute that the live heat map shows, at the vertices on which they stand."""
-    mesh = obj.data
-    if obj.mode == "EDIT" or not mesh.is_editable:
-        return
-    mesh_arrays.store(mesh, stored_names.FORCE, force, vertex, "FLOAT")
-    mesh.update_tag()
 
 
 def show_new_bake(scene, recording, folders) -> None:

@@ -109,18 +109,18 @@ def test_a_material_or_face_set_becomes_the_region(source):
     pad.data.polygons.active = int(np.argmax([face.center.x > 0.01 for face in pad.data.polygons]))
     assert bpy.ops.palpate.sensor_add(source=source) == {"FINISHED"}
     assert pad.palpate.region == source
-    assert (sensor_regions.region_vertices(pad, len(right)) == right).all()
+    assert (sensor_regions.region_vertices(pad) == right).all()
     assert 0 < right.sum() < len(right)
     if source == "FACE_SET":
         assert bpy.ops.palpate.face_set_choose(face_set="1") == {"FINISHED"}
         assert pad.palpate.face_set == 1
         pad.palpate.face_set = 7
         with pytest.raises(SensorError, match="no face set 7: choose one of 1, 2"):
-            sensor_regions.region_vertices(pad, len(right))
+            sensor_regions.region_vertices(pad)
     else:
         pad.palpate.material = "Gone"
         with pytest.raises(SensorError, match="has no material 'Gone'"):
-            sensor_regions.region_vertices(pad, len(right))
+            sensor_regions.region_vertices(pad)
 
 
 def test_a_region_by_material_survives_its_own_heat_map(tmp_path):
@@ -130,7 +130,7 @@ def test_a_region_by_material_survives_its_own_heat_map(tmp_path):
     save(tmp_path)
     for _ in range(2):
         baked(scene)
-        assert (sensor_regions.region_vertices(pad, len(right)) == right).all()
+        assert (sensor_regions.region_vertices(pad) == right).all()
 
 
 def test_a_changed_region_or_painted_map_is_noticed():

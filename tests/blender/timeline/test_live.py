@@ -188,7 +188,7 @@ def test_play_from_the_first_frame_starts_with_the_second():
     scene.palpate.use_live = False
     scene.frame_set(1)
     scene.palpate.use_live = True
-    live_cache.drop_all()
+    live_cache.drop()
     play(scene, 2, 3)
     assert sorted(live_cache.get(scene).frames) == [1, 2, 3]
 
@@ -208,7 +208,7 @@ def test_a_pose_that_is_not_keyframed_reaches_no_later_frame(is_known):
     play(scene, *range(1, 9), 1)
     expected = forces_of(live_cache.get(scene))
     if not is_known:
-        live_cache.drop_all()
+        live_cache.drop()
     target.location.z = 0.005
     bpy.context.view_layer.update()
     play(scene, *range(2, 9))

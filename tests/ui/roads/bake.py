@@ -136,7 +136,7 @@ def change(ui):
 
 def open_again(ui):
     """The file shows its bake when it is opened, under a new name, too."""
-    palpate("addon.session.frame_status").forget_all()
+    palpate("addon.session.frame_status").forget()
     bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
     frame = bpy.context.scene.frame_current
     yield from ui.becomes(says(f"Frame {frame} of the bake."), "a baked file that is opened shows its numbers at once")
