@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 
 from .other import Maker
@@ -18,6 +16,11 @@ def _between(rng, low: float, high: float) -> float:
 def _either(*makers: Maker) -> Maker:
     """One of several forms."""
     return lambda rng, strength: makers[rng.integers(len(makers))](rng, strength)
+
+
+def _forms(maker, *forms: tuple) -> Maker:
+    """One of several forms of one maker, by its first arguments."""
+    return lambda rng, strength: maker(*forms[rng.integers(len(forms))], rng, strength)
 
 
 def _over_depth(name: str, form: str, strength: float, factor, values: dict) -> Hidden:
@@ -339,23 +342,21 @@ OWN: dict[str, Maker] = {
     "hysteresis": _either(duhem, maxwell_slip),
     "creep": _either(relaxing, logarithmic),
     "adhesion": _either(unloading, steady_pull),
-    "wear": _either(
-        partial(_worn, lambda a: np.exp(-a), "exponential"), partial(_worn, lambda a: np.maximum(1 - a, 0.0), "linear")
-    ),
-    "load-spreading": _either(
-        partial(_spread, "gaussian", "width", lambda r: np.exp(-0.5 * r * r)),
-        partial(_spread, "half-space", "thickness", lambda r: (1 + r * r) ** -2.5),
+    "wear": _forms(_worn, (lambda a: np.exp(-a), "exponential"), (lambda a: np.maximum(1 - a, 0.0), "linear")),
+    "load-spreading": _forms(
+        _spread,
+        ("gaussian", "width", lambda r: np.exp(-0.5 * r * r)),
+        ("half-space", "thickness", lambda r: (1 + r * r) ** -2.5),
     ),
     "crosstalk": _either(neighbours, lines),
     "gain-mismatch": _either(listed_gains, gradient),
     "dead-texels": silent,
-    "dead-zone": _either(
-        partial(_blunt, lambda f, t: np.maximum(f - t, 0.0), "hard"), partial(_blunt, lambda f, t: f * f / (f + t), "soft")
-    ),
-    "saturation": _either(
-        partial(_full, lambda x: np.clip(x, -1, 1), "clip"),
-        partial(_full, np.tanh, "tanh"),
-        partial(_full, lambda x: x / (1 + np.abs(x)), "rational"),
+    "dead-zone": _forms(_blunt, (lambda f, t: np.maximum(f - t, 0.0), "hard"), (lambda f, t: f * f / (f + t), "soft")),
+    "saturation": _forms(
+        _full,
+        (lambda x: np.clip(x, -1, 1), "clip"),
+        (np.tanh, "tanh"),
+        (lambda x: x / (1 + np.abs(x)), "rational"),
     ),
     "lag": _either(first_order, dead_time),
     "drift": _either(steady_drift, warm_up),
@@ -363,9 +364,7 @@ OWN: dict[str, Maker] = {
     "quantization": steps,
     "noise": proportional,
     "misalignment": shift,
-    "stribeck": _either(
-        partial(_slippery, lambda x: np.exp(-x * x), "gaussian"), partial(_slippery, lambda x: np.exp(-x), "exponential")
-    ),
+    "stribeck": _forms(_slippery, (lambda x: np.exp(-x * x), "gaussian"), (lambda x: np.exp(-x), "exponential")),
     "viscous-friction": _either(viscous, viscous_load),
 }
 
