@@ -242,8 +242,7 @@ def read_sensor(path: str | os.PathLike[str], name: str | None = None) -> Sensor
     from ..core.simulators.probe_list import is_probe_list, read_probe_list
 
     if is_probe_list(path):
-        item = read_probe_list(path)
-        return Sensor(item.sensor, item.mesh, item.surface, item.position, item.quaternion)
+        return _own(read_probe_list(path))
     from ..core.simulators.sensor_format import import_sensors
 
     sensors = import_sensors(path)[1]
@@ -251,8 +250,7 @@ def read_sensor(path: str | os.PathLike[str], name: str | None = None) -> Sensor
     if len(chosen) != 1 or chosen[0].position is None:
         known = ", ".join(repr(one.name) for one in sensors)
         raise FileError(f"'{path}' has the sensors {known}: give the name of one that has texels.")
-    item = chosen[0].on_mesh()
-    return Sensor(item.sensor, item.mesh, item.surface, item.position, item.quaternion)
+    return _own(chosen[0].on_mesh())
 
 
 def sensors_from_blend(
@@ -282,7 +280,11 @@ def sensors_from_blend(
     from ..core.simulators.baked_sensors import baked_sensors
 
     found = baked_sensors(blend, names or None, folder)
-    return {item.name: Sensor(item.sensor, item.mesh, item.surface, item.position, item.quaternion) for item in found}
+    return {item.name: _own(item) for item in found}
+
+
+def _own(item: SensorOnMesh) -> Sensor:
+    return Sensor(item.sensor, item.mesh, item.surface, item.position, item.quaternion)
 
 
 def _sensor_of_toml(path: FilePath) -> Sensor:

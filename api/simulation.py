@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -76,8 +76,8 @@ def simulate(
         items = arguments.as_list(sensors, Sensor, "sensors", "a Sensor")
         pressing = arguments.as_list(bodies, Body, "bodies", "a Body")
         pressing += [body for body in dict.fromkeys(item.body for item in items if item.body) if body not in pressing]
-        parts = _Parts(items, pressing, _paths(items, pressing, motion))
-        scenario, warnings = parts.scenario(arguments.number(fps, "fps", above_zero=True), duration)
+        paths, rate = _paths(items, pressing, motion), arguments.number(fps, "fps", above_zero=True)
+        scenario, warnings = _scenario(items, pressing, paths, rate, duration)
         step = None if dt is None else arguments.number(dt, "dt", above_zero=True)
         scenario = replace(scenario, gravity=arguments.numbers(gravity, (3,), "gravity"), dt=step)
     prepare_solver()
@@ -116,49 +116,42 @@ def _paths(
     return {name: path_of(motion[name], f"motion of '{name}'", turn) for name, turn in turns if name in motion}
 
 
-@dataclass(frozen=True)
-class _Parts:
-    """Sensors, all bodies that press on them or carry them, and paths that move some of them, by name."""
+def _scenario(
+    sensors: Sequence[Sensor], bodies: Sequence[Body], paths: Mapping[str, Path], fps: float, duration: float | None
+) -> tuple[Scenario, list[str]]:
+    """Return the scenario of sensors and of all bodies that press on them or carry them, and warnings about meshes."""
+    for items, argument in ((sensors, "sensors"), (bodies, "bodies")):
+        if not items:
+            raise ArgumentError(f"{argument} is empty: give one at least.")
+    names = [sensor.name for sensor in sensors]
+    for name in names:
+        if names.count(name) > 1:
+            raise ArgumentError(f"sensors has two that are called '{name}': give each a name of its own, as name=\"left\".")
+    found, warnings = _model_bodies(bodies, paths, fps)
+    targets = tuple(Target(one.name, i, own.mesh, smooth=own.smooth) for i, (one, own) in enumerate(zip(found, bodies)))
+    placed = []
+    for sensor in sensors:
+        placed.append(sensor.of_model(len(found) if sensor.body is None else bodies.index(sensor.body)))
+        if sensor.body is None:
+            path = paths.get(sensor.name) or Path(None, sensor.position[None], sensor.quaternion[None])
+            found.append(model.Body(sensor.name, path.motion(fps)))
+    last = max(float(body.motion.times[-1]) for body in found)
+    if duration is None and last == 0.0:
+        raise ArgumentError("duration is missing, and nothing moves along a path that would say it: give seconds.")
+    frames = round(fps * (last if duration is None else arguments.number(duration, "duration", above_zero=True)))
+    if not 1 <= frames <= MOST_FRAMES:
+        raise ArgumentError(f"duration makes {frames} frames at {fps:g} fps: give seconds for 1 to {MOST_FRAMES:,} frames.")
+    return Scenario(tuple(found), tuple(placed), targets, 0, frames, fps, name="simulate"), warnings
 
-    sensors: Sequence[Sensor]
-    bodies: Sequence[Body]
-    paths: Mapping[str, Path]
 
-    def scenario(self, fps: float, duration: float | None) -> tuple[Scenario, list[str]]:
-        """Return the scenario, and warnings about meshes."""
-        for items, argument in ((self.sensors, "sensors"), (self.bodies, "bodies")):
-            if not items:
-                raise ArgumentError(f"{argument} is empty: give one at least.")
-        names = [sensor.name for sensor in self.sensors]
-        for name in names:
-            if names.count(name) > 1:
-                raise ArgumentError(f"sensors has two that are called '{name}': give each a name of its own, as name=\"left\".")
-        found, warnings = self._bodies(fps)
-        targets = tuple(
-            Target(one.name, i, own.mesh, smooth=own.smooth) for i, (one, own) in enumerate(zip(found, self.bodies))
-        )
-        placed = []
-        for sensor in self.sensors:
-            placed.append(sensor.of_model(len(found) if sensor.body is None else self.bodies.index(sensor.body)))
-            if sensor.body is None:
-                path = self.paths.get(sensor.name) or Path(None, sensor.position[None], sensor.quaternion[None])
-                found.append(model.Body(sensor.name, path.motion(fps)))
-        last = max(float(body.motion.times[-1]) for body in found)
-        if duration is None and last == 0.0:
-            raise ArgumentError("duration is missing, and nothing moves along a path that would say it: give seconds.")
-        frames = round(fps * (last if duration is None else arguments.number(duration, "duration", above_zero=True)))
-        if not 1 <= frames <= MOST_FRAMES:
-            raise ArgumentError(f"duration makes {frames} frames at {fps:g} fps: give seconds for 1 to {MOST_FRAMES:,} frames.")
-        return Scenario(tuple(found), tuple(placed), targets, 0, frames, fps, name="simulate"), warnings
-
-    def _bodies(self, fps: float) -> tuple[list[model.Body], list[str]]:
-        """Return the bodies as core has them, equal names with a number behind them, and warnings about their meshes."""
-        found: list[model.Body] = []
-        warnings: list[str] = []
-        for i, body in enumerate(self.bodies):
-            moved = body.moved(self.paths[body.name]) if body.name in self.paths else body
-            made, notes = moved.of_model(fps)
-            same = sum(one.name == body.name for one in self.bodies[:i])
-            found.append(replace(made, name=f"{body.name} {same + 1}") if same else made)
-            warnings += notes
-        return found, warnings
+def _model_bodies(bodies: Sequence[Body], paths: Mapping[str, Path], fps: float) -> tuple[list[model.Body], list[str]]:
+    """Return bodies as core has them, equal names with a number behind them, and warnings about their meshes."""
+    found: list[model.Body] = []
+    warnings: list[str] = []
+    for i, body in enumerate(bodies):
+        moved = body.moved(paths[body.name]) if body.name in paths else body
+        made, notes = moved.of_model(fps)
+        same = sum(one.name == body.name for one in bodies[:i])
+        found.append(replace(made, name=f"{body.name} {same + 1}") if same else made)
+        warnings += notes
+    return found, warnings

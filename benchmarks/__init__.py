@@ -8,3 +8,9 @@ from pathlib import Path
 _TESTS = str(Path(__file__).resolve().parents[1] / "tests")
 if _TESTS not in sys.path:
     sys.path.append(_TESTS)
+
+
+def beside(name: str, value: float, unit: str, peer: str, peer_value: float, goal: float | None = None) -> dict:
+    """Return the figure of what was measured in turn with a peer; the goal is one of their ratio."""
+    figure = {"name": name, "value": value, "unit": unit, "peer": peer, "peer_value": peer_value, "ratio": value / peer_value}
+    return figure | ({} if goal is None else {"goal": goal})

@@ -9,7 +9,6 @@ channels share (:mod:`._handmade`).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,7 @@ from palpate.core.gap.dataset.column_names import GRAVITY
 from palpate.core.gap.dataset.second_logger import interpolated
 
 from ._handmade import HandmadeModel, low_pass
-from ._recordings import Columns, Recording, adhesive, brake, foam, insole, sheet, thinned, tube, tube_by_place
+from ._recordings import Columns, Recording, adhesive, brake, foam, insole, of_spring, sheet, thinned, tube, tube_by_place
 
 RUNS = (("20250401_014340_probe", "fit"), ("20250401_015037_probe", "check"))
 """Of eFlesh's normal force: whole runs."""
@@ -39,29 +38,6 @@ DAMPER_STEP = 2e-3
 """Seconds between samples of the damper: what its displacements and speeds agree on."""
 TONGS_THINNED = {"train": 20, "test": 3}
 """Of how many samples of the tongs one is taken; they are in random order."""
-
-
-@dataclass(frozen=True)
-class ForeignSet:
-    """One set.
-
-    Attributes
-    ----------
-    kind : str
-        Of sensor.
-    licence : str
-    split : str
-        What is fitted, and what is checked.
-    read : function
-        From the folder of all data to a recording.
-    by_hand : HandmadeModel
-    """
-
-    kind: str
-    licence: str
-    split: str
-    read: Callable[[Path], Recording]
-    by_hand: HandmadeModel
 
 
 def _eflesh(folder: Path) -> Columns:
@@ -114,8 +90,7 @@ def tape(data: Path) -> Recording:
             columns = {"time": even - even[0], "depth": depth, "texel_0": np.interp(even, time, stress[first])}
             trials.append((f"stretch_{largest}_rate_{rate}", use, columns))
     stiff = max(float(c["texel_0"].max() / c["depth"].max()) for _, _, c in trials)
-    words = f"grid = {{ rows = 1, columns = 1, pitch = 0.01 }}\nk = {stiff:.4g}\ncn = 0.0\nmax_penetration = 0.1"
-    return Recording("acrylic tape in tension", words, trials)
+    return of_spring("acrylic tape in tension", stiff, trials)
 
 
 def foam_shear(data: Path) -> Recording:
@@ -131,8 +106,7 @@ def foam_shear(data: Path) -> Recording:
         even = np.linspace(0.0, depth[-1], TAPE_SAMPLES)
         scaled = np.interp(even, depth, force) * slopes["leap"] / slopes[name]
         trials.append((name, use, {"time": even / 1e-4, "depth": even, "texel_0": scaled}))
-    words = f"grid = {{ rows = 1, columns = 1, pitch = 0.01 }}\nk = {slopes['leap']:.4g}\ncn = 0.0\nmax_penetration = 0.1"
-    return Recording("shoe foam in shear", words, trials)
+    return of_spring("shoe foam in shear", slopes["leap"], trials)
 
 
 def oscillator(data: Path) -> Recording:
@@ -179,59 +153,64 @@ def tongs(data: Path) -> Recording:
     return Recording("soft robotic tongs", 'grid = { rows = 1, columns = 15, pitch = 0.01 }\nunit = "mm"', trials)
 
 
-def _cubic(p, c, channel):
+def _cubic(p, c):
     """A cubic of the force, and what is there without one."""
     force = c["force"] / 5e2
     return [np.ones_like(force), force, force**2, force**3]
 
 
-def _insole(p, c, channel):
+def _insole(p, c):
     """A gain that falls with the pressure, and what is there without one."""
     force = c["force"] / 2.5e3
     return [np.ones_like(force), force, force**2]
 
 
-def _tube(p, c, channel):
+def _tube(p, c):
     """The force behind one low pass, and what is there without one."""
     return [np.ones_like(c["force"]), low_pass(c["time"], c["force"], p[0])]
 
 
-def _adhesive(p, c, channel):
+def _adhesive(p, c):
     """A spring and two Maxwell branches."""
     strain = c["depth"] * 1e3
     return [strain, *(strain - low_pass(c["time"], strain, tau) for tau in p)]
 
 
-def _foam(p, c, channel):
+def _foam(p, c):
     """A spring, and a densification that goes with a power of the strain."""
     strain = c["depth"] * 1e2
     return [strain, strain ** p[0]]
 
 
-def _tape(p, c, channel):
+def _tape(p, c):
     """A neo-Hookean strip and two Maxwell branches."""
     stretch = 1.0 + c["depth"] * 1e3
     stress = stretch - stretch**-2.0
     return [stress, *(stress - low_pass(c["time"], stress, tau) for tau in p)]
 
 
-def _foam_shear(p, c, channel):
+def _foam_shear(p, c):
     """A spring, and a cubic part."""
     strain = c["depth"] * 1e2
     return [strain, strain**3]
 
 
-def _brake(p, c, channel):
-    """Dahl's bristles, and viscous friction."""
-    travel = c["slide_x"]
+def _bristles(travel, length):
+    """Return the deflection of Dahl's bristles along a travel."""
     bristle = np.zeros_like(travel)
     for t in range(1, len(travel)):
         step = travel[t] - travel[t - 1]
-        bristle[t] = (bristle[t - 1] + step) / (1.0 + abs(step) / (1e-3 * p[0]))
-    return [np.ones_like(travel), bristle, np.gradient(travel, c["time"])]
+        bristle[t] = (bristle[t - 1] + step) / (1.0 + abs(step) / length)
+    return bristle
 
 
-def _oscillator(p, c, channel):
+def _brake(p, c):
+    """Dahl's bristles, and viscous friction."""
+    travel = c["slide_x"]
+    return [np.ones_like(travel), _bristles(travel, 1e-3 * p[0]), np.gradient(travel, c["time"])]
+
+
+def _oscillator(p, c):
     """Duffing's oscillator: a mass on a spring and a damper, with a force that goes with the cube of its place."""
     steps = 4
     dt = float(np.diff(c["time"]).mean()) / steps
@@ -258,92 +237,28 @@ def expm_of_oscillator(turn: float, damping: float, dt: float) -> tuple[np.ndarr
     return step[:2, :2], step[:2, 2]
 
 
-def _damper(p, c, channel):
+def _damper(p, c):
     """Dahl's bristles and viscous friction, each with a part that goes with the voltage."""
     travel = c["slide_x"]
-    bristle = np.zeros_like(travel)
-    for t in range(1, len(travel)):
-        step = travel[t] - travel[t - 1]
-        bristle[t] = (bristle[t - 1] + step) / (1.0 + abs(step) / (1e-3 * p[0]))
+    bristle = _bristles(travel, 1e-3 * p[0])
     volts, rate = c["force"] * 1e-3, np.gradient(travel, c["time"])
     return [bristle, volts * bristle, rate, volts * rate]
 
 
-FOREIGN: dict[str, ForeignSet] = {
-    "eflesh-normal": ForeignSet(
-        "magnets in a printed lattice", "MIT", "one run, another", eflesh_normal, HandmadeModel(_cubic, (), (), (), "cubic")
-    ),
-    "eflesh-shear": ForeignSet(
-        "magnets in a printed lattice", "MIT", "first half, second", eflesh_shear, HandmadeModel(_cubic, (), (), (), "cubic")
-    ),
-    "insole": ForeignSet(
-        "capacitive texels on foam",
-        "BSD-3-Clause",
-        "two days, three others",
-        insole,
-        HandmadeModel(_insole, (), (), (), "parabola"),
-    ),
-    "tube": ForeignSet(
-        "fluid-filled tube",
-        "CC BY 4.0",
-        "two depths of water, two others",
-        tube,
-        HandmadeModel(_tube, (0.5,), (0.02,), (5.0,), "one low pass"),
-    ),
-    "tube-by-place": ForeignSet(
-        "fluid-filled tube",
-        "CC BY 4.0",
-        "two depths of water, two others",
-        tube_by_place,
-        HandmadeModel(_tube, (0.5,), (0.02,), (5.0,), "one low pass, a gain for each place"),
-    ),
-    "adhesive": ForeignSet(
-        "acrylic adhesive",
-        "MIT",
-        "two rates, a third",
-        adhesive,
-        HandmadeModel(_adhesive, (5.0, 100.0), (0.1, 5.0), (50.0, 5000.0), "spring and two Maxwell branches"),
-    ),
-    "foam": ForeignSet(
-        "shoe foam",
-        "MIT",
-        "one foam, another",
-        foam,
-        HandmadeModel(_foam, (6.0,), (1.5,), (30.0,), "spring and a power"),
-    ),
-    "tape": ForeignSet(
-        "acrylic tape",
-        "MIT",
-        "two rates, a third between them",
-        tape,
-        HandmadeModel(_tape, (5.0, 100.0), (0.1, 5.0), (50.0, 5000.0), "neo-Hookean strip and two Maxwell branches"),
-    ),
-    "foam-shear": ForeignSet(
-        "shoe foam", "MIT", "one foam, another", foam_shear, HandmadeModel(_foam_shear, (), (), (), "spring and a cubic part")
-    ),
-    "brake": ForeignSet(
-        "band brake",
-        "CC BY-SA 4.0",
-        "0.5 Hz, 1 Hz",
-        brake,
-        HandmadeModel(_brake, (1.0,), (0.01,), (20.0,), "Dahl and viscous friction"),
-    ),
-    "oscillator": ForeignSet(
-        "electronic oscillator",
-        "MIT (pytorch-ident)",
-        "one multisine, another",
-        oscillator,
-        HandmadeModel(_oscillator, (70.0, 0.05, 1.0), (40.0, 0.005, -50.0), (120.0, 0.5, 50.0), "Duffing's oscillator"),
-    ),
-    "damper": ForeignSet(
-        "simulated damper of Bouc and Wen",
-        "MIT (sysidentpy)",
-        "first half, second",
-        damper,
-        HandmadeModel(_damper, (1.0,), (0.01,), (20.0,), "Dahl and viscous friction that go with the voltage"),
-    ),
-    "tongs": ForeignSet(
-        "marker behind a soft finger", "MIT", "the authors'", tongs, HandmadeModel(_cubic, (), (), (), "cubic")
-    ),
+FOREIGN: dict[str, tuple[Callable[[Path], Recording], HandmadeModel]] = {
+    "eflesh-normal": (eflesh_normal, HandmadeModel(_cubic)),
+    "eflesh-shear": (eflesh_shear, HandmadeModel(_cubic)),
+    "insole": (insole, HandmadeModel(_insole)),
+    "tube": (tube, HandmadeModel(_tube, (0.5,), (0.02,), (5.0,))),
+    "tube-by-place": (tube_by_place, HandmadeModel(_tube, (0.5,), (0.02,), (5.0,))),
+    "adhesive": (adhesive, HandmadeModel(_adhesive, (5.0, 100.0), (0.1, 5.0), (50.0, 5000.0))),
+    "foam": (foam, HandmadeModel(_foam, (6.0,), (1.5,), (30.0,))),
+    "tape": (tape, HandmadeModel(_tape, (5.0, 100.0), (0.1, 5.0), (50.0, 5000.0))),
+    "foam-shear": (foam_shear, HandmadeModel(_foam_shear)),
+    "brake": (brake, HandmadeModel(_brake, (1.0,), (0.01,), (20.0,))),
+    "oscillator": (oscillator, HandmadeModel(_oscillator, (70.0, 0.05, 1.0), (40.0, 0.005, -50.0), (120.0, 0.5, 50.0))),
+    "damper": (damper, HandmadeModel(_damper, (1.0,), (0.01,), (20.0,))),
+    "tongs": (tongs, HandmadeModel(_cubic)),
 }
-"""By name. None is left out because it goes badly."""
+"""How each set is read from the folder of all data, and its model by hand; docs/real-data.md says what the sets are and how
+they are split. None is left out because it goes badly."""

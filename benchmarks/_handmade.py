@@ -14,8 +14,8 @@ import numpy as np
 
 from ._recordings import Columns, Recording
 
-Terms = Callable[[np.ndarray, Columns, int], list[np.ndarray]]
-"""Terms (T,) of one channel from the nonlinear numbers, the columns of a recording, and the number of the channel."""
+Terms = Callable[[np.ndarray, Columns], list[np.ndarray]]
+"""Terms (T,) from the nonlinear numbers and the columns of a recording."""
 
 
 @dataclass(frozen=True)
@@ -26,15 +26,12 @@ class HandmadeModel:
     ----------
     terms : Terms
     start, low, high : tuple of float
-    describes : str
-        What it consists of.
     """
 
     terms: Terms
-    start: tuple[float, ...]
-    low: tuple[float, ...]
-    high: tuple[float, ...]
-    describes: str
+    start: tuple[float, ...] = ()
+    low: tuple[float, ...] = ()
+    high: tuple[float, ...] = ()
 
 
 def low_pass(time: np.ndarray, x: np.ndarray, tau: float) -> np.ndarray:
@@ -59,20 +56,16 @@ def predict_by_hand(model: HandmadeModel, recording: Recording) -> list[np.ndarr
     fitted = [columns for _, use, columns in recording.trials if use == "fit"]
     measured = [responses(columns) for columns in fitted]
     scale = max(float(np.nanmax(m) - np.nanmin(m)) for m in measured)
-    channels = range(measured[0].shape[1])
 
-    def tables(numbers: np.ndarray, of: list[Columns], channel: int) -> list[np.ndarray]:
-        return [np.stack(model.terms(numbers, columns, channel), axis=1) for columns in of]
-
-    def weights(numbers: np.ndarray, channel: int) -> np.ndarray:
-        table = np.concatenate(tables(numbers, fitted, channel))
-        values = np.concatenate([m[:, channel] for m in measured])
-        good = np.isfinite(values)
-        return np.linalg.lstsq(table[good], values[good], rcond=None)[0]
+    def tables(numbers: np.ndarray, of: list[Columns]) -> list[np.ndarray]:
+        return [np.stack(model.terms(numbers, columns), axis=1) for columns in of]
 
     def predicted(numbers: np.ndarray, of: list[Columns]) -> list[np.ndarray]:
-        by_channel = [[table @ weights(numbers, channel) for table in tables(numbers, of, channel)] for channel in channels]
-        return [np.stack(columns, axis=1) for columns in zip(*by_channel, strict=True)]
+        table, values, weights = np.concatenate(tables(numbers, fitted)), np.concatenate(measured), []
+        for channel in values.T:
+            good = np.isfinite(channel)
+            weights.append(np.linalg.lstsq(table[good], channel[good], rcond=None)[0])
+        return [np.stack([own @ weight for weight in weights], axis=1) for own in tables(numbers, of)]
 
     def residual(numbers: np.ndarray) -> np.ndarray:
         whole = np.concatenate([((m - p) / scale).ravel() for m, p in zip(measured, predicted(numbers, fitted), strict=True)])

@@ -41,6 +41,13 @@ class Recording:
         return path
 
 
+def of_spring(name: str, k: float, trials: list[tuple[str, str, Columns]]) -> Recording:
+    """Return recordings over depth of one channel of a stiffness, without damping."""
+    return Recording(
+        name, f"grid = {{ rows = 1, columns = 1, pitch = 0.01 }}\nk = {k:.4g}\ncn = 0.0\nmax_penetration = 0.1", trials
+    )
+
+
 def thinned(values: np.ndarray, by: int) -> np.ndarray:
     """Means of `by` samples each, along the first axis."""
     whole = len(values) // by * by
@@ -123,8 +130,7 @@ def adhesive(data: Path) -> Recording:
         columns = {"time": even - even[0], "depth": np.maximum(np.interp(even, time, strain), 0.0) * 1e-3}
         trials.append((f"relaxation_{name}", use, columns | {"texel_0": np.interp(even, time, stress)}))
     stiff = max(float(c["texel_0"].max() / c["depth"].max()) for _, _, c in trials)
-    words = f"grid = {{ rows = 1, columns = 1, pitch = 0.01 }}\nk = {stiff:.4g}\ncn = 0.0\nmax_penetration = 0.1"
-    return Recording("adhesive in shear", words, trials)
+    return of_spring("adhesive in shear", stiff, trials)
 
 
 def foam(data: Path) -> Recording:
@@ -147,8 +153,7 @@ def foam(data: Path) -> Recording:
         scaled = force * wanted / stiffness(depth, force)
         columns = {"time": even, "depth": np.interp(even, time, depth), "texel_0": np.interp(even, time, scaled)}
         trials.append((name, use, columns))
-    words = f"grid = {{ rows = 1, columns = 1, pitch = 0.01 }}\nk = {wanted:.4g}\ncn = 0.0\nmax_penetration = 0.1"
-    return Recording("shoe foam", words, trials)
+    return of_spring("shoe foam", wanted, trials)
 
 
 def brake(data: Path) -> Recording:

@@ -11,6 +11,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from palpate.core.gap.selection.rule_numbers import SURE
+
 HOUSE = Path(__file__).resolve().parent.parent
 MIX = {"own": 60, "other": 60, "none": 30, "two": 40, "outside": 30, "poor": 20, "third": 100, "three": 50}
 """Cases of each kind in a whole run."""
@@ -27,7 +29,6 @@ ROWS = {
 """What is hidden in each kind of cases, in words, and the aim."""
 RIGHT = {"none": "no gap", "outside": "unexplained"}
 """The outcome that is right where it is not that all is named."""
-"""Name of the file in which a run of the study has its case."""
 
 
 def plan_of(total: int, first: int) -> list[tuple[str, int]]:
@@ -55,8 +56,6 @@ def results_in(path: Path) -> list[dict]:
 
 def sure_names(result: Any) -> set[str]:
     """Return the effects that a diagnosis names for sure."""
-    from palpate.core.gap.selection.rule_numbers import SURE
-
     return {one.name for one in result.findings if one.confidence >= SURE}
 
 

@@ -29,6 +29,13 @@ from pathlib import Path
 
 import numpy as np
 
+from palpate.core.effects.engine.registry import library
+from palpate.core.gap.dataset.rig import read_rig
+from palpate.core.gap.report import gap_table
+from palpate.core.gap.report.comparison import gap_errors
+from palpate.core.gap.selection.diagnosis import diagnose
+from palpate.core.jobs import run_job
+
 from ._foreign import FOREIGN
 from ._handmade import predict_by_hand, responses
 from ._recordings import Recording
@@ -43,12 +50,6 @@ SYNONYMS = {"warmup": "warm-up", "softening": "wear"}
 
 def run() -> Iterator[dict]:
     """Yield, for each set, the error on check recordings by the amended model over that by the model made by hand."""
-    from palpate.core.gap.dataset.rig import read_rig
-    from palpate.core.gap.report import gap_table
-    from palpate.core.gap.report.comparison import gap_errors
-    from palpate.core.gap.selection.diagnosis import diagnose
-    from palpate.core.jobs import run_job
-
     rows = []
     for name, recording, by_hand in _sets():
         yield {"name": f"foreign.{name}.by_hand", "value": by_hand, "unit": "of the range"}
@@ -95,12 +96,13 @@ def _sets() -> Iterator[tuple[str, Recording, float]]:
         print(f"No recordings in {data}: name their folder in PALPATE_REAL_DATA.", file=sys.stderr)
         return
     for name in os.environ.get("PALPATE_FOREIGN_SETS", ",".join(FOREIGN)).split(","):
+        read, model = FOREIGN[name]
         try:
-            recording = FOREIGN[name].read(data)
+            recording = read(data)
         except FileNotFoundError as error:
             print(f"'{name}' is left out: {error.filename} is missing.", file=sys.stderr)
             continue
-        yield name, recording, check_error(recording, predict_by_hand(FOREIGN[name].by_hand, recording))
+        yield name, recording, check_error(recording, predict_by_hand(model, recording))
 
 
 def check_error(recording: Recording, predicted: Sequence[np.ndarray]) -> float:
@@ -139,11 +141,6 @@ def scored_rigs(folder: Path) -> str:
 
 def examine_rig(folder: str, case: str, answer: dict) -> dict:
     """Diagnose a rig and hold what is said against what was hidden."""
-    from palpate.core.effects.engine.registry import library
-    from palpate.core.gap.dataset.rig import read_rig
-    from palpate.core.gap.selection.diagnosis import diagnose
-    from palpate.core.jobs import run_job
-
     began = time.process_time()
     result = run_job(diagnose(read_rig(Path(folder) / case / "rig.toml")))
     sure = {SYNONYMS.get(name, name) for name in sure_names(result)}

@@ -33,9 +33,21 @@ from typing import Any
 
 import numpy as np
 
+from palpate.core.effects.engine.registry import names_found_by
+from palpate.core.effects.engine.specification import SCATTER
+from palpate.core.gap.dataset.rig import read_rig
+from palpate.core.gap.report.amended_sensor import with_mean_gain_moved
+from palpate.core.gap.report.sentences import next_experiment
+from palpate.core.gap.selection.diagnosis import diagnose
+from palpate.core.jobs import run_job
+
+from . import _entry
 from ._hidden import cases
+from ._hidden.own import true_value
 from ._rows import HOUSE, RIGHT, ROWS, fingerprint, outcome, plan_of, results_in, sure_names
 
+command = _entry.command
+"""Writes cases as rigs, has any method answer them, and scores answers: docs/gap-results.md."""
 FORMULAS = ("own", "other", "third")
 """Kinds of cases with one effect, by whose formula it has."""
 BARS: dict[str, tuple[float | None, float | None]] = {
@@ -104,10 +116,6 @@ def carried_out(work: Callable[..., dict], todo: list[tuple], path: Path) -> dic
 
 def examine(kind: str, number: int) -> dict[str, Any]:
     """Draw a case, have it diagnosed from its files, and hold the outcome against the answer."""
-    from palpate.core.gap.dataset.rig import read_rig
-    from palpate.core.gap.selection.diagnosis import diagnose
-    from palpate.core.jobs import run_job
-
     case = cases.draw(kind, number)
     with tempfile.TemporaryDirectory() as folder:
         rig_path = cases.write(case, Path(folder))
@@ -129,9 +137,6 @@ def examine(kind: str, number: int) -> dict[str, Any]:
 
 def score(case: cases.Case, result: Any) -> dict[str, Any]:
     """Return what was said of a case and how right it is."""
-    from palpate.core.gap.report.amended_sensor import with_mean_gain_moved
-    from palpate.core.gap.report.sentences import next_experiment
-
     model = with_mean_gain_moved(result)
     sure = sorted(sure_names(result))
     said = [[n.name, n.form, n.confidence] for n in result.findings]
@@ -159,8 +164,6 @@ def _truth(case: cases.Case, one: Any, model: Any) -> float | None:
     if any(isinstance(value, tuple) for value in model.effects[0].values.values()):
         return None  # a number per texel takes part of the common ones
     if one.effect >= 0:
-        from ._hidden.own import true_value
-
         return true_value(case.hidden[one.effect], one.name, case.pad)
     return float(getattr(case.pad, one.name)) if hasattr(case.pad, one.name) else None
 
@@ -170,9 +173,6 @@ def closed(case: cases.Case, result: Any, model: Any) -> float | None:
 
     The gap is the root mean square of truth minus prediction, readings and forces each in units of their range.
     """
-    from palpate.core.effects.engine.registry import names_found_by
-    from palpate.core.effects.engine.specification import SCATTER
-
     if case.kind not in (*FORMULAS, *cases.SEVERAL) or set(case.answer) & set(names_found_by(SCATTER)):
         return None  # of noise no model could close a gap
     before, after = (_miss(case, result, one) for one in (result.base.model, model))
@@ -188,16 +188,6 @@ def _miss(case: cases.Case, result: Any, model: Any) -> float:
             miss = (true - guess) / size
             square, count = square + float(np.vdot(miss, miss)), count + miss.size
     return float(np.sqrt(square / count))
-
-
-# --- for other methods
-
-
-def command(arguments: list[str]) -> int:
-    """Write cases as rigs, have any method answer them, and score answers: docs/gap-results.md."""
-    from . import _entry
-
-    return _entry.command(arguments)
 
 
 # --- figures

@@ -17,14 +17,11 @@ import numpy as np
 from palpate.core.geometry import shapes
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.shapes import Shape
-from palpate.core.geometry.texels import texels_from_region
-from palpate.core.model.sensor import Sensor
-from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.simulators.pressed_sensor import PressedSensor
 from palpate.core.simulators.pressed_sensors import PressedSensors
 from palpate.core.simulators.sensor_on_mesh import SensorOnMesh
 
-from . import solver
+from . import beside, solver
 
 DT = 1e-3
 ENVIRONMENTS, THREADS = 4096, 2
@@ -38,10 +35,7 @@ BATCH_GOALS = {"cube": 20.0, "ball": 20.0, "box": 4.0, "sphere": 4.0, "capsule":
 
 def item(texels: int) -> SensorOnMesh:
     """Return the pad of the solver's benchmark."""
-    sheet = solver.pad(*solver.GRIDS[texels])
-    k = 84e3 / texels
-    parameters = SensorParameters(k=k, cn=0.01 * k, sigma0=k, sigma1=0.01 * k)
-    return SensorOnMesh(Sensor("pad", 0, texels_from_region(sheet, np.ones(len(sheet.vertices), bool)), parameters), sheet)
+    return SensorOnMesh(*solver.sensor_of(texels))
 
 
 def objects() -> dict[str, tuple[TriangleMesh | Shape, float, np.ndarray]]:
@@ -132,24 +126,15 @@ def run() -> Iterator[dict]:
         theirs = least(solver.mujoco_step(texels, solver.cube(4)))
         for name, pressing in objects().items():
             ours = least(single_step(texels, *pressing))
-            yield {
-                "name": f"loop.step.{name}.{texels}", "value": ours, "unit": "us",
-                "peer": peer, "peer_value": theirs, "ratio": ours / theirs, "goal": goal / theirs,
-            }  # fmt: skip
+            yield beside(f"loop.step.{name}.{texels}", ours, "us", peer, theirs, goal / theirs)
     theirs = least(solver.mujoco_step(84, solver.cube(4)))
     loaded = least(loaded_step(84, *objects()["cube"]))
-    yield {
-        "name": "loop.load.cube.84", "value": loaded, "unit": "us",
-        "peer": peer, "peer_value": theirs, "ratio": loaded / theirs,
-    }  # fmt: skip
+    yield beside("loop.load.cube.84", loaded, "us", peer, theirs)
     theirs *= ENVIRONMENTS / THREADS / 1e3
     for name, pressing in objects().items():
         measure = batch_step(*pressing)
         measured = np.array([measure() for _ in range(3 * ROUNDS)])
         wall, used = measured.min(axis=0)
-        yield {
-            "name": f"loop.batch.{name}.{ENVIRONMENTS}x84", "value": float(used), "unit": "ms on two processors",
-            "peer": f"{peer}, as many steps", "peer_value": theirs, "ratio": float(used) / theirs,
-            "goal": BATCH_GOALS[name] / theirs,
-        }  # fmt: skip
-        yield {"name": f"loop.batch.{name}.{ENVIRONMENTS}x84.wall", "value": float(wall), "unit": "ms"}
+        what, goal = f"loop.batch.{name}.{ENVIRONMENTS}x84", BATCH_GOALS[name] / theirs
+        yield beside(what, float(used), "ms on two processors", f"{peer}, as many steps", theirs, goal)
+        yield {"name": f"{what}.wall", "value": float(wall), "unit": "ms"}

@@ -27,6 +27,8 @@ from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.solver.simulation import Simulation
 
+from . import beside
+
 SIDE = 0.047
 """Longer side of the pad, metres."""
 CUBE, BALL = 0.06, 0.02
@@ -54,6 +56,16 @@ def pad(rows: int, columns: int) -> TriangleMesh:
     return grid_mesh(rows, columns, SIDE / (max(rows, columns) - 1))
 
 
+def sensor_of(texels: int, k: float | None = None) -> tuple[Sensor, TriangleMesh]:
+    """Return a pad as a sensor, and its mesh; stiffness is shared out so that every resolution sinks alike, or given."""
+    sheet = pad(*GRIDS[texels])
+    shared = 84e3 / texels
+    friction = {"sigma0": shared, "sigma1": 0.01 * shared} if k is None else {}
+    stiff = shared if k is None else k
+    parameters = SensorParameters(k=stiff, cn=0.01 * stiff, **friction)
+    return Sensor("pad", 0, texels_from_region(sheet, np.ones(len(sheet.vertices), bool)), parameters), sheet
+
+
 def gravity(slope: float) -> np.ndarray:
     """Return the gravity that a pad feels which is tilted by `slope` degrees, so that things slide towards -y."""
     return -GRAVITY * np.array([0.0, math.sin(math.radians(slope)), math.cos(math.radians(slope))])
@@ -62,14 +74,11 @@ def gravity(slope: float) -> np.ndarray:
 def weighing(
     texels: int, solid: trimesh.Trimesh, dt: float | None = 1e-3, fps: float = 1.0, slope: float = 0.0, gap: float = 0.0
 ) -> Scenario:
-    """1 kg on the pad; stiffness shared out so that every resolution sinks alike."""
-    sheet = pad(*GRIDS[texels])
+    """1 kg on the pad."""
     mesh, _ = checked_mesh(solid.vertices, solid.faces, "cube")
-    k = 84e3 / texels
-    parameters = SensorParameters(k=k, cn=0.01 * k, sigma0=k, sigma1=0.01 * k)
     return Scenario(
         bodies=(Body("pad", Motion.at_rest()), free_body("cube", mesh, 1.0, (0, 0, CUBE / 2 + gap))),
-        sensors=(Sensor("pad", 0, texels_from_region(sheet, np.ones(len(sheet.vertices), bool)), parameters),),
+        sensors=(sensor_of(texels)[0],),
         targets=(Target("cube", 1, mesh),),
         frame_end=10**6,
         fps=fps,
@@ -206,10 +215,7 @@ def equal_accuracy(texels: int, solid: trimesh.Trimesh) -> Iterator[dict]:
         rounds=3,
     )
     own, other = (taken[0] + taken[1]) / 2, (taken[2] + taken[3]) / 2
-    yield {
-        "name": f"solver.second.{texels}.at_{dt * 1e3:g}_ms", "value": own, "unit": "ms",
-        "peer": f"{peer} at 1 ms", "peer_value": other, "ratio": own / other, "goal": 1.0,
-    }  # fmt: skip
+    yield beside(f"solver.second.{texels}.at_{dt * 1e3:g}_ms", own, "ms", f"{peer} at 1 ms", other, 1.0)
 
 
 def ball(parts: int) -> TriangleMesh:
@@ -228,15 +234,13 @@ def ball(parts: int) -> TriangleMesh:
 def rolling_step(parts: int) -> Callable[[], float]:
     """Return a function that gives the microseconds of one substep while a :func:`ball` rolls over the pad."""
     mesh = ball(parts)
-    sheet = pad(*GRIDS[1024])
-    texels = texels_from_region(sheet, np.ones(len(sheet.vertices), bool))
     times = np.linspace(0.0, 2.0, 51)
     angle = 0.5 * np.sin(2 * np.pi * 0.5 * times)  # rolls to and fro by half a radian
     path = np.stack([np.zeros_like(times), -BALL * angle, np.full_like(times, BALL - 1.5e-3)], axis=1)
     turns = np.stack([np.cos(angle / 2), np.sin(angle / 2), 0 * angle, 0 * angle], axis=1)
     scenario = Scenario(
         bodies=(Body("pad", Motion.at_rest()), Body("ball", Motion(times, path, turns))),
-        sensors=(Sensor("pad", 0, texels, SensorParameters(k=84.0, cn=0.84)),),
+        sensors=(sensor_of(1024, 84.0)[0],),
         targets=(Target("ball", 1, mesh),),
         frame_end=10**6,
         fps=5.0,
@@ -267,28 +271,16 @@ def run() -> Iterator[dict]:
     solid = cube(4)
     for texels in GRIDS:
         ours, theirs = in_turn(palpate_step(texels, solid), mujoco_step(texels, solid))
-        yield {
-            "name": f"solver.step.cube.{texels}", "value": ours, "unit": "us",
-            "peer": f"mujoco-{mujoco.__version__} tactile", "peer_value": theirs, "ratio": ours / theirs, "goal": 0.6,
-        }  # fmt: skip
+        yield beside(f"solver.step.cube.{texels}", ours, "us", f"mujoco-{mujoco.__version__} tactile", theirs, 0.6)
     wall = time.perf_counter
     two, one = in_turn(palpate_step(10000, solid, 2, wall), palpate_step(10000, solid, 1, wall), rounds=5)
-    yield {
-        "name": "solver.step.cube.10000.two_threads", "value": two, "unit": "us",
-        "peer": "palpate with one thread", "peer_value": one, "ratio": two / one,
-    }  # fmt: skip
+    yield beside("solver.step.cube.10000.two_threads", two, "us", "palpate with one thread", one)
     for texels in GRIDS:
         yield {"name": f"solver.memory.{texels}", "value": memory(texels, solid) / texels, "unit": "bytes per texel"}
     few, many = in_turn(palpate_step(84, cube(4)), palpate_step(84, cube(8)))
-    yield {
-        "name": "solver.step.faces.786k", "value": many, "unit": "us",
-        "peer": "palpate with 3k faces", "peer_value": few, "ratio": many / few, "goal": 1.5,
-    }  # fmt: skip
+    yield beside("solver.step.faces.786k", many, "us", "palpate with 3k faces", few, 1.5)
     few, many, more = in_turn(rolling_step(20), rolling_step(204), rolling_step(331), rounds=3)
     for name, value in (("499k", many), ("1315k", more)):
-        yield {
-            "name": f"solver.step.faces.rolling.{name}", "value": value, "unit": "us",
-            "peer": "palpate with 5k faces", "peer_value": few, "ratio": value / few, "goal": 1.5,
-        }  # fmt: skip
+        yield beside(f"solver.step.faces.rolling.{name}", value, "us", "palpate with 5k faces", few, 1.5)
     for texels in GRIDS:
         yield from equal_accuracy(texels, solid)

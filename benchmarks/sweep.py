@@ -30,12 +30,9 @@ import trimesh
 from solver_scenes import shape
 
 from palpate.core.compiled.thread_team import count_of_cores
-from palpate.core.geometry.texels import texels_from_region
 from palpate.core.io.scenario_npz import save_scenario
 from palpate.core.model.body import Body, Motion
 from palpate.core.model.scenario import Scenario, Target
-from palpate.core.model.sensor import Sensor
-from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.solver.simulation import Simulation
 from palpate.core.study.variation import varied_scenario
 from palpate.sweep.dataset import publish
@@ -43,7 +40,8 @@ from palpate.sweep.report import write_report
 from palpate.sweep.study_folder import OpenStudy, open_study
 from palpate.sweep.worker import compute_batch
 
-from .solver import GRIDS, mujoco_pad, pad
+from . import beside
+from .solver import mujoco_pad, sensor_of
 
 RADIUS = 0.006
 """Of the ball, m."""
@@ -61,13 +59,11 @@ FEW, MANY = 1_000, int(os.environ.get("PALPATE_BENCH_RUNS", "20000"))
 """Runs of the studies whose memory is compared."""
 
 
-def scene(texels_wanted: int) -> Scenario:
+def scene(texels: int) -> Scenario:
     """Return a ball over a pad."""
-    sheet = pad(*GRIDS[texels_wanted])
-    texels = texels_from_region(sheet, np.ones(len(sheet.vertices), bool))
     return Scenario(
         bodies=(Body("pad", Motion.at_rest()), Body("ball", Motion.at_rest((0.0, 0.0, 0.05)))),
-        sensors=(Sensor("pad", 0, texels, SensorParameters(k=STIFFNESS, cn=0.01 * STIFFNESS)),),
+        sensors=(sensor_of(texels, STIFFNESS)[0],),
         targets=(Target("ball", 1, shape(trimesh.creation.icosphere(3, RADIUS))),),
         frame_start=1,
         frame_end=2,
@@ -120,15 +116,10 @@ def shares(name: str, hold: float, texels: int, count: int) -> Iterator[dict]:
         publish(opened.folder, opened.study)
         closing = (time.process_time() - began) / (count * ROUNDS)
         size = sum(path.stat().st_size for path in (opened.folder / "dataset").rglob("*") if path.is_file())
-    yield {
-        "name": f"sweep.{name}", "value": 1.0 / ours, "unit": "runs/(s·core)",
-        "peer": "the bare solver", "peer_value": 1.0 / solver, "ratio": solver / ours, "goal": 0.5,
-    }  # fmt: skip
+    yield beside(f"sweep.{name}", 1.0 / ours, "runs/(s·core)", "the bare solver", 1.0 / solver, 0.5)
     for other in theirs:
-        yield {
-            "name": f"sweep.{name}.mujoco", "value": 1.0 / ours, "unit": "runs/(s·core)",
-            "peer": f"mujoco-{version} tactile by rollout", "peer_value": 1.0 / other, "ratio": other / ours,
-        }  # fmt: skip
+        peer = f"mujoco-{version} tactile by rollout"
+        yield beside(f"sweep.{name}.mujoco", 1.0 / ours, "runs/(s·core)", peer, 1.0 / other)
     yield {"name": f"sweep.{name}.dataset", "value": closing * 1e3, "unit": "CPU ms per run"}
     yield {"name": f"sweep.{name}.size", "value": size / (count * ROUNDS), "unit": "bytes per run"}
 
@@ -203,10 +194,7 @@ def memory() -> Iterator[dict]:
             files = sum(path.is_file() for path in (Path(place) / "out").rglob("*"))
     for number, name in ((0, "computing"), (2, "publishing"), (4, "report")):
         few, many = (found[count][number] / 1e6 for count in (FEW, MANY))
-        yield {
-            "name": f"sweep.memory.{name}", "value": many, "unit": "MB", "peer": f"{FEW} runs", "peer_value": few,
-            "ratio": many / few, "goal": 1.05,
-        }  # fmt: skip
+        yield beside(f"sweep.memory.{name}", many, "MB", f"{FEW} runs", few, 1.05)
         yield {"name": f"sweep.time.{name}", "value": found[MANY][number + 1] / MANY * 1e3, "unit": "CPU ms per run"}
     yield {"name": f"sweep.files.{MANY}_runs", "value": files, "unit": "files", "goal": 0.01 * MANY}
 

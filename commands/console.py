@@ -257,10 +257,6 @@ GRACE = 5.0
 """Seconds in which a command may end by itself, so that its files are put away, before the process is ended."""
 
 
-class LimitReached(PalpateError):
-    """A limit of time or memory that the user gave was reached."""
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--time-limit", metavar="SECONDS", type=_positive, help="stop with exit status 1 after this time (default: no limit)"
@@ -277,8 +273,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def kept(arguments: argparse.Namespace) -> Iterator[None]:
     """Watch the limits of a command while the body runs.
 
-    A thread looks at them. When one is reached, the next :meth:`Interrupt.check` raises :class:`LimitReached`. A call
-    that does not return soon enough, such as a render, is ended with the process.
+    A thread looks at them. When one is reached, the next :meth:`Interrupt.check` raises the reason. A call that
+    does not return soon enough, such as a render, is ended with the process.
     """
     if arguments.time_limit is None and arguments.memory_limit is None:
         yield
@@ -292,7 +288,7 @@ def kept(arguments: argparse.Namespace) -> Iterator[None]:
         while not over.wait(INTERVAL):
             reason = _reached(arguments, time.monotonic() - began)
             if reason:
-                Interrupt.reason = LimitReached(reason)
+                Interrupt.reason = PalpateError(reason)
                 if Interrupt.limits_at_once:
                     signal.raise_signal(signal.SIGINT)  # as Ctrl-C does
                 if not over.wait(GRACE):

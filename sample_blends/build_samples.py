@@ -12,18 +12,9 @@ from pathlib import Path
 
 import bpy
 
-SAMPLES = {
-    "demo": ("demo", {}),
-    "fingertip": ("fingertip", {}),
-    "grasp": ("grasp", {}),
-    "geometries": ("geometries", {}),
-    "weighing": ("weighing", {}),
-    "tilt": ("tilt", {}),
-    **{f"grasp_{kind}": ("grasps", {"kind": kind}) for kind in ("sphere", "box", "cylinder", "bottle")},
-    "pick_and_place": ("pick_and_place", {}),
-    "hand": ("hand", {}),
-    "gel": ("gel", {}),
-}
+_NAMES = ("demo", "fingertip", "grasp", "geometries", "weighing", "tilt", "pick_and_place", "hand", "gel")
+_GRASPED = ("sphere", "box", "cylinder", "bottle")
+SAMPLES = {**{name: (name, ()) for name in _NAMES}, **{f"grasp_{kind}": ("grasps", (kind,)) for kind in _GRASPED}}
 """Name of the file → module of this package, and further arguments of its function ``build(scene, …)``."""
 
 
@@ -31,7 +22,7 @@ def build_one(name: str, folder: Path) -> Path:
     """Write one sample as a compressed .blend into `folder`, and return its path."""
     module, more = SAMPLES[name]
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    importlib.import_module(f".{module}", __package__).build(bpy.context.scene, **more)
+    importlib.import_module(f".{module}", __package__).build(bpy.context.scene, *more)
     path = folder / f"{name}.blend"
     bpy.context.preferences.filepaths.save_version = 0
     bpy.ops.wm.save_as_mainfile(filepath=str(path.absolute()), compress=True)

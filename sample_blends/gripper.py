@@ -102,8 +102,8 @@ def spray_bottle(scene, name: str):
     return bottle
 
 
-def close(fingers, grip, speed: float, max_force: float) -> None:
-    """Let two coupled fingers close along their own z axes, by control of the force on the first of them.
+def close(fingers, grip, speed: float, max_force: float, axes=("Z", "Z")) -> None:
+    """Let two coupled fingers close along axes of their own, by control of the force on the first of them.
 
     Parameters
     ----------
@@ -114,12 +114,8 @@ def close(fingers, grip, speed: float, max_force: float) -> None:
         Until the first touch.
     max_force : float, N
         Of the motor, on each finger.
+    axes : two of str
     """
-    drive(fingers, grip, speed, max_force, ("Z", "Z"))
-
-
-def drive(fingers, grip, speed: float, max_force: float, axes) -> None:
-    """Let fingers close along axes of their own, the second one coupled to the first."""
     first = fingers[0]
     for pad, axis in zip(fingers, axes, strict=True):
         settings = pad.palpate

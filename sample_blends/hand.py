@@ -40,7 +40,7 @@ def build(scene) -> None:
     """Fill `scene`, which is emptied first; the add-on's classes must be registered."""
     scene_builder.prepare(scene, FRAME_END, FPS)
     index, thumb, cylinder = bodies(scene)
-    gripper.drive((index, thumb), FORCE, SPEED, MAX_FORCE, ("-X", "X"))
+    gripper.close((index, thumb), FORCE, SPEED, MAX_FORCE, ("-X", "X"))
     cylinder.palpate.role, cylinder.palpate.body, cylinder.palpate.mass = "TARGET", "FREE", MASS
     gripper.table(scene, "Support", -HEIGHT / 2, sinks=(TABLE_STARTS, TABLE_GONE))
     scene.palpate.use_auto_dt, scene.palpate.dt = False, 5e-4

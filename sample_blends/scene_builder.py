@@ -301,27 +301,26 @@ def wooden_box(scene, name: str, size, bevel: float):
     return made
 
 
-def backdrop(scene, width: float = 4000.0, front: float = -1500.0, back: float = 350.0, height: float = 1500.0):
-    """Return a floor that curves upwards into a wall behind the scene."""
-    radius = 400.0
+def backdrop(scene) -> None:
+    """Add a floor that curves upwards into a wall behind the scene."""
+    width, front, back, height, radius = 4000.0, -1500.0, 350.0, 1500.0, 400.0
     turn = np.linspace(0, math.pi / 2, 24)
     profile = [(front, 0.0), *((back + radius * math.sin(a), radius * (1 - math.cos(a))) for a in turn)]
     profile.append((back + radius, height))
     vertices = [(x, y, z) for y, z in profile for x in (-width / 2, width / 2)]
     faces = [(2 * i, 2 * i + 1, 2 * i + 3, 2 * i + 2) for i in range(len(profile) - 1)]
     look = material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
-    return mesh_object(scene, "Backdrop", vertices, faces, look)
+    mesh_object(scene, "Backdrop", vertices, faces, look)
 
 
-def area_lamp(scene, name: str, location, target, size: float, power: float, color=(1.0, 1.0, 1.0)):
-    """Return a square area lamp at `location` that points at `target`; power in Blender's W at this scene's size."""
+def area_lamp(scene, name: str, location, target, size: float, power: float, color) -> None:
+    """Add a square area lamp at `location` that points at `target`; power in Blender's W at this scene's size."""
     lamp = bpy.data.lights.new(name, "AREA")
     lamp.shape, lamp.size, lamp.energy, lamp.color = "SQUARE", size, power, color
     obj = bpy.data.objects.new(name, lamp)
     scene.collection.objects.link(obj)
     obj.location = location
     obj.rotation_euler = look_at(location, target)
-    return obj
 
 
 def look_at(location, target):
@@ -331,13 +330,13 @@ def look_at(location, target):
     return (Vector(target) - Vector(location)).to_track_quat("-Z", "Y").to_euler()
 
 
-def world(scene, color=(0.9, 0.92, 1.0), strength: float = 0.35) -> None:
+def world(scene) -> None:
     """Give `scene` a faint, even light from all directions."""
     made = bpy.data.worlds.new("Studio")
     made.use_nodes = True
     background = made.node_tree.nodes["Background"]
-    background.inputs["Color"].default_value = (*color, 1.0)
-    background.inputs["Strength"].default_value = strength
+    background.inputs["Color"].default_value = (0.9, 0.92, 1.0, 1.0)
+    background.inputs["Strength"].default_value = 0.35
     scene.world = made
 
 

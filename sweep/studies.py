@@ -41,13 +41,9 @@ class Status:
     done: int
     failed: int
 
-    @property
-    def left(self) -> int:
-        """Runs that are neither done nor failed."""
-        return self.total - self.done - self.failed
-
     def __str__(self) -> str:
-        return f"{self.total} runs: {self.done} done, {self.failed} failed, {self.left} left"
+        left = self.total - self.done - self.failed
+        return f"{self.total} runs: {self.done} done, {self.failed} failed, {left} left"
 
 
 def status_of(folder: Path) -> Status:

@@ -9,6 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
+from palpate.core.effects.engine.contact_forces import friction_factors, normal_forces
+from palpate.core.effects.engine.readout_chain import readings
+from palpate.core.effects.engine.registry import actual_placement, effect, library
+from palpate.core.effects.engine.specification import TransducerArray, cycles
+from palpate.core.figures.figure_canvas import new_figure, save_figure, tidy_axes
+from palpate.core.figures.figure_style import GREY, SERIES
+from palpate.core.model.sensor_parameters import SensorParameters
+
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "effects.md"
 PICTURE = ROOT / "docs" / "images" / "effects.png"
@@ -59,8 +67,6 @@ resulting force, *r* the reading, *r₀* the reading before the effect. \\* mark
 
 def page() -> str:
     """Return the text of docs/effects.md."""
-    from palpate.core.effects.engine.registry import library
-
     return "".join([INTRODUCTION, *(section(kind) for kind in library().values())])
 
 
@@ -110,9 +116,6 @@ LINE = 0.1
 
 def picture(path: Path) -> None:
     """Draw each effect in an experiment that shows it."""
-    from palpate.core.effects.engine.registry import library
-    from palpate.core.figures.figure_canvas import new_figure, save_figure
-
     kinds = list(library().values())
     rows = -(-len(kinds) // 4)
     figure = new_figure(10.0, 2.32 * rows)
@@ -127,9 +130,6 @@ def picture(path: Path) -> None:
 
 
 def _setting():
-    from palpate.core.effects.engine.specification import TransducerArray
-    from palpate.core.model.sensor_parameters import SensorParameters
-
     row, column = (index.ravel() for index in np.mgrid[0:ROWS, 0:COLUMNS])
     position = np.stack([column * PITCH, row * PITCH, np.zeros(ROWS * COLUMNS)], axis=1)
     return TransducerArray(position, np.full(len(position), PITCH**2), row, column), SensorParameters(k=1000.0, cn=0.0)
@@ -137,10 +137,6 @@ def _setting():
 
 def _curves(axes, kind, x, base, of_form, xlabel, ylabel):
     """Draw the base model in grey and each form in colour, with the values that the kind states for its drawing."""
-    from palpate.core.effects.engine.registry import effect
-    from palpate.core.figures.figure_canvas import tidy_axes
-    from palpate.core.figures.figure_style import GREY, SERIES
-
     if base is not None:
         axes.plot(x, base, color=GREY, lw=1.0, label="_")
     for form, colour in zip(kind.forms, SERIES, strict=False):
@@ -158,9 +154,6 @@ def _curves(axes, kind, x, base, of_form, xlabel, ylabel):
 
 def _pressed(time, depth, slide=None):
     """Return a function from effects to the readings of one texel over a history of depths."""
-    from palpate.core.effects.engine.contact_forces import normal_forces
-    from palpate.core.effects.engine.readout_chain import readings
-
     site, parameters = _setting()
     one = type(site)(np.zeros((1, 3)), np.ones(1))
     slide = None if slide is None else slide[:, None]
@@ -180,8 +173,6 @@ def _over_time(axes, kind):
 
 
 def _reading_over_force(axes, kind):
-    from palpate.core.effects.engine.readout_chain import readings
-
     site, force = _setting()[0], np.linspace(0, 2, 801)
     one = type(site)(np.zeros((1, 3)), np.ones(1))
     texel = lambda item: readings((item,), one, force, force[:, None])[:, 0]  # noqa: E731
@@ -189,9 +180,6 @@ def _reading_over_force(axes, kind):
 
 
 def _over_speed(axes, kind):
-    from palpate.core.effects.engine.contact_forces import friction_factors
-    from palpate.core.model.sensor_parameters import SensorParameters
-
     v, p = np.linspace(0, 0.06, 400), SensorParameters()
 
     def drag(*items):
@@ -203,8 +191,6 @@ def _over_speed(axes, kind):
 
 def _peaks(axes, kind):
     """Draw the peak reading of each of forty pressings under steady sliding."""
-    from palpate.core.effects.engine.specification import cycles
-
     time = np.linspace(0, 40, 4001)
     texel = _pressed(time, cycles(40, time), np.full(len(time), 1e-3))
     top = lambda *items: texel(*items)[1:].reshape(40, 100).max(axis=1)  # noqa: E731
@@ -213,8 +199,6 @@ def _peaks(axes, kind):
 
 def _across(axes, kind):
     """Draw a column of the pad under a load on one texel."""
-    from palpate.core.effects.engine.readout_chain import readings
-
     site = _setting()[0]
     force = np.zeros((1, ROWS * COLUMNS))
     force[0, 7 * COLUMNS + 3] = 1.0
@@ -223,8 +207,6 @@ def _across(axes, kind):
 
 
 def _texels(axes, kind):
-    from palpate.core.effects.engine.readout_chain import readings
-
     site = _setting()[0]
     force = np.ones((1, ROWS * COLUMNS))
     even = lambda *items: readings(items, site, np.zeros(1), force)[0][:36]  # noqa: E731
@@ -234,8 +216,6 @@ def _texels(axes, kind):
 
 def _ball(axes, kind):
     """Draw the forces of a ball on the centre of the pad along one column."""
-    from palpate.core.effects.engine.registry import actual_placement
-
     site = _setting()[0]
     middle = site.position.mean(axis=0)
     up, across = np.tile([0.0, 0.0, 1.0], (len(site), 1)), np.tile([1.0, 0.0, 0.0], (len(site), 1))

@@ -19,6 +19,7 @@ from .own import OWN
 from .third import THIRD
 from .world import (
     COLUMNS,
+    DEEP,
     PITCH,
     RATE,
     ROWS,
@@ -26,6 +27,7 @@ from .world import (
     THICKNESS,
     Contact,
     Hidden,
+    N,
     Pad,
     Probe,
     Signals,
@@ -42,6 +44,8 @@ IN_FORCE = ("stribeck", "viscous-friction")
 """Effects that show in the net force along the surface and not in the readings."""
 KINDS = ("other", "own", "none", "two", "outside", "poor", "third", "three", "simulated")
 """The last one is for methods that learn from simulations: none to three effects in the library's own forms."""
+FAMILIES = {"other": MAKERS, "own": OWN, "third": THIRD, "outside": OUTSIDE}
+"""Kinds of cases in which one effect is hidden, and its makers; a case's number runs through them."""
 SEVERAL = {"two": 2, "three": 3}
 """Kinds of cases in which several effects are hidden, in formulas of :mod:`.other`, and how many."""
 SIMULATED = (0.1, 0.45, 0.3, 0.15)
@@ -105,17 +109,12 @@ class Case:
         return [effect.name for effect in self.hidden]
 
 
-def names_for(kind: str) -> list[str]:
-    """What can be hidden in a kind of case; a case's number runs through them."""
-    return list({"other": MAKERS, "own": OWN, "third": THIRD, "outside": OUTSIDE}.get(kind, {"": None}))
-
-
 def draw(kind: str, number: int) -> Case:
     """Return case `number` of a kind; the same every time."""
     rng, pad, probe, names = _begun(kind, number)
     makers = {"own": OWN, "simulated": OWN, "third": THIRD}.get(kind, {**MAKERS, **OUTSIDE})
     way = list(POOR)[number % len(POOR)] if kind == "poor" else ""
-    times, paths = _poor(way, rng, probe) if way in PROGRAMMES else _trials(rng, probe, pad)
+    times, paths = _trials(rng, probe, way)
     plain = [touch(probe, pad, time, path) for time, path in zip(times, paths, strict=True)]
     found = [_calibrated(makers[name], name, rng, pad, probe, plain) for name in names]
     hidden = tuple(effect for effect, _ in found)
@@ -173,18 +172,18 @@ def _names(kind: str, number: int, rng, ball: bool) -> list[str]:
     if kind == "poor":
         choice = POOR[list(POOR)[number % len(POOR)]]
         return [choice[number // len(POOR) % len(choice)]]
-    pool = names_for(kind) if kind not in SEVERAL else ORDER
     blind = () if ball else BALL_ONLY
+    if kind in FAMILIES:
+        pool = list(FAMILIES[kind])
+        name = pool[number % len(pool)]
+        return [name if name not in blind else pool[(number + 7) % len(pool)]]
     if kind == "simulated":
         known = [name for name in OWN if name not in blind]
         count = rng.choice(len(SIMULATED), p=SIMULATED)
-        return sorted(map(str, rng.choice(known, size=count, replace=False)), key=ORDER.index)
-    if kind not in SEVERAL:
-        name = pool[number % len(pool)]
-        return [name if name not in blind else pool[(number + 7) % len(pool)]]
-    unclear = ("noise", "quantization", "offset", "dead-texels")
-    clear = [name for name in ORDER if name not in unclear and name not in blind]
-    return sorted(map(str, rng.choice(clear, size=SEVERAL[kind], replace=False)), key=ORDER.index)
+    else:
+        unclear = ("noise", "quantization", "offset", "dead-texels")
+        known, count = [name for name in ORDER if name not in unclear and name not in blind], SEVERAL[kind]
+    return sorted(map(str, rng.choice(known, size=count, replace=False)), key=ORDER.index)
 
 
 def _words(rng, pad: Pad, kind: str, number: int) -> dict:
@@ -196,15 +195,13 @@ def _words(rng, pad: Pad, kind: str, number: int) -> dict:
         "k": float(f"{k:.3g}"),
         "cn": float(f"{0.01 * k:.3g}"),
         "sigma0": float(f"{pad.sigma0:.4g}"),
-    }
-    words |= {
         "sigma1": float(f"{pad.sigma1:.4g}"),
         "ct": pad.ct,
         "mus": round(pad.mus, 2),
         "mud": round(pad.mud, 2),
         "x0": round(pad.x0, 3),
+        "unit": pad.unit,
     }
-    words["unit"] = pad.unit
     if pad.unit == "N" or not wrong:
         words |= {"gain": float(f"{pad.gain:.4g}"), "zero": float(f"{pad.zero:.4g}")}
     return words
@@ -224,13 +221,13 @@ def _noise(rng, shape, coloured: bool) -> np.ndarray:
 # --- what the probe does
 
 
-def _trials(rng, probe: Probe, pad: Pad) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Six different programmes of 25 s: staircase, cycles, press and hold, slides; two more of all to check on."""
-    deep = 3e-3
-    makers = (_staircase, _cycles, _holds, _slides, _mixture, _mixture)
-    paths = [maker(rng, deep) for maker in makers]
+def _trials(rng, probe: Probe, way: str) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Six programmes of 25 s: staircase, cycles, press and hold, slides, and two of all to check on; of some ways to be poor
+    six times the same.
+    """
+    makers = [PROGRAMMES[way]] * 6 if way in PROGRAMMES else [_staircase, _cycles, _holds, _slides, _mixture, _mixture]
     time = np.arange(round(SECONDS * RATE) + 1) / RATE
-    return [time] * len(paths), [_path(time, knots, probe) for knots in paths]
+    return [time] * len(makers), [_path(time, maker(rng), probe) for maker in makers]
 
 
 def _path(time: np.ndarray, knots: list[tuple[float, float, float, float]], probe: Probe) -> np.ndarray:
@@ -250,47 +247,45 @@ UP = -1e-3
 """Depth while nothing touches, metres."""
 
 
-def _staircase(rng, deep):
+def _staircase(rng):
     (x, y), steps = _spots(rng, 1)[0], rng.permutation([0.25, 0.5, 0.75, 1.0])
     knots, t = [(0, x, y, UP), (1.0, x, y, UP)], 1.0
     for share in (*np.sort(steps), *np.sort(steps)[-2::-1]):
-        knots += [(t + 0.6, x, y, deep * share), (t + 2.4, x, y, deep * share)]
+        knots += [(t + 0.6, x, y, DEEP * share), (t + 2.4, x, y, DEEP * share)]
         t += 2.4
     return [*knots, (t + 0.8, x, y, UP), (SECONDS, x, y, UP)]
 
 
-def _cycles(rng, deep):
+def _cycles(rng):
     knots, t = [(0, 0, 0, UP), (1.0, 0, 0, UP)], 1.0
     for (x, y), period in zip(_spots(rng, 4), (0.8, 1.6, 3.0, 1.2), strict=True):
         knots += [(t + 0.3, x, y, UP)]
         t += 0.3
-        for depth in rng.uniform(0.5, 1.0, 3) * deep:
+        for depth in rng.uniform(0.5, 1.0, 3) * DEEP:
             knots += [(t + period / 2, x, y, depth), (t + period, x, y, UP)]
             t += period
     return [*knots, (SECONDS, x, y, UP)]
 
 
-def _holds(rng, deep):
+def _holds(rng):
     knots, t = [(0, 0, 0, UP), (1.0, 0, 0, UP)], 1.0
     for (x, y), hold in zip(_spots(rng, 3), (3.0, 8.0, 4.0), strict=True):
-        depth, quick = deep * rng.uniform(0.6, 1.0), rng.uniform(0.15, 0.4)
+        depth, quick = DEEP * rng.uniform(0.6, 1.0), rng.uniform(0.15, 0.4)
         knots += [(t + 0.3, x, y, UP), (t + 0.3 + quick, x, y, depth), (t + 0.3 + quick + hold, x, y, depth)]
         knots += [(t + 0.6 + quick + hold, x, y, UP), (t + 2.0 + quick + hold, x, y, UP)]
         t += 2.0 + quick + hold
     return [*knots, (SECONDS, x, y, UP)]
 
 
-def _slides(rng, deep):
+def _slides(rng):
     knots, t = [(0, 0, 0, UP), (1.0, 0, 0, UP)], 1.0
-    for depth in rng.permutation([0.6, 0.9]) * deep:
+    for depth in rng.permutation([0.6, 0.9]) * DEEP:
         y = 0.25 * ROWS * PITCH * rng.choice([-1, 1])
         knots += [(t + 0.3, 0, y, UP), (t + 0.9, 0, y, depth), (t + 1.3, 0, y, depth)]
         t += 1.3
         for speed in rng.permutation([0.004, 0.012, 0.04, 0.1]):
             y = -y
-            travel = 2 * abs(y) / speed
-            travel = min(travel, 3.5)
-            y = float(np.clip(y, -abs(y), abs(y)))
+            travel = min(2 * abs(y) / speed, 3.5)
             goal = np.clip(-y + np.sign(y) * speed * travel, -abs(y), abs(y))
             knots += [(t + travel, 0, goal, depth), (t + travel + 0.4, 0, goal, depth)]
             t, y = t + travel + 0.4, goal
@@ -299,11 +294,11 @@ def _slides(rng, deep):
     return [*knots, (max(SECONDS, t), 0, y, UP)]
 
 
-def _mixture(rng, deep):
+def _mixture(rng):
     """Some of everything at other places, depths and speeds."""
     knots, t = [(0, 0, 0, UP), (1.0, 0, 0, UP)], 1.0
     for x, y in _spots(rng, 3):
-        depth, quick = deep * rng.uniform(0.4, 1.0), np.exp(rng.uniform(np.log(0.15), np.log(1.0)))
+        depth, quick = DEEP * rng.uniform(0.4, 1.0), np.exp(rng.uniform(np.log(0.15), np.log(1.0)))
         knots += [(t + 0.3, x, y, UP), (t + 0.3 + quick, x, y, depth), (t + 2.3 + quick, x, y, depth)]
         t += 2.3 + quick
         low, speed = 0.4 * depth, rng.uniform(0.005, 0.05)
@@ -351,12 +346,6 @@ PROGRAMMES = {
     "one level": _one_level,
     "one place": _one_place,
 }
-
-
-def _poor(way: str, rng, probe: Probe) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Six times the same programme, of the poor ones."""
-    time = np.arange(round(SECONDS * RATE) + 1) / RATE
-    return [time] * 6, [_path(time, PROGRAMMES[way](rng), probe) for _ in range(6)]
 
 
 def _calibrated(maker, name: str, rng, pad: Pad, probe: Probe, contacts: list[Contact]) -> tuple[Hidden, float]:
@@ -418,7 +407,7 @@ def write(case: Case, folder: Path, name: str = "") -> Path:
         'format = "palpate-rig/1"', f'name = "{name or f"case {case.number}"}"', "[sensor]",
         GRID, words, "[indenter]", f"shape = {shape}",
     ]  # fmt: skip
-    header = ["time", "x", "y", "z", *(f"texel_{i}" for i in range(ROWS * COLUMNS)), "force_x", "force_y", "force_z"]
+    header = ["time", "x", "y", "z", *(f"texel_{i}" for i in range(N)), "force_x", "force_y", "force_z"]
     for i, use in enumerate(uses):
         lines += ["[[trial]]", f'file = "trial_{i}.csv"', f'use = "{use}"']
         table = np.hstack([case.times[i][:, None], case.paths[i], case.readings[i], case.forces[i]])

@@ -10,18 +10,19 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .world import COLUMNS, RATE, ROWS, Hidden, Pad, Signals
+from .world import COLUMNS, RATE, ROWS, Hidden, N, Pad, Signals, faded
 
 Maker = Callable[[np.random.Generator, float], Hidden]
 
 
-def _elastic(change: Callable[[Signals, Pad], np.ndarray]) -> Callable[[Signals, Pad], None]:
+def by_name(*makers: Maker) -> dict[str, Maker]:
+    """Return makers by the names of the effects, which are those of the functions."""
+    return {maker.__name__.replace("_", "-"): maker for maker in makers}
+
+
+def _elastic(change: Callable[[Signals, Pad], np.ndarray]) -> Callable[[Signals, Pad], np.ndarray]:
     """An effect that multiplies the normal force by what `change` returns."""
-
-    def act(signals: Signals, pad: Pad) -> None:
-        signals.force = np.maximum(signals.force * change(signals, pad), 0.0)
-
-    return act
+    return lambda s, pad: np.maximum(s.force * change(s, pad), 0.0)
 
 
 def stiffening(rng, strength) -> Hidden:
@@ -32,7 +33,7 @@ def stiffening(rng, strength) -> Hidden:
         x = np.maximum(s.depth, 1e-9) / length
         return np.sinh(np.minimum(x, 20)) / x
 
-    return Hidden("stiffening", "sinh", strength, force=_elastic(factor), values={"length": length})
+    return Hidden("stiffening", "sinh", force=_elastic(factor))
 
 
 def softening(rng, strength) -> Hidden:
@@ -44,7 +45,7 @@ def softening(rng, strength) -> Hidden:
         below = np.clip(1.0 - s.depth / np.maximum(most, 1e-9), 0, 1)
         return 1.0 - 0.9 * min(strength, 1.0) * (1 - np.exp(-((most / deep) ** 1.5))) * np.tanh(3 * below) ** 0.5
 
-    return Hidden("softening", "weibull", strength, force=_elastic(factor))
+    return Hidden("softening", "weibull", force=_elastic(factor))
 
 
 def hysteresis(rng, strength) -> Hidden:
@@ -60,8 +61,9 @@ def hysteresis(rng, strength) -> Hidden:
             depth = s.depth[t][:, None]
             state = (state & (depth > off)) | (depth > on)
             s.force[t] = (1 - share) * s.force[t] + share * pad.k * deep * state.mean(axis=1)
+        return s.force
 
-    return Hidden("hysteresis", "crowd of relays", strength, elastic=act)
+    return Hidden("hysteresis", "crowd of relays", elastic=act)
 
 
 def creep(rng, strength) -> Hidden:
@@ -69,14 +71,10 @@ def creep(rng, strength) -> Hidden:
     tau, beta = np.exp(rng.uniform(np.log(0.8), np.log(4.0))), rng.uniform(0.45, 0.7)
 
     def act(s, pad):
-        lag = s.time - s.time[0]
-        memory = 0.7 * min(strength, 1.2) * (1 - np.exp(-((lag / tau) ** beta)))
-        steps = np.diff(pad.k * s.depth, axis=0, prepend=0.0)
-        n = 2 * len(lag)
-        relaxed = np.fft.irfft(np.fft.rfft(steps, n, axis=0) * np.fft.rfft(memory, n)[:, None], n, axis=0)[: len(lag)]
-        s.force = np.where(s.depth > 0, np.maximum(s.force - relaxed, 0.0), 0.0)
+        memory = 0.7 * min(strength, 1.2) * (1 - np.exp(-(((s.time - s.time[0]) / tau) ** beta)))
+        return np.where(s.depth > 0, np.maximum(s.force - faded(pad.k * s.depth, memory), 0.0), 0.0)
 
-    return Hidden("creep", "stretched", strength, force=act, values={"tau": tau, "beta": beta})
+    return Hidden("creep", "stretched", force=act)
 
 
 def adhesion(rng, strength) -> Hidden:
@@ -87,9 +85,9 @@ def adhesion(rng, strength) -> Hidden:
         touched = np.maximum.accumulate(s.depth, axis=0) > 0.3e-3
         leaving = touched & (s.contact.pace < 0) & (s.depth > 0)
         pull = strength * pad.k * 1.2e-3 * np.exp(-((s.depth / width) ** 2)) * (1 - np.exp(-s.depth / (0.1 * width)))
-        s.force = s.force - np.where(leaving, pull, 0.0)
+        return s.force - np.where(leaving, pull, 0.0)
 
-    return Hidden("adhesion", "rounded Dugdale", strength, force=act)
+    return Hidden("adhesion", "rounded Dugdale", force=act)
 
 
 def wear(rng, strength) -> Hidden:
@@ -100,7 +98,7 @@ def wear(rng, strength) -> Hidden:
         work = np.cumsum(s.force * speed, axis=0) * s.dt  # J
         return 1.0 / (1.0 + 1.5 * strength * work / (pad.k * 3e-3 * 0.03))
 
-    return Hidden("wear", "rational", strength, force=_elastic(factor))
+    return Hidden("wear", "rational", force=_elastic(factor))
 
 
 def _neighbours(values: np.ndarray) -> np.ndarray:
@@ -118,8 +116,9 @@ def load_spreading(rng, strength) -> Hidden:
         share = min(0.2 * strength, 0.22)
         for _ in range(4):
             s.force = s.force + share * (_neighbours(s.force) - 4 * s.force)
+        return s.force
 
-    return Hidden("load-spreading", "diffusion", strength, force=act)
+    return Hidden("load-spreading", "diffusion", force=act)
 
 
 def crosstalk(rng, strength) -> Hidden:
@@ -132,23 +131,23 @@ def crosstalk(rng, strength) -> Hidden:
             apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
             couple = np.where(apart == 0, 1.0, 0.15 * strength * np.exp(-(apart - 1) / fade))
             signal = np.moveaxis(np.tensordot(signal, couple, (axis, 0)), -1, axis)
-        s.reading = pad.zero + signal.reshape(s.reading.shape)
+        return pad.zero + signal.reshape(s.reading.shape)
 
-    return Hidden("crosstalk", "ribbon", strength, reading=act)
+    return Hidden("crosstalk", "ribbon", reading=act)
 
 
 def gain_mismatch(rng, strength) -> Hidden:
     """Log-normal gains on top of a slope across the pad, of texels that are each bent a little as well."""
     y, x = np.mgrid[-1 : 1 : ROWS * 1j, -1 : 1 : COLUMNS * 1j]
     tilt = rng.normal(size=2)
-    gain = np.exp(strength * (0.35 * rng.normal(size=ROWS * COLUMNS) + 0.2 * (tilt[0] * x + tilt[1] * y).ravel()))
-    bend = 0.15 * strength * rng.normal(size=ROWS * COLUMNS)
+    gain = np.exp(strength * (0.35 * rng.normal(size=N) + 0.2 * (tilt[0] * x + tilt[1] * y).ravel()))
+    bend = 0.15 * strength * rng.normal(size=N)
 
     def act(s, pad):
         x = (s.reading - pad.zero) / (pad.gain * pad.k * 3e-3)
-        s.reading = s.reading + pad.gain * pad.k * 3e-3 * x * (gain / gain.mean() * (1 + bend * np.clip(x, -1.5, 1.5)) - 1)
+        return s.reading + pad.gain * pad.k * 3e-3 * x * (gain / gain.mean() * (1 + bend * np.clip(x, -1.5, 1.5)) - 1)
 
-    return Hidden("gain-mismatch", "lognormal and bent", strength, reading=act)
+    return Hidden("gain-mismatch", "lognormal and bent", reading=act)
 
 
 def dead_texels(rng, strength) -> Hidden:
@@ -160,8 +159,9 @@ def dead_texels(rng, strength) -> Hidden:
     def act(s, pad):
         stuck = pad.gain * pad.k * 3e-3 * 0.2 * level
         s.reading[:, dead] = pad.zero + stuck + deaf * (s.reading[:, dead] - pad.zero)
+        return s.reading
 
-    return Hidden("dead-texels", "broken", strength, reading=act, values={"texels": sorted(int(i) for i in dead)})
+    return Hidden("dead-texels", "broken", reading=act)
 
 
 def dead_zone(rng, strength) -> Hidden:
@@ -171,9 +171,9 @@ def dead_zone(rng, strength) -> Hidden:
         start = pad.k * 1.5e-3 * strength
         x = np.maximum(s.reading - pad.zero, 0) / pad.gain
         onset = np.maximum(x - 0.5 * start, 0.0)
-        s.reading = pad.zero + pad.gain * np.where(onset < start, onset**2 / (2 * start), onset - start / 2)
+        return pad.zero + pad.gain * np.where(onset < start, onset**2 / (2 * start), onset - start / 2)
 
-    return Hidden("dead-zone", "quadratic", strength, reading=act)
+    return Hidden("dead-zone", "quadratic", reading=act)
 
 
 def saturation(rng, strength) -> Hidden:
@@ -182,9 +182,9 @@ def saturation(rng, strength) -> Hidden:
     def act(s, pad):
         top = pad.k * 4e-3 / strength
         x = (s.reading - pad.zero) / pad.gain
-        s.reading = pad.zero + pad.gain * top * 2 / np.pi * np.arctan(np.pi / 2 * x / top)
+        return pad.zero + pad.gain * top * 2 / np.pi * np.arctan(np.pi / 2 * x / top)
 
-    return Hidden("saturation", "arctan", strength, reading=act)
+    return Hidden("saturation", "arctan", reading=act)
 
 
 def lag(rng, strength) -> Hidden:
@@ -198,32 +198,31 @@ def lag(rng, strength) -> Hidden:
         for t in range(len(s.time)):
             state = keep * state + (1 - keep) * late[t]
             s.reading[t] = state
+        return s.reading
 
-    return Hidden("lag", "dead time and low pass", strength, reading=act, values={"tau": tau, "dead": dead})
+    return Hidden("lag", "dead time and low pass", reading=act)
 
 
 def drift(rng, strength) -> Hidden:
     """The zero wanders with a power of the time, a little differently in each texel."""
-    power, spread = rng.uniform(0.6, 1.5), 1 + 0.2 * rng.normal(size=ROWS * COLUMNS)
+    power, spread = rng.uniform(0.6, 1.5), 1 + 0.2 * rng.normal(size=N)
 
     def act(s, pad):
-        s.reading = (
-            s.reading + pad.gain * pad.k * 3e-3 * 0.2 * strength * ((s.time[:, None] - s.time[0]) / 25.0) ** power * spread
-        )
+        return s.reading + pad.gain * pad.k * 3e-3 * 0.2 * strength * ((s.time[:, None] - s.time[0]) / 25.0) ** power * spread
 
-    return Hidden("drift", "power", strength, reading=act)
+    return Hidden("drift", "power", reading=act)
 
 
 def offset(rng, strength) -> Hidden:
     """A cover that is stretched over the texels presses on each of them, by row and by texel, until the load takes over."""
-    preload = np.abs(np.repeat(rng.normal(size=ROWS), COLUMNS) + 0.5 * rng.normal(size=ROWS * COLUMNS))
+    preload = np.abs(np.repeat(rng.normal(size=ROWS), COLUMNS) + 0.5 * rng.normal(size=N))
 
     def act(s, pad):
         rest = 0.2 * strength * pad.k * 3e-3 * preload
         load = np.maximum(s.reading - pad.zero, 0.0) / pad.gain
-        s.reading = s.reading + pad.gain * rest / (1.0 + load / (pad.k * 3e-3))
+        return s.reading + pad.gain * rest / (1.0 + load / (pad.k * 3e-3))
 
-    return Hidden("offset", "preload", strength, reading=act)
+    return Hidden("offset", "preload", reading=act)
 
 
 def quantization(rng, strength) -> Hidden:
@@ -235,7 +234,7 @@ def quantization(rng, strength) -> Hidden:
         root = np.sign(x) * np.sqrt(np.abs(x))
         return pad.zero + full * np.sign(root) * (step * np.floor(np.abs(root) / step)) ** 2
 
-    return Hidden("quantization", "square root", strength, convert=act)
+    return Hidden("quantization", "square root", convert=act)
 
 
 def noise(rng, strength) -> Hidden:
@@ -243,16 +242,16 @@ def noise(rng, strength) -> Hidden:
 
     def act(s, pad):
         shake = rng.standard_t(5, size=s.reading.shape)
-        s.reading = s.reading + strength * 0.25 * np.abs(s.reading - pad.zero) * shake
+        return s.reading + strength * 0.25 * np.abs(s.reading - pad.zero) * shake
 
-    return Hidden("noise", "of the load", strength, reading=act)
+    return Hidden("noise", "of the load", reading=act)
 
 
 def misalignment(rng, strength) -> Hidden:
     """The pad was glued on shifted and stretched."""
     shift, stretch = rng.normal(size=2), 1.0 + 0.04 * strength * rng.uniform(0.3, 1.0) * rng.choice([-1, 1])
     shift = 3e-3 * strength * shift / np.linalg.norm(shift)
-    return Hidden("misalignment", "shift and stretch", strength, place=lambda places: stretch * places + shift)
+    return Hidden("misalignment", "shift and stretch", place=lambda places: stretch * places + shift)
 
 
 def stribeck(rng, strength) -> Hidden:
@@ -262,7 +261,7 @@ def stribeck(rng, strength) -> Hidden:
     def law(speed, fn, pad):
         return np.maximum(1.0 - 0.18 * strength * np.log1p(speed / slow), 0.2), np.zeros_like(speed)
 
-    return Hidden("stribeck", "logarithmic", strength, friction=law)
+    return Hidden("stribeck", "logarithmic", friction=law)
 
 
 def viscous_friction(rng, strength) -> Hidden:
@@ -272,31 +271,13 @@ def viscous_friction(rng, strength) -> Hidden:
         drag = strength * 0.6 * np.maximum(fn, 0.0) * (np.maximum(speed, 1e-6) / 0.02) ** 0.6
         return np.ones_like(speed), drag / np.maximum(speed, 1e-6)
 
-    return Hidden("viscous-friction", "film", strength, friction=law)
+    return Hidden("viscous-friction", "film", friction=law)
 
 
-MAKERS: dict[str, Maker] = {
-    "stiffening": stiffening,
-    "softening": softening,
-    "hysteresis": hysteresis,
-    "creep": creep,
-    "adhesion": adhesion,
-    "wear": wear,
-    "load-spreading": load_spreading,
-    "crosstalk": crosstalk,
-    "gain-mismatch": gain_mismatch,
-    "dead-texels": dead_texels,
-    "dead-zone": dead_zone,
-    "saturation": saturation,
-    "lag": lag,
-    "drift": drift,
-    "offset": offset,
-    "quantization": quantization,
-    "noise": noise,
-    "misalignment": misalignment,
-    "stribeck": stribeck,
-    "viscous-friction": viscous_friction,
-}
+MAKERS = by_name(
+    stiffening, softening, hysteresis, creep, adhesion, wear, load_spreading, crosstalk, gain_mismatch, dead_texels, dead_zone,
+    saturation, lag, drift, offset, quantization, noise, misalignment, stribeck, viscous_friction,
+)  # fmt: skip
 
 
 # --- what is in nobody's library
@@ -304,12 +285,12 @@ MAKERS: dict[str, Maker] = {
 
 def hum(rng, strength) -> Hidden:
     """Mains hum that the sampling folds down to a few hertz."""
-    pitch, phase = rng.uniform(2.5, 0.4 * RATE), rng.uniform(0, 6, size=ROWS * COLUMNS)
+    pitch, phase = rng.uniform(2.5, 0.4 * RATE), rng.uniform(0, 6, size=N)
 
     def act(s, pad):
-        s.reading = s.reading + pad.gain * pad.k * 3e-3 * 0.2 * strength * np.sin(2 * np.pi * pitch * s.time[:, None] + phase)
+        return s.reading + pad.gain * pad.k * 3e-3 * 0.2 * strength * np.sin(2 * np.pi * pitch * s.time[:, None] + phase)
 
-    return Hidden("hum", "sine", strength, reading=act)
+    return Hidden("hum", "sine", reading=act)
 
 
 def temperature_swing(rng, strength) -> Hidden:
@@ -318,11 +299,11 @@ def temperature_swing(rng, strength) -> Hidden:
 
     def act(s, pad):
         swing = np.sin(2 * np.pi * s.time[:, None] / period + phase)
-        s.reading = (
+        return (
             pad.zero + (s.reading - pad.zero) * (1 + 0.35 * strength * swing) + pad.gain * pad.k * 3e-3 * 0.1 * strength * swing
         )
 
-    return Hidden("temperature-swing", "sine", strength, reading=act)
+    return Hidden("temperature-swing", "sine", reading=act)
 
 
 def jitter(rng, strength) -> Hidden:
@@ -333,8 +314,9 @@ def jitter(rng, strength) -> Hidden:
         wander = 0.25 * strength * (wander - wander.mean()) / max(float(np.abs(wander - wander.mean()).max()), 1e-9)
         for i in range(s.reading.shape[1]):
             s.reading[:, i] = np.interp(s.time + wander, s.time, s.reading[:, i])
+        return s.reading
 
-    return Hidden("jitter", "wandering clock", strength, reading=act)
+    return Hidden("jitter", "wandering clock", reading=act)
 
 
-OUTSIDE: dict[str, Maker] = {"hum": hum, "temperature-swing": temperature_swing, "jitter": jitter}
+OUTSIDE = by_name(hum, temperature_swing, jitter)

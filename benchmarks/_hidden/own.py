@@ -6,11 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from .other import Maker
-from .world import COLUMNS, PITCH, ROWS, Hidden, Pad, Signals
-
-DEEP = 3e-3
-"""Metres: the depth that goes with forces and readings below, which the pad is about pressed to."""
-N = ROWS * COLUMNS
+from .world import COLUMNS, DEEP, PITCH, ROWS, Hidden, N, Pad, faded
 
 
 def _between(rng, low: float, high: float) -> float:
@@ -22,13 +18,14 @@ def _either(*makers: Maker) -> Maker:
     return lambda rng, strength: makers[rng.integers(len(makers))](rng, strength)
 
 
+def _forms(maker, *forms: tuple) -> Maker:
+    """One of several forms of one maker, by its first arguments."""
+    return lambda rng, strength: maker(*forms[rng.integers(len(forms))], rng, strength)
+
+
 def _over_depth(name: str, form: str, strength: float, factor, values: dict) -> Hidden:
     """An elastic force times a function of the depth alone."""
-
-    def act(s: Signals, pad: Pad) -> None:
-        s.force = s.force * factor(s.depth)
-
-    return Hidden(name, form, strength, elastic=act, values=values)
+    return Hidden(name, form, elastic=lambda s, pad: s.force * factor(s.depth), values=values)
 
 
 def polynomial(rng, strength) -> Hidden:
@@ -53,9 +50,9 @@ def peak(rng, strength) -> Hidden:
     share, depth = min(0.5 * strength, 0.85), _between(rng, 1e-3, 2.5e-3)
 
     def act(s, pad):
-        s.force = s.force * (1 - share * -np.expm1(-np.maximum.accumulate(s.depth, axis=0) / depth))
+        return s.force * (1 - share * -np.expm1(-np.maximum.accumulate(s.depth, axis=0) / depth))
 
-    return Hidden("softening", "peak", strength, elastic=act, values={"share": share, "depth": depth})
+    return Hidden("softening", "peak", elastic=act, values={"share": share, "depth": depth})
 
 
 def ogden_roxburgh(rng, strength) -> Hidden:
@@ -66,9 +63,9 @@ def ogden_roxburgh(rng, strength) -> Hidden:
     def act(s, pad):
         work = 0.5 * s.force * s.depth
         most = np.maximum(np.maximum.accumulate(work, axis=0), 1e-30)
-        s.force = s.force * (1 - share * erf((1 - work / most) / width))
+        return s.force * (1 - share * erf((1 - work / most) / width))
 
-    return Hidden("softening", "ogden-roxburgh", strength, elastic=act, values={"share": share, "width": width})
+    return Hidden("softening", "ogden-roxburgh", elastic=act, values={"share": share, "width": width})
 
 
 def duhem(rng, strength) -> Hidden:
@@ -82,8 +79,9 @@ def duhem(rng, strength) -> Hidden:
             z = aim + (z - aim) * np.exp(-np.abs(step) / depth)
             s.force[t] *= 1 + width * z
             z = np.where(s.depth[t] > 0, z, 0.0)
+        return s.force
 
-    return Hidden("hysteresis", "duhem", strength, elastic=act, values={"width": width, "depth": depth})
+    return Hidden("hysteresis", "duhem", elastic=act, values={"width": width, "depth": depth})
 
 
 def maxwell_slip(rng, strength) -> Hidden:
@@ -99,8 +97,9 @@ def maxwell_slip(rng, strength) -> Hidden:
             s.force[t] = (1 - share) * now + share * springs.mean(axis=1)
             springs[s.depth[t] <= 0] = 0.0
             before = now
+        return s.force
 
-    return Hidden("hysteresis", "maxwell-slip", strength, elastic=act, values={"share": share, "force / k": scale * DEEP})
+    return Hidden("hysteresis", "maxwell-slip", elastic=act, values={"share": share, "force / k": scale * DEEP})
 
 
 def _low_pass(x: np.ndarray, dt: float, tau: float, first: np.ndarray) -> np.ndarray:
@@ -118,9 +117,9 @@ def relaxing(rng, strength) -> Hidden:
     amount, time = min(0.5 * strength, 0.9), _between(rng, 0.5, 5.0)
 
     def act(s, pad):
-        s.force = s.force - amount * _low_pass(s.force, s.dt, time, np.zeros(N))
+        return s.force - amount * _low_pass(s.force, s.dt, time, np.zeros(N))
 
-    return Hidden("creep", "exponential", strength, elastic=act, values={"amount": amount, "time": time})
+    return Hidden("creep", "exponential", elastic=act, values={"amount": amount, "time": time})
 
 
 def logarithmic(rng, strength) -> Hidden:
@@ -130,24 +129,19 @@ def logarithmic(rng, strength) -> Hidden:
         inside = (np.arange(8) + 0.5) / 8  # of a step along which the force grows evenly
         at = (np.arange(len(s.time))[:, None] + inside) * s.dt
         memory = amount * np.log10(1 + at / time).mean(axis=1)
-        steps, n = np.diff(s.force, axis=0, prepend=0.0), 2 * len(memory)
-        gone = np.fft.irfft(np.fft.rfft(steps, n, axis=0) * np.fft.rfft(memory, n)[:, None], n, axis=0)
-        s.force = s.force - gone[: len(memory)]
+        return s.force - faded(s.force, memory)
 
-    return Hidden("creep", "logarithmic", strength, elastic=act, values={"amount": amount, "time": time})
+    return Hidden("creep", "logarithmic", elastic=act, values={"amount": amount, "time": time})
 
 
-def _worn(law, form: str) -> Maker:
-    def make(rng, strength) -> Hidden:
-        def act(s, pad):
-            life = 4.0 * pad.k * DEEP / strength
-            put_on = np.cumsum(np.maximum(np.diff(s.force, axis=0, prepend=0.0), 0.0), axis=0)
-            before = np.vstack([np.zeros((1, N)), put_on[:-1]])
-            s.force = s.force * law(before / life)
+def _worn(law, form: str, rng, strength) -> Hidden:
+    def act(s, pad):
+        life = 4.0 * pad.k * DEEP / strength
+        put_on = np.cumsum(np.maximum(np.diff(s.force, axis=0, prepend=0.0), 0.0), axis=0)
+        before = np.vstack([np.zeros((1, N)), put_on[:-1]])
+        return s.force * law(before / life)
 
-        return Hidden("wear", form, strength, elastic=act, values={"life / k": 4.0 * DEEP / strength})
-
-    return make
+    return Hidden("wear", form, elastic=act, values={"life / k": 4.0 * DEEP / strength})
 
 
 def unloading(rng, strength) -> Hidden:
@@ -160,32 +154,30 @@ def unloading(rng, strength) -> Hidden:
             aim = np.where(step >= 0, 0.0, 1.0)
             u = np.where(s.depth[t] > 0, aim + (u - aim) * np.exp(-np.abs(step) / width), 0.0)
             s.force[t] -= pull * u
+        return s.force
 
-    return Hidden("adhesion", "unloading", strength, force=act, values={"pull / k": strength * 1e-3, "depth": width})
+    return Hidden("adhesion", "unloading", force=act, values={"pull / k": strength * 1e-3, "depth": width})
 
 
 def steady_pull(rng, strength) -> Hidden:
     width = _between(rng, 0.05e-3, 0.15e-3)
 
     def act(s, pad):
-        s.force = s.force + strength * pad.k * 1e-3 * np.expm1(-s.depth / width)
+        return s.force + strength * pad.k * 1e-3 * np.expm1(-s.depth / width)
 
-    return Hidden("adhesion", "constant", strength, force=act, values={"pull / k": strength * 1e-3, "depth": width})
+    return Hidden("adhesion", "constant", force=act, values={"pull / k": strength * 1e-3, "depth": width})
 
 
-def _spread(form: str, size: str, weight) -> Maker:
-    def make(rng, strength) -> Hidden:
-        width = 3e-3 * strength
+def _spread(form: str, size: str, weight, rng, strength) -> Hidden:
+    width = 3e-3 * strength
 
-        def act(s, pad):
-            apart = np.linalg.norm(pad.place[:, None] - pad.place[None], axis=2)
-            shares = weight(apart / width)
-            shares /= shares.sum(axis=0)
-            s.reading = pad.zero + (s.reading - pad.zero) @ shares.T
+    def act(s, pad):
+        apart = np.linalg.norm(pad.place[:, None] - pad.place[None], axis=2)
+        shares = weight(apart / width)
+        shares /= shares.sum(axis=0)
+        return pad.zero + (s.reading - pad.zero) @ shares.T
 
-        return Hidden("load-spreading", form, strength, reading=act, values={size: width})
-
-    return make
+    return Hidden("load-spreading", form, reading=act, values={size: width})
 
 
 def neighbours(rng, strength) -> Hidden:
@@ -198,9 +190,9 @@ def neighbours(rng, strength) -> Hidden:
         out[:, :-1] += share * x[:, 1:]
         out[:, :, 1:] += share * x[:, :, :-1]
         out[:, :, :-1] += share * x[:, :, 1:]
-        s.reading = pad.zero + out.reshape(s.reading.shape)
+        return pad.zero + out.reshape(s.reading.shape)
 
-    return Hidden("crosstalk", "neighbours", strength, reading=act, values={"share": share})
+    return Hidden("crosstalk", "neighbours", reading=act, values={"share": share})
 
 
 def lines(rng, strength) -> Hidden:
@@ -209,16 +201,13 @@ def lines(rng, strength) -> Hidden:
     def act(s, pad):
         x = (s.reading - pad.zero).reshape(-1, ROWS, COLUMNS)
         leak = x.mean(axis=1, keepdims=True) + x.mean(axis=2, keepdims=True)
-        s.reading = pad.zero + (x + share * leak).reshape(s.reading.shape)
+        return pad.zero + (x + share * leak).reshape(s.reading.shape)
 
-    return Hidden("crosstalk", "lines", strength, reading=act, values={"share": share})
+    return Hidden("crosstalk", "lines", reading=act, values={"share": share})
 
 
 def _gains(form: str, strength: float, gain: np.ndarray, values: dict) -> Hidden:
-    def act(s, pad):
-        s.reading = pad.zero + (s.reading - pad.zero) * gain
-
-    return Hidden("gain-mismatch", form, strength, reading=act, values=values)
+    return Hidden("gain-mismatch", form, reading=lambda s, pad: pad.zero + (s.reading - pad.zero) * gain, values=values)
 
 
 def listed_gains(rng, strength) -> Hidden:
@@ -239,57 +228,52 @@ def silent(rng, strength) -> Hidden:
 
     def act(s, pad):
         s.reading[:, dead] = pad.zero
+        return s.reading
 
-    return Hidden("dead-texels", "listed", strength, reading=act)
-
-
-def _blunt(law, form: str) -> Maker:
-    def make(rng, strength) -> Hidden:
-        def act(s, pad):
-            f = np.maximum(s.reading - pad.zero, 0.0) / pad.gain
-            s.reading = pad.zero + pad.gain * law(f, pad.k * 1.2e-3 * strength)
-
-        return Hidden("dead-zone", form, strength, reading=act, values={"threshold / k": 1.2e-3 * strength})
-
-    return make
+    return Hidden("dead-texels", "listed", reading=act)
 
 
-def _full(law, form: str) -> Maker:
-    def make(rng, strength) -> Hidden:
-        level = DEEP / (0.6 + strength if form == "clip" else strength)
+def _blunt(law, form: str, rng, strength) -> Hidden:
+    def act(s, pad):
+        f = np.maximum(s.reading - pad.zero, 0.0) / pad.gain
+        return pad.zero + pad.gain * law(f, pad.k * 1.2e-3 * strength)
 
-        def act(s, pad):
-            top = pad.gain * pad.k * level
-            s.reading = pad.zero + top * law((s.reading - pad.zero) / top)
+    return Hidden("dead-zone", form, reading=act, values={"threshold / k": 1.2e-3 * strength})
 
-        return Hidden("saturation", form, strength, reading=act, values={"level / k gain": level})
 
-    return make
+def _full(law, form: str, rng, strength) -> Hidden:
+    level = DEEP / (0.6 + strength if form == "clip" else strength)
+
+    def act(s, pad):
+        top = pad.gain * pad.k * level
+        return pad.zero + top * law((s.reading - pad.zero) / top)
+
+    return Hidden("saturation", form, reading=act, values={"level / k gain": level})
 
 
 def first_order(rng, strength) -> Hidden:
     time = 0.2 * strength
 
     def act(s, pad):
-        s.reading = _low_pass(s.reading, s.dt, time, s.reading[0])
+        return _low_pass(s.reading, s.dt, time, s.reading[0])
 
-    return Hidden("lag", "first-order", strength, reading=act, values={"time": time})
+    return Hidden("lag", "first-order", reading=act, values={"time": time})
 
 
 def dead_time(rng, strength) -> Hidden:
     time = 0.2 * strength
 
     def act(s, pad):
-        s.reading = np.stack([np.interp(s.time - time, s.time, channel) for channel in s.reading.T], axis=1)
+        return np.stack([np.interp(s.time - time, s.time, channel) for channel in s.reading.T], axis=1)
 
-    return Hidden("lag", "dead-time", strength, reading=act, values={"time": time})
+    return Hidden("lag", "dead-time", reading=act, values={"time": time})
 
 
 def _drifting(form: str, strength: float, course, values: dict) -> Hidden:
     def act(s, pad):
-        s.reading = s.reading + pad.gain * pad.k * course(s.time - s.time[0])[:, None]
+        return s.reading + pad.gain * pad.k * course(s.time - s.time[0])[:, None]
 
-    return Hidden("drift", form, strength, reading=act, values=values)
+    return Hidden("drift", form, reading=act, values=values)
 
 
 def steady_drift(rng, strength) -> Hidden:
@@ -304,18 +288,14 @@ def warm_up(rng, strength) -> Hidden:
 
 def listed_offsets(rng, strength) -> Hidden:
     zero = 0.2 * strength * DEEP * rng.normal(size=N)
-
-    def act(s, pad):
-        s.reading = s.reading + pad.gain * pad.k * zero
-
-    return Hidden("offset", "listed", strength, reading=act)
+    return Hidden("offset", "listed", reading=lambda s, pad: s.reading + pad.gain * pad.k * zero)
 
 
 def proportional(rng, strength) -> Hidden:
     def act(s, pad):
-        s.reading = s.reading + 0.25 * strength * (s.reading - pad.zero) * rng.normal(size=s.reading.shape)
+        return s.reading + 0.25 * strength * (s.reading - pad.zero) * rng.normal(size=s.reading.shape)
 
-    return Hidden("noise", "proportional", strength, reading=act)
+    return Hidden("noise", "proportional", reading=act)
 
 
 def steps(rng, strength) -> Hidden:
@@ -323,40 +303,37 @@ def steps(rng, strength) -> Hidden:
         step = pad.gain * pad.k * DEEP * 0.3 * strength
         return step * np.round(reading / step)
 
-    return Hidden("quantization", "round", strength, convert=act, values={"step / k gain": DEEP * 0.3 * strength})
+    return Hidden("quantization", "round", convert=act, values={"step / k gain": DEEP * 0.3 * strength})
 
 
 def shift(rng, strength) -> Hidden:
     turn = rng.uniform(0, 2 * np.pi)
     by = PITCH * strength * np.array([np.cos(turn), np.sin(turn)])
     values = {"x": float(by[0]), "y": float(by[1])}
-    return Hidden("misalignment", "shift", strength, place=lambda places: places + by, values=values)
+    return Hidden("misalignment", "shift", place=lambda places: places + by, values=values)
 
 
-def _slippery(law, form: str) -> Maker:
-    def make(rng, strength) -> Hidden:
-        rise, speed = min(1.5 * strength, 3.8), _between(rng, 4e-3, 0.03)
+def _slippery(law, form: str, rng, strength) -> Hidden:
+    rise, speed = min(1.5 * strength, 3.8), _between(rng, 4e-3, 0.03)
 
-        def factor(v, fn, pad):
-            return 1 + rise * law(v / speed), np.zeros_like(v)
+    def factor(v, fn, pad):
+        return 1 + rise * law(v / speed), np.zeros_like(v)
 
-        return Hidden("stribeck", form, strength, friction=factor, values={"rise": rise, "speed": speed})
-
-    return make
+    return Hidden("stribeck", form, friction=factor, values={"rise": rise, "speed": speed})
 
 
 def viscous(rng, strength) -> Hidden:
     def law(v, fn, pad):
         return np.ones_like(v), np.full_like(v, 0.01 * pad.k * strength)
 
-    return Hidden("viscous-friction", "linear", strength, friction=law, values={"viscosity / k": 0.01 * strength})
+    return Hidden("viscous-friction", "linear", friction=law, values={"viscosity / k": 0.01 * strength})
 
 
 def viscous_load(rng, strength) -> Hidden:
     def law(v, fn, pad):
         return np.ones_like(v), 8.0 * strength * np.maximum(fn, 0.0)
 
-    return Hidden("viscous-friction", "load", strength, friction=law, values={"viscosity": 8.0 * strength})
+    return Hidden("viscous-friction", "load", friction=law, values={"viscosity": 8.0 * strength})
 
 
 OWN: dict[str, Maker] = {
@@ -365,17 +342,21 @@ OWN: dict[str, Maker] = {
     "hysteresis": _either(duhem, maxwell_slip),
     "creep": _either(relaxing, logarithmic),
     "adhesion": _either(unloading, steady_pull),
-    "wear": _either(_worn(lambda a: np.exp(-a), "exponential"), _worn(lambda a: np.maximum(1 - a, 0.0), "linear")),
-    "load-spreading": _either(
-        _spread("gaussian", "width", lambda r: np.exp(-0.5 * r * r)),
-        _spread("half-space", "thickness", lambda r: (1 + r * r) ** -2.5),
+    "wear": _forms(_worn, (lambda a: np.exp(-a), "exponential"), (lambda a: np.maximum(1 - a, 0.0), "linear")),
+    "load-spreading": _forms(
+        _spread,
+        ("gaussian", "width", lambda r: np.exp(-0.5 * r * r)),
+        ("half-space", "thickness", lambda r: (1 + r * r) ** -2.5),
     ),
     "crosstalk": _either(neighbours, lines),
     "gain-mismatch": _either(listed_gains, gradient),
     "dead-texels": silent,
-    "dead-zone": _either(_blunt(lambda f, t: np.maximum(f - t, 0.0), "hard"), _blunt(lambda f, t: f * f / (f + t), "soft")),
-    "saturation": _either(
-        _full(lambda x: np.clip(x, -1, 1), "clip"), _full(np.tanh, "tanh"), _full(lambda x: x / (1 + np.abs(x)), "rational")
+    "dead-zone": _forms(_blunt, (lambda f, t: np.maximum(f - t, 0.0), "hard"), (lambda f, t: f * f / (f + t), "soft")),
+    "saturation": _forms(
+        _full,
+        (lambda x: np.clip(x, -1, 1), "clip"),
+        (np.tanh, "tanh"),
+        (lambda x: x / (1 + np.abs(x)), "rational"),
     ),
     "lag": _either(first_order, dead_time),
     "drift": _either(steady_drift, warm_up),
@@ -383,7 +364,7 @@ OWN: dict[str, Maker] = {
     "quantization": steps,
     "noise": proportional,
     "misalignment": shift,
-    "stribeck": _either(_slippery(lambda x: np.exp(-x * x), "gaussian"), _slippery(lambda x: np.exp(-x), "exponential")),
+    "stribeck": _forms(_slippery, (lambda x: np.exp(-x * x), "gaussian"), (lambda x: np.exp(-x), "exponential")),
     "viscous-friction": _either(viscous, viscous_load),
 }
 

@@ -9,12 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .other import Maker
-from .world import COLUMNS, PITCH, ROWS, Hidden
-
-DEEP = 3e-3
-"""Metres: the depth to which pads are about pressed; forces and readings below are in units of those at this depth."""
-N = ROWS * COLUMNS
+from .other import by_name
+from .world import COLUMNS, DEEP, PITCH, ROWS, Hidden, N, faded
 
 
 def _full(pad) -> float:
@@ -32,9 +28,9 @@ def stiffening(rng, strength) -> Hidden:
     def act(s, pad):
         stretch = 1.0 - np.clip(s.depth / height, 1e-9, 0.8)
         stress = (stretch**-2 - stretch) * (1.0 + second / stretch)
-        s.force = s.force * stress / (3.0 * (1.0 - stretch) * (1.0 + second))
+        return s.force * stress / (3.0 * (1.0 - stretch) * (1.0 + second))
 
-    return Hidden("stiffening", "mooney-rivlin", strength, elastic=act, values={"height": height, "second": second})
+    return Hidden("stiffening", "mooney-rivlin", elastic=act)
 
 
 def softening(rng, strength) -> Hidden:
@@ -45,9 +41,9 @@ def softening(rng, strength) -> Hidden:
 
     def act(s, pad):
         most = np.maximum.accumulate(s.depth, axis=0)
-        s.force = s.force * np.exp(-0.8 * strength * np.sqrt((most - s.depth) / DEEP))
+        return s.force * np.exp(-0.8 * strength * np.sqrt((most - s.depth) / DEEP))
 
-    return Hidden("softening", "zuniga-beatty", strength, elastic=act)
+    return Hidden("softening", "zuniga-beatty", elastic=act)
 
 
 def hysteresis(rng, strength) -> Hidden:
@@ -73,8 +69,9 @@ def hysteresis(rng, strength) -> Hidden:
             start, held, friction = (np.where(free, 0.0, value) for value in (start, held, friction))
             way, before = np.where(free, 1.0, way), depth
             s.force[t] += share * pad.k * DEEP * friction
+        return s.force
 
-    return Hidden("hysteresis", "berg", strength, elastic=act, values={"length": length, "share": share})
+    return Hidden("hysteresis", "berg", elastic=act)
 
 
 def _mittag_leffler(time: np.ndarray, order: float) -> np.ndarray:
@@ -95,13 +92,10 @@ def creep(rng, strength) -> Hidden:
     tau, order = np.exp(rng.uniform(np.log(0.5), np.log(4.0))), rng.uniform(0.5, 0.85)
 
     def act(s, pad):
-        lag = s.time - s.time[0]
-        memory = min(0.6 * strength, 0.95) * (1.0 - _mittag_leffler(lag / tau, order))
-        steps, n = np.diff(s.force, axis=0, prepend=0.0), 2 * len(lag)
-        gone = np.fft.irfft(np.fft.rfft(steps, n, axis=0) * np.fft.rfft(memory, n)[:, None], n, axis=0)
-        s.force = s.force - gone[: len(lag)]
+        memory = min(0.6 * strength, 0.95) * (1.0 - _mittag_leffler((s.time - s.time[0]) / tau, order))
+        return s.force - faded(s.force, memory)
 
-    return Hidden("creep", "fractional", strength, elastic=act, values={"tau": tau, "order": order})
+    return Hidden("creep", "fractional", elastic=act)
 
 
 def adhesion(rng, strength) -> Hidden:
@@ -116,9 +110,9 @@ def adhesion(rng, strength) -> Hidden:
         opening = np.maximum(-s.contact.pace, 0.0)
         u = s.depth / width
         pull = strength * pad.k * 0.6e-3 * u * np.exp(1.0 - u) * (1.0 + (opening / pace) ** 0.6)
-        s.force = s.force - np.where(touched & (opening > 0.0) & (s.depth > 0.0), pull, 0.0)
+        return s.force - np.where(touched & (opening > 0.0) & (s.depth > 0.0), pull, 0.0)
 
-    return Hidden("adhesion", "xu-needleman", strength, force=act, values={"width": width, "pace": pace})
+    return Hidden("adhesion", "xu-needleman", force=act)
 
 
 def wear(rng, strength) -> Hidden:
@@ -129,9 +123,9 @@ def wear(rng, strength) -> Hidden:
         peaks = np.maximum(s.force, 0.0) / (pad.k * DEEP)
         used = np.cumsum(np.maximum(np.diff(peaks**power, axis=0, prepend=0.0), 0.0), axis=0)
         before = np.vstack([np.zeros((1, N)), used[:-1]])
-        s.force = s.force * np.maximum(1.0 - 0.2 * strength * before, 0.1)
+        return s.force * np.maximum(1.0 - 0.2 * strength * before, 0.1)
 
-    return Hidden("wear", "basquin", strength, elastic=act, values={"power": power})
+    return Hidden("wear", "basquin", elastic=act)
 
 
 # --- from texel to texel
@@ -151,9 +145,9 @@ def load_spreading(rng, strength) -> Hidden:
         shares = -kei(apart)
         shares[apart > 30.0] = 0.0
         shares /= shares.sum(axis=0)
-        s.reading = pad.zero + (s.reading - pad.zero) @ shares.T
+        return pad.zero + (s.reading - pad.zero) @ shares.T
 
-    return Hidden("load-spreading", "plate", strength, reading=act, values={"length": length})
+    return Hidden("load-spreading", "plate", reading=act)
 
 
 def crosstalk(rng, strength) -> Hidden:
@@ -168,7 +162,7 @@ def crosstalk(rng, strength) -> Hidden:
         (loaded,) = np.nonzero(g.any(axis=(1, 2)))
         held = g[loaded]
         if not len(held):
-            return
+            return s.reading
         sneak = np.zeros_like(held)
         tiny = 1e-12 * held.max()
         for k, j in zip(*np.nonzero(held.any(axis=0)), strict=True):
@@ -178,8 +172,9 @@ def crosstalk(rng, strength) -> Hidden:
             sneak += way
         s.reading = s.reading.copy()
         s.reading[loaded] += 0.2 * strength * sneak.reshape(len(held), -1)
+        return s.reading
 
-    return Hidden("crosstalk", "sneak currents", strength, reading=act)
+    return Hidden("crosstalk", "sneak currents", reading=act)
 
 
 # --- readout
@@ -197,9 +192,9 @@ def gain_mismatch(rng, strength) -> Hidden:
     def act(s, pad):
         x = (s.reading - pad.zero) / _full(pad)
         divided = x / np.maximum(1.0 + resistor * (np.abs(x) - 1.0), 0.2)
-        s.reading = pad.zero + _full(pad) * gain / gain.mean() * divided
+        return pad.zero + _full(pad) * gain / gain.mean() * divided
 
-    return Hidden("gain-mismatch", "rows, columns and dividers", strength, reading=act)
+    return Hidden("gain-mismatch", "rows, columns and dividers", reading=act)
 
 
 def dead_texels(rng, strength) -> Hidden:
@@ -211,8 +206,9 @@ def dead_texels(rng, strength) -> Hidden:
 
     def act(s, pad):
         s.reading[:, dead] = pad.zero + _full(pad) * level * np.exp(-(s.time - s.time[0])[:, None] / tau)
+        return s.reading
 
-    return Hidden("dead-texels", "floating", strength, reading=act, values={"texels": [int(i) for i in dead]})
+    return Hidden("dead-texels", "floating", reading=act)
 
 
 def dead_zone(rng, strength) -> Hidden:
@@ -227,9 +223,9 @@ def dead_zone(rng, strength) -> Hidden:
         width = sharp * threshold
         f = np.maximum(s.reading - pad.zero, 0.0) / pad.gain
         read = width * (np.logaddexp(0.0, (f - threshold) / width) - np.logaddexp(0.0, -threshold / width))
-        s.reading = pad.zero + pad.gain * read
+        return pad.zero + pad.gain * read
 
-    return Hidden("dead-zone", "softplus", strength, reading=act, values={"sharp": sharp})
+    return Hidden("dead-zone", "softplus", reading=act)
 
 
 def saturation(rng, strength) -> Hidden:
@@ -239,9 +235,9 @@ def saturation(rng, strength) -> Hidden:
     def act(s, pad):
         top = pad.gain * pad.k * 2.5e-3 / strength
         x = (s.reading - pad.zero) / top
-        s.reading = pad.zero + top * x / (1.0 + np.abs(x) ** sharp) ** (1.0 / sharp)
+        return pad.zero + top * x / (1.0 + np.abs(x) ** sharp) ** (1.0 / sharp)
 
-    return Hidden("saturation", "rapp", strength, reading=act, values={"sharp": sharp})
+    return Hidden("saturation", "rapp", reading=act)
 
 
 def lag(rng, strength) -> Hidden:
@@ -262,9 +258,9 @@ def lag(rng, strength) -> Hidden:
         padded = np.vstack([np.repeat(s.reading[:1], len(taps) - 1, axis=0), s.reading])
         n = len(padded) + len(taps)
         late = np.fft.irfft(np.fft.rfft(padded - padded[0], n, axis=0) * np.fft.rfft(taps, n)[:, None], n, axis=0)
-        s.reading = padded[0] + late[len(taps) - 1 : len(padded)]
+        return padded[0] + late[len(taps) - 1 : len(padded)]
 
-    return Hidden("lag", "three averages", strength, reading=act, values={"width": width})
+    return Hidden("lag", "three averages", reading=act)
 
 
 def drift(rng, strength) -> Hidden:
@@ -274,9 +270,9 @@ def drift(rng, strength) -> Hidden:
 
     def act(s, pad):
         course = np.log1p(rate * (s.time - s.time[0])) / np.log1p(rate * 25.0)
-        s.reading = s.reading + _full(pad) * amount * course[:, None] * spread
+        return s.reading + _full(pad) * amount * course[:, None] * spread
 
-    return Hidden("drift", "ageing", strength, reading=act, values={"rate": rate})
+    return Hidden("drift", "ageing", reading=act)
 
 
 def offset(rng, strength) -> Hidden:
@@ -287,11 +283,7 @@ def offset(rng, strength) -> Hidden:
     y, x = np.mgrid[-1 : 1 : ROWS * 1j, -1 : 1 : COLUMNS * 1j]
     bent = rng.normal() * y**2 + rng.normal() * x * y + rng.normal() * x**2
     zero = (bent - bent.mean() + 0.7 * rng.normal(size=COLUMNS)).ravel()
-
-    def act(s, pad):
-        s.reading = s.reading + 0.2 * strength * _full(pad) * zero
-
-    return Hidden("offset", "bent board", strength, reading=act)
+    return Hidden("offset", "bent board", reading=lambda s, pad: s.reading + 0.2 * strength * _full(pad) * zero)
 
 
 def quantization(rng, strength) -> Hidden:
@@ -302,7 +294,7 @@ def quantization(rng, strength) -> Hidden:
         step = 0.15 * strength * np.where(np.abs(x) > 0.5, 4.0, np.where(np.abs(x) > 0.25, 2.0, 1.0))
         return pad.zero + _full(pad) * step * np.round(x / step)
 
-    return Hidden("quantization", "ranges", strength, convert=act)
+    return Hidden("quantization", "ranges", convert=act)
 
 
 def noise(rng, strength) -> Hidden:
@@ -311,9 +303,9 @@ def noise(rng, strength) -> Hidden:
     def act(s, pad):
         charge = 0.1 * strength**2 * _full(pad)
         x = s.reading - pad.zero
-        s.reading = pad.zero + np.sign(x) * charge * rng.poisson(np.abs(x) / charge)
+        return pad.zero + np.sign(x) * charge * rng.poisson(np.abs(x) / charge)
 
-    return Hidden("noise", "shot", strength, reading=act)
+    return Hidden("noise", "shot", reading=act)
 
 
 def misalignment(rng, strength) -> Hidden:
@@ -324,7 +316,7 @@ def misalignment(rng, strength) -> Hidden:
     def place(places):
         return places + by + shear * np.stack([places[:, 1], np.zeros(len(places))], axis=1)
 
-    return Hidden("misalignment", "shift and shear", strength, place=place, values={"shear": shear})
+    return Hidden("misalignment", "shift and shear", place=place)
 
 
 # --- friction
@@ -337,7 +329,7 @@ def stribeck(rng, strength) -> Hidden:
     def law(speed, fn, pad):
         return 1.0 + rise * (1.0 - np.tanh(speed / slow)), np.zeros_like(speed)
 
-    return Hidden("stribeck", "tanh", strength, friction=law, values={"rise": rise, "speed": slow})
+    return Hidden("stribeck", "tanh", friction=law)
 
 
 def viscous_friction(rng, strength) -> Hidden:
@@ -349,28 +341,10 @@ def viscous_friction(rng, strength) -> Hidden:
         v = np.maximum(speed, 1e-6)
         return np.ones_like(speed), 0.5 * strength * load * np.arcsinh(v / slow) / v
 
-    return Hidden("viscous-friction", "eyring", strength, friction=law, values={"speed": slow})
+    return Hidden("viscous-friction", "eyring", friction=law)
 
 
-THIRD: dict[str, Maker] = {
-    "stiffening": stiffening,
-    "softening": softening,
-    "hysteresis": hysteresis,
-    "creep": creep,
-    "adhesion": adhesion,
-    "wear": wear,
-    "load-spreading": load_spreading,
-    "crosstalk": crosstalk,
-    "gain-mismatch": gain_mismatch,
-    "dead-texels": dead_texels,
-    "dead-zone": dead_zone,
-    "saturation": saturation,
-    "lag": lag,
-    "drift": drift,
-    "offset": offset,
-    "quantization": quantization,
-    "noise": noise,
-    "misalignment": misalignment,
-    "stribeck": stribeck,
-    "viscous-friction": viscous_friction,
-}
+THIRD = by_name(
+    stiffening, softening, hysteresis, creep, adhesion, wear, load_spreading, crosstalk, gain_mismatch, dead_texels, dead_zone,
+    saturation, lag, drift, offset, quantization, noise, misalignment, stribeck, viscous_friction,
+)  # fmt: skip

@@ -9,6 +9,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 ROWS, COLUMNS, PITCH = 14, 6, 3.4e-3
+N = ROWS * COLUMNS
+DEEP = 3e-3
+"""Metres: the depth to which pads are about pressed; effects take forces and readings in units of those at this depth."""
 THICKNESS = 6e-3
 RATE = 50.0
 """Samples per second."""
@@ -66,7 +69,7 @@ class Contact:
 
 @dataclass
 class Signals:
-    """What happens in one trial. Hidden effects change `force` and `reading` in place, stage by stage."""
+    """What happens in one trial. Hidden effects give other values of `force` and `reading`, stage by stage."""
 
     contact: Contact
     force: np.ndarray  # (T, n) N, at first elastic alone, then elastic and damped
@@ -90,20 +93,19 @@ class Signals:
 class Hidden:
     """One hidden effect, cut into the stages at which it can act; each is a function, or None.
 
-    `place` moves the texels' (n, 2) places, `elastic` changes forces before they are damped and cut off at zero, `force`
+    `place` moves the texels' (n, 2) places, `elastic` returns other forces before they are damped and cut off at zero, `force`
     behind that, `friction` is a factor on the friction coefficient and an extra viscous coefficient as functions of speed and
-    normal force, `reading` changes readings, `convert` does so behind the noise. `values` are the true numbers of a form that
-    the library has, by its names; `/ k` and `/ k gain` stand for a number that goes with the pad.
+    normal force, `reading` returns other readings, `convert` does so behind the noise. `values` are the true numbers of a form
+    that the library has, by its names; `/ k` and `/ k gain` stand for a number that goes with the pad.
     """
 
     name: str
     form: str
-    strength: float
     place: Callable[[np.ndarray], np.ndarray] | None = None
-    elastic: Callable[[Signals, Pad], None] | None = None
-    force: Callable[[Signals, Pad], None] | None = None
+    elastic: Callable[[Signals, Pad], np.ndarray] | None = None
+    force: Callable[[Signals, Pad], np.ndarray] | None = None
     friction: Callable[[np.ndarray, np.ndarray, Pad], tuple[np.ndarray, np.ndarray]] | None = None
-    reading: Callable[[Signals, Pad], None] | None = None
+    reading: Callable[[Signals, Pad], np.ndarray] | None = None
     convert: Callable[[np.ndarray, Pad], np.ndarray] | None = None
     values: dict = field(default_factory=dict)
 
@@ -143,17 +145,17 @@ def respond(contact: Contact, pad: Pad, hidden: tuple[Hidden, ...] = (), slides:
     signals = Signals(contact, pad.k * contact.depth, nothing, np.zeros(0))
     for effect in hidden:
         if effect.elastic is not None:
-            effect.elastic(signals, pad)
+            signals.force = effect.elastic(signals, pad)
     signals.force = np.where(contact.depth > 0, np.maximum(signals.force + pad.cn * contact.pace, 0.0), 0.0)
     for effect in hidden:
         if effect.force is not None:
-            effect.force(signals, pad)
+            signals.force = effect.force(signals, pad)
     if slides:
         signals.shear = _friction(signals, pad, hidden)
     signals.reading = pad.zero + pad.gain * signals.force
     for effect in hidden:
         if effect.reading is not None:
-            effect.reading(signals, pad)
+            signals.reading = effect.reading(signals, pad)
     return signals
 
 
@@ -168,6 +170,13 @@ def converted(reading: np.ndarray, pad: Pad, hidden: tuple[Hidden, ...]) -> np.n
 def net_force(signals: Signals) -> np.ndarray:
     """(T, 3) N: what the probe does to the sensor, normal and friction together."""
     return (signals.force[..., None] * signals.contact.normal + signals.shear).sum(axis=1)
+
+
+def faded(force: np.ndarray, memory: np.ndarray) -> np.ndarray:
+    """Return (T, n) what is lost of a force whose steps each fade with the time, by shares (T,) of the step."""
+    steps, n = np.diff(force, axis=0, prepend=0.0), 2 * len(memory)
+    lost = np.fft.irfft(np.fft.rfft(steps, n, axis=0) * np.fft.rfft(memory, n)[:, None], n, axis=0)
+    return lost[: len(memory)]
 
 
 def _friction(signals: Signals, pad: Pad, hidden: tuple[Hidden, ...]) -> np.ndarray:
