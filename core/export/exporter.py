@@ -24,6 +24,7 @@ from .format_table import FORMATS
 UNITS = {
     "normal_force": "N",
     "shear": "N",
+    "friction": "N",
     "depth": "m",
     "slip": "m/s",
     "net_force": "N",
