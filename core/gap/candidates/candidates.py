@@ -19,6 +19,7 @@ from ..fitting.identifiability import unidentifiable
 from ..fitting.least_squares import FreeParameter, value_of
 from ..fitting.noise_floor import coverage
 from ..forward.predictor import Model, Predictor
+from ..forward.response_check import centred
 
 NOT_FITTED = names_found_by(SCATTER)
 """Kinds that are not fitted but found in the final residual (see :func:`.residual_tests.proportional_noise`)."""
@@ -67,8 +68,8 @@ class Scales:
     ----------
     depth, force, reading : float
         Largest of a texel: m, N, the sensor's unit.
-    pitch, size : float, m
-        Distance between neighbouring texels, and extent of the sensor.
+    pitch : float, m
+        Distance between neighbouring texels.
     step, seconds : float, s
         Median time between samples, and length of the longest trial or session.
     sliding_speed, rate : float, m/s
@@ -84,7 +85,6 @@ class Scales:
     force: float
     reading: float
     pitch: float
-    size: float
     step: float
     seconds: float
     sliding_speed: float
@@ -96,32 +96,24 @@ class Scales:
 
 def scales_of(predictors: Sequence[Predictor], model: Model) -> Scales:
     """Return the magnitudes in the trials of some predictors; forces are those of a model."""
-    p = predictors[0].rig.texels.position
+    texels = predictors[0].rig.texels
     forces = [predictor.normal_force(model) for predictor in predictors]
-    readings = [np.nanmax(np.abs(t.reading)) for t in (q.trial for q in predictors) if t.reading is not None]
-    force = max(float(f.max(initial=0.0)) for f in forces)
-    extent = float(np.linalg.norm(np.ptp(p, axis=0))) if len(p) > 1 else 0.0
-    pitch = float(np.sqrt(np.median(predictors[0].rig.texels.area))) if len(p) > 1 else 1e-3
+    readings = [float(np.nanmax(np.abs(t.reading))) for t in (q.trial for q in predictors) if t.reading is not None]
+    steps = [np.abs(np.diff(q.stimulus.depth, axis=0)).max(axis=1, initial=0.0) for q in predictors]
+    rates = [float((step / np.diff(q.trial.time)).max(initial=0.0)) for step, q in zip(steps, predictors, strict=True)]
     return Scales(
         depth=max(max(float(q.stimulus.depth.max(initial=0.0)) for q in predictors), 1e-6),
-        force=max(force, 1e-9),
-        reading=max([float(r) for r in readings] + [1e-12]),
-        pitch=pitch,
-        size=max(extent, pitch),
+        force=max(max(float(f.max(initial=0.0)) for f in forces), 1e-9),
+        reading=max([*readings, 1e-12]),
+        pitch=float(np.sqrt(np.median(texels.area))) if len(texels) > 1 else 1e-3,
         step=float(np.median([q.trial.step for q in predictors])),
-        seconds=max(float(np.ptp(q.trial.time if q.session is None else q.session.stimulus.time)) for q in predictors),
+        seconds=max(float(np.ptp(q.responses.stimulus.time)) for q in predictors),
         sliding_speed=max(max(float(q.stimulus.slide_speed.max(initial=0.0)) for q in predictors), 1e-6),
-        rate=max(max(_largest_rate(q) for q in predictors), 1e-6),
-        texels=len(p),
+        rate=max([*rates, 1e-6]),
+        texels=len(texels),
         travel=_travel(predictors),
         warmth=_warmth(predictors),
     )
-
-
-def _largest_rate(predictor: Predictor) -> float:
-    """Largest speed of a texel's depth in a trial, m/s."""
-    steps = np.abs(np.diff(predictor.stimulus.depth, axis=0)).max(axis=1, initial=0.0)
-    return float((steps / np.diff(predictor.trial.time)).max(initial=0.0))
 
 
 def _warmth(predictors: Sequence[Predictor]) -> float:
@@ -264,8 +256,7 @@ class Candidate:
 
     def _strength(self) -> tuple[Parameter | None, float]:
         """The parameter that is zero if the effect is absent, with 1, or the one that is infinite, with -1."""
-        absent = {0.0: 1.0, np.inf: -1.0}
-        for end, power in absent.items():
+        for end, power in ((0.0, 1.0), (np.inf, -1.0)):
             for p in self.form.parameters:
                 if not p.per_texel and self.form.neutral.get(p.name) == end:
                     return p, power
@@ -274,14 +265,10 @@ class Candidate:
 
 @cache
 def _halton_points(dimensions: int, count: int) -> np.ndarray:
-    """The first points of a Halton sequence but the corner of the unit cube, (count, dimensions) float, as scipy's."""
-    primes = [n for n in range(2, 2 + dimensions**2) if all(n % i for i in range(2, n))][:dimensions]
-    points = np.zeros((count, dimensions))
-    for axis, base in enumerate(primes):
-        left, size = np.arange(1, count + 1), 1.0 / base
-        while left.any():
-            points[:, axis] += left % base * size
-            left, size = left // base, size / base
+    """The first points of a Halton sequence but the corner of the unit cube, (count, dimensions) float."""
+    from scipy.stats import qmc
+
+    points: np.ndarray = qmc.Halton(dimensions, scramble=False).random(count + 1)[1:]
     return points
 
 
@@ -344,23 +331,18 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
         if kind.name in NOT_FITTED or kind.name in cannot:
             continue
         for form in kind.forms:
-            acts_on_force = kind.site_of(form) != "readout"
-            if (
-                form.random
-                or not form.is_tried
-                or (form.placement is not None and not posed)
-                or lacking.get(kind.needs_of(form), False)
-                or (form.friction_law is not None and not dragged)
-            ):
-                continue
-            if form.friction_law is None and acts_on_force and loaded:
-                continue  # with known loads the contact law does not matter
-            if not acts_on_force and not read:
-                continue
-            fitted = _without(form, kind.known_parameters)
             moves = form.placement is not None
-            held = form.jumps_at or (IN_PLANE if moves and in_steps else ())
-            one = Candidate(kind, _without(fitted, ("z",)) if moves and heights_open else fitted, held)
+            if form.friction_law is not None:
+                is_recorded = dragged
+            elif kind.site_of(form) == "readout":
+                is_recorded = read
+            else:  # with known loads the contact law does not matter
+                is_recorded = posed if moves else not loaded
+            if form.random or not form.is_tried or not is_recorded or lacking.get(kind.needs_of(form), False):
+                continue
+            known = (*kind.known_parameters, "z") if moves and heights_open else kind.known_parameters
+            fitted = replace(form, parameters=tuple(p for p in form.parameters if p.name not in known)) if known else form
+            one = Candidate(kind, fitted, form.jumps_at or (IN_PLANE if moves and in_steps else ()))
             if several or not (one.has_texel_parameters or form.is_spatial):
                 found.append(one)
     return found
@@ -388,16 +370,8 @@ def has_signed_channels(predictors: Sequence[Predictor], model: Model) -> bool:
     for predictor in predictors:
         if predictor.trial.reading is None:
             continue
-        load, reading = predictor.normal_force(model), predictor.trial.reading
-        good = np.isfinite(reading) & np.isfinite(load)
-        count = np.maximum(good.sum(axis=0), 1)
-        x, y = (np.where(good, v - np.where(good, v, 0.0).sum(axis=0) / count, 0.0) for v in (load, reading))
+        x, y = centred(predictor.normal_force(model), predictor.trial.reading)
         sums += [(x * y).sum(axis=0), (x * x).sum(axis=0), (y * y).sum(axis=0)]
     follows = sums[0] / np.sqrt(np.maximum(sums[1] * sums[2], 1e-300))
     least = max(1.0, LEAST_SIGNED * len(follows))
     return bool((follows >= SIGNED_CORRELATION).sum() >= least and (follows <= -SIGNED_CORRELATION).sum() >= least)
-
-
-def _without(form: Form, names: Sequence[str]) -> Form:
-    """A form in which some parameters are not free."""
-    return replace(form, parameters=tuple(p for p in form.parameters if p.name not in names)) if names else form

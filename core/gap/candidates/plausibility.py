@@ -51,12 +51,11 @@ def _adhesion_pulls(model: Model, views: Sequence[TrialView]) -> bool:
     """True if readings are negative where fitted adhesion predicts a pull, and there is such a place."""
     predicted, measured, p = [], [], model.parameters
     for view in views:
-        reading = (view.predictor.predict(model).reading - p.zero) / p.gain * abs(p.gain) / view.noise[0]
-        pulled = reading < PULL_LEVEL
         if view.predictor.trial.reading is not None:
-            own = (view.predictor.trial.reading - p.zero) / p.gain * abs(p.gain) / view.noise[0]
-            predicted.append(reading[pulled])
-            measured.append(own[pulled])
+            both = view.predictor.predict(model).reading, view.predictor.trial.reading
+            reading, own = ((values - p.zero) / p.gain * abs(p.gain) / view.noise[0] for values in both)
+            predicted.append(reading[reading < PULL_LEVEL])
+            measured.append(own[reading < PULL_LEVEL])
     if not predicted:
         return True  # only net forces were measured, in which a single texel's pull is not seen
     pull, seen = np.concatenate(predicted), np.concatenate(measured)

@@ -12,6 +12,7 @@ from ...effects.engine.registry import form_of
 from ...model.sensor import Effect
 from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
 from ..fitting.least_squares import Fit, FreeParameter, TrialView, coordinates_of, derivatives, with_coordinates
+from ..forward.predictor import Model
 
 RIDGE = 1e-10
 """Added to the diagonal of a Gram matrix, as a share of one plus its trace."""
@@ -56,10 +57,8 @@ class ScoreTest:
         Those that act on the views.
     residual : list of (T, c + 3) float
         For each view.
-    tables : list of (p, T, c + 3) float
-        By how much a step along each of the p common parameters lowers the residual, for each view.
     derivatives : list of (p, T (c + 3)) float
-        The same as rows.
+        By how much a step along each of the p common parameters lowers the residual, in rows, for each view.
     gram : (p, p) float
         Their scalar products.
     along : (p,) float
@@ -71,10 +70,9 @@ class ScoreTest:
         common = tuple(item for item in self.free if not item.per_texel)
         at = coordinates_of(found.model, common)
         self.residual = [view.residual(found.model) for view in views]
-        self.tables = [np.empty((len(common), *r.shape)) for r in self.residual]
-        for view, r, table in zip(views, self.residual, self.tables, strict=True):
-            derivatives(view, found.model, common, at, r, table, 0)
-        self.derivatives = [table.reshape(len(common), r.size) for table, r in zip(self.tables, self.residual, strict=True)]
+        self.derivatives = [np.empty((len(common), r.size)) for r in self.residual]
+        for view, r, rows in zip(views, self.residual, self.derivatives, strict=True):
+            derivatives(view, found.model, common, at, r, rows.reshape(len(common), *r.shape), 0)
         self.gram = ridged(np.sum([c @ c.T for c in self.derivatives], axis=0))
         self._decreases: dict[int, tuple[Effect, float]] = {}
         self.along = sum(c @ r.ravel() for c, r in zip(self.derivatives, self.residual, strict=True))
@@ -82,7 +80,9 @@ class ScoreTest:
     @property
     def initial_derivatives(self) -> list[np.ndarray] | None:
         """Derivatives with which a fit of these parameters and more may begin; None if some belong to single texels."""
-        return None if any(item.per_texel for item in self.free) else self.tables
+        if any(item.per_texel for item in self.free):
+            return None
+        return [rows.reshape(len(rows), *r.shape) for rows, r in zip(self.derivatives, self.residual, strict=True)]
 
     @cached_property
     def total(self) -> float:
@@ -134,9 +134,7 @@ class ScoreTest:
         along = sum(c @ view.residual(model).ravel() for c, view in zip(self.derivatives, self.views, strict=True))
         steps = np.linalg.solve(self.gram, along)
         at = [x + step for x, step in zip(coordinates_of(model, common), steps, strict=True)]
-        moved = with_coordinates(model, common, at)
-        after = sum(float(np.vdot(r, r)) for r in (view.residual(moved) for view in self.views))
-        return self.total - after if np.isfinite(after) else -np.inf
+        return self._decrease_to(with_coordinates(model, common, at))
 
     def score_of_texels(self, effect: Effect) -> float:
         """Return by how much the squares fall at best if each texel has a length of its own, less what noise alone gives.
@@ -166,14 +164,10 @@ class ScoreTest:
         lengths : (len(effects),) float
             The best lengths along the changes.
         """
-        models = [self.model.with_effect(effect) for effect in effects]
-        changes = [
-            [(r - view.residual(model)).ravel() for view, r in zip(self.views, self.residual, strict=True)] for model in models
-        ]
-        size = len(self.gram)
-        gram, along = np.zeros((size + len(changes),) * 2), np.zeros(size + len(changes))
-        for i, r in enumerate(self.residual):
-            x = np.vstack([self.derivatives[i], *(change[i] for change in changes)])
+        models, size = [self.model.with_effect(effect) for effect in effects], len(self.gram)
+        gram, along = np.zeros((size + len(models),) * 2), np.zeros(size + len(models))
+        for view, r, c in zip(self.views, self.residual, self.derivatives, strict=True):
+            x = np.vstack([c, *((r - view.residual(model)).ravel() for model in models)])
             gram += x @ x.T
             along += x @ r.ravel()
         best = np.linalg.solve(ridged(gram), along)
@@ -182,7 +176,10 @@ class ScoreTest:
     def decrease(self, effect: Effect) -> float:
         """Return by how much an effect lowers the squares as it is; minus infinity if it predicts no numbers."""
         if id(effect) not in self._decreases:
-            model = self.model.with_effect(effect)
-            after = sum(float(np.vdot(r, r)) for r in (view.residual(model) for view in self.views))
-            self._decreases[id(effect)] = effect, self.total - after if np.isfinite(after) else -np.inf
+            self._decreases[id(effect)] = effect, self._decrease_to(self.model.with_effect(effect))
         return self._decreases[id(effect)][1]
+
+    def _decrease_to(self, model: Model) -> float:
+        """By how much a model as it is lowers the squares; minus infinity if it predicts no numbers."""
+        after = sum(float(np.vdot(r, r)) for r in (view.residual(model) for view in self.views))
+        return self.total - after if np.isfinite(after) else -np.inf

@@ -60,6 +60,7 @@ def silenced_texels(predictors: Sequence[Predictor], model: Model, noise: float)
     if not whole.any():
         return []
     usual = float(np.median(product[-1, whole] / square[-1, whole]))
+    starts = np.cumsum([0, *(len(reading) for _, reading in pairs)])  # of the recordings among all samples
     found = []
     for texel in np.flatnonzero(whole):
         before, after = square[:-1, texel], square[-1, texel] - square[:-1, texel]
@@ -72,14 +73,7 @@ def silenced_texels(predictors: Sequence[Predictor], model: Model, noise: float)
         slopes = product[last, texel] / before[last], (product[-1, texel] - product[last, texel]) / after[last]
         if slopes[0] > LIVELY_SLOPE * usual > 0.0 and slopes[1] < LEAST_SLOPE * usual:
             loaded = last + 1 + int(np.argmax(x[last + 1 :, texel] != 0.0))
-            found.append(_at(pairs, int(texel), loaded))
+            number = int(np.searchsorted(starts, loaded, side="right")) - 1
+            trial = pairs[number][0].trial
+            found.append(SilencedTexel(int(texel), trial.name, float(trial.time[loaded - starts[number]] - trial.time[0])))
     return found
-
-
-def _at(pairs: Sequence[tuple[Predictor, np.ndarray]], texel: int, sample: int) -> SilencedTexel:
-    """The texel with the recording in which a sample of all recordings lies."""
-    for one, reading in pairs:
-        if sample < len(reading):
-            return SilencedTexel(texel, one.trial.name, float(one.trial.time[sample] - one.trial.time[0]))
-        sample -= len(reading)
-    raise AssertionError("the sample is one of these recordings")

@@ -91,10 +91,10 @@ def _scanned_threshold(candidate: Candidate, score_test: ScoreTest, scales: Scal
 
 def _quantization_starts(candidate: Candidate, score_test: ScoreTest, view_set: ViewSet) -> list[tuple[float, Effect]]:
     """The best of the steps that are estimated from the readings; the other parameters follow it by half a step."""
-    values = view_set.moving_readings(score_test.model)
-    starts = quantization_starts(values, view_set.whole, score_test.model, candidate)
+    model = score_test.model
+    starts = quantization_starts(view_set.moving_readings(model), view_set.whole, model, candidate)
     decreases = [(score_test.decrease_after_step(effect), effect) for effect in starts]
-    return [max(decreases, key=lambda entry: entry[0])] if starts else []
+    return sorted(decreases, key=lambda entry: -entry[0])[:1]
 
 
 def _texel_parameter_starts(candidate: Candidate, score_test: ScoreTest, scales: Scales) -> list[tuple[float, Effect]]:
@@ -112,15 +112,12 @@ def _displacement_start(candidate: Candidate, score_test: ScoreTest, scales: Sca
     """The best small displacement of the texels: a joint score test of a small step of each parameter."""
     gain = abs(score_test.model.parameters.gain)
     parameters = [q for q in candidate.form.parameters if q.name not in candidate.held]
-    neutral = {name: 0.0 for name in candidate.form.neutral}
-    steps = [SMALL_SHIFT * scales.pitch if q.unit == "m" else SMALL_TURN for q in parameters]
-    moved = [
-        candidate.effect({**neutral, q.name: step}, scales.texels, gain) for q, step in zip(parameters, steps, strict=True)
-    ]
+    neutral = dict.fromkeys(candidate.form.neutral, 0.0)
+    shifts, turns = (SMALL_SHIFT * scales.pitch, LARGEST_SHIFT * scales.pitch), (SMALL_TURN, LARGEST_TURN)
+    steps = {q.name: shifts if q.unit == "m" else turns for q in parameters}
+    moved = [candidate.effect({**neutral, name: step}, scales.texels, gain) for name, (step, _) in steps.items()]
     promise, best = score_test.joint_score(moved)
-    limits = [LARGEST_SHIFT * scales.pitch if q.unit == "m" else LARGEST_TURN for q in parameters]
-    lengths = [float(np.clip(b * s, -m, m)) for b, s, m in zip(best, steps, limits, strict=True)]
-    values = {q.name: length for q, length in zip(parameters, lengths, strict=True)}
+    values = {name: float(np.clip(b * s, -m, m)) for b, (name, (s, m)) in zip(best, steps.items(), strict=True)}
     return promise, candidate.effect(values, scales.texels, gain)
 
 

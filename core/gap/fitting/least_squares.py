@@ -447,17 +447,15 @@ def _equations_of(
     common, local = (table[~own_each], table[own_each]) if own_each.any() else (table, table[:0])
     flat = common.reshape(len(common), residual.size)  # there may be none, where all of the base model is known
     n, texels, width = len(view.predictor.rig.texels), view.texels, len(view.texels)
-    m = len(local)
+    m, own = len(local), local[:, :, :width]
     b, c, h = np.zeros((n, m, len(common))), np.zeros((n, m, m)), np.zeros((n, m))
-    own = local[:, :, :width]
     if m:
         h[texels] = np.einsum("mtn,tn->nm", own, residual[:, :width])
         c[texels] = np.einsum("mtn,ktn->nmk", own, own)
         b[texels] = np.einsum("mtn,ptn->nmp", own, common[:, :, :width])
-    gradients = np.zeros((0, n + 3, len(common)))
+    starts = np.unique(np.linspace(0, len(residual), blocks, endpoint=False).astype(int))
+    gradients = np.zeros((len(starts), n + 3, len(common)))
     if blocks:
-        starts = np.unique(np.linspace(0, len(residual), blocks, endpoint=False).astype(int))
-        gradients = np.zeros((len(starts), n + 3, len(common)))
         per_column = np.add.reduceat(common * residual, starts, axis=1).transpose(1, 2, 0)
         gradients[:, texels], gradients[:, n:] = per_column[:, :width], per_column[:, width:]
     return NormalEquations(flat @ flat.T, flat @ residual.ravel(), b, c, h, _sum_of_squares(residual), gradients)

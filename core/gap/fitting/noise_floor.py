@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from ...errors import FileError
-from ..dataset.trial import runs
+from ..dataset.trial import columns_at, runs
 from ..forward.contact_phases import hold_rate_limit
 from ..forward.predictor import Predictor
 
@@ -122,9 +122,13 @@ def _variance_and_autocovariance(part: np.ndarray) -> tuple[np.ndarray, np.ndarr
     part = _about_lines(part)
     if part.shape[1] >= MANY_TEXELS:
         together = np.isfinite(part).sum(axis=1)
-        part[together < MANY_TEXELS // 2] = np.nan
-        part -= _common_mode(part)
-        part /= np.sqrt(1.0 - 2.0 / np.maximum(together, 3) + _variance_of_median(together))[:, None]
+        enough = together >= MANY_TEXELS // 2
+        part[~enough] = np.nan
+        part[enough] -= np.nanmedian(part[enough], axis=1, keepdims=True)
+        # The variance of the median of n standard normal values is π/2n in the limit. The terms beside a small n were found by
+        # simulation (4·10⁵ draws each); from four values on the variance is right within 0.005.
+        of_median = np.pi / 2.0 / (together + np.where(together % 2, 0.45, 1.35))
+        part /= np.sqrt(1.0 - 2.0 / np.maximum(together, 3) + of_median)[:, None]
         part = _about_lines(part)  # where cells are missing, lines and the common mode depend on each other
     known = np.isfinite(part)
     count = known.sum(axis=0)
@@ -152,23 +156,6 @@ def _about_lines(part: np.ndarray) -> np.ndarray:
     t = np.where(known, t - (t * known).sum(axis=0) / count, 0.0)
     part = part - np.nansum(part, axis=0) / count
     return part - t * np.nansum(t * part, axis=0) / (t * t).sum(axis=0)
-
-
-def _common_mode(part: np.ndarray) -> np.ndarray:
-    """Median of each row's known values, (t, 1); zero in a row without any."""
-    known = np.isfinite(part).any(axis=1)
-    median = np.zeros((len(part), 1))
-    median[known] = np.nanmedian(part[known], axis=1, keepdims=True)
-    return median
-
-
-def _variance_of_median(count: np.ndarray) -> np.ndarray:
-    """Variance of the median of standard normal values, by their number; its limit is π/2 divided by that.
-
-    The two terms of a small number were found by simulation (4·10⁵ draws each); from four values on the variance is right
-    within 0.005.
-    """
-    return np.pi / 2.0 / (count + np.where(count % 2, 0.45, 1.35))
 
 
 def integral_time(curves: list[np.ndarray]) -> float:
@@ -375,11 +362,14 @@ def with_repeats(noise: ChannelNoise, predictors: Sequence[Predictor], part: str
 
 
 def _scatter(members: Sequence[Predictor], part: str, name: str) -> np.ndarray:
-    """Differences of repeats from their mean at equal times, scaled to the deviation of one recording, (members, T, c)."""
+    """Differences of repeats from their mean at equal times, scaled to the deviation of one recording, (members, T, c).
+
+    They are NaN beside missing values.
+    """
     first = members[0]
-    clock = first.trial.time - first.trial.time[0]
-    clock = clock[clock <= min(float(np.ptp(one.trial.time)) for one in members)]
-    loads = np.array([_at(clock, one, one.stimulus.load) for one in members])
+    clocks = [one.trial.time - one.trial.time[0] for one in members]
+    clock = clocks[0][clocks[0] <= min(float(np.ptp(one.trial.time)) for one in members)]
+    loads = np.array([columns_at(clock, own, one.stimulus.load) for own, one in zip(clocks, members, strict=True)])
     most = max(float(loads.max(initial=0.0)), 1e-300)
     for one, load in zip(members[1:], loads[1:], strict=True):
         if float(np.sqrt(np.mean((load - loads[0]) ** 2))) > MOST_DIFFERENT * most:
@@ -387,11 +377,5 @@ def _scatter(members: Sequence[Predictor], part: str, name: str) -> np.ndarray:
                 f"'{one.trial.name}.csv' and '{first.trial.name}.csv' are called repeats ({name}) and their loads differ: "
                 "name only recordings of the same stimulus, begun at the same moment of it."
             )
-    values = np.array([_at(clock, one, getattr(one.trial, part)) for one in members])
+    values = np.array([columns_at(clock, own, getattr(one.trial, part)) for own, one in zip(clocks, members, strict=True)])
     return (values - values.mean(axis=0)) * np.sqrt(len(members) / (len(members) - 1.0))
-
-
-def _at(clock: np.ndarray, one: Predictor, values: np.ndarray) -> np.ndarray:
-    """Values (T, c) of a recording at times since its beginning; NaN beside missing ones."""
-    time = one.trial.time - one.trial.time[0]
-    return np.stack([np.interp(clock, time, column) for column in values.T], axis=1)

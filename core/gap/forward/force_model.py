@@ -131,11 +131,11 @@ class ContactHistory:
         column[self.group] = self.touched
         pressed = force[t.sample, column[t.texel]]
         total = np.zeros((len(self.time), 3))
-        factor, viscous = np.ones(1), np.zeros(1)
+        friction_load, viscous = pressed, np.zeros_like(pressed)
         if friction_effects:
             factor, viscous = contact_forces.friction_factors(friction_effects, np.sqrt(t.slip_squared), pressed)
-        work = np.empty((5, len(pressed)))
-        sum_forces(t, pressed, factor, viscous, contact_law(p), work, total)
+            friction_load = pressed * factor
+        sum_forces(t, pressed, friction_load, viscous, contact_law(p), np.empty((4, len(pressed))), total)
         return total
 
 
@@ -175,28 +175,25 @@ def _equal_texels(arrays: list[np.ndarray], texels: np.ndarray) -> tuple[np.ndar
 
 
 @kernel
-def sum_forces(samples, force, factor, viscous, parameters, work, total):  # type: ignore[no-untyped-def]
+def sum_forces(samples, force, friction_load, viscous, parameters, work, total):  # type: ignore[no-untyped-def]
     """Sum normal forces and friction (paper, Eq. 9 and 13) of all samples in contact, for a known motion.
 
     Parameters
     ----------
     samples : ContactSamples
         Of m samples.
-    force : (m,) float, N
-        Normal force of one texel.
-    factor, viscous : (m,) or (1,) float
-        What effects do: to the friction coefficient, and N·s/m beside `ct`.
+    force, friction_load : (m,) float, N
+        Normal force of one texel, and its product with the factor that effects give the friction coefficient.
+    viscous : (m,) float, N·s/m
+        What effects add to `ct`.
     parameters : ContactLaw
-    work : (5, m) float
-        Room for what the bristles keep and gain over the step, the rate of Eq. 9 as ``own · v - fade · z``, and force · factor.
+    work : (4, m) float
+        Room for what the bristles keep and gain over the step, and the rate of Eq. 9 as ``own · v - fade · z``.
     total : (T, 3) float, N
         Added to; forces on the sensor.
     """
-    plain = factor.shape[0] == 1
-    friction_load, length, now, before = work[4], samples.time_step, samples.slip_squared, samples.mean_slip_squared
+    length, now, before = samples.time_step, samples.slip_squared, samples.mean_slip_squared
     keeps, gains, owns, fades = work[0], work[1], work[2], work[3]
-    for i in range(force.shape[0]):
-        friction_load[i] = force[i] if plain else force[i] * factor[i]
     for i in range(force.shape[0]):  # over a step the load is the mean of its ends, as the velocity is
         load = (
             0.5 * (friction_load[i] + friction_load[i - 1])
@@ -229,7 +226,7 @@ def sum_forces(samples, force, factor, viscous, parameters, work, total):  # typ
         scale = deflection_scale(zx * zx + zy * zy + zz * zz, max_bristle_deflection(fn, parameters))
         zx, zy, zz = scale * zx, scale * zy, scale * zz
         vx, vy, vz = samples.slip[i, 0], samples.slip[i, 1], samples.slip[i, 2]
-        own, fade, c = owns[i], fades[i], viscous[0] if plain else viscous[i]
+        own, fade, c = owns[i], fades[i], viscous[i]
         total[sample, 0] += weight * (friction_force(zx, own * vx - fade * zx, vx, parameters) + c * vx)
         total[sample, 1] += weight * (friction_force(zy, own * vy - fade * zy, vy, parameters) + c * vy)
         total[sample, 2] += weight * (friction_force(zz, own * vz - fade * zz, vz, parameters) + c * vz)

@@ -386,7 +386,5 @@ def _effects_key(effects: tuple[Effect, ...]) -> object:
 
 def _effect_on_texels(effect: Effect, subset: np.ndarray) -> Effect:
     """The effect on some of the texels."""
-    if not any(isinstance(value, tuple) for value in effect.values.values()):
-        return effect
     values = {k: tuple(np.asarray(v)[subset]) if isinstance(v, tuple) else v for k, v in effect.values.items()}
     return replace(effect, values=values)

@@ -220,11 +220,9 @@ def joined_stimuli(stimuli: Sequence[Stimulus], texels: Texels) -> tuple[Stimulu
     missing = {"normal": -texels.normal, "slip": np.zeros((len(texels), 3))}
 
     def joined(name: str) -> np.ndarray | None:
-        values = [getattr(part, name) for part in parts]
-        if all(one is None for one in values):
+        pairs = [(getattr(part, name), (len(part.time), len(texels), 3)) for part in parts]
+        if all(one is None for one, _ in pairs):
             return None
-        shapes = [(len(part.time), len(texels), 3) for part in parts]
-        pairs = zip(values, shapes, strict=True)
         return np.concatenate([np.broadcast_to(missing[name], shape) if one is None else one for one, shape in pairs])
 
     names = ("depth", "rate", "force_share", "normal", "slide_speed", "slip")
