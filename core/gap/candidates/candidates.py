@@ -265,10 +265,17 @@ class Candidate:
 
 @cache
 def _halton_points(dimensions: int, count: int) -> np.ndarray:
-    """The first points of a Halton sequence but the corner of the unit cube, (count, dimensions) float."""
-    from scipy.stats import qmc
+    """The first points of a Halton sequence but the corner of the unit cube, (count, dimensions) float, as scipy's.
 
-    points: np.ndarray = qmc.Halton(dimensions, scramble=False).random(count + 1)[1:]
+    The import of scipy.stats takes half a second, and this is all that a diagnosis would need of it.
+    """
+    primes = [n for n in range(2, 2 + dimensions**2) if all(n % i for i in range(2, n))][:dimensions]
+    points = np.zeros((count, dimensions))
+    for axis, base in enumerate(primes):
+        left, size = np.arange(1, count + 1), 1.0 / base
+        while left.any():
+            points[:, axis] += left % base * size
+            left, size = left // base, size / base
     return points
 
 
