@@ -68,11 +68,11 @@ def magnetic_skin(
 
     if isinstance(magnets, str):
         named = skin_presets.preset_named(magnets)
-        own_places = skin_presets.placed(named, sensor.texels)
-        magnets = own_places.magnets
-        axes = own_places.axes if axes is None and magnetometers is None else axes
-        moments = own_places.moments if moments is None else moments
-        magnetometers = own_places.magnetometers if magnetometers is None else magnetometers
+        own_magnets, own_chips = skin_presets.placed(named, sensor.texels)
+        magnets = own_magnets.place
+        axes = own_chips.axes if axes is None and magnetometers is None else axes
+        moments = own_magnets.moment if moments is None else moments
+        magnetometers = own_chips.place if magnetometers is None else magnetometers
         thickness = named.thickness if thickness is None else thickness
     if moments is None or magnetometers is None or thickness is None:
         named_skins = ", ".join(skin_presets.PRESETS)

@@ -18,7 +18,15 @@ import numpy as np
 from ...core.errors import SensorError
 from ...core.geometry.mesh import TriangleMesh, checked_mesh, vertex_normals
 from ...core.geometry.scattered_points import scatter
-from ...core.geometry.texel_arrays import TexelMesh, filled_region, pad_array, region_middle, shifted_pose, wrapped_array
+from ...core.geometry.texel_arrays import (
+    TexelMesh,
+    filled_region,
+    mesh_of_faces,
+    pad_array,
+    region_middle,
+    shifted_pose,
+    wrapped_array,
+)
 from ...core.model.sensor_parameters import SENSOR_PARAMETERS
 from ..properties import effect_stack
 from ..properties.object_properties import PatternProperties
@@ -248,8 +256,7 @@ def make_texels(mesh: TriangleMesh, pattern: dict) -> TexelMesh:
     if pattern["method"] == "GRID":
         return filled_region(mesh, pattern["spacing"], pattern["angle"])
     if pattern["method"] == "VERTICES":
-        used, corners = np.unique(mesh.triangles, return_inverse=True)
-        return TexelMesh(mesh.vertices[used], [tuple(face) for face in corners.reshape(-1, 3).tolist()])
+        return mesh_of_faces(mesh.vertices, mesh.triangles)
     middle = shifted_pose(mesh, region_middle(mesh), (pattern["shift_x"], pattern["shift_y"]))
     pitch = pattern["pitch_x"], pattern["pitch_y"]
     return wrapped_array(mesh, pattern["rows"], pattern["columns"], pitch, middle, pattern["angle"])

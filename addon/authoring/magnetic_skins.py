@@ -39,7 +39,7 @@ def place_skin(context, obj, name: str):
     scene, depsgraph = context.scene, participants.depsgraph_of(context.scene)
     preset = skin_presets.preset_named(name)
     sensor, _ = sensor_reader.sensor_in_own_frame(scene, obj, depsgraph)
-    skin = skin_presets.placed(preset, sensor.texels)
+    magnets, chips = skin_presets.placed(preset, sensor.texels)
     pose, metres = moved_bodies.body_pose(scene, obj, depsgraph), transforms.metres_per_unit(scene)
     body = np.array(Matrix.LocRotScale(pose[:3] / metres, Quaternion(pose[3:]), None))
     collection = bpy.data.collections.new(f"{obj.name} Magnetic Skin")
@@ -57,9 +57,9 @@ def place_skin(context, obj, name: str):
         part.palpate.magnetic.part = what
         return part.palpate.magnetic
 
-    for i, (place, moment) in enumerate(zip(skin.magnets, skin.moments, strict=True)):
+    for i, (place, moment) in enumerate(zip(magnets.place, magnets.moment, strict=True)):
         put("MAGNET", i, place, _frame_of(moment), "SINGLE_ARROW").moment = float(np.linalg.norm(moment))
-    for i, (place, axes) in enumerate(zip(skin.magnetometers, skin.axes, strict=True)):
+    for i, (place, axes) in enumerate(zip(chips.place, chips.axes, strict=True)):
         put("MAGNETOMETER", i, place, axes, "ARROWS")
     own = obj.palpate.readout
     own.kind, own.collection, own.thickness = object_properties.PLACED, collection, preset.thickness

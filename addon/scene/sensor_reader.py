@@ -15,7 +15,7 @@ from ...core.model.sensor import Sensor
 from ...core.model.sensor_parameters import Painted
 from ...core.skins import skin_presets
 from ...core.skins.channel_readouts import MagneticReadout, net_force_of
-from ...core.skins.magnetic_skin import FULL_SCALE, Magnetometers, Magnets, magnetic_skin
+from ...core.skins.magnetic_skin import Magnetometers, Magnets, magnetic_skin
 from ..properties import effect_stack, object_properties, parameter_properties
 from ..session import transforms
 from . import mesh_arrays, moved_bodies, sensor_regions, uv_layouts
@@ -57,9 +57,7 @@ def _magnetic(obj, sensor: Sensor, to_body: tuple[np.ndarray, np.ndarray], depsg
         thickness = transforms.as_typed(own.thickness)
     else:
         preset = skin_presets.preset_named(own.kind.lower())
-        skin = skin_presets.placed(preset, texels)
-        magnets = Magnets(skin.magnets, skin.moments)
-        chips = Magnetometers(skin.magnetometers, skin.axes, FULL_SCALE, np.zeros(skin.magnetometers.shape))
+        magnets, chips = skin_presets.placed(preset, texels)
         thickness = preset.thickness
     stiffness = transforms.as_typed(own.shear_stiffness) or sensor.parameters.k
     return MagneticReadout(magnetic_skin(texels, magnets, chips, thickness), texels, stiffness)

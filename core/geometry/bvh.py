@@ -40,10 +40,10 @@ class Tree(NamedTuple):
         Each triangle's index in the mesh it came from.
     roots : (m + 1,) int
         Node at which each mesh's tree starts; the last entry is the number of nodes.
-    across : (nt, 3) int
+    adjacent : (nt, 3) int
         Triangle on the other side of the edges from first to second, second to third and third to first corner, in leaf order;
         -1 unless that edge joins exactly two triangles of one orientation.
-    facing : (nn, 6) float
+    normal_bounds : (nn, 6) float
         Low and high end of the normals of each node's triangles, by axis; ``±2`` where one of them has no neighbour. They are
         those of the meshes as they were given.
     """
@@ -127,7 +127,7 @@ def _fit_normal_bounds(
     number: np.ndarray,
     normal_bounds: np.ndarray,
 ) -> None:
-    """Fill in :attr:`Tree.facing`; rounded away from what is inside, since it is kept in single precision."""
+    """Fill in :attr:`Tree.normal_bounds`; rounded away from what is inside, since it is kept in single precision."""
     for node in range(len(normal_bounds) - 1, -1, -1):
         for axis in range(3):
             low, high = 2.0, -2.0

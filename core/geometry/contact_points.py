@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .grid_layout import GridLayout
+from .mesh import TriangleMesh, triangle_areas
 from .texels import Texels
 
 
@@ -77,25 +78,9 @@ def _in_grid(layout: GridLayout, across: int) -> tuple[np.ndarray, np.ndarray]:
     up, right = (grid.ravel() for grid in np.meshgrid(offset, offset, indexing="ij"))
     row, row_share = _neighbour(layout.row, layout.rows, up)
     column, column_share = _neighbour(layout.column, layout.columns, right)
-    own_row, own_column = layout.row[:, None], layout.column[:, None]
-    corner = np.stack(
-        [
-            number[own_row, own_column] + np.zeros_like(row),
-            number[own_row, column],
-            number[row, own_column],
-            number[row, column],
-        ],
-        axis=-1,
-    )
-    weight = np.stack(
-        [
-            (1 - row_share) * (1 - column_share),
-            (1 - row_share) * column_share,
-            row_share * (1 - column_share),
-            row_share * column_share,
-        ],
-        axis=-1,
-    )
+    own_row, own_column = (np.broadcast_to(own[:, None], row.shape) for own in (layout.row, layout.column))
+    corner = np.stack([number[i, j] for i in (own_row, row) for j in (own_column, column)], axis=-1)
+    weight = np.stack([a * b for a in (1 - row_share, row_share) for b in (1 - column_share, column_share)], axis=-1)
     return corner.reshape(-1, 4), weight.reshape(-1, 4)
 
 
@@ -109,10 +94,7 @@ def _neighbour(place: np.ndarray, count: int, offset: np.ndarray) -> tuple[np.nd
 
 def _in_fans(triangles: np.ndarray, position: np.ndarray, across: int) -> tuple[np.ndarray, np.ndarray]:
     """Place the points on rings of equal area around each vertex; rings are turned by the golden ratio."""
-    size = 0.5 * np.linalg.norm(
-        np.cross(position[triangles[:, 1]] - position[triangles[:, 0]], position[triangles[:, 2]] - position[triangles[:, 0]]),
-        axis=1,
-    )
+    size = triangle_areas(TriangleMesh(position, triangles))
     ring, place = (grid.ravel() for grid in np.meshgrid(np.arange(across), np.arange(across), indexing="ij"))
     radius = np.sqrt((ring + 0.5) / across)
     around = (place + (0.25 + 0.618 * ring) % 1.0) / across

@@ -93,7 +93,8 @@ def grid_layout(
     if edges is None or len(edges.rim) != 2 * sum(sizes) - 4:
         return None, None
     position = np.asarray(position, float)
-    grid = _find_grid(position, edges, sizes, _whole_quads(quads))
+    quads = np.zeros((0, 4), int) if quads is None or len(quads) == 0 else np.asarray(quads)
+    grid = _find_grid(position, edges, sizes, quads[(quads >= 0).all(axis=1)])
     if grid is None:
         return None, None
     grid = _turned(grid, position, normal)
@@ -167,13 +168,6 @@ class _Edges:
         wanted = start * len(self.fan) + end
         at = np.minimum(np.searchsorted(self.key, wanted), len(self.key) - 1)
         return np.where(self.key[at] == wanted, self.third[at], -1)
-
-
-def _whole_quads(quads: np.ndarray | None) -> np.ndarray:
-    if quads is None or len(quads) == 0:
-        return np.zeros((0, 4), int)
-    quads = np.asarray(quads)
-    return quads[(quads >= 0).all(axis=1)]
 
 
 def _find_grid(position: np.ndarray, edges: _Edges, sizes: tuple[int, int], quads: np.ndarray) -> np.ndarray | None:

@@ -162,12 +162,6 @@ def _corners(mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]
 
 
-def _longest_edges(mesh: TriangleMesh) -> np.ndarray:
-    a, b, c = _corners(mesh)
-    squares = [np.einsum("ij,ij->i", edge, edge) for edge in (b - a, c - b, a - c)]
-    return np.sqrt(np.maximum(np.maximum(*squares[:2]), squares[2]))
-
-
 def triangle_areas(mesh: TriangleMesh) -> np.ndarray:
     """Area of each triangle, (nt,) float, m²."""
     a, b, c = _corners(mesh)
@@ -183,7 +177,8 @@ def have_area(mesh: TriangleMesh) -> np.ndarray:
 
 
 def _exceed_rounding(mesh: TriangleMesh, area: np.ndarray) -> np.ndarray:
-    longest = _longest_edges(mesh)
+    a, b, c = _corners(mesh)
+    longest = np.sqrt(np.max([np.einsum("ij,ij->i", edge, edge) for edge in (b - a, c - b, a - c)], axis=0))
     scale = np.abs(mesh.vertices).max(initial=0.0) + longest.max(initial=0.0)
     return area > 1e-13 * scale * longest
 
@@ -217,11 +212,8 @@ def vertex_areas(mesh: TriangleMesh, chosen: np.ndarray) -> np.ndarray:
     mesh : TriangleMesh
     chosen : (nt,) bool
     """
-    total = np.zeros(len(mesh.vertices))
     share = triangle_areas(mesh)[chosen] / 3.0
-    for corner in range(3):
-        np.add.at(total, mesh.triangles[chosen, corner], share)
-    return total
+    return np.bincount(mesh.triangles[chosen].T.ravel(), np.tile(share, 3), len(mesh.vertices))
 
 
 def mass_properties(mesh: TriangleMesh, mass: float, name: str) -> tuple[np.ndarray, np.ndarray, list[str]]:
@@ -248,11 +240,11 @@ def mass_properties(mesh: TriangleMesh, mass: float, name: str) -> tuple[np.ndar
     """
     if not (np.isfinite(mass) and mass > 0):
         raise ParameterError(f"The mass of free body '{name}' is {mass:g} kg: give it a value above zero.")
+    middle, size = _extent(mesh)
     if is_closed(mesh.triangles):
         import trimesh
 
         # Computed about the middle and in units of the size, so that small and far objects lose no digits.
-        middle, size = _extent(mesh)
         unit = (mesh.vertices - middle) / size.max()
         properties = trimesh.triangles.mass_properties(unit[mesh.triangles])
         volume = float(properties["volume"])
@@ -260,7 +252,6 @@ def mass_properties(mesh: TriangleMesh, mass: float, name: str) -> tuple[np.ndar
             inertia = np.asarray(properties["inertia"]) * (mass / volume) * size.max() ** 2
             center = np.asarray(properties["center_mass"]) * size.max() + middle
             return center, 0.5 * (inertia + inertia.T), []
-    middle, size = _extent(mesh)
     size = np.maximum(size, 1e-3 * size.max())
     squares = size**2
     inertia = np.diag(mass / 12.0 * (squares.sum() - squares))

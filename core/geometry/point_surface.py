@@ -90,13 +90,8 @@ def _triangles_by_votes(
 
 def _triangles_in_plane(points: np.ndarray, normal: np.ndarray, reach: np.ndarray) -> list[tuple[int, ...]]:
     """Return the Delaunay triangles across a direction whose edges are not longer than the reach of both of their ends."""
-    from scipy.spatial import Delaunay, QhullError
-
     flat = _flattened(points, normal, points[0])
-    try:
-        simplices = Delaunay(flat).simplices
-    except QhullError:  # all on a line
-        return []
+    simplices = _delaunay(flat)
     ends = simplices[:, [[0, 1], [1, 2], [2, 0]]]
     length = np.linalg.norm(points[ends[:, :, 0]] - points[ends[:, :, 1]], axis=2)
     a, b, c = (flat[simplices[:, i]] for i in range(3))
@@ -119,16 +114,20 @@ def _nearest_triangle(points: np.ndarray, point: int, near: np.ndarray) -> tuple
 
 def _triangles_at(points: np.ndarray, normal: np.ndarray, own: list[int]) -> list[tuple[int, ...]]:
     """Return the Delaunay triangles, in a plane, that have the first of some points as a corner; corners in ascending order."""
-    from scipy.spatial import Delaunay, QhullError
-
     if len(own) < 3:
         return []
-    flat = _flattened(points[own], normal, points[own[0]])
-    try:
-        simplices = Delaunay(flat).simplices
-    except QhullError:  # all on a line
-        return []
+    simplices = _delaunay(_flattened(points[own], normal, points[own[0]]))
     return [tuple(sorted(own[i] for i in simplex)) for simplex in simplices if 0 in simplex]
+
+
+def _delaunay(flat: np.ndarray) -> np.ndarray:
+    """Return the Delaunay triangles of points in a plane, (m, 3) int."""
+    from scipy.spatial import Delaunay, QhullError
+
+    try:
+        return np.asarray(Delaunay(flat).simplices)
+    except QhullError:  # all on a line
+        return np.zeros((0, 3), int)
 
 
 def _flattened(points: np.ndarray, normal: np.ndarray, origin: np.ndarray) -> np.ndarray:

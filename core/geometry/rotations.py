@@ -13,12 +13,8 @@ from ..compiled.kernels import kernel, plain
 def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
     """Return the (…, 3, 3) rotation matrices of (…, 4) unit quaternions (w, x, y, z)."""
     q = np.asarray(quaternions, float)
-    w, x, y, z = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
-    xx, yy, zz, xy, xz, yz, wx, wy, wz = x * x, y * y, z * z, x * y, x * z, y * z, w * x, w * y, w * z
-    rows = np.empty((3, 3, *np.shape(x)))
-    rows[0, 0], rows[0, 1], rows[0, 2] = 1 - 2 * (yy + zz), 2 * (xy - wz), 2 * (xz + wy)
-    rows[1, 0], rows[1, 1], rows[1, 2] = 2 * (xy + wz), 1 - 2 * (xx + zz), 2 * (yz - wx)
-    rows[2, 0], rows[2, 1], rows[2, 2] = 2 * (xz - wy), 2 * (yz + wx), 1 - 2 * (xx + yy)
+    rows = np.empty((3, 3, *q.shape[:-1]))
+    plain(write_rotation)(np.moveaxis(q, -1, 0), rows)
     return rows.transpose(*range(2, rows.ndim), 0, 1)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import SensorError
 from .mesh import TriangleMesh, face_normals, triangle_areas, unique_edges
-from .texel_arrays import TexelMesh, nearest_point
+from .texel_arrays import TexelMesh, mesh_of_faces, nearest_point
 
 # A number of points spread evenly over a surface, each with the normal of the surface below it.
 #
@@ -140,12 +140,10 @@ def _farthest(features: np.ndarray, count: int) -> np.ndarray:
 def _smooth_normals(mesh: TriangleMesh, face: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Return unit normals at barycentric coordinates (n, 3) of faces (n,), interpolated where the surface is smooth."""
     normals = face_normals(mesh)
-    order = np.argsort(mesh.triangles.ravel(), kind="stable")
-    starts = np.searchsorted(mesh.triangles.ravel()[order], np.arange(len(mesh.vertices) + 1))
-    found = np.zeros((len(face), 3))
+    meeting, found = _triangles_at(mesh), np.zeros((len(face), 3))
     for row, (one, shares) in enumerate(zip(face.tolist(), weight, strict=True)):
         for vertex, share in zip(mesh.triangles[one].tolist(), shares, strict=True):
-            around = normals[order[starts[vertex] : starts[vertex + 1]] // 3]
+            around = normals[meeting[vertex]]
             corner = around[around @ normals[one] > SMOOTH].sum(axis=0)
             found[row] += share * corner / np.linalg.norm(corner)
     return found / np.linalg.norm(found, axis=1, keepdims=True)
@@ -188,10 +186,9 @@ def scatter(mesh: TriangleMesh, spacing: float, seed: int = 0) -> TexelMesh:
         )
     fine = refined(mesh, spacing / FINENESS)
     links = _links(fine)
-    weight = _weights(fine)
+    weight = np.bincount(fine.triangles.ravel(), np.repeat(triangle_areas(fine) / 3.0, 3), len(fine.vertices))  # of area
     sites = _discs(fine.vertices, links, RADIUS * spacing, np.random.default_rng(seed))
     points = fine.vertices[sites]
-    owner = np.zeros(0, dtype=int)
     for _ in range(RELAXATIONS):
         owner = _nearest(fine.vertices, links, points, sites)
         middle, sites = _centres(fine.vertices, weight, owner, len(sites))
@@ -201,10 +198,7 @@ def scatter(mesh: TriangleMesh, spacing: float, seed: int = 0) -> TexelMesh:
     faces = _duals(fine.triangles, owner)
     if not len(faces):
         raise SensorError(f"No three texels {spacing * 1e3:g} mm apart fit into the region: use a smaller spacing.")
-    used = np.unique(faces)
-    number = np.full(len(points), -1)
-    number[used] = np.arange(len(used))
-    return TexelMesh(points[used], [tuple(face) for face in number[faces].tolist()])
+    return mesh_of_faces(points, faces)
 
 
 def refined(mesh: TriangleMesh, longest: float) -> TriangleMesh:
@@ -252,18 +246,19 @@ def _split(triangles: np.ndarray, middle: np.ndarray) -> np.ndarray:
 def _links(mesh: TriangleMesh) -> list[list[int]]:
     """Neighbours of each vertex."""
     edges, _, _ = unique_edges(mesh.triangles)
-    both = np.vstack([edges, edges[:, ::-1]])
-    both = both[np.argsort(both[:, 0], kind="stable")]
-    starts = np.searchsorted(both[:, 0], np.arange(len(mesh.vertices) + 1)).tolist()
-    ends = both[:, 1].tolist()
-    return [ends[starts[i] : starts[i + 1]] for i in range(len(mesh.vertices))]
+    ends = edges[:, ::-1].T.ravel()
+    return [ends[which].tolist() for which in _grouped(edges.T.ravel(), len(mesh.vertices))]
 
 
-def _weights(mesh: TriangleMesh) -> np.ndarray:
-    """(nv,) area that belongs to each vertex."""
-    weight = np.zeros(len(mesh.vertices))
-    np.add.at(weight, mesh.triangles, triangle_areas(mesh)[:, None] / 3.0)
-    return weight
+def _triangles_at(mesh: TriangleMesh) -> list[np.ndarray]:
+    """Triangles at each vertex."""
+    return [which // 3 for which in _grouped(mesh.triangles.ravel(), len(mesh.vertices))]
+
+
+def _grouped(numbers: np.ndarray, count: int) -> list[np.ndarray]:
+    """Return for each number from zero to `count` the places, ascending, where it is among some."""
+    order = np.argsort(numbers, kind="stable")
+    return np.split(order, np.searchsorted(numbers[order], np.arange(1, count)))
 
 
 def _discs(vertices: np.ndarray, links: list[list[int]], radius: float, rng: np.random.Generator) -> np.ndarray:
@@ -312,18 +307,14 @@ def _centres(vertices: np.ndarray, weight: np.ndarray, owner: np.ndarray, count:
     )
     distance = np.where(there, np.linalg.norm(vertices - middle[owner], axis=1), np.inf)
     order = np.lexsort((distance, owner))
-    first = np.searchsorted(owner[order], np.arange(count))
-    sites = order[first]
-    return middle, sites
+    return middle, order[np.searchsorted(owner[order], np.arange(count))]
 
 
 def _on_surface(mesh: TriangleMesh, points: np.ndarray, sites: np.ndarray) -> np.ndarray:
     """(n, 3) float: points moved onto the triangles around the vertices that they are nearest to."""
-    order = np.argsort(mesh.triangles.ravel(), kind="stable")
-    starts = np.searchsorted(mesh.triangles.ravel()[order], np.arange(len(mesh.vertices) + 1))
-    around = [order[starts[site] : starts[site + 1]] // 3 for site in sites]
-    moved = (nearest_point(TriangleMesh(mesh.vertices, mesh.triangles[i]), point)[0] for i, point in zip(around, points))
-    return np.array(list(moved))
+    meeting = _triangles_at(mesh)
+    around = (TriangleMesh(mesh.vertices, mesh.triangles[meeting[site]]) for site in sites)
+    return np.array([nearest_point(near, point)[0] for near, point in zip(around, points)])
 
 
 def _duals(triangles: np.ndarray, owner: np.ndarray) -> np.ndarray:

@@ -35,11 +35,6 @@ class SurfacePose:
     point: np.ndarray
     heading: np.ndarray
 
-    def turned(self, normal: np.ndarray, angle: float) -> SurfacePose:
-        """Return the same point with the heading turned anticlockwise, seen from outside."""
-        across = np.cross(normal, self.heading)
-        return SurfacePose(self.triangle, self.point, np.cos(angle) * self.heading + np.sin(angle) * across)
-
 
 class GeodesicTracer:
     """Follows straightest geodesics on a surface.
@@ -90,6 +85,18 @@ class GeodesicTracer:
                 return None
             here, left = after, left - step
         return None
+
+    def turned(self, pose: SurfacePose, angle: float) -> SurfacePose:
+        """Return the same point with the heading turned anticlockwise, seen from outside."""
+        across = np.cross(self.normals[pose.triangle], pose.heading)
+        return SurfacePose(pose.triangle, pose.point, np.cos(angle) * pose.heading + np.sin(angle) * across)
+
+    def along(self, pose: SurfacePose, length: float) -> SurfacePose | None:
+        """Do as :meth:`trace`, backwards for a negative length. The heading at the end points forwards in both cases."""
+        if length >= 0:
+            return self.trace(pose, length)
+        end = self.trace(self.turned(pose, math.pi), -length)
+        return None if end is None else self.turned(end, math.pi)
 
     def _exit(self, here: SurfacePose) -> tuple[float, int]:
         """Return the distance to the border of the triangle and the edge that is met there."""
@@ -194,8 +201,10 @@ def pad_array(rows: int, columns: int, pitch: tuple[float, float], radius: float
         )
     y, along = np.mgrid[0:rows, 0:columns].astype(float)
     along, y = (along - (columns - 1) / 2) * pitch[0], (y - (rows - 1) / 2) * pitch[1]
-    x, z = (along, np.zeros_like(along)) if not radius else _bent(along, radius)
-    return TexelMesh(np.stack([x, y, z], axis=-1).reshape(-1, 3), _quads(np.arange(rows * columns).reshape(rows, columns)))
+    x, z = along, np.zeros_like(along)
+    if radius:
+        x, z = radius * np.sin(along / radius), radius * (np.cos(along / radius) - 1.0)
+    return _whole_grid(np.stack([x, y, z], axis=-1).reshape(-1, 3), rows, columns)
 
 
 def _check_size(rows: int, columns: int, pitch: tuple[float, float]) -> None:
@@ -203,11 +212,6 @@ def _check_size(rows: int, columns: int, pitch: tuple[float, float]) -> None:
         raise SensorError(
             f"An array of {rows} × {columns} texels has no face: use two rows and columns or more, and a pitch above zero."
         )
-
-
-def _bent(along: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
-    angle = along / radius
-    return radius * np.sin(angle), radius * (np.cos(angle) - 1.0)
 
 
 def wrapped_array(
@@ -244,23 +248,21 @@ def wrapped_array(
     """
     _check_size(rows, columns, pitch)
     tracer = GeodesicTracer(mesh)
-    centre = _turned(tracer, middle or region_middle(mesh), angle)
-    index = np.full((rows, columns), -1)
+    centre = tracer.turned(middle or region_middle(mesh), angle)
     points: list[np.ndarray] = []
     offsets_y = (np.arange(rows) - (rows - 1) / 2) * pitch[1]
     offsets_x = (np.arange(columns) - (columns - 1) / 2) * pitch[0]
     for row, y in enumerate(offsets_y):
-        start = _along(tracer, centre, y)
+        start = tracer.along(centre, y)
         for column, x in enumerate(offsets_x):
-            found = None if start is None else _along(tracer, _turned(tracer, start, -math.pi / 2), x)
+            found = None if start is None else tracer.along(tracer.turned(start, -math.pi / 2), x)
             if found is None:
                 raise SensorError(
                     f"Texel ({row}, {column}) of the {rows} × {columns} array lies beyond the region: "
                     "use fewer texels, a smaller pitch or a larger region, or turn the array."
                 )
-            index[row, column] = len(points)
             points.append(found.point)
-    return TexelMesh(np.array(points), _quads(index))
+    return _whole_grid(np.array(points), rows, columns)
 
 
 def filled_region(mesh: TriangleMesh, spacing: float, angle: float = 0.0) -> TexelMesh:
@@ -280,9 +282,12 @@ def filled_region(mesh: TriangleMesh, spacing: float, angle: float = 0.0) -> Tex
     SensorError
         Not even one face fits.
     """
-    tracer, most = GeodesicTracer(mesh), _most_steps(mesh, spacing)
-    middle_line = _both_ways(tracer, _turned(tracer, region_middle(mesh), angle), spacing, most)
-    row_lines = [_both_ways(tracer, _turned(tracer, pose, -math.pi / 2), spacing, most) for _, pose in middle_line]
+    if not spacing > 0:
+        raise SensorError(f"The spacing of texels is {spacing * 1e3:g} mm: give a length above zero.")
+    size = float(np.linalg.norm(np.ptp(mesh.vertices[mesh.triangles].reshape(-1, 3), axis=0)))
+    tracer, most = GeodesicTracer(mesh), 2 + math.ceil(4.0 * size / spacing)
+    middle_line = _both_ways(tracer, tracer.turned(region_middle(mesh), angle), spacing, most)
+    row_lines = [_both_ways(tracer, tracer.turned(pose, -math.pi / 2), spacing, most) for _, pose in middle_line]
     low = min(number for row_line in row_lines for number, _ in row_line)
     high = max(number for row_line in row_lines for number, _ in row_line)
     index = np.full((len(row_lines), high - low + 1), -1)
@@ -296,9 +301,9 @@ def filled_region(mesh: TriangleMesh, spacing: float, angle: float = 0.0) -> Tex
             index[row, column - low] = len(points)
             points.append(pose.point)
     faces = _quads(index)
-    if not faces:
+    if not len(faces):
         raise SensorError(f"No face of {spacing * 1e3:g} × {spacing * 1e3:g} mm fits into the region: use a smaller spacing.")
-    return _used(np.array(points), faces)
+    return mesh_of_faces(np.array(points), faces)
 
 
 def region_middle(mesh: TriangleMesh) -> SurfacePose:
@@ -338,27 +343,15 @@ def shifted_pose(mesh: TriangleMesh, pose: SurfacePose, shift: tuple[float, floa
         It lies beyond the region.
     """
     tracer = GeodesicTracer(mesh)
-    found = _along(tracer, pose, shift[1])
+    found = tracer.along(pose, shift[1])
     if found is not None and shift[0]:
-        side = _along(tracer, _turned(tracer, found, -math.pi / 2), shift[0])
-        found = None if side is None else _turned(tracer, side, math.pi / 2)
+        side = tracer.along(tracer.turned(found, -math.pi / 2), shift[0])
+        found = None if side is None else tracer.turned(side, math.pi / 2)
     if found is None:
         raise SensorError(
             f"Shifted by {shift[0] * 1e3:g} and {shift[1] * 1e3:g} mm the array's middle lies beyond the region: shift it less."
         )
     return found
-
-
-def _turned(tracer: GeodesicTracer, pose: SurfacePose, angle: float) -> SurfacePose:
-    return pose.turned(tracer.normals[pose.triangle], angle)
-
-
-def _along(tracer: GeodesicTracer, pose: SurfacePose, length: float) -> SurfacePose | None:
-    """Follow a straight line, backwards for a negative length. The heading at the end points forwards in both cases."""
-    if length >= 0:
-        return tracer.trace(pose, length)
-    end = tracer.trace(_turned(tracer, pose, math.pi), -length)
-    return None if end is None else _turned(tracer, end, math.pi)
 
 
 def _both_ways(tracer: GeodesicTracer, middle: SurfacePose, spacing: float, most: int) -> list[tuple[int, SurfacePose]]:
@@ -367,36 +360,28 @@ def _both_ways(tracer: GeodesicTracer, middle: SurfacePose, spacing: float, most
     for sign in (-1, 1):
         here: SurfacePose | None = middle
         for number in range(1, most):
-            here = _along(tracer, here, sign * spacing) if here is not None else None
+            here = tracer.along(here, sign * spacing) if here is not None else None
             if here is None or np.linalg.norm(here.point - middle.point) < CROWDED * spacing:  # off it, or once around it
                 break
             found.append((sign * number, here))
-            if sign > 0 and _meets(found, here.point, CROWDED * spacing):
+            behind = [pose.point for number, pose in found if number < 0] if sign > 0 else []
+            if any(np.linalg.norm(point - here.point) < CROWDED * spacing for point in behind):  # around a closed surface
                 found.pop()
                 break
     return sorted(found, key=lambda item: item[0])
 
 
-def _meets(found: list[tuple[int, SurfacePose]], point: np.ndarray, distance: float) -> bool:
-    """True if a line has gone around a closed surface and met its own part behind the middle."""
-    return any(number < 0 and np.linalg.norm(pose.point - point) < distance for number, pose in found)
-
-
-def _most_steps(mesh: TriangleMesh, spacing: float) -> int:
-    if not spacing > 0:
-        raise SensorError(f"The spacing of texels is {spacing * 1e3:g} mm: give a length above zero.")
-    return 2 + math.ceil(4.0 * float(np.linalg.norm(np.ptp(mesh.vertices[mesh.triangles].reshape(-1, 3), axis=0))) / spacing)
-
-
-def _quads(index: np.ndarray) -> list[tuple[int, ...]]:
-    """Faces between neighbours in a table of vertex numbers; −1 marks an empty place."""
+def _quads(index: np.ndarray) -> np.ndarray:
+    """(m, 4) int: faces between neighbours in a table of vertex numbers; −1 marks an empty place."""
     corners = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(-1, 4)
-    return [tuple(corner) for corner in corners[(corners >= 0).all(axis=1)].tolist()]
+    return corners[(corners >= 0).all(axis=1)]
 
 
-def _used(points: np.ndarray, faces: list[tuple[int, ...]]) -> TexelMesh:
-    """Return a mesh without the points that belong to no face."""
-    used = np.unique([corner for face in faces for corner in face])
-    number = np.full(len(points), -1)
-    number[used] = np.arange(len(used))
-    return TexelMesh(points[used], [tuple(number[list(face)].tolist()) for face in faces])
+def _whole_grid(points: np.ndarray, rows: int, columns: int) -> TexelMesh:
+    return mesh_of_faces(points, _quads(np.arange(rows * columns).reshape(rows, columns)))
+
+
+def mesh_of_faces(points: np.ndarray, faces: np.ndarray) -> TexelMesh:
+    """Return the points (n, 3) that are corners of faces (m, 3 or 4) int, and these faces."""
+    used, number = np.unique(faces, return_inverse=True)
+    return TexelMesh(points[used], [tuple(face) for face in number.reshape(faces.shape).tolist()])

@@ -175,20 +175,14 @@ def _layout(
     digest = hashlib.blake2b(digest_size=32)
     for array in (position, normals, triangles, quads):
         digest.update(b"" if array is None else f"{array.dtype}{array.shape}".encode() + array.tobytes())
-    found = _last_layouts.pop(digest.digest(), None) or _new_layout(position, normals, triangles, quads)
+    found = _last_layouts.pop(digest.digest(), None)
+    if found is None:
+        grid, along = grid_layout(position, normals, triangles, quads)
+        found = uv_layout(position, normals, triangles) if grid is None or along is None else (grid, along)
     _last_layouts[digest.digest()] = found
     while len(_last_layouts) > KEPT_LAYOUTS:
         _last_layouts.pop(next(iter(_last_layouts)), None)
     return found
-
-
-def _new_layout(
-    position: np.ndarray, normals: np.ndarray, triangles: np.ndarray, quads: np.ndarray | None
-) -> tuple[GridLayout | UVLayout, np.ndarray]:
-    grid, along = grid_layout(position, normals, triangles, quads)
-    if grid is not None and along is not None:
-        return grid, along
-    return uv_layout(position, normals, triangles)
 
 
 def _tangents(along: np.ndarray, normals: np.ndarray) -> np.ndarray:

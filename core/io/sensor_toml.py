@@ -79,8 +79,7 @@ def write_sensor(path: str | os.PathLike, model: SensorModel) -> None:
     table: dict[str, Any] = {"format": FORMAT, "name": model.name, "sensor": {**words, **model.shape}}
     if model.effects:
         table["effect"] = [to_dict(item) for item in model.effects]
-    text = tomli_w.dumps(table)
-    write_text(path, text)
+    write_text(path, tomli_w.dumps(table))
 
 
 def read_sensor(path: str | os.PathLike) -> SensorModel:

@@ -51,6 +51,8 @@ class Parameter:
         Place among the elements of OpenRAVE's XML (paper, Table 2), counted from one; zero when the XML does not have it.
     fit_place : int
         Place among the parameters that the gap analysis fits to friction, counted from one; zero when it is not among them.
+    neutral : float or None
+        Of an effect: the value at which it vanishes, which may lie outside the bounds. Examples: strength zero, level infinity.
     """
 
     name: str
@@ -69,6 +71,7 @@ class Parameter:
     group: str = ""
     xml_place: int = 0
     fit_place: int = 0
+    neutral: float | None = None
 
     def scaled(self, gain: float) -> Parameter:
         """Return the parameter as it is for a sensor with this gain."""

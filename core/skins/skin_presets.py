@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import SensorError, suggestion
 from ..geometry.texels import Texels
+from .magnetic_skin import FULL_SCALE, Magnetometers, Magnets
 
 LEAST_NORMAL = 0.2
 """Least cosine between the normal of a texel and the mean of all, for a skin to lie below it."""
@@ -93,26 +94,10 @@ def preset_named(name: str) -> SkinPreset:
     return PRESETS[name]
 
 
-@dataclass(frozen=True)
-class PlacedSkin:
-    """A preset under the texels of a sensor, in the frame of its body.
-
-    Attributes
-    ----------
-    magnets, moments : (m, 3) float, m and A·m²
-    magnetometers : (k, 3) float, m
-    axes : (k, 3, 3) float
-        Of each magnetometer in its rows, the last along the normal above it.
-    """
-
-    magnets: np.ndarray
-    moments: np.ndarray
-    magnetometers: np.ndarray
-    axes: np.ndarray
-
-
-def placed(preset: SkinPreset, texels: Texels) -> PlacedSkin:
+def placed(preset: SkinPreset, texels: Texels) -> tuple[Magnets, Magnetometers]:
     """Return a preset under the middle of a sensor's texels; on a curved surface it follows the surface.
+
+    The last axis of each magnetometer is along the normal above it.
 
     Raises
     ------
@@ -147,7 +132,8 @@ def placed(preset: SkinPreset, texels: Texels) -> PlacedSkin:
         return middle + (surface + places[:, 2:] * normal) @ frame, axes @ frame
 
     (magnets, turned), (chips, axes) = under(preset.magnets), under(preset.magnetometers)
-    return PlacedSkin(magnets, np.einsum("i,mij->mj", preset.moment, turned), chips, axes)
+    moments = np.einsum("i,mij->mj", preset.moment, turned)
+    return Magnets(magnets, moments), Magnetometers(chips, axes, FULL_SCALE, np.zeros(chips.shape))
 
 
 def _check_size(preset: SkinPreset, within: np.ndarray) -> None:

@@ -309,30 +309,6 @@ class EffectProgram(NamedTuple):
         return np.zeros((points, self.state_size))
 
 
-class _Tables:
-    """Collects the constants of laws, which have different numbers of columns, in one array."""
-
-    def __init__(self) -> None:
-        self._tables: list[np.ndarray] = []
-        self._rows = 0
-
-    def add(self, table: np.ndarray) -> int:
-        """Add the constants of a law for all lengths of step, (m, c) float, and return its first row."""
-        first = self._rows
-        self._tables.append(table)
-        self._rows += len(table)
-        return first
-
-    def joined(self) -> np.ndarray:
-        """Return all constants, (rows, c) float, padded with zeros."""
-        joined = np.zeros((self._rows, max((table.shape[1] for table in self._tables), default=1)))
-        first = 0
-        for table in self._tables:
-            joined[first : first + len(table), : table.shape[1]] = table
-            first += len(table)
-        return joined
-
-
 def compile_program(stacks: Sequence[Sequence[Effect]], dt: ArrayLike) -> EffectProgram:
     """Return the laws that act on the forces of several sensors.
 
@@ -344,7 +320,7 @@ def compile_program(stacks: Sequence[Sequence[Effect]], dt: ArrayLike) -> Effect
         Lengths of step that will occur. The argument `step_length` of :func:`apply_force_laws` is an index of these.
     """
     lengths = np.atleast_1d(np.asarray(dt, dtype=float))
-    tables = _Tables()
+    tables: list[np.ndarray] = []  # of each law, (m, c) with a c of its own
     first_law, first_unclipped, first_friction_law = [0], [], [0]
     laws: list[tuple[int, int, int]] = []
     friction_laws: list[tuple[int, int]] = []
@@ -354,7 +330,8 @@ def compile_program(stacks: Sequence[Sequence[Effect]], dt: ArrayLike) -> Effect
         for item, form in in_signal_order(stack, readout=False):
             if form.constants is None:
                 continue
-            row = tables.add(form.constants(complete_values(item), lengths))
+            row = len(tables) * len(lengths)
+            tables.append(form.constants(complete_values(item), lengths))
             if form.law is not None:
                 laws.append((_number_of(form.law, _law_over_points), state, row))
                 state += form.state_size
@@ -366,6 +343,9 @@ def compile_program(stacks: Sequence[Sequence[Effect]], dt: ArrayLike) -> Effect
         first_unclipped.append(len(laws) - unclipped)
         first_friction_law.append(len(friction_laws))
         state_size = max(state_size, state)
+    constants = np.zeros((len(tables), len(lengths), max((table.shape[1] for table in tables), default=1)))
+    for own, table in zip(constants, tables, strict=True):
+        own[:, : table.shape[1]] = table
     law, law_state, law_row = np.array(laws, dtype=np.int64).reshape(-1, 3).T.copy()
     friction_law, friction_row = np.array(friction_laws, dtype=np.int64).reshape(-1, 2).T.copy()
     program = EffectProgram(
@@ -377,7 +357,7 @@ def compile_program(stacks: Sequence[Sequence[Effect]], dt: ArrayLike) -> Effect
         first_friction_law=np.array(first_friction_law, dtype=np.int64),
         friction_law=friction_law,
         friction_row=friction_row,
-        constants=tables.joined(),
+        constants=constants.reshape(-1, constants.shape[2]),
         addresses=_ADDRESSES,
         state_size=state_size,
     )

@@ -12,14 +12,7 @@ from ...compiled.kernels import kernel, plain, with_plain_form
 from ...laws.contact_law import ContactLaw, contact_law
 from ...laws.normal_force import damped_force, elastic_force
 from ...model.sensor import Effect
-from .compiled_program import (
-    PointRange,
-    TexelContacts,
-    apply_friction_laws,
-    compile_program,
-    constants_of,
-    law_over_time,
-)
+from .compiled_program import PointRange, TexelContacts, apply_friction_laws, compile_program, constants_of, law_over_time
 from .readout_chain import steps_of
 from .registry import complete_values, in_signal_order
 

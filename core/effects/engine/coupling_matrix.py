@@ -1,13 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Linear coupling of texels: a dense matrix for few texels, and a list of the pairs within reach for many."""
+"""Linear coupling of texels: a dense matrix for few texels, and a sparse one of the pairs within reach for many."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+Weights: TypeAlias = "np.ndarray | csr_array"
+"""Weights with which texels add to texels, (n, n) float; row: target, column: source. No row is empty."""
 
 LARGEST_DENSE = 1500
 """Up to this number of texels every pair counts. Of more texels only pairs within reach count, since the matrix would not fit
@@ -17,73 +23,46 @@ LARGEST_KEPT = 256
 """Up to this number of texels all distances are kept: a fit asks thousands of times for those of the same texels."""
 
 
-@dataclass(frozen=True)
-class CouplingMatrix:
-    """Weights with which the texels `source` add to the texels `target`.
+def coupled(signal: np.ndarray, weights: Weights) -> np.ndarray:
+    """Return ``signal @ weights.T``, (t, n) float; each sample of a sparse matrix by itself, with the same bits.
 
-    Attributes
-    ----------
-    matrix : (n, n) float or None
-        Row: target; column: source.
-    target, source : (p,) int
-    weight : (p,) float
-        The same as a list of pairs, sorted by target, if there is no matrix.
-    """
-
-    matrix: np.ndarray | None
-    target: np.ndarray
-    source: np.ndarray
-    weight: np.ndarray
-
-    def apply(self, signal: np.ndarray) -> np.ndarray:
-        """Return the coupled signal, (t, n) float."""
-        if self.matrix is not None:
-            return coupled(signal, self.matrix)
-        result = np.zeros_like(signal)
-        starts = np.flatnonzero(np.diff(self.target, prepend=-1))
-        for i in range(len(signal)):
-            result[i, self.target[starts]] = np.add.reduceat(self.weight * signal[i, self.source], starts)
-        return result
-
-    def sums(self, texels: int) -> np.ndarray:
-        """Return the sum of the weights of each source, (n,) float."""
-        return np.bincount(self.source, self.weight, texels) if self.matrix is None else self.matrix.sum(axis=0)
-
-    def divided(self, by: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> CouplingMatrix:
-        """Return each weight divided by a number, which `by` computes from the indices of its target and of its source."""
-        if self.matrix is None:
-            return replace(self, weight=self.weight / by(self.target, self.source))
-        texel = np.arange(len(self.matrix))
-        return replace(self, matrix=self.matrix / by(texel[:, None], texel))
-
-    def balance(self, texels: int) -> np.ndarray:
-        """Return the numbers u, (n,) float, with which rows and columns of ``uᵢ wᵢⱼ uⱼ`` sum to one, for symmetric weights w.
-
-        Knight, Ruiz and Uçar, SIAM J. Matrix Anal. 35 (2014): Sinkhorn's iteration for symmetric matrices. Each step halves
-        what the sums lack, where no eigenvalue is negative, so as many steps as a number has bits reach rounding. All weights
-        have the same number of steps, so that the result is a smooth function of them.
-        """
-        scale = self.sums(texels) ** -0.5
-        for _ in range(np.finfo(float).nmant):
-            scale = np.sqrt(scale / self.apply(scale[None])[0])
-        return scale
-
-
-def coupled(signal: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """Return ``signal @ matrix.T``, (t, n) float.
-
-    A signal that is no smaller than the matrix goes without the texels that are never loaded: an indenter touches few, and
+    A signal that is no smaller than a dense matrix goes without the texels that are never loaded: an indenter touches few, and
     selecting the others costs less than their products. One sample is multiplied as it is.
     """
-    if len(signal) < len(matrix):
-        return np.asarray(signal @ matrix.T)
+    if not isinstance(weights, np.ndarray):
+        sums = [np.add.reduceat(weights.data * sample[weights.indices], weights.indptr[:-1]) for sample in signal]
+        return np.reshape(sums, signal.shape)
+    if len(signal) < len(weights):
+        return np.asarray(signal @ weights.T)
     (source,) = np.nonzero((signal != 0.0).any(axis=0))
-    return np.asarray(signal[:, source] @ matrix[:, source].T)
+    return np.asarray(signal[:, source] @ weights[:, source].T)
+
+
+def divided(weights: Weights, by: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> Weights:
+    """Return each weight divided by a number, which `by` computes from the indices of its target and of its source."""
+    if isinstance(weights, np.ndarray):
+        texel = np.arange(len(weights))
+        return weights / by(texel[:, None], texel)
+    target = np.repeat(np.arange(weights.shape[0]), np.diff(weights.indptr))
+    return type(weights)((weights.data / by(target, weights.indices), weights.indices, weights.indptr), weights.shape)
+
+
+def balancing_scale(weights: Weights) -> np.ndarray:
+    """Return the numbers u, (n,) float, with which rows and columns of ``uᵢ wᵢⱼ uⱼ`` sum to one, for symmetric weights w.
+
+    Knight, Ruiz and Uçar, SIAM J. Matrix Anal. 35 (2014): Sinkhorn's iteration for symmetric matrices. Each step halves
+    what the sums lack, where no eigenvalue is negative, so as many steps as a number has bits reach rounding. All weights
+    have the same number of steps, so that the result is a smooth function of them.
+    """
+    scale = weights.sum(axis=0) ** -0.5
+    for _ in range(np.finfo(float).nmant):
+        scale = np.sqrt(scale / coupled(scale[None], weights)[0])
+    return scale
 
 
 def coupling_matrix(
     position: np.ndarray, weight: Callable[[np.ndarray], np.ndarray], reach: float, area: np.ndarray | None
-) -> CouplingMatrix:
+) -> Weights:
     """Return weights that depend on the distance between two texels.
 
     Parameters
@@ -100,19 +79,19 @@ def coupling_matrix(
     position = np.asarray(position, float)
     n = len(position)
     if n <= LARGEST_DENSE:
-        matrix = weight(_distances_kept(position.tobytes()) if n <= LARGEST_KEPT else _distances(position))
+        weights: Weights = weight(_distances_kept(position.tobytes()) if n <= LARGEST_KEPT else _distances(position))
         if area is not None:
-            matrix = matrix * area[:, None]
-        nothing = np.zeros(0, dtype=int)
-        weights = CouplingMatrix(matrix, nothing, nothing, np.zeros(0))
+            weights = weights * area[:, None]
     else:
+        from scipy.sparse import csr_array
+
         target, source, distance = pairs_within(position, reach)
-        values = weight(distance)
-        weights = CouplingMatrix(None, target, source, values if area is None else values * area[target])
+        values = weight(distance) if area is None else weight(distance) * area[target]
+        weights = csr_array((values, source, np.searchsorted(target, np.arange(n + 1))), (n, n))
     if area is None:
         return weights
-    sums = weights.sums(n)
-    return weights.divided(lambda _, source: sums[source])
+    sums = weights.sum(axis=0)
+    return divided(weights, lambda _, source: sums[source])
 
 
 def _distances(position: np.ndarray) -> np.ndarray:

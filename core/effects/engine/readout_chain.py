@@ -3,15 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from functools import lru_cache
+from collections.abc import Callable, Iterable
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...model.sensor import Effect, Values
 from .compiled_program import constants_of, law_over_time
-from .coupling_matrix import CouplingMatrix
+from .coupling_matrix import Weights, coupled
 from .registry import complete_values, in_signal_order
 from .specification import Form, TransducerArray
 
@@ -98,23 +98,22 @@ class ReadoutChain:
 
     def __init__(self, effects: Iterable[Effect], transducers: TransducerArray):
         self.transducers = transducers
-        self._links: list[_Memoryless | _Coupling | _Law | _Delay | _Conversion] = []
-        converted = False
+        self._links: list[Callable[[np.ndarray, np.ndarray], np.ndarray]] = []
+        conversion = partial(_converted, transducers)
         for item, form in in_signal_order(effects, readout=True):
-            if form.after_conversion and not converted:
-                self._links.append(_Conversion(transducers))
-                converted = True
+            if form.after_conversion and conversion not in self._links:
+                self._links.append(conversion)
             values = complete_values(item, transducers.gain)
             if form.law is not None:
                 self._links.append(_Law(form, values, len(transducers.position)))
             elif form.coupling is not None:
-                self._links.append(_Coupling(form.coupling(values, transducers)))
+                self._links.append(partial(_coupled, form.coupling(values, transducers)))
             elif form.memoryless is not None:
-                self._links.append(_Memoryless(form, values, transducers, item.seed))
+                self._links.append(partial(_changed, form.memoryless, values, transducers, item.seed))
             if form.delay is not None:
                 self._links.append(_Delay(form.delay(values), len(transducers.position)))
-        if not converted:
-            self._links.append(_Conversion(transducers))
+        if conversion not in self._links:
+            self._links.append(conversion)
 
     @classmethod
     def of(cls, sensor: Sensor) -> ReadoutChain:
@@ -128,7 +127,7 @@ class ReadoutChain:
         """
         signal = force
         for link in self._links:
-            signal = link.apply(time, signal)
+            signal = link(time, signal)
         return signal
 
     def step(self, time: float, force: np.ndarray) -> np.ndarray:
@@ -136,37 +135,26 @@ class ReadoutChain:
         return self.read(np.array([time]), force[None, :])[0]
 
 
-class _Conversion:
-    """Converts newtons to the unit of the sensor (paper, section 4)."""
-
-    def __init__(self, transducers: TransducerArray):
-        self.transducers = transducers
-
-    def apply(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
-        reading: np.ndarray = self.transducers.gain * self.transducers.painted * signal
-        reading += self.transducers.zero
-        return reading
+def _converted(transducers: TransducerArray, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
+    """Convert newtons to the unit of the sensor (paper, section 4)."""
+    reading: np.ndarray = transducers.gain * transducers.painted * signal
+    reading += transducers.zero
+    return reading
 
 
-class _Memoryless:
-    """Applies a formula without memory."""
+def _changed(
+    formula: Callable[..., np.ndarray],
+    values: Values,
+    transducers: TransducerArray,
+    seed: int,
+    time: np.ndarray,
+    signal: np.ndarray,
+) -> np.ndarray:
+    return formula(signal, time, values, transducers, seed)
 
-    def __init__(self, form: Form, values: Values, transducers: TransducerArray, seed: int):
-        self.form, self.values, self.transducers, self.seed = form, values, transducers, seed
 
-    def apply(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
-        assert self.form.memoryless is not None
-        return self.form.memoryless(signal, time, self.values, self.transducers, self.seed)
-
-
-class _Coupling:
-    """Applies a linear coupling of texels."""
-
-    def __init__(self, weights: CouplingMatrix):
-        self.weights = weights
-
-    def apply(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
-        return self.weights.apply(signal)
+def _coupled(weights: Weights, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
+    return coupled(signal, weights)
 
 
 class _Law:
@@ -177,7 +165,7 @@ class _Law:
         self.memory = np.zeros((texels, form.state_size))
         self.last: float | None = None
 
-    def apply(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
+    def __call__(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
         lengths, step = steps_of(time, self.last)
         self.last = float(time[-1])
         return law_over_time(self.form, signal, step, constants_of(self.form, self.values, lengths), self.memory)
@@ -190,7 +178,7 @@ class _Delay:
         self.delay = delay
         self.time, self.signal = np.zeros(0), np.zeros((0, texels))  # the part of the past that is still needed
 
-    def apply(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
+    def __call__(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
         if not len(self.time):
             self.time, self.signal = time, signal
         else:

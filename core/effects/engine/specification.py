@@ -7,7 +7,7 @@ for the same phenomenon, because publications differ. A form acts by one mechani
 ================  ===========================================================================================================
 ``law``           law with memory, equal in the solver, over whole signals and over streams (see :data:`Law`)
 ``memoryless``    formula on readings: ``memoryless(signal (t, n), time (t,), values, transducers, seed) → (t, n)``
-``coupling``      linear coupling of texels, made once for all samples: ``coupling(values, transducers) → CouplingMatrix``
+``coupling``      linear coupling of texels, made once for all samples: ``coupling(values, transducers) → Weights``
 ``delay``         seconds by which the reading comes late: ``delay(values) → float``
 ``friction_law``  law of sliding (see :data:`FrictionLaw`)
 ``placement``     where the texels really are: ``placement(position, normal, tangent, values) → the same three``
@@ -38,7 +38,7 @@ import numpy as np
 from ...errors import EffectError
 from ...model.parameter import Parameter
 from ...model.sensor import Value, Values
-from .coupling_matrix import CouplingMatrix
+from .coupling_matrix import Weights
 
 # What a kind states for the rest of the package: how recordings show it, how it is searched for, and how it is drawn.
 #
@@ -232,13 +232,11 @@ class Form:
     reference : str
         Where the formula comes from.
     parameters : tuple of Parameter
-    neutral : dict of str to float
-        Values at which the effect vanishes; they may lie outside the bounds. Examples: strength zero, level infinity.
     law, memoryless, coupling, delay, friction_law, placement
         The mechanism: one is given, or a law and a delay (see the text of the module).
     constants : callable
-        ``constants(values, dt (m,)) → (m, c)``: the constants of a law for steps of these lengths (s). The constants of a
-        friction law must not depend on the length.
+        ``constants(values, dt (m,)) → (m, c)``: the constants of a law for steps of these lengths (s); by default its
+        parameters in their order. The constants of a friction law must not depend on the length.
     state_size : int
         How many numbers a law remembers for each texel.
     site : str
@@ -278,10 +276,9 @@ class Form:
     formula: str
     reference: str
     parameters: tuple[Parameter, ...]
-    neutral: dict[str, float]
     law: Law | None = None
     memoryless: Callable[..., np.ndarray] | None = None
-    coupling: Callable[[Values, TransducerArray], CouplingMatrix] | None = None
+    coupling: Callable[[Values, TransducerArray], Weights] | None = None
     delay: Callable[[Values], float] | None = None
     friction_law: FrictionLaw | None = None
     placement: Callable[..., tuple[np.ndarray, np.ndarray, np.ndarray]] | None = None
@@ -301,6 +298,15 @@ class Form:
     is_apart: bool = False
     level_number: Callable[[np.ndarray, Values], np.ndarray] | None = None
     couples: bool = False
+
+    def __post_init__(self) -> None:
+        if self.constants is None and (self.law is not None or self.friction_law is not None):
+            object.__setattr__(self, "constants", constants_from(*(parameter.name for parameter in self.parameters)))
+
+    @cached_property
+    def neutral(self) -> dict[str, float]:
+        """The values at which the effect vanishes, by the names of the parameters that state one."""
+        return {parameter.name: parameter.neutral for parameter in self.parameters if parameter.neutral is not None}
 
     @property
     def is_spatial(self) -> bool:
@@ -420,10 +426,10 @@ def scalar(values: Values, name: str) -> float:
     return float(value)
 
 
-def constants_from(*names: str) -> Callable[[Values, np.ndarray], np.ndarray]:
-    """Return the `constants` of a form whose constants are the parameters of these names, for steps of any length."""
+def constants_from(*entries: str | float) -> Callable[[Values, np.ndarray], np.ndarray]:
+    """Return the `constants` of a form whose constants are parameters, by name, and numbers, for steps of any length."""
 
     def constants(values: Values, dt: np.ndarray) -> np.ndarray:
-        return np.tile([scalar(values, name) for name in names], (len(dt), 1))
+        return np.tile([scalar(values, one) if isinstance(one, str) else one for one in entries], (len(dt), 1))
 
     return constants

@@ -71,26 +71,16 @@ def cohesive(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit
     return texel.force - pull * u * traction, texel.slope - pull * bend / length
 
 
-def _at_once(values: Values, dt: np.ndarray) -> np.ndarray:
-    return np.tile([scalar(values, "pull"), scalar(values, "depth"), 1.0, 1.0], (len(dt), 1))
-
-
 def _with_time(values: Values, dt: np.ndarray) -> np.ndarray:
-    decay = np.exp(-np.asarray(dt) / scalar(values, "time"))
-    same = np.tile([scalar(values, "pull"), scalar(values, "depth")], (len(dt), 1))
-    return np.column_stack([same, decay, np.zeros(len(dt))])
-
-
-def _held(values: Values, dt: np.ndarray) -> np.ndarray:
-    return np.tile([scalar(values, "pull"), scalar(values, "depth"), 0.0], (len(dt), 1))
+    same = constants_from("pull", "depth")(values, dt)
+    return np.column_stack([same, np.exp(-np.asarray(dt) / scalar(values, "time")), np.zeros(len(dt))])
 
 
 def _relaxing(values: Values, dt: np.ndarray) -> np.ndarray:
-    same = np.tile([scalar(values, "pull"), scalar(values, "depth")], (len(dt), 1))
-    return np.column_stack([same, np.asarray(dt) / scalar(values, "time")])
+    return np.column_stack([constants_from("pull", "depth")(values, dt), np.asarray(dt) / scalar(values, "time")])
 
 
-_PULL = Parameter("pull", "N", 0.02, 0.0, 100.0, "Largest pull F of one texel.")
+_PULL = Parameter("pull", "N", 0.02, 0.0, 100.0, "Largest pull F of one texel.", neutral=0.0)
 _ZONE = Parameter("depth", "m", 2e-4, 1e-6, 0.02, "Depth D of the largest pull, before contact ends.", log=True)
 _WAY = Parameter("depth", "m", 2e-4, 1e-6, 0.02, "Retraction D after which the pull has reached 63 %.", log=True)
 
@@ -107,9 +97,8 @@ KIND = Kind(
             "f = f₀ − F u,  u → 1 during unloading, → 0 during loading, within D",
             "Johnson, Kendall and Roberts, Proc. R. Soc. A 324 (1971): contact is held longer than it was made",
             (_PULL, _WAY),
-            neutral={"pull": 0.0},
             law=unloading,
-            constants=_at_once,
+            constants=constants_from("pull", "depth", 1.0, 1.0),
             state_size=3,
             after_clip=True,
         ),
@@ -118,9 +107,7 @@ KIND = Kind(
             "f = f₀ − F · (1 − exp(−d/D))",
             "Derjaguin, Muller and Toporov, J. Colloid Interface Sci. 53 (1975)",
             (_PULL, Parameter("depth", "m", 1e-4, 1e-6, 0.02, "Depth D at which the pull has reached 63 %.", log=True)),
-            neutral={"pull": 0.0},
             law=constant,
-            constants=constants_from("pull", "depth"),
             after_clip=True,
         ),
         Form(
@@ -132,7 +119,6 @@ KIND = Kind(
                 _WAY,
                 Parameter("time", "s", 2.0, 0.01, 1000.0, "Contact time τ after which the pull has reached 63 %.", log=True),
             ),
-            neutral={"pull": 0.0},
             law=unloading,
             constants=_with_time,
             state_size=3,
@@ -144,9 +130,8 @@ KIND = Kind(
             "Rose, Ferrante and Smith, Phys. Rev. Lett. 47 (1981); Xu and Needleman, Model. Simul. Mater. Sci. Eng. 1 (1993): "
             "traction over separation",
             (_PULL, _ZONE),
-            neutral={"pull": 0.0},
             law=cohesive,
-            constants=_held,
+            constants=constants_from("pull", "depth", 0.0),
             state_size=2,
             after_clip=True,
         ),
@@ -154,12 +139,7 @@ KIND = Kind(
             "relaxing",
             "as cohesive, but u fades within τ at rest",
             "Maugis and Barquins, J. Phys. D 11 (1978): the faster surfaces part, the more adhesion takes",
-            (
-                _PULL,
-                _ZONE,
-                Parameter("time", "s", 0.1, 1e-3, 1000.0, "Time constant τ of the decay at rest.", log=True),
-            ),
-            neutral={"pull": 0.0},
+            (_PULL, _ZONE, Parameter("time", "s", 0.1, 1e-3, 1000.0, "Time constant τ of the decay at rest.", log=True)),
             law=cohesive,
             constants=_relaxing,
             state_size=2,

@@ -34,7 +34,7 @@ def linear(signal: np.ndarray, time: np.ndarray, values: Values, transducers: Tr
 
 
 def _parameters(unit: str, size: float, limit: float, what: str) -> tuple[Parameter, ...]:
-    return tuple(Parameter(axis, unit, size, -limit, limit, f"{what} along {axis}.") for axis in AXES)
+    return tuple(Parameter(axis, unit, size, -limit, limit, f"{what} along {axis}.", neutral=0.0) for axis in AXES)
 
 
 KIND = Kind(
@@ -49,7 +49,6 @@ KIND = Kind(
             "rᵢ = r₀ᵢ + B of the axis of i",
             "Tomo et al., IEEE Robot. Autom. Lett. 3 (2018): uSkin, whose readings are zeroed where the skin is used",
             _parameters("unit", 0.05, 1e5, "Field"),
-            neutral=dict.fromkeys(AXES, 0.0),
             memoryless=constant,
             couples=True,
             after_conversion=True,
@@ -61,7 +60,6 @@ KIND = Kind(
             "rᵢ = r₀ᵢ + Ḃ t of the axis of i",
             "ISO/IEC Guide 99 (2007), 4.21: instrumental drift, here shared by all magnetometers",
             _parameters("unit/s", 1e-3, 1e3, "Change of the field per second"),
-            neutral=dict.fromkeys(AXES, 0.0),
             memoryless=linear,
             couples=True,
             after_conversion=True,

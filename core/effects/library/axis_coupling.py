@@ -55,8 +55,10 @@ KIND = Kind(
             "rotation",
             "r = R f of each magnetometer,  R a rotation",
             "Goldstein, Classical Mechanics (1980), section 4-7: rotation of a vector about an axis",
-            tuple(Parameter(axis, "rad", 0.05, -3.2, 3.2, f"Rotation about {axis}, as a vector of rotation.") for axis in AXES),
-            neutral=dict.fromkeys(AXES, 0.0),
+            tuple(
+                Parameter(axis, "rad", 0.05, -3.2, 3.2, f"Rotation about {axis}, as a vector of rotation.", neutral=0.0)
+                for axis in AXES
+            ),
             memoryless=rotation,
             couples=True,
             needs="axes",
@@ -67,10 +69,11 @@ KIND = Kind(
             "r = (1 + S) f of each magnetometer,  S symmetric",
             "Gebre-Egziabher et al., J. Aerosp. Eng. 19 (2006): soft iron beside a magnetometer",
             tuple(
-                Parameter(name, "1", 0.05, -0.9, 0.9, f"Share of {name[0]} in {name[1]}, and of {name[1]} in {name[0]}.")
+                Parameter(
+                    name, "1", 0.05, -0.9, 0.9, f"Share of {name[0]} in {name[1]}, and of {name[1]} in {name[0]}.", neutral=0.0
+                )
                 for name, _, _ in PAIRS
             ),
-            neutral={name: 0.0 for name, _, _ in PAIRS},
             memoryless=soft_iron,
             couples=True,
             needs="axes",

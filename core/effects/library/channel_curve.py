@@ -21,13 +21,15 @@ def curve(signal: np.ndarray, time: np.ndarray, values: Values, transducers: Tra
     return result
 
 
-_OFFSET = Parameter("offset", "N", 0.0, -1e4, 1e4, "Force o that a channel shows without load.", per_texel=True)
-_FACTOR = Parameter("factor", "1", 1.0, -100.0, 100.0, "Factor g at small forces; negative: it falls.", per_texel=True)
-_SECOND = Parameter("second", "1/N", 0.0, -1e4, 1e4, "Coefficient c of the square of the force.", per_texel=True)
-_THIRD = Parameter("third", "1/N²", 0.0, -1e6, 1e6, "Coefficient d of the cube of the force.", per_texel=True)
+_OFFSET = Parameter("offset", "N", 0.0, -1e4, 1e4, "Force o that a channel shows without load.", per_texel=True, neutral=0.0)
+_FACTOR = Parameter(
+    "factor", "1", 1.0, -100.0, 100.0, "Factor g at small forces; negative: it falls.", per_texel=True, neutral=1.0
+)
+_SECOND = Parameter("second", "1/N", 0.0, -1e4, 1e4, "Coefficient c of the square of the force.", per_texel=True, neutral=0.0)
+_THIRD = Parameter("third", "1/N²", 0.0, -1e6, 1e6, "Coefficient d of the cube of the force.", per_texel=True, neutral=0.0)
 _HIGHER = (
-    Parameter("fourth", "1/N³", 0.0, -1e8, 1e8, "Coefficient e of the fourth power.", per_texel=True),
-    Parameter("fifth", "1/N⁴", 0.0, -1e8, 1e8, "Coefficient h of the fifth power.", per_texel=True),
+    Parameter("fourth", "1/N³", 0.0, -1e8, 1e8, "Coefficient e of the fourth power.", per_texel=True, neutral=0.0),
+    Parameter("fifth", "1/N⁴", 0.0, -1e8, 1e8, "Coefficient h of the fifth power.", per_texel=True, neutral=0.0),
 )
 _POLYNOMIAL = "ISO/IEC Guide 99 (2007), 4.31: calibration curve, here with a sign and to order {} for each channel"
 
@@ -43,31 +45,15 @@ KIND = Kind(
             "rᵢ = oᵢ + gᵢ f + cᵢ f² + dᵢ f³",
             _POLYNOMIAL.format("three"),
             (_FACTOR, _OFFSET, _SECOND, _THIRD),
-            neutral={"offset": 0.0, "factor": 1.0, "second": 0.0, "third": 0.0},
             memoryless=curve,
         ),
-        Form(
-            "linear",
-            "rᵢ = oᵢ + gᵢ f",
-            _POLYNOMIAL.format("one"),
-            (_FACTOR, _OFFSET),
-            neutral={"offset": 0.0, "factor": 1.0},
-            memoryless=curve,
-        ),
-        Form(
-            "quadratic",
-            "rᵢ = oᵢ + gᵢ f + cᵢ f²",
-            _POLYNOMIAL.format("two"),
-            (_FACTOR, _OFFSET, _SECOND),
-            neutral={"offset": 0.0, "factor": 1.0, "second": 0.0},
-            memoryless=curve,
-        ),
+        Form("linear", "rᵢ = oᵢ + gᵢ f", _POLYNOMIAL.format("one"), (_FACTOR, _OFFSET), memoryless=curve),
+        Form("quadratic", "rᵢ = oᵢ + gᵢ f + cᵢ f²", _POLYNOMIAL.format("two"), (_FACTOR, _OFFSET, _SECOND), memoryless=curve),
         Form(
             "quintic",
             "rᵢ = oᵢ + gᵢ f + cᵢ f² + dᵢ f³ + eᵢ f⁴ + hᵢ f⁵",
             _POLYNOMIAL.format("five"),
             (_FACTOR, _OFFSET, _SECOND, _THIRD, *_HIGHER),
-            neutral=dict.fromkeys((*POWERS[2:], "offset"), 0.0) | {"factor": 1.0},
             memoryless=curve,
             error=0.005,  # of 27 curves that rise or fall it leaves 0.001 at most (benchmarks/RESULTS.md)
         ),

@@ -95,14 +95,14 @@ def power(values: Values) -> tuple[np.ndarray, np.ndarray]:
 
 _TIME = Parameter("time", "s", 2.0, 0.02, 1000.0, "Time constant τ of the settling.", log=True)
 _ONSET = Parameter("time", "s", 0.5, 0.01, 100.0, "Time τ of the onset.", log=True)
-_AMOUNT = Parameter("amount", "1", 0.2, 0.0, 0.95, "Final loss a, as a share of the force.")
-_RISE = Parameter("amount", "1", 0.2, -0.9, 5.0, "Final rise a, as a share; negative: fall.")
+_AMOUNT = Parameter("amount", "1", 0.2, 0.0, 0.95, "Final loss a, as a share of the force.", neutral=0.0)
+_RISE = Parameter("amount", "1", 0.2, -0.9, 5.0, "Final rise a, as a share; negative: fall.", neutral=0.0)
 _SECOND = (
-    Parameter("amount_2", "1", 0.1, 0.0, 0.95, "Loss a₂ of a second, slower settling."),
+    Parameter("amount_2", "1", 0.1, 0.0, 0.95, "Loss a₂ of a second, slower settling.", neutral=0.0),
     Parameter("time_2", "s", 20.0, 0.02, 1000.0, "Time constant τ₂ of the second settling.", log=True),
 )
-_DECADE = Parameter("amount", "1", 0.05, 0.0, 0.15, "Loss a per decade of time, as a share.")
-_RISE_DECADE = Parameter("amount", "1", 0.05, 0.0, 1.0, "Rise a per decade of time, as a share.")
+_DECADE = Parameter("amount", "1", 0.05, 0.0, 0.15, "Loss a per decade of time, as a share.", neutral=0.0)
+_RISE_DECADE = Parameter("amount", "1", 0.05, 0.0, 1.0, "Rise a per decade of time, as a share.", neutral=0.0)
 _EXPONENT = Parameter("exponent", "1", 0.3, 0.05, 1.5, "Exponent p of the power law.")
 
 _VISCOELASTIC = "Fung, Biomechanics (1993), section 7.6: quasi-linear viscoelasticity"
@@ -122,7 +122,6 @@ KIND = Kind(
             "f(t) = fₑ − a · q,  τ q̇ = fₑ − q",
             _VISCOELASTIC,
             (_AMOUNT, _TIME),
-            neutral={"amount": 0.0},
             law=settling,
             constants=_constants(prony, -1.0),
             state_size=2,
@@ -132,7 +131,6 @@ KIND = Kind(
             "f(t) = fₑ − a₁ q₁ − a₂ q₂,  τᵢ q̇ᵢ = fₑ − qᵢ",
             _VISCOELASTIC,
             (_AMOUNT, _TIME, *_SECOND),
-            neutral={"amount": 0.0, "amount_2": 0.0},
             law=settling,
             constants=_constants(prony, -1.0),
             state_size=3,
@@ -143,7 +141,6 @@ KIND = Kind(
             "step response 1 − a · log₁₀(1 + t/τ)",
             _LOG,
             (_DECADE, _ONSET),
-            neutral={"amount": 0.0},
             law=settling,
             constants=_constants(logarithmic, -1.0),
             state_size=1 + TERMS,
@@ -153,7 +150,6 @@ KIND = Kind(
             "step response 1 − a · (1 − (1 + t/τ)⁻ᵖ)",
             _POWER,
             (_AMOUNT, _ONSET, _EXPONENT),
-            neutral={"amount": 0.0},
             law=settling,
             constants=_constants(power, -1.0),
             state_size=1 + TERMS,
@@ -163,7 +159,6 @@ KIND = Kind(
             "r(t) = f + a · q,  τ q̇ = f − q",
             _VISCOELASTIC,
             (_RISE, _TIME),
-            neutral={"amount": 0.0},
             law=settling,
             constants=_constants(prony, 1.0),
             state_size=2,
@@ -175,7 +170,6 @@ KIND = Kind(
             "step response 1 + a · log₁₀(1 + t/τ)",
             _LOG,
             (_RISE_DECADE, _ONSET),
-            neutral={"amount": 0.0},
             law=settling,
             constants=_constants(logarithmic, 1.0),
             state_size=1 + TERMS,

@@ -8,11 +8,11 @@ import numpy as np
 from ...errors import EffectError
 from ...model.parameter import Parameter
 from ...model.sensor import Values
-from ..engine.coupling_matrix import CouplingMatrix, coupled, coupling_matrix, nearest_distance
+from ..engine.coupling_matrix import Weights, coupled, coupling_matrix, nearest_distance
 from ..engine.specification import Drawing, Form, Kind, TransducerArray, scalar
 
 
-def neighbours(values: Values, transducers: TransducerArray) -> CouplingMatrix:
+def neighbours(values: Values, transducers: TransducerArray) -> Weights:
     """Add a share of the neighbours: texels up to 1.25 times the median distance of nearest neighbours away."""
     reach, share = 1.25 * nearest_distance(transducers.position), scalar(values, "share")
 
@@ -83,16 +83,14 @@ KIND = Kind(
             "neighbours",
             "rᵢ = fᵢ + c · Σ fⱼ over the texels next to i",
             "Dahiya and Valle, Robotic Tactile Sensing (2013)",
-            (Parameter("share", "1", 0.05, 0.0, 0.25, "Share c that each neighbour adds."),),
-            neutral={"share": 0.0},
+            (Parameter("share", "1", 0.05, 0.0, 0.25, "Share c that each neighbour adds.", neutral=0.0),),
             coupling=neighbours,
         ),
         Form(
             "lines",
             "rᵢ = fᵢ + c · (mean of the row of i + mean of its column)",
             "D'Alessio, Sens. Actuators A 72 (1999): arrays of resistors scanned by rows and columns",
-            (Parameter("share", "1", 0.1, 0.0, 2.0, "Share c of the mean of a line that is added."),),
-            neutral={"share": 0.0},
+            (Parameter("share", "1", 0.1, 0.0, 2.0, "Share c of the mean of a line that is added.", neutral=0.0),),
             memoryless=lines,
             couples=True,
             needs="rows",
@@ -101,8 +99,7 @@ KIND = Kind(
             "common",
             "rᵢ = fᵢ + c · mean of all f",
             "Saxena, Bhan and Aggrawal, Sens. Actuators A 149 (2009): common parts of the readout of resistive arrays",
-            (Parameter("share", "1", 0.2, 0.0, 5.0, "Share c of the mean of all texels that is added."),),
-            neutral={"share": 0.0},
+            (Parameter("share", "1", 0.2, 0.0, 5.0, "Share c of the mean of all texels that is added.", neutral=0.0),),
             memoryless=common,
             couples=True,
             is_apart=True,
@@ -112,8 +109,7 @@ KIND = Kind(
             "rᵢ = fᵢ + c · fᵢ₋₁",
             "Kester (ed.), The Data Conversion Handbook (2005), section 7.3: a multiplexer that has not settled keeps "
             "a part of the channel before",
-            (Parameter("share", "1", 0.05, 0.0, 1.0, "Share c that the texel scanned before leaves."),),
-            neutral={"share": 0.0},
+            (Parameter("share", "1", 0.05, 0.0, 1.0, "Share c that the texel scanned before leaves.", neutral=0.0),),
             memoryless=previous,
             couples=True,
             is_apart=True,
@@ -123,10 +119,9 @@ KIND = Kind(
             "r = (1 + A) f (1 + B),  A and B: c · qᵈ⁻¹ between wires d apart, of rows and of columns",
             "Paul, Introduction to Electromagnetic Compatibility (2006), chapter 9: crosstalk between parallel wires",
             (
-                Parameter("share", "1", 0.05, 0.0, 0.5, "Share c that the next wire adds."),
+                Parameter("share", "1", 0.05, 0.0, 0.5, "Share c that the next wire adds.", neutral=0.0),
                 Parameter("fall", "1", 0.4, 0.0, 1.0, "Factor q of the share from each wire to the next but one."),
             ),
-            neutral={"share": 0.0},
             memoryless=wires,
             couples=True,
             needs="rows",

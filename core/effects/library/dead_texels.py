@@ -45,8 +45,9 @@ _DEAD = Parameter(
     1.0,
     "1 for each dead texel, 0 for the others, less than 1 where a texel still answers.",
     per_texel=True,
+    neutral=0.0,
 )
-_SHARE = Parameter("share", "1", 0.1, 0.0, 1.0, "Share of the texels that are dead.")
+_SHARE = Parameter("share", "1", 0.1, 0.0, 1.0, "Share of the texels that are dead.", neutral=0.0)
 
 KIND = Kind(
     name="dead-texels",
@@ -60,7 +61,6 @@ KIND = Kind(
             "rᵢ = 0 for a share of the texels",
             "Ni et al., ACM Trans. Sens. Netw. 5 (2009): fault types",
             (_SHARE,),
-            neutral={"share": 0.0},
             memoryless=random,
             random=True,
         ),
@@ -69,7 +69,6 @@ KIND = Kind(
             "rᵢ = (1 − deadᵢ) · fᵢ",
             "Ni et al., ACM Trans. Sens. Netw. 5 (2009): fault types",
             (_DEAD,),
-            neutral={"dead": 0.0},
             memoryless=listed,
             error=EXACT_FORM_ERROR,  # every texel that is silent is one of these
         ),
@@ -77,11 +76,7 @@ KIND = Kind(
             "held",
             "rᵢ = (1 − deadᵢ) · r₀ᵢ + deadᵢ · Lᵢ",
             "Ni et al., ACM Trans. Sens. Netw. 5 (2009): stuck-at fault",
-            (
-                _DEAD,
-                Parameter("level", "unit", 0.1, -1e5, 1e5, "Reading L at which a dead texel stays.", per_texel=True),
-            ),
-            neutral={"dead": 0.0},
+            (_DEAD, Parameter("level", "unit", 0.1, -1e5, 1e5, "Reading L at which a dead texel stays.", per_texel=True)),
             memoryless=held,
             after_conversion=True,
             error=EXACT_FORM_ERROR,  # every stuck-at fault has this form
@@ -90,11 +85,7 @@ KIND = Kind(
             "stuck",
             "rᵢ = r₀ + L for a share of the texels",
             "Ni et al., ACM Trans. Sens. Netw. 5 (2009): stuck-at fault",
-            (
-                _SHARE,
-                Parameter("level", "unit", 0.1, -1e5, 1e5, "Constant reading L, counted from the reading without load."),
-            ),
-            neutral={"share": 0.0},
+            (_SHARE, Parameter("level", "unit", 0.1, -1e5, 1e5, "Constant reading L, counted from the reading without load.")),
             memoryless=stuck,
             after_conversion=True,
             random=True,

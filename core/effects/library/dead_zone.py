@@ -41,7 +41,7 @@ def knee(signal: np.ndarray, time: np.ndarray, values: Values, transducers: Tran
     return where_loaded(beyond, signal)
 
 
-_THRESHOLD = Parameter("threshold", "N", 0.01, 0.0, 100.0, "Largest force T that is not measured.")
+_THRESHOLD = Parameter("threshold", "N", 0.01, 0.0, 100.0, "Largest force T that is not measured.", neutral=0.0)
 
 
 KIND = Kind(
@@ -56,7 +56,6 @@ KIND = Kind(
             "r = max(f − T, 0)",
             "Tao and Kokotović, Adaptive Control of Systems with Actuator and Sensor Nonlinearities (1996), section 2.1",
             (_THRESHOLD,),
-            neutral={"threshold": 0.0},
             memoryless=hard,
         ),
         Form(
@@ -64,7 +63,6 @@ KIND = Kind(
             "r = f² / (f + T)",
             "Weiss and Wörn, IEEE ICMA (2005): contact resistance R ∝ 1/f in series with a fixed one",
             (_THRESHOLD,),
-            neutral={"threshold": 0.0},
             memoryless=soft,
         ),
         Form(
@@ -78,7 +76,6 @@ KIND = Kind(
                     "sharpness", "1", 3.0, 1.2, 20.0, "Exponent p: 2 is a hyperbola, a large one a sharp knee.", log=True
                 ),
             ),
-            neutral={"threshold": 0.0},
             memoryless=knee,
             error=EXACT_FORM_ERROR,  # of hard and soft it leaves 0.0002 at most
         ),
@@ -87,7 +84,6 @@ KIND = Kind(
             "r = f where f > T, else 0",
             "ISO/IEC Guide 99 (2007), 4.16: discrimination threshold",
             (_THRESHOLD,),
-            neutral={"threshold": 0.0},
             memoryless=step,
             jumps_at=("threshold",),
             is_apart=True,

@@ -50,6 +50,10 @@ def listed(signal: np.ndarray, time: np.ndarray, values: Values, transducers: Tr
     return signal + share[:, None] * np.asarray(values["amount"])
 
 
+_OWN_AMOUNT = Parameter(
+    "amount", "unit", 0.0, -1e5, 1e5, "Change a of the reading of each texel after 60 s.", per_texel=True, neutral=0.0
+)
+
 KIND = Kind(
     name="drift",
     title="Drift",
@@ -61,8 +65,7 @@ KIND = Kind(
             "linear",
             "r = r₀ + b t",
             "ISO/IEC Guide 99 (2007), 4.21: instrumental drift",
-            (Parameter("rate", "unit/s", 1e-3, -1e3, 1e3, "Change b of the reading per second."),),
-            neutral={"rate": 0.0},
+            (Parameter("rate", "unit/s", 1e-3, -1e3, 1e3, "Change b of the reading per second.", neutral=0.0),),
             memoryless=linear,
             after_conversion=True,
         ),
@@ -71,10 +74,9 @@ KIND = Kind(
             "r = r₀ + a · (1 − exp(−t/τ))",
             "Doebelin, Measurement Systems (2003): warm-up of an instrument",
             (
-                Parameter("amount", "unit", 0.05, -1e4, 1e4, "Change a of the reading when warm."),
+                Parameter("amount", "unit", 0.05, -1e4, 1e4, "Change a of the reading when warm.", neutral=0.0),
                 Parameter("time", "s", 30.0, 0.1, 1e5, "Time constant τ of the change.", log=True),
             ),
-            neutral={"amount": 0.0},
             memoryless=warm_up,
             after_conversion=True,
         ),
@@ -84,12 +86,9 @@ KIND = Kind(
             "ISO/IEC Guide 99 (2007), 4.21: instrumental drift; a power of the time as in Findley et al., Creep and Relaxation "
             "of Nonlinear Viscoelastic Materials (1976)",
             (
-                Parameter(
-                    "amount", "unit", 0.0, -1e5, 1e5, "Change a of the reading of each texel after 60 s.", per_texel=True
-                ),
+                _OWN_AMOUNT,
                 Parameter("exponent", "1", 1.0, 0.1, 3.0, "Exponent n of the time; 1 is a constant rate.", log=True),
             ),
-            neutral={"amount": 0.0},
             memoryless=listed,
             after_conversion=True,
             is_apart=True,
@@ -100,11 +99,10 @@ KIND = Kind(
             "constructed after Box and Cox, J. R. Stat. Soc. B 26 (1964): the shifted power transformation, here of time; a "
             "straight line, a logarithm and an exponential approach are cases of it, or close to one",
             (
-                Parameter("amount", "unit", 0.05, -1e4, 1e4, "Change a of the reading after 60 s."),
+                Parameter("amount", "unit", 0.05, -1e4, 1e4, "Change a of the reading after 60 s.", neutral=0.0),
                 Parameter("time", "s", 30.0, 0.1, 1e5, "Time τ before the start from which the power counts.", log=True),
                 Parameter("exponent", "1", 0.5, -10.0, 1.0, "Exponent n: 1 is a constant rate, below 0 a final value exists."),
             ),
-            neutral={"amount": 0.0},
             memoryless=shifted_power,
             after_conversion=True,
             error=EXACT_FORM_ERROR,  # of linear and warm-up it leaves 0.0002 at most
@@ -114,10 +112,9 @@ KIND = Kind(
             "r = f · (1 + a · (1 − exp(−t/τ)))",
             "Doebelin, Measurement Systems (2003), section 3.2: sensitivity drift",
             (
-                Parameter("amount", "1", 0.2, -0.9, 5.0, "Final change a of the sensitivity, as a share."),
+                Parameter("amount", "1", 0.2, -0.9, 5.0, "Final change a of the sensitivity, as a share.", neutral=0.0),
                 Parameter("time", "s", 30.0, 0.1, 1e5, "Time constant τ of the change.", log=True),
             ),
-            neutral={"amount": 0.0},
             memoryless=sensitivity,
             needs="no clock",  # on the clock of a session a gain that changes by itself is a warm-up
             is_apart=True,
@@ -126,8 +123,7 @@ KIND = Kind(
             "random-walk",
             "r = r₀ + s · W(t),  W Brownian motion",
             "IEEE Std 952 (1997), annex C: random walk; constructed after Lévy (1948)",
-            (Parameter("spread", "unit/√s", 0.005, 0.0, 1e3, "Standard deviation s after one second."),),
-            neutral={"spread": 0.0},
+            (Parameter("spread", "unit/√s", 0.005, 0.0, 1e3, "Standard deviation s after one second.", neutral=0.0),),
             memoryless=walk,
             after_conversion=True,
             random=True,
@@ -135,9 +131,7 @@ KIND = Kind(
     ),
     experiment="record an hour without touching the sensor",
     drawing=Drawing(
-        time=np.linspace(0, 120, 601),
-        depth=np.zeros(601),
-        values={"linear": {"rate": 4e-4}, "random-walk": {"spread": 0.004}},
+        time=np.linspace(0, 120, 601), depth=np.zeros(601), values={"linear": {"rate": 4e-4}, "random-walk": {"spread": 0.004}}
     ),
     known_from=("timing", "rest"),
 )

@@ -41,6 +41,11 @@ def gradient(signal: np.ndarray, time: np.ndarray, values: Values, transducers: 
     return signal * (1.0 + scalar(values, "along_x") * place[:, 0] + scalar(values, "along_y") * place[:, 1])
 
 
+_FACTOR = Parameter("factor", "1", 1.0, 0.0, 100.0, "Factor g of each texel.", per_texel=True, neutral=1.0)
+_CURVATURE = Parameter(
+    "curvature", "1/N", 0.0, -1e4, 1e4, "Share c by which the factor grows per newton.", per_texel=True, neutral=0.0
+)
+
 KIND = Kind(
     name="gain-mismatch",
     title="Gain Mismatch",
@@ -52,8 +57,7 @@ KIND = Kind(
             "random",
             "rᵢ = exp(s εᵢ) · fᵢ,  ε normal",
             "Schürmann et al., IEEE World Haptics (2011): a modular sensor, calibrated texel by texel",
-            (Parameter("spread", "1", 0.1, 0.0, 1.5, "Standard deviation s of the factors' logarithm."),),
-            neutral={"spread": 0.0},
+            (Parameter("spread", "1", 0.1, 0.0, 1.5, "Standard deviation s of the factors' logarithm.", neutral=0.0),),
             memoryless=random,
             random=True,
         ),
@@ -61,8 +65,7 @@ KIND = Kind(
             "listed",
             "rᵢ = gᵢ · fᵢ",
             "ISO/IEC Guide 99 (2007), 2.39: calibration",
-            (Parameter("factor", "1", 1.0, 0.0, 100.0, "Factor g of each texel.", per_texel=True),),
-            neutral={"factor": 1.0},
+            (_FACTOR,),
             memoryless=listed,
             error=EXACT_FORM_ERROR,  # every factor of a texel is one of these
         ),
@@ -71,21 +74,16 @@ KIND = Kind(
             "r = (1 + gₓ x + g_y y) · f,  x and y from −1 to 1 across the sensor",
             "ISO/IEC Guide 99 (2007), 2.39: calibration, to first order in the place",
             (
-                Parameter("along_x", "1", 0.2, -0.5, 0.5, "Change g of the factor from the centre to the +x end."),
-                Parameter("along_y", "1", 0.0, -0.5, 0.5, "Change g of the factor from the centre to the +y end."),
+                Parameter("along_x", "1", 0.2, -0.5, 0.5, "Change g of the factor from the centre to the +x end.", neutral=0.0),
+                Parameter("along_y", "1", 0.0, -0.5, 0.5, "Change g of the factor from the centre to the +y end.", neutral=0.0),
             ),
-            neutral={"along_x": 0.0, "along_y": 0.0},
             memoryless=gradient,
         ),
         Form(
             "curved",
             "rᵢ = gᵢ · fᵢ · (1 + cᵢ fᵢ)",
             "ISO/IEC Guide 99 (2007), 4.31: calibration curve, here to second order for each texel",
-            (
-                Parameter("factor", "1", 1.0, 0.0, 100.0, "Factor g of each texel.", per_texel=True),
-                Parameter("curvature", "1/N", 0.0, -1e4, 1e4, "Share c by which the factor grows per newton.", per_texel=True),
-            ),
-            neutral={"factor": 1.0, "curvature": 0.0},
+            (_FACTOR, _CURVATURE),
             memoryless=curved,
             is_tried=False,  # that two numbers per texel take no other effect's name has not been measured
             is_apart=True,
@@ -95,10 +93,9 @@ KIND = Kind(
             "rᵢ = F · (fᵢ/F)^pᵢ,  pᵢ = exp(s εᵢ),  ε normal",
             "ISO/IEC Guide 99 (2007), 4.31: calibration curve, here a power for each texel",
             (
-                Parameter("spread", "1", 0.1, 0.0, 1.0, "Standard deviation s of the powers' logarithm."),
+                Parameter("spread", "1", 0.1, 0.0, 1.0, "Standard deviation s of the powers' logarithm.", neutral=0.0),
                 Parameter("force", "N", 1.0, 1e-6, 1e6, "Force F at which all texels agree.", log=True),
             ),
-            neutral={"spread": 0.0},
             memoryless=random_power,
             random=True,
         ),

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...model.parameter import Parameter
 from ...model.sensor import Values
-from ..engine.specification import Drawing, Form, Kind, TexelInput, constants_from, cycles, scalar
+from ..engine.specification import Drawing, Form, Kind, TexelInput, cycles, scalar
 
 ELEMENTS = 4
 """Number of elements of the operators; their thresholds are spread evenly around the given one."""
@@ -160,9 +160,9 @@ def _relays(values: Values, dt: np.ndarray) -> np.ndarray:
     return np.tile(row, (len(dt), 1))
 
 
-_SHARE = Parameter("share", "1", 0.4, 0.0, 0.95, "Share a of the force in the slip elements.")
+_SHARE = Parameter("share", "1", 0.4, 0.0, 0.95, "Share a of the force in the slip elements.", neutral=0.0)
 _FORCE = Parameter("force", "N", 0.05, 1e-6, 1e3, "Force Y at which they slip.", log=True)
-_WIDTH = Parameter("width", "1", 0.15, 0.0, 0.9, "Half width h of the loop, as a share of the force.")
+_WIDTH = Parameter("width", "1", 0.15, 0.0, 0.9, "Half width h of the loop, as a share of the force.", neutral=0.0)
 
 
 KIND = Kind(
@@ -176,21 +176,8 @@ KIND = Kind(
             "duhem",
             "f = fₑ · (1 + h z),  dz/dd = (sgn ḋ − z) / D",
             "Visintin, Differential Models of Hysteresis (1994): Duhem; Coleman and Hodgdon, Int. J. Eng. Sci. 24 (1986)",
-            (
-                _WIDTH,
-                Parameter(
-                    "depth",
-                    "m",
-                    3e-4,
-                    1e-6,
-                    0.05,
-                    "Depth D over which 63 % of the transition happens.",
-                    log=True,
-                ),
-            ),
-            neutral={"width": 0.0},
+            (_WIDTH, Parameter("depth", "m", 3e-4, 1e-6, 0.05, "Depth D over which 63 % of the transition happens.", log=True)),
             law=duhem,
-            constants=constants_from("width", "depth"),
             state_size=2,
             fitted_up_to={"width": 0.5},
         ),
@@ -203,9 +190,7 @@ KIND = Kind(
                 _FORCE,
                 Parameter("beta", "1", 0.75, 0.5, 1.0, "Shape β of the loop: share of the yielding on unloading."),
             ),
-            neutral={"share": 0.0},
             law=bouc_wen,
-            constants=constants_from("share", "force", "beta"),
             state_size=2,
         ),
         Form(
@@ -213,7 +198,6 @@ KIND = Kind(
             "f = (1 − a) fₑ + a · mean of sⱼ,  sⱼ follows fₑ within ±rⱼ",
             "Iwan, J. Appl. Mech. 33 (1966); Al-Bender et al., IEEE Trans. Autom. Control 50 (2005)",
             (_SHARE, _FORCE),
-            neutral={"share": 0.0},
             law=maxwell_slip,
             constants=_operators,
             state_size=1 + ELEMENTS,
@@ -223,10 +207,9 @@ KIND = Kind(
             "r = (1 − a) f + a · mean of pⱼ,  pⱼ is dragged along rⱼ behind f",
             "Krasnosel'skii and Pokrovskii, Systems with Hysteresis (1989); Kuhnen, Eur. J. Control 9 (2003): play operators",
             (
-                Parameter("share", "1", 0.4, 0.0, 1.0, "Share a of the reading in the play elements."),
+                Parameter("share", "1", 0.4, 0.0, 1.0, "Share a of the reading in the play elements.", neutral=0.0),
                 Parameter("force", "N", 0.05, 1e-6, 1e3, "Mean force Y by which they trail.", log=True),
             ),
-            neutral={"share": 0.0},
             law=play,
             constants=_operators,
             state_size=ELEMENTS,
@@ -237,10 +220,9 @@ KIND = Kind(
             "r = (1 − a) f + a · mean of pⱼ,  pⱼ between f − wⱼ and f, and never below zero",
             "Preisach, Z. Phys. 94 (1935); Mayergoyz, Mathematical Models of Hysteresis (1991): relays of exponential widths",
             (
-                Parameter("share", "1", 0.4, 0.0, 1.0, "Share a of the reading in the relays."),
+                Parameter("share", "1", 0.4, 0.0, 1.0, "Share a of the reading in the relays.", neutral=0.0),
                 Parameter("force", "N", 0.1, 1e-6, 1e3, "Mean width w between switching on and off.", log=True),
             ),
-            neutral={"share": 0.0},
             law=preisach,
             constants=_relays,
             state_size=ELEMENTS,
@@ -250,21 +232,8 @@ KIND = Kind(
             "trailing",
             "r = f · (1 − h z),  dz/df = (sgn ḟ − z) / F",
             "Visintin, Differential Models of Hysteresis (1994): Duhem's model",
-            (
-                _WIDTH,
-                Parameter(
-                    "force",
-                    "N",
-                    0.02,
-                    1e-6,
-                    1e3,
-                    "Force F over which 63 % of the transition happens.",
-                    log=True,
-                ),
-            ),
-            neutral={"width": 0.0},
+            (_WIDTH, Parameter("force", "N", 0.02, 1e-6, 1e3, "Force F over which 63 % of the transition happens.", log=True)),
             law=trailing,
-            constants=constants_from("width", "force"),
             state_size=2,
             site="readout",
             fitted_up_to={"width": 0.5},

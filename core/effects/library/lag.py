@@ -69,14 +69,6 @@ def _second_order(time: float, damping: float, dt: np.ndarray) -> np.ndarray:
     return np.column_stack([kept, sine, whole - place, place, -sine, cosine - damping * sine, sine - speed, speed])
 
 
-def _critically_damped(values: Values, dt: np.ndarray) -> np.ndarray:
-    return _second_order(scalar(values, "time"), 1.0, dt)
-
-
-def _resonance(values: Values, dt: np.ndarray) -> np.ndarray:
-    return _second_order(scalar(values, "period") / (2.0 * np.pi), scalar(values, "damping"), dt)
-
-
 def _dead_time(values: Values) -> float:
     return scalar(values, "time") * scalar(values, "dead_share")
 
@@ -86,7 +78,7 @@ def _behind_dead_time(values: Values, dt: np.ndarray) -> np.ndarray:
     return _second_order((scalar(values, "time") - _dead_time(values)) * quality, 0.5 / quality, dt)
 
 
-_TIME = Parameter("time", "s", 0.05, 0.0, 100.0, "Time constant τ.")
+_TIME = Parameter("time", "s", 0.05, 0.0, 100.0, "Time constant τ.", neutral=0.0)
 
 
 _SECOND = np.linspace(0, 1, 501)
@@ -104,7 +96,6 @@ KIND = Kind(
             "τ ṙ = r₀ − r",
             "Doebelin, Measurement Systems (2003), section 3.3: first-order instrument",
             (_TIME,),
-            neutral={"time": 0.0},
             law=first_order,
             constants=_first,
             state_size=3,
@@ -114,8 +105,7 @@ KIND = Kind(
             "dead-time",
             "r(t) = r₀(t − T)",
             "Doebelin, Measurement Systems (2003), section 3.3: dead-time element",
-            (Parameter("time", "s", 0.05, 0.0, 10.0, "Dead time T."),),
-            neutral={"time": 0.0},
+            (Parameter("time", "s", 0.05, 0.0, 10.0, "Dead time T.", neutral=0.0),),
             delay=lambda values: scalar(values, "time"),
             after_conversion=True,
         ),
@@ -124,9 +114,8 @@ KIND = Kind(
             "τ² r̈ + 2 τ ṙ + r = r₀",
             "Doebelin, Measurement Systems (2003), section 3.3: second-order instrument, critically damped",
             (_TIME,),
-            neutral={"time": 0.0},
             law=second_order,
-            constants=_critically_damped,
+            constants=lambda values, dt: _second_order(scalar(values, "time"), 1.0, dt),
             state_size=4,
             after_conversion=True,
         ),
@@ -135,12 +124,11 @@ KIND = Kind(
             "r̈ + 2 ζ ω ṙ + ω² r = ω² r₀, ω = 2π / T",
             "Doebelin, Measurement Systems (2003), section 3.3: second-order instrument, underdamped",
             (
-                Parameter("period", "s", 0.05, 1e-6, 100.0, "Period T of the undamped oscillation.", log=True),
+                Parameter("period", "s", 0.05, 1e-6, 100.0, "Period T of the undamped oscillation.", log=True, neutral=0.0),
                 Parameter("damping", "1", 0.2, 1e-3, 0.95, "Damping ratio ζ.", log=True),
             ),
-            neutral={"period": 0.0},
             law=second_order,
-            constants=_resonance,
+            constants=lambda values, dt: _second_order(scalar(values, "period") / (2.0 * np.pi), scalar(values, "damping"), dt),
             state_size=4,
             after_conversion=True,
             error=0.005,  # it follows what rings longer than the next form can (damping below 0.1)
@@ -150,11 +138,10 @@ KIND = Kind(
             "τ² r̈ + τ ṙ / Q + r = r₀(t − s D), τ = (1 − s) D Q",
             "Seborg, Edgar and Mellichamp, Process Dynamics and Control (2004), section 7.2: second order plus time delay",
             (
-                Parameter("time", "s", 0.05, 0.0, 100.0, "Mean delay D: by so much a slow change comes late."),
+                Parameter("time", "s", 0.05, 0.0, 100.0, "Mean delay D: by so much a slow change comes late.", neutral=0.0),
                 Parameter("quality", "1", 0.5, 0.0, 5.0, "Quality factor Q: 0 is a first order, up to 0.5 nothing oscillates."),
-                Parameter("dead_share", "1", 0.2, 0.0, 1.0, "Share s of the dead time in the mean delay."),
+                Parameter("dead_share", "1", 0.2, 0.0, 1.0, "Share s of the dead time in the mean delay.", neutral=0.0),
             ),
-            neutral={"time": 0.0, "dead_share": 0.0},
             law=second_order,
             constants=_behind_dead_time,
             delay=_dead_time,

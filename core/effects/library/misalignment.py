@@ -44,12 +44,12 @@ def _rotation(x: float, y: float, z: float) -> np.ndarray:
     return about_x @ about_y @ about_z
 
 
-_X = Parameter("x", "m", 0.001, -0.05, 0.05, "Shift along the columns.")
-_Y = Parameter("y", "m", 0.0, -0.05, 0.05, "Shift along the rows.")
-_TURN = Parameter("about_z", "rad", 0.05, -0.8, 0.8, "Turn about the normal.")
-_HEIGHT = Parameter("z", "m", 0.0, -0.02, 0.02, "Shift along the normal.")
-_TILT_X = Parameter("about_x", "rad", 0.03, -0.5, 0.5, "Turn about the texels' x axis.")
-_TILT_Y = Parameter("about_y", "rad", 0.0, -0.5, 0.5, "Turn about the texels' y axis.")
+_X = Parameter("x", "m", 0.001, -0.05, 0.05, "Shift along the columns.", neutral=0.0)
+_Y = Parameter("y", "m", 0.0, -0.05, 0.05, "Shift along the rows.", neutral=0.0)
+_TURN = Parameter("about_z", "rad", 0.05, -0.8, 0.8, "Turn about the normal.", neutral=0.0)
+_HEIGHT = Parameter("z", "m", 0.0, -0.02, 0.02, "Shift along the normal.", neutral=0.0)
+_TILT_X = Parameter("about_x", "rad", 0.03, -0.5, 0.5, "Turn about the texels' x axis.", neutral=0.0)
+_TILT_Y = Parameter("about_y", "rad", 0.0, -0.5, 0.5, "Turn about the texels' y axis.", neutral=0.0)
 
 KIND = Kind(
     name="misalignment",
@@ -63,7 +63,6 @@ KIND = Kind(
             "p = p₀ + s",
             "Craig, Introduction to Robotics (2005), section 2.8: a frame's error as a rigid motion",
             (_X, _Y),
-            neutral={"x": 0.0, "y": 0.0},
             placement=displaced,
         ),
         Form(
@@ -71,7 +70,6 @@ KIND = Kind(
             "p = R_z (p₀ − m) + m + s",
             "Craig, Introduction to Robotics (2005), section 2.8",
             (_X, _Y, _TURN),
-            neutral={"x": 0.0, "y": 0.0, "about_z": 0.0},
             placement=displaced,
         ),
         Form(
@@ -79,7 +77,6 @@ KIND = Kind(
             "p = R_x R_y (p₀ − m) + m + z",
             "Craig, Introduction to Robotics (2005), section 2.8",
             (_TILT_X, _TILT_Y, _HEIGHT),
-            neutral={"about_x": 0.0, "about_y": 0.0, "z": 0.0},
             placement=displaced,
         ),
         Form(
@@ -87,7 +84,6 @@ KIND = Kind(
             "p = R_x R_y R_z (p₀ − m) + m + s",
             "Craig, Introduction to Robotics (2005), section 2.8: all six numbers of a rigid motion",
             (_X, _Y, _HEIGHT, _TILT_X, _TILT_Y, _TURN),
-            neutral=dict.fromkeys(("x", "y", "z", "about_x", "about_y", "about_z"), 0.0),
             placement=displaced,
             error=EXACT_FORM_ERROR,  # every motion of a rigid sensor is one of these
         ),

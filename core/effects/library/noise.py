@@ -40,7 +40,7 @@ def _normal(seed: int, moments: np.ndarray, texels: int) -> np.ndarray:
     return normal("noise", seed, moments[:, None], np.arange(texels)[None, :])
 
 
-_SPREAD = Parameter("spread", "unit", 0.002, 0.0, 1e4, "Standard deviation s.")
+_SPREAD = Parameter("spread", "unit", 0.002, 0.0, 1e4, "Standard deviation s.", neutral=0.0)
 
 _SECOND = np.linspace(0, 1, 501)
 
@@ -57,7 +57,6 @@ KIND = Kind(
             "r = r₀ + s ε,  ε normal",
             "JCGM 100 (2008), section 4.2: repeatability",
             (_SPREAD,),
-            neutral={"spread": 0.0},
             memoryless=white,
             after_conversion=True,
             random=True,
@@ -66,8 +65,7 @@ KIND = Kind(
             "proportional",
             "r = r₀ · (1 + s ε),  ε normal",
             "JCGM 100 (2008), section 4.2: relative repeatability",
-            (Parameter("share", "1", 0.02, 0.0, 1.0, "Standard deviation s as a share of the reading."),),
-            neutral={"share": 0.0},
+            (Parameter("share", "1", 0.02, 0.0, 1.0, "Standard deviation s as a share of the reading.", neutral=0.0),),
             memoryless=proportional,
             after_conversion=True,
             random=True,
@@ -77,7 +75,6 @@ KIND = Kind(
             "r = r₀ + s ε(t),  ε normal with correlation over τ",
             "Perlin, SIGGRAPH (1985): noise on a lattice; IEEE Std 952 (1997), annex C: correlated noise",
             (_SPREAD, Parameter("time", "s", 0.2, 1e-3, 1e3, "Time τ over which it is correlated.", log=True)),
-            neutral={"spread": 0.0},
             memoryless=coloured,
             after_conversion=True,
             random=True,

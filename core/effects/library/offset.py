@@ -45,8 +45,7 @@ KIND = Kind(
             "common",
             "r = r₀ + b",
             "ISO/IEC Guide 99 (2007), 4.28: zero error",
-            (Parameter("offset", "unit", 0.05, -1e5, 1e5, "Offset b of all texels."),),
-            neutral={"offset": 0.0},
+            (Parameter("offset", "unit", 0.05, -1e5, 1e5, "Offset b of all texels.", neutral=0.0),),
             memoryless=common,
             after_conversion=True,
             same_as="zero",
@@ -55,8 +54,7 @@ KIND = Kind(
             "random",
             "rᵢ = r₀ᵢ + s εᵢ,  ε normal",
             "ISO/IEC Guide 99 (2007), 4.28: zero error",
-            (Parameter("spread", "unit", 0.05, 0.0, 1e5, "Standard deviation s of the texels' offsets."),),
-            neutral={"spread": 0.0},
+            (Parameter("spread", "unit", 0.05, 0.0, 1e5, "Standard deviation s of the texels' offsets.", neutral=0.0),),
             memoryless=random,
             after_conversion=True,
             random=True,
@@ -65,8 +63,7 @@ KIND = Kind(
             "listed",
             "rᵢ = r₀ᵢ + bᵢ",
             "ISO/IEC Guide 99 (2007), 4.28: zero error",
-            (Parameter("offset", "unit", 0.0, -1e5, 1e5, "Offset b of each texel.", per_texel=True),),
-            neutral={"offset": 0.0},
+            (Parameter("offset", "unit", 0.0, -1e5, 1e5, "Offset b of each texel.", per_texel=True, neutral=0.0),),
             memoryless=listed,
             after_conversion=True,
         ),
@@ -75,10 +72,11 @@ KIND = Kind(
             "rᵢ = r₀ᵢ + bᵢ exp(−|r₀ᵢ − z| / L),  z the sensor's zero",
             "ISO/IEC Guide 99 (2007), 4.28: zero error; a cover that presses on the texels until the load takes over",
             (
-                Parameter("offset", "unit", 0.0, -1e5, 1e5, "Offset b of each texel without load.", per_texel=True),
+                Parameter(
+                    "offset", "unit", 0.0, -1e5, 1e5, "Offset b of each texel without load.", per_texel=True, neutral=0.0
+                ),
                 Parameter("level", "unit", 1.0, 1e-3, 1e5, "Reading L at which an offset has fallen to 37 %.", log=True),
             ),
-            neutral={"offset": 0.0},
             memoryless=relieved,
             after_conversion=True,
             error=0.005,  # listed is a limit of it; of b / (1 + r/L) up to three L it leaves 0.003

@@ -67,7 +67,7 @@ def _stepped(signal: np.ndarray, step: float, rounding: Callable[[np.ndarray], n
     return step * rounding(signal / step) if step > 0.0 else signal
 
 
-_STEP = Parameter("step", "unit", 0.01, 0.0, 1e4, "Width Δ of a step.")
+_STEP = Parameter("step", "unit", 0.01, 0.0, 1e4, "Width Δ of a step.", neutral=0.0)
 _ROUNDING = Parameter("rounding", "1", 0.0, 0.0, 0.5, "Share h of a step that is rounded up: 0 truncates, 0.5 rounds.")
 
 KIND = Kind(
@@ -82,7 +82,6 @@ KIND = Kind(
             "r = Δ · round(r₀ / Δ)",
             "IEEE Std 1241 (2010): mid-tread quantizer",
             (_STEP,),
-            neutral={"step": 0.0},
             memoryless=rounded,
             after_conversion=True,
             level_number=even,
@@ -93,7 +92,6 @@ KIND = Kind(
             "r = Δ · floor(r₀ / Δ)",
             "IEEE Std 1241 (2010): truncating quantizer",
             (_STEP,),
-            neutral={"step": 0.0},
             memoryless=rounded_down,
             after_conversion=True,
             level_number=even,
@@ -105,9 +103,8 @@ KIND = Kind(
             "IEEE Std 1241 (2010): converter of b bits",
             (
                 Parameter("bits", "1", 8.0, 1.0, 24.0, "Bits b of the converter."),
-                Parameter("range", "unit", 1.0, 1e-6, 1e6, "Range R that they divide into steps.", log=True),
+                Parameter("range", "unit", 1.0, 1e-6, 1e6, "Range R that they divide into steps.", log=True, neutral=0.0),
             ),
-            neutral={"range": 0.0},
             memoryless=converter,
             after_conversion=True,
             is_tried=False,  # "round" has the same steps
@@ -118,10 +115,9 @@ KIND = Kind(
             "ITU-T Recommendation G.711 (1988): companding by a logarithm",
             (
                 Parameter("scale", "unit", 0.1, 1e-6, 1e5, "Reading A above which the steps grow with the reading.", log=True),
-                Parameter("growth", "1", 0.05, 0.0, 3.0, "Width b of a step, as a share of A plus the reading."),
+                Parameter("growth", "1", 0.05, 0.0, 3.0, "Width b of a step, as a share of A plus the reading.", neutral=0.0),
                 _ROUNDING,
             ),
-            neutral={"growth": 0.0},
             memoryless=companded,
             after_conversion=True,
             level_number=after_logarithm,
@@ -132,11 +128,10 @@ KIND = Kind(
             "r = s · floor((r₀/s)ᵖ + h)^(1/p)",
             "Max, IRE Trans. Inf. Theory 6 (1960): uneven steps as even steps behind a compressor, here a power",
             (
-                Parameter("first", "unit", 0.02, 0.0, 1e4, "Reading s at the end of the first step."),
+                Parameter("first", "unit", 0.02, 0.0, 1e4, "Reading s at the end of the first step.", neutral=0.0),
                 Parameter("exponent", "1", 0.5, 0.1, 3.0, "Power p of the reading that is divided evenly."),
                 _ROUNDING,
             ),
-            neutral={"first": 0.0},
             memoryless=power,
             after_conversion=True,
             level_number=after_power,
@@ -146,12 +141,7 @@ KIND = Kind(
     experiment="raise the load very slowly through its whole range",
     drawing=Drawing(
         "force",
-        values={
-            "round": {"step": 0.25},
-            "floor": {"step": 0.25},
-            "bits": {"bits": 4, "range": 2.4},
-            "power": {"first": 0.1},
-        },
+        values={"round": {"step": 0.25}, "floor": {"step": 0.25}, "bits": {"bits": 4, "range": 2.4}, "power": {"first": 0.1}},
     ),
     found_by=STEPS,
 )

@@ -11,7 +11,9 @@ from ...model.parameter import Parameter
 from ...model.sensor import Values
 from ..engine.specification import Drawing, Form, Kind, TransducerArray, scalar, where_loaded
 
-_LEVEL = Parameter("level", "unit", 1.0, 1e-4, 1e5, "Largest reading L, counted from the reading without load.", log=True)
+_LEVEL = Parameter(
+    "level", "unit", 1.0, 1e-4, 1e5, "Largest reading L, counted from the reading without load.", log=True, neutral=math.inf
+)
 
 
 def clip(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
@@ -56,7 +58,6 @@ KIND = Kind(
             "r = min(r₀, L)",
             "IEEE Std 1241 (2010), section 3: full scale of a converter",
             (_LEVEL,),
-            neutral={"level": math.inf},
             memoryless=clip,
             after_conversion=True,
         ),
@@ -65,7 +66,6 @@ KIND = Kind(
             "r = L · tanh(r₀ / L)",
             "Dahiya and Valle, Robotic Tactile Sensing (2013)",
             (_LEVEL,),
-            neutral={"level": math.inf},
             memoryless=tanh,
             after_conversion=True,
         ),
@@ -74,7 +74,6 @@ KIND = Kind(
             "r = r₀ / (1 + |r₀| / L)",
             "Flórez and Velásquez, IEEE ANDESCON (2010): force-sensing resistor in a voltage divider",
             (_LEVEL,),
-            neutral={"level": math.inf},
             memoryless=rational,
             after_conversion=True,
         ),
@@ -86,7 +85,6 @@ KIND = Kind(
                 _LEVEL,
                 Parameter("sharpness", "1", 2.0, 0.7, 20.0, "Exponent p: 1 is a voltage divider, a large one clips.", log=True),
             ),
-            neutral={"level": math.inf},
             memoryless=power,
             after_conversion=True,
             error=0.005,  # of the other forms it leaves 0.0016 at most

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from ...model.parameter import Parameter
-from ..engine.specification import Drawing, Form, Kind, TexelInput, constants_from, cycles
+from ..engine.specification import Drawing, Form, Kind, TexelInput, cycles
 
 
 def ogden_roxburgh(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
@@ -54,7 +54,7 @@ def path(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bo
     return texel.force * factor, texel.slope * factor + texel.force * factor_slope
 
 
-_SHARE = Parameter("share", "1", 0.25, 0.0, 0.9, "Largest share s of the force that is lost.")
+_SHARE = Parameter("share", "1", 0.25, 0.0, 0.9, "Largest share s of the force that is lost.", neutral=0.0)
 
 
 _TWICE = np.linspace(0, 20, 2001)
@@ -75,9 +75,7 @@ KIND = Kind(
             "f = fₑ · (1 − s · erf((1 − W/Wₘ) / b)),  W = fₑ d / 2, Wₘ the largest W so far",
             "Ogden and Roxburgh, Proc. R. Soc. A 455 (1999), without their constant m",
             (_SHARE, Parameter("width", "1", 0.5, 0.05, 3.0, "Width b of the transition back to the first curve.")),
-            neutral={"share": 0.0},
             law=ogden_roxburgh,
-            constants=constants_from("share", "width"),
             state_size=1,
         ),
         Form(
@@ -85,9 +83,7 @@ KIND = Kind(
             "f = fₑ · (1 − s · (1 − exp(−dₘ/D))),  dₘ the largest depth so far",
             "Simo, Comput. Methods Appl. Mech. Eng. 60 (1987): damage by the largest strain",
             (_SHARE, Parameter("depth", "m", 0.002, 1e-5, 0.1, "Depth D that causes 63 % of the loss.", log=True)),
-            neutral={"share": 0.0},
             law=peak,
-            constants=constants_from("share", "depth"),
             state_size=1,
             fitted_up_to={"share": 0.6},  # a softening that leaves nothing is wear
         ),
@@ -99,20 +95,14 @@ KIND = Kind(
                 _SHARE,
                 Parameter("path", "m", 0.01, 1e-5, 10.0, "Path P, over all cycles, that causes 63 % of the loss.", log=True),
             ),
-            neutral={"share": 0.0},
             law=path,
-            constants=constants_from("share", "path"),
             state_size=2,
             fitted_up_to={"share": 0.5},
             over_within={"path": OVER_WITHIN},
         ),
     ),
     experiment="press the same spot ten times equally deep, then deeper, and again after an hour",
-    drawing=Drawing(
-        "depth",
-        depth=cycles(2, _TWICE) * np.where(_TWICE < 10, 0.7, 1.0),
-        values={"peak": {"depth": 0.001}},
-    ),
+    drawing=Drawing("depth", depth=cycles(2, _TWICE) * np.where(_TWICE < 10, 0.7, 1.0), values={"peak": {"depth": 0.001}}),
     known_from=("unloading", "cycles"),
     signature="end",
 )

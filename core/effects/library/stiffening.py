@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from ...model.parameter import Parameter
-from ..engine.specification import Drawing, Form, Kind, TexelInput, constants_from
+from ..engine.specification import Drawing, Form, Kind, TexelInput
 
 
 def polynomial(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
@@ -65,7 +65,9 @@ def bilinear(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit
     return texel.force * (1.0 + share), texel.slope * (1.0 + share) + texel.force * factor_slope
 
 
-_DOUBLE = Parameter("depth", "m", 0.004, 1e-4, 0.1, "Depth D at which the force is twice the linear one.", log=True)
+_DOUBLE = Parameter(
+    "depth", "m", 0.004, 1e-4, 0.1, "Depth D at which the force is twice the linear one.", log=True, neutral=math.inf
+)
 _POWER = Parameter("exponent", "1", 1.0, 0.5, 4.0, "Exponent p: 1 adds a quadratic force, 2 a cubic one.")
 
 
@@ -81,30 +83,28 @@ KIND = Kind(
             "f = k d · (1 + (d/D)ᵖ)",
             "Rusch, J. Appl. Polym. Sci. 13 (1969): load of flexible foams with a power of the compression",
             (_DOUBLE, _POWER),
-            neutral={"depth": math.inf},
             law=polynomial,
-            constants=constants_from("depth", "exponent"),
         ),
         Form(
             "exponential",
             "f = k D · (exp(d/D) − 1)",
             "Fung, Biomechanics (1993), section 7.5: exponential stress-strain law of soft tissue",
-            (Parameter("depth", "m", 0.004, 1e-4, 0.1, "Depth D by which the stiffness grows e-fold.", log=True),),
-            neutral={"depth": math.inf},
+            (
+                Parameter(
+                    "depth", "m", 0.004, 1e-4, 0.1, "Depth D by which the stiffness grows e-fold.", log=True, neutral=math.inf
+                ),
+            ),
             law=exponential,
-            constants=constants_from("depth"),
         ),
         Form(
             "foam",
             "f = k d / (1 − (d/L)ᵖ)",
             "Gibson and Ashby, Cellular Solids (1997), chapter 5: densification",
             (
-                Parameter("depth", "m", 0.01, 2e-4, 0.1, "Depth L at which the cells are closed.", log=True),
+                Parameter("depth", "m", 0.01, 2e-4, 0.1, "Depth L at which the cells are closed.", log=True, neutral=math.inf),
                 Parameter("exponent", "1", 2.0, 0.1, 8.0, "Exponent p of the densification."),
             ),
-            neutral={"depth": math.inf},
             law=foam,
-            constants=constants_from("depth", "exponent"),
         ),
         Form(
             "bilinear",
@@ -112,12 +112,10 @@ KIND = Kind(
             "Shaw and Holmes, J. Sound Vib. 90 (1983): piecewise linear spring, with a rounded knee",
             (
                 Parameter("depth", "m", 0.002, 1e-4, 0.1, "Depth D of the knee.", log=True),
-                Parameter("growth", "1", 1.0, 0.0, 10.0, "Growth g of the stiffness beyond the knee, as a share."),
+                Parameter("growth", "1", 1.0, 0.0, 10.0, "Growth g of the stiffness beyond the knee, as a share.", neutral=0.0),
                 Parameter("sharpness", "1", 3.0, 0.2, 60.0, "Sharpness p of the knee.", log=True),
             ),
-            neutral={"growth": 0.0},
             law=bilinear,
-            constants=constants_from("depth", "growth", "sharpness"),
             error=0.005,  # of other formulas it leaves 0.001 in the middle, 0.009 at most (benchmarks/RESULTS.md)
         ),
     ),

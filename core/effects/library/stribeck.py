@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from ...model.parameter import Parameter
-from ..engine.specification import Drawing, Form, Kind, constants_from
+from ..engine.specification import Drawing, Form, Kind
 
 
 def gaussian(speed: float, force: float, constants: np.ndarray) -> tuple[float, float]:
@@ -34,10 +34,9 @@ def stretched(speed: float, force: float, constants: np.ndarray) -> tuple[float,
 
 
 _PARAMETERS = (
-    Parameter("rise", "1", 0.5, 0.0, 4.0, "Excess a of friction at rest over fast sliding, as a share."),
+    Parameter("rise", "1", 0.5, 0.0, 4.0, "Excess a of friction at rest over fast sliding, as a share.", neutral=0.0),
     Parameter("speed", "m/s", 0.01, 1e-5, 2.0, "Stribeck velocity V, at which most of the excess is gone.", log=True),
 )
-_CONSTANTS = constants_from("rise", "speed")
 
 KIND = Kind(
     name="stribeck",
@@ -51,27 +50,21 @@ KIND = Kind(
             "μ = μ₀ · (1 + a exp(−(v/V)²))",
             "Bo and Pavelescu, Wear 82 (1982); Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995)",
             _PARAMETERS,
-            neutral={"rise": 0.0},
             friction_law=gaussian,
-            constants=_CONSTANTS,
         ),
         Form(
             "exponential",
             "μ = μ₀ · (1 + a exp(−v/V))",
             "Tustin, J. IEE 94 (1947); Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994)",
             _PARAMETERS,
-            neutral={"rise": 0.0},
             friction_law=exponential,
-            constants=_CONSTANTS,
         ),
         Form(
             "rational",
             "μ = μ₀ · (1 + a / (1 + (v/V)²))",
             "Hess and Soom, J. Tribol. 112 (1990)",
             _PARAMETERS,
-            neutral={"rise": 0.0},
             friction_law=rational,
-            constants=_CONSTANTS,
         ),
         Form(
             "stretched",
@@ -82,9 +75,7 @@ KIND = Kind(
                 *_PARAMETERS,
                 Parameter("exponent", "1", 0.7, 0.2, 4.0, "Exponent q: 1 is the exponential, 2 the Gaussian.", log=True),
             ),
-            neutral={"rise": 0.0},
             friction_law=stretched,
-            constants=constants_from("rise", "speed", "exponent"),
             error=0.005,  # at most, of the other forms and of a logarithmic law (benchmarks/RESULTS.md)
         ),
     ),

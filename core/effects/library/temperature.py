@@ -37,11 +37,11 @@ def _warmth(time: np.ndarray, values: Values, transducers: TransducerArray) -> n
     return np.interp(time, recorded_time, recorded) - scalar(values, "reference")
 
 
-_GAIN = Parameter("gain_change", "1/K", 0.005, -0.5, 0.5, "Share a by which the gain changes per kelvin.")
-_ZERO = Parameter("zero_change", "unit/K", 0.005, -1e3, 1e3, "Change b of the reading per kelvin.")
+_GAIN = Parameter("gain_change", "1/K", 0.005, -0.5, 0.5, "Share a by which the gain changes per kelvin.", neutral=0.0)
+_ZERO = Parameter("zero_change", "unit/K", 0.005, -1e3, 1e3, "Change b of the reading per kelvin.", neutral=0.0)
 _TEMPERATURES = (
-    Parameter("temperature", "°C", 35.0, -273.0, 2000.0, "Temperature T of the sensor, unless recorded."),
-    Parameter("reference", "°C", REFERENCE, -273.0, 2000.0, "Reference temperature T₀ of gain and zero."),
+    Parameter("temperature", "°C", 35.0, -273.0, 2000.0, "Temperature T of the sensor, unless recorded.", neutral=REFERENCE),
+    Parameter("reference", "°C", REFERENCE, -273.0, 2000.0, "Reference temperature T₀ of gain and zero.", neutral=REFERENCE),
 )
 
 KIND = Kind(
@@ -56,7 +56,6 @@ KIND = Kind(
             "r = (1 + a (T − T₀)) · f",
             "ISA-37.1 (1982): thermal sensitivity shift",
             (_GAIN, *_TEMPERATURES),
-            neutral={"gain_change": 0.0, "temperature": REFERENCE, "reference": REFERENCE},
             memoryless=gain,
         ),
         Form(
@@ -64,7 +63,6 @@ KIND = Kind(
             "r = r₀ + b (T − T₀)",
             "ISA-37.1 (1982): thermal zero shift",
             (_ZERO, *_TEMPERATURES),
-            neutral={"zero_change": 0.0, "temperature": REFERENCE, "reference": REFERENCE},
             memoryless=zero,
             after_conversion=True,
         ),
@@ -73,7 +71,6 @@ KIND = Kind(
             "r = z + (1 + a (T − T₀)) · (r₀ − z) + b (T − T₀),  z the reading without load",
             "ISA-37.1 (1982): thermal sensitivity shift and thermal zero shift",
             (_GAIN, _ZERO, *_TEMPERATURES),
-            neutral={"gain_change": 0.0, "zero_change": 0.0, "temperature": REFERENCE, "reference": REFERENCE},
             memoryless=both,
             after_conversion=True,
         ),

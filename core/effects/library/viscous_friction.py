@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...model.parameter import Parameter
-from ..engine.specification import Drawing, Form, Kind, constants_from
+from ..engine.specification import Drawing, Form, Kind
 
 
 def linear(speed: float, force: float, constants: np.ndarray) -> tuple[float, float]:
@@ -35,31 +35,25 @@ KIND = Kind(
             "linear",
             "fₜ = fₜ₀ + c v",
             "Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994)",
-            (Parameter("viscosity", "N·s/m", 0.05, 0.0, 1e3, "Drag c of one texel per metre per second."),),
-            neutral={"viscosity": 0.0},
+            (Parameter("viscosity", "N·s/m", 0.05, 0.0, 1e3, "Drag c of one texel per metre per second.", neutral=0.0),),
             friction_law=linear,
-            constants=constants_from("viscosity"),
         ),
         Form(
             "load",
             "fₜ = fₜ₀ + c f v",
             "Bowden and Tabor, The Friction and Lubrication of Solids (1950): the area that is sheared grows with the load",
-            (Parameter("viscosity", "s/m", 0.5, 0.0, 1e3, "Drag c per newton of load and metre per second."),),
-            neutral={"viscosity": 0.0},
+            (Parameter("viscosity", "s/m", 0.5, 0.0, 1e3, "Drag c per newton of load and metre per second.", neutral=0.0),),
             friction_law=load,
-            constants=constants_from("viscosity"),
         ),
         Form(
             "power",
             "fₜ = fₜ₀ + C vᵖ",
             "Olsson et al., Eur. J. Control 4 (1998)",
             (
-                Parameter("drag", "N·(s/m)^p", 0.05, 0.0, 1e3, "Drag C of one texel at one metre per second."),
+                Parameter("drag", "N·(s/m)^p", 0.05, 0.0, 1e3, "Drag C of one texel at one metre per second.", neutral=0.0),
                 Parameter("exponent", "1", 0.5, 0.2, 2.0, "Exponent p of the speed."),
             ),
-            neutral={"drag": 0.0},
             friction_law=power,
-            constants=constants_from("drag", "exponent"),
         ),
     ),
     experiment="slide at constant speeds, up to the fastest possible",

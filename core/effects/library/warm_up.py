@@ -26,8 +26,8 @@ def _since(time: np.ndarray, values: Values) -> np.ndarray:
     return np.asarray(np.maximum(time + scalar(values, "since"), 0.0)[:, None])
 
 
-_AMOUNT = Parameter("amount", "1", 0.2, -0.9, 5.0, "Final change a of the sensitivity, as a share.")
-_SINCE = Parameter("since", "s", 0.0, 0.0, 1e6, "Time t₀ from power-on to the first frame or recording.")
+_AMOUNT = Parameter("amount", "1", 0.2, -0.9, 5.0, "Final change a of the sensitivity, as a share.", neutral=0.0)
+_SINCE = Parameter("since", "s", 0.0, 0.0, 1e6, "Time t₀ from power-on to the first frame or recording.", neutral=0.0)
 
 KIND = Kind(
     name="warm-up",
@@ -40,24 +40,14 @@ KIND = Kind(
             "exponential",
             "r = f · (1 + a · (1 − exp(−(t + t₀)/τ)))",
             "Doebelin, Measurement Systems (2003), section 3.2: sensitivity drift",
-            (
-                _AMOUNT,
-                Parameter("time", "s", 300.0, 0.1, 1e5, "Time constant τ of the change.", log=True),
-                _SINCE,
-            ),
-            neutral={"amount": 0.0, "since": 0.0},
+            (_AMOUNT, Parameter("time", "s", 300.0, 0.1, 1e5, "Time constant τ of the change.", log=True), _SINCE),
             memoryless=exponential,
         ),
         Form(
             "rational",
             "r = f · (1 + a · (t + t₀) / (t + t₀ + τ))",
             "Doebelin, Measurement Systems (2003), section 3.2: sensitivity drift, here with a slow end",
-            (
-                _AMOUNT,
-                Parameter("time", "s", 300.0, 0.1, 1e5, "Time τ of half the change.", log=True),
-                _SINCE,
-            ),
-            neutral={"amount": 0.0, "since": 0.0},
+            (_AMOUNT, Parameter("time", "s", 300.0, 0.1, 1e5, "Time τ of half the change.", log=True), _SINCE),
             memoryless=rational,
         ),
     ),

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...model.parameter import Parameter
 from ...model.sensor import Values
-from ..engine.specification import Drawing, Form, Kind, TexelInput, constants_from, scalar
+from ..engine.specification import Drawing, Form, Kind, TexelInput, scalar
 
 
 def exponential(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
@@ -70,6 +70,10 @@ def work(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bo
     return texel.force * factor, texel.slope * factor
 
 
+def _life(unit: str, default: float, low: float, text: str) -> tuple[Parameter]:
+    return (Parameter("life", unit, default, low, 1e9, text, log=True, neutral=math.inf),)
+
+
 KIND = Kind(
     name="wear",
     title="Wear",
@@ -81,32 +85,23 @@ KIND = Kind(
             "exponential",
             "f = fₑ · exp(−A/L),  A the sum of all loads put on so far",
             "Lemaitre and Desmorat, Engineering Damage Mechanics (2005): fatigue damage",
-            (Parameter("life", "N", 100.0, 0.01, 1e9, "Sum L of loads that leaves 37 % of the force.", log=True),),
-            neutral={"life": math.inf},
+            _life("N", 100.0, 0.01, "Sum L of loads that leaves 37 % of the force."),
             law=exponential,
-            constants=constants_from("life"),
             state_size=2,
         ),
         Form(
             "linear",
             "f = fₑ · (1 − A/L),  A the sum of all loads put on so far",
             "Palmgren (1924); Miner, J. Appl. Mech. 12 (1945): linear damage",
-            (Parameter("life", "N", 100.0, 0.01, 1e9, "Sum L of loads that leaves nothing.", log=True),),
-            neutral={"life": math.inf},
+            _life("N", 100.0, 0.01, "Sum L of loads that leaves nothing."),
             law=linear,
-            constants=constants_from("life"),
             state_size=2,
         ),
         Form(
             "dose",
             "f = fₑ · exp(−B/L),  Ḃ = fₑ",
             "Lemaitre and Desmorat, Engineering Damage Mechanics (2005), section 5: creep damage",
-            (
-                Parameter(
-                    "life", "N·s", 100.0, 0.01, 1e9, "Integral L of load over time that leaves 37 % of the force.", log=True
-                ),
-            ),
-            neutral={"life": math.inf},
+            _life("N·s", 100.0, 0.01, "Integral L of load over time that leaves 37 % of the force."),
             law=dose,
             constants=_with_step,
             state_size=1,
@@ -115,20 +110,16 @@ KIND = Kind(
             "archard",
             "f = fₑ · (1 − δ/d),  δ̇ = κ fₑ |v|",
             "Archard, J. Appl. Phys. 24 (1953)",
-            (Parameter("rate", "1/N", 1e-3, 0.0, 10.0, "Thickness κ lost per newton and metre slid, m/(N·m)."),),
-            neutral={"rate": 0.0},
+            (Parameter("rate", "1/N", 1e-3, 0.0, 10.0, "Thickness κ lost per newton and metre slid, m/(N·m).", neutral=0.0),),
             law=archard,
-            constants=constants_from("rate"),
             state_size=1,
         ),
         Form(
             "work",
             "f = fₑ · exp(−W/L),  Ẇ = fₑ √(v² + ḋ²)",
             "Fouvry, Kapsa and Vincent, Wear 200 (1996): what is lost goes with the energy that was dissipated",
-            (Parameter("life", "J", 0.1, 1e-6, 1e9, "Load times path L that leaves 37 % of the force.", log=True),),
-            neutral={"life": math.inf},
+            _life("J", 0.1, 1e-6, "Load times path L that leaves 37 % of the force."),
             law=work,
-            constants=constants_from("life"),
             state_size=2,
         ),
     ),

@@ -196,8 +196,10 @@ def test_a_preset_follows_a_curved_surface(name):
     position = radius * normal + np.column_stack([0 * y.ravel(), y.ravel(), 0 * y.ravel()])
     tangent = np.cross([0.0, 1.0, 0.0], normal)
     texels = type("", (), {"position": position, "normal": normal, "tangent": tangent, "area": np.full(len(normal), 1e-6)})
-    skin = skin_presets.placed(preset, texels)
-    depth = radius - np.hypot(skin.magnets[:, 0], skin.magnets[:, 2])
+    magnets, chips = skin_presets.placed(preset, texels)
+    depth = radius - np.hypot(magnets.place[:, 0], magnets.place[:, 2])
     np.testing.assert_allclose(depth, -preset.magnets[:, 2], atol=1e-5)  # the tangent plane of the nearest texel
-    np.testing.assert_allclose(np.linalg.norm(skin.moments, axis=1), np.linalg.norm(preset.moment))
-    np.testing.assert_allclose(skin.axes @ np.swapaxes(skin.axes, 1, 2), np.tile(np.eye(3), (len(skin.axes), 1, 1)), atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(magnets.moment, axis=1), np.linalg.norm(preset.moment))
+    np.testing.assert_allclose(
+        chips.axes @ np.swapaxes(chips.axes, 1, 2), np.tile(np.eye(3), (len(chips.axes), 1, 1)), atol=1e-12
+    )

@@ -21,7 +21,7 @@ def halved(signal, time, values, transducers, seed):
     return 0.5 * signal
 
 KIND = Kind("halving", "Halving", "Halves the reading.", "readout", 1.0, (
-    Form("half", "r = f / 2", "No one (2026)", (), {}, memoryless=halved),
+    Form("half", "r = f / 2", "No one (2026)", (), memoryless=halved),
 ), experiment="press")
 """
 
