@@ -19,7 +19,6 @@ from .numba_internals import (
     COMPILED,
     CPUDispatcher,
     JITCodeLibrary,
-    carray,
     compiler,
     intrinsic,
     ir,
@@ -28,6 +27,7 @@ from .numba_internals import (
     types,
     typing,
 )
+from .numba_internals import carray as carray  # for kernels
 
 # Numba's dispatcher for kernels: every function is compiled once, and may be interpreted meanwhile.
 #
@@ -220,25 +220,6 @@ else:
     _InterpretedKernel: Any = None  # type: ignore[no-redef]
 
 
-__all__ = [
-    "COMPILED",
-    "KERNELS",
-    "address_of",
-    "addressed_kernel",
-    "allocating_addressed_kernel",
-    "allocating_kernel",
-    "are_interpreted",
-    "call_address",
-    "carray",
-    "compile_kernels",
-    "inlined",
-    "interpret_kernels",
-    "kernel",
-    "plain",
-    "pointer_to",
-    "with_plain_form",
-]
-
 FINGERPRINT = fingerprint() if COMPILED else ""
 
 
@@ -248,15 +229,11 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     Such a function allocates nothing. Numba then counts no references in it, which in a small step would take more time than
     all the arithmetic, and it refuses whatever would make an array.
     """
-    if not COMPILED:
-        return function
     return _compiled(function, **known_options(_nrt=False))
 
 
 def allocating_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Do as :func:`kernel` for a function that makes arrays. None of these is called in the inner loop."""
-    if not COMPILED:
-        return function
     return _compiled(function)
 
 
@@ -266,8 +243,6 @@ def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
     A loop with a call is not vectorised. Such a function takes and returns numbers, and selects with ``a if c else b`` instead
     of branching.
     """
-    if not COMPILED:
-        return function
     return _compiled(function, **known_options(_nrt=False, forceinline=True))
 
 
@@ -277,6 +252,8 @@ def plain(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _compiled(function: Callable[..., Any], **options: bool) -> Callable[..., Any]:
+    if not COMPILED:
+        return function
     function.__qualname__ += f"_{FINGERPRINT}"  # part of the name under which numba keeps the result
     settings = {"nopython": True, "fastmath": False, "error_model": "numpy", "nogil": True, "boundscheck": None}
     return KernelDispatcher.of(function, {**settings, "no_cfunc_wrapper": True, **options})
@@ -284,27 +261,33 @@ def _compiled(function: Callable[..., Any], **options: bool) -> Callable[..., An
 
 # --- functions that kernels call by their address: they are compiled once, and not inside each of their callers
 
+
+def addressed_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Do as :func:`kernel` for a function without result that kernels call by its address (:func:`address_of`)."""
+    return _compiled(function, no_cfunc_wrapper=False, **known_options(_nrt=False))
+
+
+def allocating_addressed_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Do as :func:`addressed_kernel` for a function that makes arrays, also of pointers."""
+    return _compiled(function, no_cfunc_wrapper=False)
+
+
+def address_of(function: Any, *arguments: Any) -> int:
+    """Compile an :func:`addressed_kernel` for arguments such as these, and return the address of its machine code.
+
+    Zero without numba, if kernels are interpreted, or are from now on because the compiler failed.
+    """
+    if not COMPILED:
+        return 0
+    return int(function.address(tuple(one if isinstance(one, types.Type) else typeof(one) for one in arguments)))
+
+
+def pointer_to(integers: bool = False) -> Any:
+    """Return the type of a pointer to floats or integers, as an argument of :func:`address_of`; None without numba."""
+    return types.CPointer(types.int64 if integers else types.float64) if COMPILED else None
+
+
 if COMPILED:
-
-    def addressed_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-        """Do as :func:`kernel` for a function without result that kernels call by its address (:func:`address_of`)."""
-        return _compiled(function, no_cfunc_wrapper=False, **known_options(_nrt=False))
-
-    def allocating_addressed_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-        """Do as :func:`addressed_kernel` for a function that makes arrays, also of pointers."""
-        return _compiled(function, no_cfunc_wrapper=False)
-
-    def address_of(function: Any, *arguments: Any) -> int:
-        """Compile an :func:`addressed_kernel` for arguments such as these, and return the address of its machine code.
-
-        Zero if kernels are interpreted, or are from now on because the compiler failed.
-        """
-        kinds = tuple(one if isinstance(one, types.Type) else typeof(one) for one in arguments)
-        return int(function.address(kinds))
-
-    def pointer_to(integers: bool = False) -> Any:
-        """Return the type of a pointer to floats or integers, as an argument of :func:`address_of`."""
-        return types.CPointer(types.int64 if integers else types.float64)
 
     @intrinsic
     def call_address(_context, address, *arguments):  # type: ignore[no-untyped-def]
@@ -321,19 +304,6 @@ if COMPILED:
         return signature, codegen
 
 else:
-
-    def addressed_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-        """Return the function: without numba nothing has an address."""
-        return function
-
-    allocating_addressed_kernel = addressed_kernel
-
-    def address_of(function: Any, *arguments: Any) -> int:
-        """Return zero: only compiled code has addresses."""
-        return 0
-
-    def pointer_to(integers: bool = False) -> Any:
-        """Return None: only compiled code has pointers."""
 
     def call_address(_address: int, *_arguments: Any) -> None:
         """Raise: only compiled code has addresses."""

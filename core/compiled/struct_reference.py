@@ -16,11 +16,13 @@ import ctypes
 import hashlib
 import operator
 import sys
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any, TypeVar, cast
 
 import numpy as np
 
+from .kernels import address_of, are_interpreted
 from .numba_internals import (
     COMPILED,
     AttributeTemplate,
@@ -202,6 +204,23 @@ else:
             return builder.inttoptr(arguments[0], _BYTES)
 
         return example(types.int64, example), codegen
+
+
+def call_of_range(function: Any, given: Any, plain: Callable[[int, int], None]) -> Callable[[int, int], None]:
+    """Return a call of an :func:`.addressed_kernel` of the first and the last of some numbers and of a tuple by reference.
+
+    Numba's own way of calling takes longer than a step of a small sensor. Where kernels are interpreted `plain` is called.
+    """
+    address, place = address_of(function, 0, 0, given), address_of_fields(given)
+    compiled = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p)(address) if address else None
+
+    def call(first: int, last: int) -> None:
+        if compiled is not None and not are_interpreted():
+            compiled(first, last, place)
+        else:
+            plain(first, last)
+
+    return call
 
 
 def address_of_fields(instance: Any) -> int:

@@ -78,6 +78,26 @@ def rotate(quaternion: np.ndarray, vx: float, vy: float, vz: float) -> tuple[flo
 
 
 @kernel
+def matrix_times_vector(matrix: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Return a (3, 3) matrix times a vector."""
+    return (
+        matrix[0, 0] * x + matrix[0, 1] * y + matrix[0, 2] * z,
+        matrix[1, 0] * x + matrix[1, 1] * y + matrix[1, 2] * z,
+        matrix[2, 0] * x + matrix[2, 1] * y + matrix[2, 2] * z,
+    )
+
+
+@kernel
+def to_body_axes(rotation: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Return a vector of the world in the axes of a body with the given rotation."""
+    return (
+        rotation[0, 0] * x + rotation[1, 0] * y + rotation[2, 0] * z,
+        rotation[0, 1] * x + rotation[1, 1] * y + rotation[2, 1] * z,
+        rotation[0, 2] * x + rotation[1, 2] * y + rotation[2, 2] * z,
+    )
+
+
+@kernel
 def write_rotation(quaternion: np.ndarray, rotation: np.ndarray) -> None:
     """Write the rotation matrix of a unit quaternion into `rotation` (3, 3)."""
     w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]

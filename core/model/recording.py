@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import mmap
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import Field, dataclass, field, fields, is_dataclass, replace
 from typing import Any, Protocol
 
@@ -163,30 +163,30 @@ class SensorRecording(SensorArrays):
 
     def at(self, i: int) -> SensorFrame:
         """Return the recorded frame with index `i`."""
-        return SensorFrame(
-            **{name: getattr(self, name)[i] for name in SENSOR_FIELDS}, channels=self._channels(i), unit=self.unit
-        )
+        return SensorFrame(**self._values(i))
 
     def part(self, frames: slice) -> SensorRecording:
         """Return some of the frames, by their indices; the arrays are views."""
-        arrays = {name: getattr(self, name)[frames] for name in SENSOR_FIELDS}
-        return SensorRecording(**arrays, channels=self._channels(frames), unit=self.unit)
+        return SensorRecording(**self._values(frames))
+
+    def _values(self, frames: int | slice) -> dict[str, Any]:
+        channels = None if self.channels is None else self.channels.part(frames)
+        return {name: getattr(self, name)[frames] for name in SENSOR_FIELDS} | {"channels": channels, "unit": self.unit}
 
     def arrays(self) -> list[np.ndarray]:
         """Return all arrays with an axis of length F."""
         own = [] if self.channels is None else [self.channels.values, self.channels.clipped]
         return [getattr(self, name) for name in SENSOR_FIELDS] + own
 
-    def _channels(self, frames: int | slice) -> VectorReadings | None:
-        return None if self.channels is None else self.channels.part(frames)
-
-
-def _all_frames(parts: Sequence[SensorArrays], put: Callable[[list[np.ndarray]], np.ndarray]) -> SensorRecording:
-    """Return the recording of frames, or of recordings, of one sensor that are put together."""
-    arrays = {name: put([getattr(part, name) for part in parts]) for name in SENSOR_FIELDS}
-    own = [part.channels for part in parts if part.channels is not None]
-    channels = replace(own[0], values=put([o.values for o in own]), clipped=put([o.clipped for o in own])) if own else None
-    return SensorRecording(**arrays, channels=channels, unit=parts[0].unit)
+    @classmethod
+    def stack(cls, frames: Sequence[SensorFrame]) -> SensorRecording:
+        """Return the recording of frames that are given in order."""
+        arrays = {name: np.stack([getattr(frame, name) for frame in frames]) for name in SENSOR_FIELDS}
+        own = [frame.channels for frame in frames if frame.channels is not None]
+        if not own:
+            return cls(**arrays, unit=frames[0].unit)
+        values, clipped = np.stack([one.values for one in own]), np.stack([one.clipped for one in own])
+        return cls(**arrays, channels=replace(own[0], values=values, clipped=clipped), unit=frames[0].unit)
 
 
 @dataclass
@@ -233,7 +233,7 @@ class Recording:
         step_reason: str = "",
     ) -> Recording:
         """Return the recording of frames that are given in order."""
-        sensors = {name: _all_frames([frame.sensors[name] for frame in frames], np.stack) for name in frames[0].sensors}
+        sensors = {name: SensorRecording.stack([frame.sensors[name] for frame in frames]) for name in frames[0].sensors}
         return cls(
             frames=np.array([frame.frame for frame in frames]),
             times=np.array([frame.time for frame in frames]),
@@ -246,15 +246,6 @@ class Recording:
             warnings=tuple(warnings),
             step_reason=step_reason,
         )
-
-    @classmethod
-    def joined(cls, parts: Sequence[Recording]) -> Recording:
-        """Return the recording of parts that follow each other; what concerns the whole run is that of the first part."""
-        sensors = {name: _all_frames([part.sensors[name] for part in parts], np.concatenate) for name in parts[0].sensors}
-        own = {
-            key: np.concatenate([getattr(part, key) for part in parts]) for key in ("frames", "times", "poses", "velocities")
-        }
-        return replace(parts[0], sensors=sensors, **own)
 
     def at(self, frame: int) -> Frame:
         """Return one recorded frame by its frame number; raises KeyError when it was not recorded."""

@@ -102,7 +102,7 @@ class PressedSensor:
         out = self._out = PressedTexels.zero(1, model.texels, len(targets))
         memory = self._memory = StepMemory.zero(model.texels, len(targets))
         self._environments, self._workspace = model.environments(1), model.workspace()
-        self._presser = model.presser(memory, out, self._environments, self._workspace)
+        self._press_environments = model.presser(memory, out, self._environments, self._workspace)
         self._rows = [(row[:3], row[3:]) for row in out.poses[0]]
         arrays = (
             memory.force, memory.shear, memory.friction, memory.depth, memory.slip, memory.contact, out.readings[0],
@@ -232,9 +232,9 @@ class PressedSensor:
         """Run one step to the poses."""
         if self._model.helpers:
             with self._model.helping(self._environments[0], self._workspace):
-                self._presser.press(0, 1)
+                self._press_environments(0, 1)
         else:
-            self._presser.press(0, 1)
+            self._press_environments(0, 1)
 
     def _press_under(self, wrench: ArrayLike) -> None:
         """Run one step under a load."""

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from ..geometry.mesh import TriangleMesh
 from ..geometry.shapes import Shape
 from ..solver.jumps import JumpFinder
 from ..solver.pressed_model import PressedModel, targets_of
-from ..solver.pressing import PressedTexels, Presser, StepMemory
+from ..solver.pressing import PressedTexels, StepMemory
 from .environment_parameters import Columns, sensors_of
 from .load_balance import LoadBalance, first_numbers, reason_of_pulls
 from .sensor_on_mesh import SensorOnMesh
@@ -259,10 +259,10 @@ class PressedSensors:
         for helper in helpers:
             helper.join()
 
-    def _work(self, presser: Presser, starts: Iterator[int]) -> None:
+    def _work(self, press: Callable[[int, int], None], starts: Iterator[int]) -> None:
         """Take chunks of environments until none is left."""
         for start in starts:
-            presser.press(start, min(start + self._chunk, len(self)))
+            press(start, min(start + self._chunk, len(self)))
 
     def _read(self, fresh: np.ndarray) -> None:
         """Compute readings that effects act on, environment by environment, as each has a past of its own."""

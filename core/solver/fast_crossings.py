@@ -28,22 +28,6 @@ _MOST_TESTS = 1 << 18
 """Pairs of a segment and a triangle that are tested at once."""
 
 
-class BodiesInFrame(NamedTuple):
-    """Motion of the b bodies during one frame: positions and quaternions at its ends, and the velocities of its steps.
-
-    `velocities` (steps, b, 6), m/s and rad/s, count for the bodies that no force moves. `moved` tells those that forces move,
-    `radius` (m) is the distance of a body's farthest point from its centre.
-    """
-
-    velocities: np.ndarray
-    position_before: np.ndarray
-    quaternion_before: np.ndarray
-    position_after: np.ndarray
-    quaternion_after: np.ndarray
-    moved: np.ndarray
-    radius: np.ndarray
-
-
 class CrossingLimits(NamedTuple):
     """How far the bodies of p pairs may move in a step.
 
@@ -88,7 +72,7 @@ class FastCrossings:
         self._warned = np.zeros(len(self._pairs), np.bool_)
         self.limits = CrossingLimits(
             pairs=np.array([(s.body, t.body) for s, t in self._pairs], np.int64).reshape(-1, 2),
-            limits=np.array([_limit_of(s) for s, _ in self._pairs], float),
+            limits=np.array([LARGEST_SHARE * s.parameters.max_penetration for s, _ in self._pairs], float),
             moved=np.array([body.moved_by_forces for body in scenario.bodies], np.bool_),
             radius=radius,
         )
@@ -104,15 +88,11 @@ class FastCrossings:
             Paths of the bodies, step by step.
         dt : float, seconds
         """
-        travel = np.linalg.norm(np.diff(positions, axis=0), axis=2).max(axis=0)
-        cosines = np.abs(np.einsum("sbi,sbi->sb", quaternions[1:], quaternions[:-1])).min(axis=0)
-        travel = travel + 2.0 * np.arccos(np.minimum(cosines, 1.0)) * self.limits.radius
         found = []
         for i, (sensor, target) in enumerate(self._pairs):
-            limit = _limit_of(sensor)
-            if self._warned[i] or travel[sensor.body] + travel[target.body] < limit:
+            if self._warned[i]:
                 continue
-            deepest = self._deepest_entry(sensor, target, positions, quaternions, limit)
+            deepest = self._deepest_entry(sensor, target, positions, quaternions, self.limits.limits[i])
             if deepest > 0.0:
                 self._warned[i] = True
                 advised = dt * GOOD_SHARE * sensor.parameters.max_penetration / deepest
@@ -155,39 +135,58 @@ def _reach(points: np.ndarray, center: bytes) -> float:
     return float(np.linalg.norm(points - np.frombuffer(center), axis=1).max())
 
 
-def _limit_of(sensor: Sensor) -> float:
-    """Return how far a target may go into a sensor in one step, metres."""
-    return LARGEST_SHARE * sensor.parameters.max_penetration
-
-
 @kernel
-def may_cross(bodies: BodiesInFrame, pairs: np.ndarray, limits: np.ndarray, dt: float) -> bool:
-    """Return whether the bodies of any pair (p, 2) together move by its limit (m) in a step: compiled, as each frame asks."""
-    for pair in range(len(pairs)):
-        if _travel(pairs[pair, 0], bodies, dt) + _travel(pairs[pair, 1], bodies, dt) >= limits[pair]:
+def may_cross(
+    limits: CrossingLimits,
+    dt: float,
+    velocities: np.ndarray,
+    before: tuple[np.ndarray, np.ndarray],
+    after: tuple[np.ndarray, np.ndarray],
+) -> bool:
+    """Return whether the bodies of any pair together move by its limit in a step of a frame: compiled, as each frame asks.
+
+    Parameters
+    ----------
+    limits : CrossingLimits
+    dt : float, seconds
+    velocities : (steps, b, 6) float, m/s and rad/s
+        Of the steps; they count for the bodies that no force moves.
+    before, after : ((b, 3) float, (b, 4) float)
+        Positions and quaternions at the beginning and the end of the frame.
+    """
+    for pair in range(len(limits.pairs)):
+        travel = _travel(limits.pairs[pair, 0], limits, dt, velocities, before, after)
+        if travel + _travel(limits.pairs[pair, 1], limits, dt, velocities, before, after) >= limits.limits[pair]:
             return True
     return False
 
 
 @kernel
-def _travel(body: int, bodies: BodiesInFrame, dt: float) -> float:
-    """Return an upper bound of the distance that a point of a body goes in one step, metres."""
-    steps = len(bodies.velocities)
-    if bodies.moved[body]:
+def _travel(
+    body: int,
+    limits: CrossingLimits,
+    dt: float,
+    velocities: np.ndarray,
+    before: tuple[np.ndarray, np.ndarray],
+    after: tuple[np.ndarray, np.ndarray],
+) -> float:
+    """Return an upper bound of the distance that a point of a body goes in one step, metres; arguments of :func:`may_cross`."""
+    steps, radius = len(velocities), limits.radius[body]
+    if limits.moved[body]:
         square, cosine = 0.0, 0.0
         for axis in range(3):
-            square += (bodies.position_after[body, axis] - bodies.position_before[body, axis]) ** 2
+            square += (after[0][body, axis] - before[0][body, axis]) ** 2
         for axis in range(4):
-            cosine += bodies.quaternion_after[body, axis] * bodies.quaternion_before[body, axis]
+            cosine += after[1][body, axis] * before[1][body, axis]
         # `path_of_moved_bodies` does not turn evenly: up to half a turn its fastest step turns by less than twice the mean.
         angle = 4.0 * math.acos(min(abs(cosine), 1.0))
-        return (math.sqrt(square) + angle * bodies.radius[body]) / steps
+        return (math.sqrt(square) + angle * radius) / steps
     farthest = 0.0
     for step in range(steps):
-        velocity = bodies.velocities[step, body]
+        velocity = velocities[step, body]
         speed = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2)
         spin = math.sqrt(velocity[3] ** 2 + velocity[4] ** 2 + velocity[5] ** 2)
-        farthest = max(farthest, dt * (speed + spin * bodies.radius[body]))
+        farthest = max(farthest, dt * (speed + spin * radius))
     return farthest
 
 

@@ -7,15 +7,15 @@ of a texel, closer to the texel than the radius, and nothing is in contact after
 
 from __future__ import annotations
 
-import ctypes
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from ..compiled.kernels import address_of, addressed_kernel, are_interpreted, inlined, kernel
-from ..compiled.struct_reference import address_of_fields, by_reference
+from ..compiled.kernels import addressed_kernel, inlined, kernel
+from ..compiled.struct_reference import by_reference, call_of_range
 from ..geometry.mesh import TriangleMesh, face_normals, is_closed
 from ..geometry.rotations import rotate
 from ..geometry.shapes import BOX, PLANE, Shape, Vector
@@ -76,11 +76,7 @@ class JumpFinder:
         self._search = JumpSearch(frame, bound, spheres, centre, np.zeros(e, np.bool_), np.zeros(4), pressed)
         self.jumped = self._search.jumped
         self._can_jump, self._environments = bool(spheres[:, 3].any()), e
-        address = address_of(find_jumps, 0, 0, self._search)
-        self._compiled: Callable[[int, int, int], None] | None = None
-        if address:  # as in Presser
-            self._compiled = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p)(address)
-        self._address = address_of_fields(self._search)
+        self._find = call_of_range(find_jumps, self._search, partial(find_jumps, search=self._search))
 
     def forget(self, which: np.ndarray | slice) -> None:
         """Let environments begin with their next step."""
@@ -88,12 +84,8 @@ class JumpFinder:
 
     def find(self) -> None:
         """Look at the step that was taken."""
-        if not self._can_jump:
-            return
-        if self._compiled is not None and not are_interpreted():
-            self._compiled(0, self._environments, self._address)
-        else:
-            find_jumps(0, self._environments, self._search)
+        if self._can_jump:
+            self._find(0, self._environments)
 
 
 def jump_arrays(texels: Texels, targets: Sequence[TriangleMesh | Shape]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -56,28 +56,10 @@ def write_pair_contacts(
         finish_contacts(pair, dt, model, detection, state, workspace)
 
 
-@addressed_kernel
-def sum_contacts(
-    pair: int, dt: float, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace
-) -> None:
-    """Sum up the contacts of one pair."""
-    if workspace.contacts.number[pair] > 0:
-        sum_pair_contacts(pair, dt, model, state, workspace)
-
-
-@addressed_kernel
-def update_friction(
-    pair: int, dt: float, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace
-) -> None:
-    """Bring the bristles of one pair forward."""
-    if workspace.contacts.number[pair] > 0:
-        update_pair_friction(pair, dt, model, detection.surfaces, state, workspace)
-
-
 PAIR_LOOPS = {
     FIND_CONTACTS: find_pair_contacts,
-    SUM_CONTACTS: sum_contacts,
-    UPDATE_FRICTION: update_friction,
+    SUM_CONTACTS: sum_pair_contacts,
+    UPDATE_FRICTION: update_pair_friction,
     WRITE_CONTACTS: write_pair_contacts,
 }
 """Work of each loop on a pair. It writes only to memory of this pair."""

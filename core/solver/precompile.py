@@ -86,15 +86,16 @@ def compile_solver(report: Report = lambda done, total: None) -> None:
             return
         from ..compiled import machine_code
         from ..compiled.kernels import KERNELS, are_interpreted
-        from . import simulation  # noqa: F401 (it imports all kernels)
+        from .simulation import Simulation  # which imports all kernels
 
         with suppress(OSError):  # no place to keep it: it is compiled, and kept for this session only
             machine_code.install(KERNELS)
         with (
             _rare_garbage_collection(),
-            _PeriodicReport(lambda: report(sum(kernel.is_translated for kernel in list(KERNELS)), max(1, len(KERNELS)))),
+            _periodic_report(lambda: report(sum(kernel.is_translated for kernel in list(KERNELS)), max(1, len(KERNELS)))),
         ):
-            _solve()
+            for threads in (1, 2):  # a scene that uses every kernel, with one thread and with a helper
+                Simulation(scenario(), threads).advance()
         _done = True
         if are_interpreted():  # the compiler failed and has said why
             return
@@ -134,31 +135,22 @@ def _rare_garbage_collection() -> Iterator[None]:
         gc.set_threshold(*before)
 
 
-class _PeriodicReport:
-    """Calls a function twice a second while its block runs."""
+@contextmanager
+def _periodic_report(look: Callable[[], None]) -> Iterator[None]:
+    """Call a function twice a second meanwhile."""
+    over = threading.Event()
 
-    def __init__(self, look: Callable[[], None]):
-        self._look, self._over = look, threading.Event()
-        self._thread = threading.Thread(target=self._watch, name="palpate compiling", daemon=True)
+    def watch() -> None:
+        while not over.wait(0.5):
+            look()
 
-    def __enter__(self) -> None:
-        self._thread.start()
-
-    def __exit__(self, *_: object) -> None:
-        self._over.set()
-        self._thread.join()
-
-    def _watch(self) -> None:
-        while not self._over.wait(0.5):
-            self._look()
-
-
-def _solve() -> None:
-    """Solve a frame of a scene that uses every kernel, with one thread and with a helper."""
-    from .simulation import Simulation
-
-    for threads in (1, 2):
-        Simulation(scenario(), threads).advance()
+    thread = threading.Thread(target=watch, name="palpate compiling", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
 
 
 def compile_effect_laws() -> None:

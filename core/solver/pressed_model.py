@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 
 import numpy as np
@@ -25,11 +25,11 @@ from .pressing import (
     Environment,
     OwnNumbers,
     PressedTexels,
-    Presser,
     Pressing,
     StepMemory,
     addresses_of,
     make_environments,
+    presser,
 )
 from .simulation import Simulation
 from .structures import step_program, workspace_for
@@ -109,7 +109,7 @@ class PressedModel:
         self._model, detection, self._state, workspace = simulation.arrays
         shapes = [target if isinstance(target, Shape) else None for target in targets]
         points = blocks_of_points(self._model.pairs, self._model.points.frame)
-        self._detection = detection._replace(shapes=TargetShapes.of(shapes, points))
+        self._detection = detection._replace(shapes=TargetShapes.of(shapes, detection.shapes.closed, points))
         self._queue = workspace.queue
         self.helpers = simulation.helpers
         transducers = transducers_of(sensor)
@@ -155,8 +155,8 @@ class PressedModel:
 
     def presser(
         self, memory: StepMemory, pressed: PressedTexels, environments: list[Environment], workspace: Workspace
-    ) -> Presser:
-        """Return the stepper that runs steps of these environments in one thread."""
+    ) -> Callable[[int, int], None]:
+        """Return what runs one step of some of these environments in one thread (see :func:`.pressing.presser`)."""
         model = self._model
         model = model._replace(
             pairs=model.pairs._replace(law=model.pairs.law.copy()),
@@ -172,7 +172,7 @@ class PressedModel:
             addresses=addresses_of(environments),
             example=environments[0],
         )
-        return Presser(pressing, environments)
+        return presser(pressing, environments)
 
     def helping(self, environment: Environment, workspace: Workspace) -> AbstractContextManager[None]:
         """Let other threads help with the steps of an environment meanwhile."""

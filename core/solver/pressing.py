@@ -8,20 +8,19 @@ the next.
 
 from __future__ import annotations
 
-import ctypes
 import math
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from ..compiled.kernels import address_of, addressed_kernel, are_interpreted, kernel
-from ..compiled.struct_reference import address_of_fields, by_reference, reference_at
+from ..compiled.kernels import addressed_kernel, kernel
+from ..compiled.struct_reference import address_of_fields, by_reference, call_of_range, reference_at
 from ..geometry.rotations import write_backward_step_motion, write_velocity
 from .detection.detection_data import DetectionData, NeighbourLists
 from .parallel_loops import find_all_contacts
 from .solver_model import NO_TRIANGLE, SolverModel, State
-from .substep import FramePath, advance_steps
+from .substep import FramePath, advance_steps, copy_table
 from .texel_readout import TexelReadout, read_pair
 from .workspace import Workspace
 
@@ -212,31 +211,17 @@ def begin_at(poses: np.ndarray, environment: Environment) -> None:
     environment.state.quaternion[...] = poses[:, 3:] / np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
 
 
-class Presser:
-    """Runs steps of environments in one thread.
+def presser(pressing: Pressing, environments: list[Environment]) -> Callable[[int, int], None]:
+    """Return what runs one step of some environments, from the first to the last one excluded, in one thread.
 
-    Parameters
-    ----------
-    pressing : Pressing
-        With working memory that no other thread uses.
-    environments : list of Environment
+    No other thread may use the working memory of `pressing`.
     """
 
-    def __init__(self, pressing: Pressing, environments: list[Environment]):
-        self._pressing, self._environments = pressing, environments
-        address = address_of(press_environments, 0, 0, pressing)
-        self._compiled: Callable[[int, int, int], None] | None = None
-        if address:  # numba's own way of calling takes longer than a step of a small sensor
-            self._compiled = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p)(address)
-        self._address = address_of_fields(pressing)
-
-    def press(self, first: int, last: int) -> None:
-        """Run one step of some environments, the last one excluded."""
-        if self._compiled is not None and not are_interpreted():
-            self._compiled(first, last, self._address)
-            return
+    def press(first: int, last: int) -> None:
         for number in range(first, last):
-            press_environment(number, self._pressing, self._environments[number])
+            press_environment(number, pressing, environments[number])
+
+    return call_of_range(press_environments, pressing, press)
 
 
 @addressed_kernel
@@ -256,8 +241,8 @@ def press_environment(number: int, pressing: Pressing, environment: Environment)
         out.begins[number] = True
         _clear(number, out)
         return
-    _copy_table(own.law, model.pairs.law)
-    _copy_table(own.constants, model.effects.constants)
+    copy_table(own.law, model.pairs.law)
+    copy_table(own.constants, model.effects.constants)
     _write_path(dt, poses, out.begins[number], state, memory)
     if out.begins[number]:
         forget(state)
@@ -270,14 +255,6 @@ def press_environment(number: int, pressing: Pressing, environment: Environment)
     out.too_deep[number] = find_all_contacts(-dt, model, environment.detection, state, workspace)
     environment.found[0] = True
     _read(number, pressing, own.readout, state)
-
-
-@kernel
-def _copy_table(values: np.ndarray, out: np.ndarray) -> None:
-    """Write the values (r, c) into `out`."""
-    for i in range(values.shape[0]):
-        for j in range(values.shape[1]):
-            out[i, j] = values[i, j]
 
 
 @kernel
@@ -299,14 +276,10 @@ def are_poses(poses: np.ndarray) -> bool:
 def _clear(number: int, out: PressedTexels) -> None:
     """Let an environment measure nothing."""
     out.too_deep[number] = 0
-    for texel in range(out.readings.shape[1]):
-        out.readings[number, texel] = 0.0
-        out.contact[number, texel] = False
-        for i in range(3):
-            out.texels[number, texel, i] = 0.0
-    for target in range(out.wrench.shape[1]):
-        for i in range(6):
-            out.wrench[number, target, i] = 0.0
+    out.readings[number, :] = 0.0
+    out.contact[number, :] = False
+    out.texels[number, :, :] = 0.0
+    out.wrench[number, :, :] = 0.0
 
 
 @kernel
@@ -330,17 +303,11 @@ def _write_path(dt: float, poses: np.ndarray, begins: bool, state: State, memory
 @kernel
 def forget(state: State) -> None:
     """Bring a state back to the beginning of a run; where the bodies are is written afterwards."""
-    for body in range(len(state.velocity)):
-        for i in range(6):
-            state.velocity[body, i] = 0.0
-    for slot in range(len(state.triangle)):
-        state.triangle[slot] = NO_TRIANGLE
-        state.pressed_share[slot] = 0.0
-        for i in range(3):
-            state.bristle[slot, i] = 0.0
-    for point in range(state.effect_memory.shape[0]):
-        for i in range(state.effect_memory.shape[1]):
-            state.effect_memory[point, i] = 0.0
+    state.velocity[:] = 0.0
+    state.triangle[:] = NO_TRIANGLE
+    state.pressed_share[:] = 0.0
+    state.bristle[:] = 0.0
+    state.effect_memory[:] = 0.0
 
 
 @kernel

@@ -19,7 +19,7 @@ from ..effects.engine.readout_chain import ReadoutChain
 from ..effects.engine.registry import check_scenario, mounted_texels
 from ..geometry.rotations import quaternion_product, quaternions_from_vectors, rotation_matrices, rotation_vectors
 from ..jobs import Job, Progress, run_job
-from ..model.body import Motion
+from ..model.body import Mode, Motion
 from ..model.recording import BLOCK_BYTES, Frame, Recording, SensorRecording
 from ..model.scenario import Scenario
 from ..model.shared_results import SharedResults
@@ -29,12 +29,11 @@ from .detection.detection_data import DetectionData
 from .detection.narrow_phase import count_too_deep
 from .dynamics.actuators import DriveCommands
 from .dynamics.linear_system import contacts_of, credit_initial_contacts
-from .dynamics.modes import driven_bodies
 from .fast_crossings import FastCrossings, path_of_moved_bodies
 from .parallel_loops import find_all_contacts, help_with_loops, prepare_pair_loops
 from .solver_model import SolverModel, State
 from .structures import structures_for, texel_starts
-from .substep import FRAME, NOTHING, TEXELS, FramePath, ObservedFrames, Surroundings, advance_frames
+from .substep import FRAME, NOTHING, TEXELS, FramePath, ObservedFrames, advance_frames
 from .time_step_adviser import plan
 from .workspace import Workspace
 
@@ -42,8 +41,6 @@ TEXEL_BYTES = 8 * 8
 """Bytes of a frame of a texel: forces, friction, depth, slip, contact and reading."""
 PATH_ROWS = 4096
 """Poses of bodies in steps that are computed at once: few enough to stay in a processor's cache."""
-PART_BYTES = 1 << 28
-"""Bytes of the frames that are observed in one piece of memory; joining pieces takes as long as solving."""
 NO_PATH = 0, (np.zeros((0, 0, 0, 3)), np.zeros((0, 0, 0, 4)), np.zeros((0, 0, 0, 6)))
 """The first frame whose path is known, and the paths of it and of those that follow."""
 
@@ -74,6 +71,8 @@ class Simulation:
         What the step is and why, for the user.
     warnings : list of str
         One sentence each; grows while the simulation runs.
+    helpers : int
+        Threads that help with the steps.
     """
 
     def __init__(self, scenario: Scenario, threads: int | None = None, shared: SharedResults | None = None):
@@ -89,20 +88,14 @@ class Simulation:
         # Bodies that forces move are followed at their centre of mass, keyframed ones at their origin.
         self._center = np.array([body.center_of_mass if body.moved_by_forces else np.zeros(3) for body in scenario.bodies])
         found = structures_for(self, scenario, self._center, self.dt, threads, shared)
-        self._closed, self._model, self._deforming_surfaces = found.closed, found.model, found.deforming_surfaces
-        self._detection, self._state, self._workspace, self._helpers = (
-            found.detection,
-            found.state,
-            found.workspace,
-            found.helpers,
-        )
+        self._model, self._deforming_surfaces, self.helpers = found.model, found.deforming_surfaces, found.helpers
+        self._detection, self._state, self._workspace = found.detection, found.state, found.workspace
         # How many contact points of each pair were pressed too deep in the worst step of the last frame.
         self._most_too_deep = np.zeros(len(self._model.pairs.sensor), np.int64)
         self._readers = [ReadoutChain.of(sensor) for sensor in scenario.sensors]
         self._drive_commands = DriveCommands(scenario)
         self._texel_start = texel_starts(scenario)
         self._fast_crossings = FastCrossings(scenario, self._center, shared)
-        self._surroundings = Surroundings(np.array(self._closed, np.bool_), self._fast_crossings.limits)
 
     @property
     def arrays(self) -> tuple[SolverModel, DetectionData, State, Workspace]:
@@ -110,11 +103,6 @@ class Simulation:
         arrays = self._model, self._detection, self._state, self._workspace
         prepare_pair_loops(*arrays)
         return arrays
-
-    @property
-    def helpers(self) -> int:
-        """Threads that help with the steps."""
-        return self._helpers
 
     @property
     def time(self) -> float:
@@ -175,32 +163,22 @@ class Simulation:
         The numbers are those of :meth:`advance`, bit by bit. Where Python has nothing to do in between, many frames are
         computed in one call. The digest of the scenario is left out on request, because it takes a tenth of a short run.
         """
-        parts = [self._advance_far(with_present=True)]
-        while self.frame < self.scenario.frame_end:
-            parts.append(self._advance_far(with_present=False))
-        found = Recording.joined(parts) if len(parts) > 1 else parts[0]
-        digest = self.scenario.digest() if with_digest else ""
-        found = replace(found, digest=digest, warnings=tuple(self.warnings), step_reason=self.step_reason)
-        return with_clipping_warnings(found)
-
-    def _advance_far(self, with_present: bool) -> Recording:
-        """Go through the frames that are left, in a long run :data:`PART_BYTES` of them, and return their recording."""
-        first = self.frame if with_present else self.frame + 1
-        most = max(2, PART_BYTES // (int(self._texel_start[-1]) * TEXEL_BYTES))
-        seen = self._seen(max(1, min(most, self.scenario.frame_end - first + 1)))
-        count, at = len(seen.may_cross), 0
-        if with_present:
-            self._observe_first(seen.part(slice(0, 1)))
-            at = 1
+        first = self.frame
+        seen = self._seen(self.scenario.frame_end - first + 1)
+        count, at = len(seen.may_cross), 1
+        self._observe_first(seen.part(slice(0, 1)))
         while at < count:
             stop = min(at + self._frames_at_once(), count)
             self._advance(seen.part(slice(at, stop)))
             at = stop
-        return self._recorded(first + np.arange(count), seen)
+        found = self._recorded(first + np.arange(count), seen)
+        digest = self.scenario.digest() if with_digest else ""
+        found = replace(found, digest=digest, warnings=tuple(self.warnings), step_reason=self.step_reason)
+        return with_clipping_warnings(found)
 
     def _frames_at_once(self) -> int:
         """Return how many of the next frames one call of the kernels may compute."""
-        if self._deforming_surfaces.any_deforms or self._drive_commands.reads_sensors or self._helpers:
+        if self._deforming_surfaces.any_deforms or self._drive_commands.reads_sensors or self.helpers:
             return 1
         most = max(1, BLOCK_BYTES // (int(self._texel_start[-1]) * TEXEL_BYTES))
         return min(most, self._path_frames(self.frame))
@@ -218,7 +196,7 @@ class Simulation:
         before = seen.position[0].copy(), seen.quaternion[0].copy()
         for steps, commands in self._intervals(times):
             path = FramePath(positions, quaternions, velocities, commands)
-            with helper_threads(self._workspace.queue, self._helpers, help_with_loops, *self.arrays):
+            with helper_threads(self._workspace.queue, self.helpers, help_with_loops, *self.arrays):
                 self._run(steps, FRAME if steps[1] == self.substeps else NOTHING, path, seen)
         too_deep = seen.too_deep.any(axis=1) | seen.too_deep_between.any(axis=1)
         for i in np.flatnonzero(seen.may_cross | too_deep).tolist():
@@ -250,32 +228,29 @@ class Simulation:
 
     def _run(self, steps: tuple[int, int], observed: int, path: FramePath, seen: ObservedFrames) -> None:
         """Call :func:`.advance_frames`."""
-        advance_frames(self.dt, steps, observed, path, self._surroundings, *self.arrays, seen)
+        advance_frames(self.dt, steps, observed, path, self._fast_crossings.limits, *self.arrays, seen)
 
     def _place_deforming(self, times: np.ndarray) -> None:
         """Bring surfaces that deform to the frame whose steps are at these times, (steps + 1,) s."""
         if self._deforming_surfaces.any_deforms:
-            self._bring_surfaces(times)
+            surfaces = self._deforming_surfaces.at(times)
+            self._detection = self._detection._replace(surfaces=surfaces)
             if self._drive_commands.reads_sensors:  # controllers read before the first step
-                self._place_surfaces(0, 1, 0.0)
+                refit_boxes(surfaces, self._detection.tree)
+                set_moment(0, 1, 0.0, self._model, surfaces)
 
     def _intervals(self, times: np.ndarray) -> Iterator[tuple[tuple[int, int], np.ndarray]]:
         """Yield the steps of frames in intervals during which no controller is updated, with (F, steps, d, 4) commands.
 
         `times` (F, steps + 1), s, are those of steps.
         """
-        if self._drive_commands.reads_sensors:
-            for first, last, commands in self._drive_commands.control_intervals(times[0], self.dt, self._normal_forces):
-                yield (first, last), commands[None]
-        elif len(self._model.drives.gains) == 0:
+        if len(self._model.drives.gains) == 0:
             yield (0, self.substeps), np.zeros((len(times), self.substeps, 0, 4))
-        else:
-            yield (0, self.substeps), np.stack([self._commands_at(own) for own in times])
-
-    def _commands_at(self, times: np.ndarray) -> np.ndarray:
-        """Commands (steps, d, 4) to the drives of a frame, where no controller reads a sensor."""
-        ((_, _, commands),) = self._drive_commands.control_intervals(times, self.dt, self._normal_forces)
-        return commands
+            return
+        frames = [self._drive_commands.control_intervals(own, self.dt, self._normal_forces) for own in times]
+        for parts in zip(*frames, strict=True):  # where controllers read sensors there is one frame, else one interval
+            first, last, _ = parts[0]
+            yield (first, last), np.stack([commands for _, _, commands in parts])
 
     def _readings(self, i: int, times: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Readings (F, n) of a sensor; frame by frame where effects act on them, whose sums of many frames round otherwise."""
@@ -321,16 +296,6 @@ class Simulation:
         if readout is not None:
             recorded.channels = readout.channels(recorded)
         return recorded
-
-    def _bring_surfaces(self, times: np.ndarray) -> None:
-        """Get the shapes of deforming surfaces between some times, (steps + 1,) s."""
-        self._detection = self._detection._replace(surfaces=self._deforming_surfaces.at(times))
-
-    def _place_surfaces(self, now: int, other: int, dt: float) -> None:
-        """Bring deforming surfaces to a moment of their present frame; the arguments are those of :func:`.set_moment`."""
-        surfaces = self._detection.surfaces
-        refit_boxes(surfaces, self._detection.tree)
-        set_moment(now, other, dt, self._model, surfaces)
 
     def _step_times(self, frames: int | np.ndarray) -> np.ndarray:
         """(…, substeps + 1) times at which the steps after frames (…) begin, and the last one ends, s."""
@@ -379,14 +344,13 @@ class Simulation:
         for body, (position, quaternion) in enumerate(path):
             positions[:, :, body] = position.reshape(*times.shape, 3)
             quaternions[:, :, body] = quaternion.reshape(*times.shape, 4)
-        for body in driven_bodies(self._model.bodies.mode):
+        for body in np.flatnonzero(self._model.bodies.mode == Mode.DRIVEN):
             positions[:, :, body] += rotation_matrices(quaternions[:, :, body]) @ self._center[body]
         before, after = quaternions[:, :-1], quaternions[:, 1:]
         turning = (after != before).any(axis=3)
         turns = np.zeros((*turning.shape, 3))  # not rounding: bodies that animation moves bring energy (:func:`.check_energy`)
         if turning.any():
-            conjugate = before[turning] * np.array([1.0, -1.0, -1.0, -1.0])
-            turns[turning] = rotation_vectors(quaternion_product(after[turning], conjugate))
+            turns[turning] = rotation_vectors(quaternion_product(after[turning], _conjugate(before[turning])))
         velocities = np.concatenate([positions[:, 1:] - positions[:, :-1], turns], axis=3) / self.dt
         return positions, quaternions, velocities
 
@@ -422,7 +386,7 @@ class Simulation:
             too_deep = find_all_contacts(-self.dt, *self.arrays)
             most = max(most, int(too_deep))
             for pair in own:
-                most = max(most, self._count_too_deep(pair))
+                most = max(most, int(count_too_deep(pair, *self.arrays)))
                 found, pairs = contacts_of(pair, self._workspace), self._model.pairs
                 texel = self._model.points.texel[pairs.first_point[pair] + found.slots - pairs.first_slot[pair]]
                 deeper = np.argsort(found.depth, kind="stable")  # of several points of a texel the deepest comes last
@@ -459,10 +423,6 @@ class Simulation:
                 f"{', '.join(dict.fromkeys(pressed))} and exert no force; "
                 "reduce the depth, or raise k or the maximum penetration."
             )
-
-    def _count_too_deep(self, pair: int) -> int:
-        """Count the contact points of a pair that are pressed past their maximum penetration."""
-        return int(count_too_deep(pair, self._closed[self._model.pairs.target[pair]], *self.arrays))
 
     def _normal_forces(self, sensor: int) -> np.ndarray:
         """(n,) normal forces of a sensor in the present state, for its controllers."""

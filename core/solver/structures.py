@@ -7,8 +7,9 @@ A short run takes less time than making these arrays does, and than telling comp
 from __future__ import annotations
 
 import weakref
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -181,13 +182,13 @@ def pairs_of(scenario: Scenario, first_point: np.ndarray, shared: SharedResults)
         force_share=np.array(share, dtype=float),
         overlap_share=np.array(overlap, dtype=float),
         max_tube_radius=np.array([MAX_RADIUS_SHARE * sensors[i].parameters.max_penetration for i, _, _, _ in parts]),
-        max_list_radius=np.array([_list_radius(sensors[i], shared.of(_median_edge, targets[j].mesh)) for i, j, _, _ in parts]),
+        max_list_radius=np.array(
+            [  # a tenth of the target's median edge at the most, so that lists are short
+                0.1 * min(shared.of(_median_edge, targets[j].mesh), sensors[i].parameters.max_penetration)
+                for i, j, _, _ in parts
+            ]
+        ),
     )
-
-
-def _list_radius(sensor: Sensor, edge: float) -> float:
-    """How far around a texel triangles are listed at the most: a tenth of the target's median edge, so that they are few."""
-    return min(0.1 * edge, 0.1 * sensor.parameters.max_penetration)
 
 
 def _median_edge(mesh: TriangleMesh) -> float:
@@ -323,8 +324,6 @@ class Structures:
 
     Attributes
     ----------
-    closed : list of bool
-        Which targets are closed.
     deforming_surfaces : DeformingSurfaces
     model : SolverModel
     detection : DetectionData
@@ -335,14 +334,15 @@ class Structures:
     """
 
     def __init__(self, scenario: Scenario, center: np.ndarray, dt: float, threads: int | None, shared: SharedResults):
-        tree, self.closed = _prepared_targets(scenario, center, shared)
+        tree = _tree_of_targets(scenario, center, shared)
+        closed = [shared.of(is_closed, target.mesh.triangles) for target in scenario.targets]
         points = [shared.of(contact_points, s.texels, s.parameters.points_per_texel) for s in scenario.sensors]
         self.model = build_model(scenario, center, points, dt, shared)
         self.deforming_surfaces = DeformingSurfaces(scenario, center, points, tree, self.model)
         surface_motion = self.deforming_surfaces.at(np.zeros(1))
         self.state = initial_state(scenario, self.model, center)
         lists = neighbour_lists_for(len(self.state.triangle), len(self.model.pairs.sensor))
-        self.detection = DetectionData(tree, lists, surface_motion, TargetShapes.of([None] * len(scenario.targets)))
+        self.detection = DetectionData(tree, lists, surface_motion, TargetShapes.of([None] * len(closed), closed))
         queue, self.helpers = make_queue(len(self.state.triangle), threads)
         self.workspace = workspace_for(self.model, self.state, surface_motion, queue)
         self._center, self._sensors = center, scenario.sensors
@@ -378,25 +378,18 @@ class LastStructures:
         self._kept: Structures | None = None
         self._user: weakref.ref[Any] | None = None
 
-    def acquire(
-        self, user: object, scenario: Scenario, center: np.ndarray, dt: float, threads: int | None, shared: SharedResults
-    ) -> Structures:
-        """Return structures at the beginning of a scenario: new ones while the last user of the kept ones is there.
+    def acquire(self, user: object, scenario: Scenario, shared: SharedResults, make: Callable[[], Structures]) -> Structures:
+        """Return structures at the beginning of a scenario: new ones, of `make`, while the last user of the kept ones is there.
 
-        Parameters
-        ----------
-        user : object
-            Who works on them; nobody else gets them as long as it lives.
-        scenario, center, dt, threads, shared
-            See :class:`Structures`.
+        Nobody else gets those of `user` as long as it lives.
         """
         if self._user is not None and self._user() is not None:
-            return Structures(scenario, center, dt, threads, shared)
+            return make()
         if self._kept is not None:
             self._kept.begin_again(scenario, shared)
             found = self._kept
         else:
-            found = Structures(scenario, center, dt, threads, shared)
+            found = make()
             if self._user is not None:  # not the first time: there may be many more
                 found.keep_beginning()
                 self._kept = found
@@ -408,10 +401,10 @@ def structures_for(
     user: object, scenario: Scenario, center: np.ndarray, dt: float, threads: int | None, shared: SharedResults
 ) -> Structures:
     """Return structures for a simulation: those of an earlier one with the same `shared` that is gone, if they fit."""
+    make = partial(Structures, scenario, center, dt, threads, shared)
     if any_deforms(scenario):
-        return Structures(scenario, center, dt, threads, shared)
-    last = shared.of(LastStructures, dt, threads or 0, *_shape_key(scenario))
-    return last.acquire(user, scenario, center, dt, threads, shared)
+        return make()
+    return shared.of(LastStructures, dt, threads or 0, *_shape_key(scenario)).acquire(user, scenario, shared, make)
 
 
 def any_deforms(scenario: Scenario) -> bool:
@@ -456,19 +449,14 @@ def _in_one_piece(part: Any, memory: np.ndarray | None, at: int = 0) -> tuple[An
     return part, -(-stop // _ALIGNED) * _ALIGNED
 
 
-def _prepared_targets(scenario: Scenario, center: np.ndarray, shared: SharedResults) -> tuple[Tree, list[bool]]:
-    """Return the tree of all targets, and which of them are closed; the tree of what deforms is the simulation's own."""
+def _tree_of_targets(scenario: Scenario, center: np.ndarray, shared: SharedResults) -> Tree:
+    """Return the tree of all targets; that of what deforms is the simulation's own."""
     centers = np.array([center[target.body] for target in scenario.targets]).tobytes()
     meshes = [target.mesh for target in scenario.targets]
-    closed = [shared.of(_is_closed, mesh) for mesh in meshes]
-    return (_tree_about(centers, *meshes) if any_deforms(scenario) else shared.of(_tree_about, centers, *meshes)), closed
+    return _tree_about(centers, *meshes) if any_deforms(scenario) else shared.of(_tree_about, centers, *meshes)
 
 
 def _tree_about(centers: bytes, *meshes: TriangleMesh) -> Tree:
     """Return the tree of meshes whose points are seen from others, (m, 3) float as bytes, m."""
     middles = np.frombuffer(centers).reshape(-1, 3)
     return build_tree([replace(mesh, vertices=mesh.vertices - middle) for mesh, middle in zip(meshes, middles, strict=True)])
-
-
-def _is_closed(mesh: TriangleMesh) -> bool:
-    return is_closed(mesh.triangles)

@@ -20,7 +20,7 @@ from .detection.narrow_phase import count_too_deep
 from .dynamics.actuators import move_drives
 from .dynamics.effect_kernels import commit_effect_memory
 from .dynamics.modes import move, place, prescribe_velocity, write_inertia
-from .fast_crossings import BodiesInFrame, CrossingLimits, may_cross
+from .fast_crossings import CrossingLimits, may_cross
 from .implicit_velocities import solve_velocities
 from .parallel_loops import UPDATE_FRICTION, find_all_contacts, run_parallel_loop, write_all_contacts
 from .solver_model import SolverModel, State
@@ -96,20 +96,6 @@ class ObservedFrames(NamedTuple):
         """Return some of the frames, by their indices; the arrays are views."""
         texels = TexelReadout(*(values[frames] for values in self.texels))
         return ObservedFrames(texels, *(values[frames] for values in self[1:]))
-
-
-class Surroundings(NamedTuple):
-    """Observations of the bodies at a frame.
-
-    Attributes
-    ----------
-    closed : (T,) bool
-        Which targets are closed.
-    limits : CrossingLimits
-    """
-
-    closed: np.ndarray
-    limits: CrossingLimits
 
 
 @inlined
@@ -188,7 +174,7 @@ def advance_frames(
     steps: tuple[int, int],
     observed: int,
     path: FramePath,
-    surroundings: Surroundings,
+    limits: CrossingLimits,
     model: SolverModel,
     detection: DetectionData,
     state: State,
@@ -206,7 +192,7 @@ def advance_frames(
         NOTHING, TEXELS or FRAME.
     path : FramePath
         With a leading axis of length F in each array.
-    surroundings : Surroundings
+    limits : CrossingLimits
     model : SolverModel
     detection : DetectionData
     state : State
@@ -215,15 +201,14 @@ def advance_frames(
         Zero at first, apart from the poses before the first frame; written.
     """
     first, last = steps
-    limits = surroundings.limits
     for frame in range(len(seen.may_cross)):
         own = FramePath(path.position[frame], path.quaternion[frame], path.velocity[frame], path.commands[frame])
         if last > first:
             worst = advance_steps(dt, first, last, own, model, detection, state, workspace, False)
-            before = 0
+            known = 0
             for pair in range(len(model.pairs.sensor)):
-                before += seen.too_deep_between[frame, pair]
-            if worst > before:
+                known += seen.too_deep_between[frame, pair]
+            if worst > known:
                 for pair in range(len(model.pairs.sensor)):
                     seen.too_deep_between[frame, pair] = workspace.contacts.most_too_deep[pair]
         if observed == NOTHING:
@@ -231,8 +216,7 @@ def advance_frames(
         find_all_contacts(-dt, model, detection, state, workspace)
         if observed == FRAME:
             for pair in range(len(model.pairs.sensor)):
-                is_closed = surroundings.closed[model.pairs.target[pair]]
-                seen.too_deep[frame, pair] = count_too_deep(pair, is_closed, model, detection, state, workspace)
+                seen.too_deep[frame, pair] = count_too_deep(pair, model, detection, state, workspace)
         t = seen.texels
         out = TexelReadout(
             t.force[frame], t.shear[frame], t.friction[frame], t.depth[frame], t.slip[frame], t.contact[frame],
@@ -241,20 +225,18 @@ def advance_frames(
         read_texels(model, state, workspace, out)
         if last > first:
             previous = max(frame - 1, 0)
-            moved = BodiesInFrame(
-                own.velocity, seen.position[previous], seen.quaternion[previous], state.position, state.quaternion,
-                limits.moved, limits.radius,
-            )  # fmt: skip
-            seen.may_cross[frame] = may_cross(moved, limits.pairs, limits.limits, dt)
-        _copy(state.position, seen.position[frame])
-        _copy(state.quaternion, seen.quaternion[frame])
-        _copy(state.velocity, seen.velocity[frame])
+            before = seen.position[previous], seen.quaternion[previous]
+            after = state.position, state.quaternion
+            seen.may_cross[frame] = may_cross(limits, dt, own.velocity, before, after)
+        copy_table(state.position, seen.position[frame])
+        copy_table(state.quaternion, seen.quaternion[frame])
+        copy_table(state.velocity, seen.velocity[frame])
         for body in range(len(state.position)):
-            _copy(workspace.bodies.rotation[body], seen.rotation[frame, body])
+            copy_table(workspace.bodies.rotation[body], seen.rotation[frame, body])
 
 
 @kernel
-def _copy(values: np.ndarray, out: np.ndarray) -> None:
+def copy_table(values: np.ndarray, out: np.ndarray) -> None:
     """Write the values (r, c) into `out`, without a temporary array."""
     for i in range(values.shape[0]):
         for j in range(values.shape[1]):

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..compiled.kernels import inlined, kernel
 from ..effects.engine.compiled_program import TexelMotion, has_effects
-from ..laws.contact_law import LINEAR_EXPONENT, ContactLaw, read_law
+from ..laws.contact_law import LINEAR_EXPONENT, ContactLaw, read_law, with_friction
 from ..laws.friction import bristle_rate, deflection_scale, friction_force, max_bristle_deflection
 from ..laws.normal_force import linear_normal_force, normal_force
 from .detection.detection_data import (
@@ -26,7 +26,7 @@ from .detection.detection_data import (
     read_vector,
     write_vector,
 )
-from .dynamics.effect_kernels import NO_TIME, apply_effects, force_and_friction_law, lane_range, press_texel
+from .dynamics.effect_kernels import NO_TIME, apply_effects, lane_range, press_texel
 from .dynamics.friction_state import motion_values, point_law, row_of, row_velocity, velocity_at, write_pair_motion
 from .solver_model import SolverModel, State
 from .workspace import Workspace
@@ -158,7 +158,7 @@ def _write_forces(pair: int, law: ContactLaw, workspace: Workspace) -> None:
 def _write_forces_one_by_one(pair: int, law: ContactLaw, model: SolverModel, state: State, workspace: Workspace) -> None:
     """Do as :func:`_write_forces` where effects act, points are painted, surfaces deform or the law is curved."""
     contacts, motion, rows = workspace.contacts, motion_values(workspace.pairs.motion[pair]), workspace.contacts.rows
-    effects = has_effects(model.pairs.sensor[pair], model.effects)
+    effects, share = has_effects(model.pairs.sensor[pair], model.effects), model.pairs.force_share[pair]
     for r in range(contacts.number[pair]):
         b, lane = row_of(r, pair, contacts)
         point = model.pairs.first_point[pair] + contacts.slots[b, lane] - model.pairs.first_slot[pair]
@@ -172,7 +172,8 @@ def _write_forces_one_by_one(pair: int, law: ContactLaw, model: SolverModel, sta
             press_texel(texels, b, lane, pair, TexelMotion(depth, rate, 0.0, speed), p, model)
             points = lane_range(pair, b, lane, 1, model, workspace)
             apply_effects(pair, NO_TIME, points, p, model, state.effect_memory, workspace)
-            fn, p = force_and_friction_law(pair, b, lane, p, model, texels)
+            fn, viscous = share * texels.force[b, lane], share * texels.extra_viscosity[b, lane]
+            p = with_friction(p, texels.friction_factor[b, lane], viscous)
         fx, fy, fz = _friction(bristle, (vx, vy, vz), normal, rate, fn, p)
         write_vector(rows, b, FRICTION, lane, fx, fy, fz)
         rows[b, PUSH + lane], rows[b, SPEED + lane] = fn, speed

@@ -84,11 +84,8 @@ def advise(scenario: Scenario) -> Advice:
             if found < limit:
                 limit, culprit, contact = found, body.name, f"'{body.name}' with {', '.join(touched)}"
     if math.isinf(limit):
-        return Advice(
-            LONGEST,
-            limit,
-            f"{LONGEST * 1e3:g} ms: no free body touches a sensor, so only the animation must be resolved.",
-        )
+        reason = f"{LONGEST * 1e3:g} ms: no free body touches a sensor, so only the animation must be resolved."
+        return Advice(LONGEST, limit, reason)
     wanted = SHARE_OF_LIMIT * limit
     of_limit = f"the explicit stability limit of '{culprit}'"
     if SHORTEST <= wanted <= LONGEST:
@@ -138,14 +135,13 @@ def plan(scenario: Scenario) -> Plan:
     number = f"{substeps} per frame"
     if scenario.dt is None:
         return Plan(dt, substeps, f"Time step {dt * 1e3:.3g} ms ({number}). Recommended: {advice.reason}")
+    warning = ""
     if dt > FAR_ABOVE_LIMIT * advice.limit:
         warning = (
             f"Frame {scenario.frame_start}: steps of {dt * 1e3:.3g} ms are {dt / advice.limit:,.0f} times the explicit "
             f"stability limit of the contact of {advice.contact}, whose forces may be far too large for some steps: "
             f"set a time step of {advice.dt * 1e3:.3g} ms or less."
         )
-    else:
-        warning = ""
     beyond = " Longer steps are stable but less accurate." if dt > 1.001 * advice.dt else ""
     return Plan(dt, substeps, f"Time step {dt * 1e3:.3g} ms ({number}, as set). Recommended: {advice.reason}{beyond}", warning)
 

@@ -82,16 +82,8 @@ def stack_windows(windows: Sequence[SampleWindow | None], columns: int, moments:
     return SampleTrack(np.ascontiguousarray(np.concatenate(values), dtype=float), stride, row, share)
 
 
-def vertex_speed_bound(found: SampleWindow | None) -> float:
-    """Bound on the speed of the vertices of a window, m/s."""
-    if found is None or len(found.spans) == 0:
-        return 0.0
-    step = np.linalg.norm(np.diff(found.samples[:, :, :3], axis=0), axis=2)
-    return float((step.max(axis=1, initial=0.0) / found.spans).max())
-
-
-def point_speed_bound(found: SampleWindow | None, reach: float) -> float:
-    """Bound on the speed of both ends of the segments of a window's contact points, m/s.
+def speed_bound(found: SampleWindow | None, reach: float) -> float:
+    """Bound on the speed of both ends of the segments of a window's contact points, m/s; vertices have a reach of zero.
 
     A unit vector that goes straight to another and is stretched to its length turns fastest half-way.
     """
@@ -114,6 +106,16 @@ def at_moment(found: SampleTrack, moment: int, surface: int, i: int, column: int
     if share == 1.0:
         return after
     return before + share * (after - before)
+
+
+@kernel
+def vector_at_moment(found: SampleTrack, moment: int, surface: int, i: int, column: int) -> tuple[float, float, float]:
+    """Do as :func:`at_moment` for the vector that begins with a column."""
+    return (
+        at_moment(found, moment, surface, i, column),
+        at_moment(found, moment, surface, i, column + 1),
+        at_moment(found, moment, surface, i, column + 2),
+    )
 
 
 @kernel
@@ -200,17 +202,8 @@ def corners_of(meshes: Sequence, tree: Tree) -> tuple[np.ndarray, np.ndarray]:
 @kernel
 def point_at(surfaces: SurfaceMotion, moment: int, sensor: int, i: int) -> tuple[float, ...]:
     """Position and unit normal of a contact point of a deforming sensor."""
-    found = surfaces.sensors
-    x, y, z = (
-        at_moment(found, moment, sensor, i, 0),
-        at_moment(found, moment, sensor, i, 1),
-        at_moment(found, moment, sensor, i, 2),
-    )
-    nx, ny, nz = (
-        at_moment(found, moment, sensor, i, 3),
-        at_moment(found, moment, sensor, i, 4),
-        at_moment(found, moment, sensor, i, 5),
-    )
+    x, y, z = vector_at_moment(surfaces.sensors, moment, sensor, i, 0)
+    nx, ny, nz = vector_at_moment(surfaces.sensors, moment, sensor, i, 3)
     scale = 1.0 / max(math.sqrt(nx * nx + ny * ny + nz * nz), 1e-300)
     return x, y, z, scale * nx, scale * ny, scale * nz
 
@@ -218,13 +211,8 @@ def point_at(surfaces: SurfaceMotion, moment: int, sensor: int, i: int) -> tuple
 @kernel
 def frame_at(surfaces: SurfaceMotion, moment: int, sensor: int, i: int) -> tuple[float, ...]:
     """Position of a contact point of a deforming sensor, and normal, x axis and y axis of its texel there: twelve numbers."""
-    found = surfaces.sensors
     x, y, z, nx, ny, nz = point_at(surfaces, moment, sensor, i)
-    tx, ty, tz = (
-        at_moment(found, moment, sensor, i, 6),
-        at_moment(found, moment, sensor, i, 7),
-        at_moment(found, moment, sensor, i, 8),
-    )
+    tx, ty, tz = vector_at_moment(surfaces.sensors, moment, sensor, i, 6)
     out = tx * nx + ty * ny + tz * nz
     tx, ty, tz = tx - out * nx, ty - out * ny, tz - out * nz
     scale = 1.0 / max(math.sqrt(tx * tx + ty * ty + tz * tz), 1e-300)
@@ -347,8 +335,8 @@ class DeformingSurfaces:
             sensors=stack_windows(rows, 12, len(moments)),
             corner=self._corner,
             triangle_start=self._triangle_start,
-            target_speed=np.array([vertex_speed_bound(found) for found in vertices]),
-            sensor_speed=np.array([point_speed_bound(found, reach[i]) for i, found in enumerate(rows)]),
+            target_speed=np.array([speed_bound(found, 0.0) for found in vertices]),
+            sensor_speed=np.array([speed_bound(found, reach[i]) for i, found in enumerate(rows)]),
             target_travel=self._travel[0],
             sensor_travel=self._travel[1],
             triangle_moment=self._triangle_moment,

@@ -164,7 +164,7 @@ class NeighbourLists(NamedTuple):
 
 @by_reference
 class TargetShapes(NamedTuple):
-    """Surfaces of T targets.
+    """The kinds of surface of T targets.
 
     Attributes
     ----------
@@ -172,20 +172,25 @@ class TargetShapes(NamedTuple):
         MESH, or a kind of :mod:`.geometry.shapes`, whose contacts are computed in closed form.
     size : (T, 3) float, metres
         See :attr:`.Shape.size`.
+    closed : (T,) bool
+        Which meshes have an inside.
     points : (blocks, 6 · LANES) float
         See :func:`.blocks_of_points`; without rows where all are meshes.
     """
 
     kind: np.ndarray
     size: np.ndarray
+    closed: np.ndarray
     points: np.ndarray
 
     @classmethod
-    def of(cls, shapes: Sequence[Shape | None], points: np.ndarray | None = None) -> TargetShapes:
+    def of(
+        cls, shapes: Sequence[Shape | None], closed: Sequence[bool] | np.ndarray, points: np.ndarray | None = None
+    ) -> TargetShapes:
         """Return the shapes of targets; None stands for a mesh."""
         kind = np.array([MESH if shape is None else shape.kind for shape in shapes], np.int64)
         size = np.array([(0.0, 0.0, 0.0) if shape is None else shape.size for shape in shapes]).reshape(-1, 3)
-        return cls(kind, size, np.zeros((0, 0)) if points is None else points)
+        return cls(kind, size, np.array(closed, np.bool_), np.zeros((0, 0)) if points is None else points)
 
 
 @by_reference

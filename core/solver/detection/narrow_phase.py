@@ -284,17 +284,16 @@ def _is_inside(segment: Segment, target: int, tree: Tree) -> bool:
 
 
 @kernel
-def count_too_deep(
-    pair: int, closed: bool, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace
-) -> int:
+def count_too_deep(pair: int, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace) -> int:
     """Count the contact points of a pair that are pressed past their maximum penetration, and so measure nothing.
 
-    They are looked for once a frame by a long line from each segment's base: among all points when the target is `closed`,
+    They are looked for once a frame by a long line from each segment's base: among all points when the target is closed,
     otherwise among those that were seen to go in. Points that have come out elsewhere, as in a hole of the target, are cleared.
-    The other arguments are those of :func:`find_contacts`.
+    The arguments are those of :func:`find_contacts`.
     """
     sensor, target = model.pairs.sensor[pair], model.pairs.target[pair]
     pose, tree, triangles = workspace.pairs.pose[pair], detection.tree, state.triangle
+    closed = detection.shapes.closed[target]
     write_relative_pose(pair, model, state, workspace)
     place_all_triangles(target, detection.surfaces, tree)
     frame, reach, root, bounds = model.points.frame, model.sensors.max_penetration[sensor], tree.roots[target], tree.bounds

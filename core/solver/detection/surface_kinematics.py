@@ -8,10 +8,11 @@ import math
 import numpy as np
 
 from ...compiled.kernels import kernel
+from ...geometry.rotations import matrix_times_vector
 from ...laws.friction import turned_into_plane
 from ..solver_model import SolverModel, State
 from ..workspace import Workspace
-from .deformation import at_moment, point_at
+from .deformation import point_at, vector_at_moment
 from .detection_data import (
     BRISTLE,
     DEPTH,
@@ -25,6 +26,7 @@ from .detection_data import (
     read_vector,
     write_vector,
 )
+from .shape_contacts import in_sensor_axes
 
 
 @kernel
@@ -49,9 +51,8 @@ def _smooth_normal(
     moment, found, corner = surfaces.clock[PRESENT], surfaces.targets, surfaces.corner
     nx, ny, nz = 0.0, 0.0, 0.0
     for k in range(3):
-        nx += weights[k] * at_moment(found, moment, target, corner[triangle, k], 3)
-        ny += weights[k] * at_moment(found, moment, target, corner[triangle, k], 4)
-        nz += weights[k] * at_moment(found, moment, target, corner[triangle, k], 5)
+        x, y, z = vector_at_moment(found, moment, target, corner[triangle, k], 3)
+        nx, ny, nz = nx + weights[k] * x, ny + weights[k] * y, nz + weights[k] * z
     length = math.sqrt(nx * nx + ny * ny + nz * nz)
     scale = 1.0 / length if length > 1e-9 else 0.0
     return scale * nx, scale * ny, scale * nz
@@ -93,9 +94,9 @@ def _target_velocity(
     x, y, z = 0.0, 0.0, 0.0
     for k in range(3):
         i, share = corner[triangle, k], weights[k] / dt
-        x += share * (at_moment(found, other, target, i, 0) - at_moment(found, now, target, i, 0))
-        y += share * (at_moment(found, other, target, i, 1) - at_moment(found, now, target, i, 1))
-        z += share * (at_moment(found, other, target, i, 2) - at_moment(found, now, target, i, 2))
+        ax, ay, az = vector_at_moment(found, now, target, i, 0)
+        bx, by, bz = vector_at_moment(found, other, target, i, 0)
+        x, y, z = x + share * (bx - ax), y + share * (by - ay), z + share * (bz - az)
     return x, y, z
 
 
@@ -139,24 +140,18 @@ def _apply_surface_motion(
         if smooth:
             fx, fy, fz = _smooth_normal(target, triangle, weights, surfaces)
             if fx != 0.0 or fy != 0.0 or fz != 0.0:
-                nx = pose[0] * fx + pose[3] * fy + pose[6] * fz
-                ny = pose[1] * fx + pose[4] * fy + pose[7] * fz
-                nz = pose[2] * fx + pose[5] * fy + pose[8] * fz
+                nx, ny, nz = in_sensor_axes((fx, fy, fz), pose)
                 facing = nx * frame[point, 3] + ny * frame[point, 4] + nz * frame[point, 5]
                 write_vector(rows, block, NORMAL, lane, nx, ny, nz)
                 rows[block, DEPTH + lane] = along * max(-facing, 0.0)
         if deforms or bends:
             vx, vy, vz = 0.0, 0.0, 0.0
             if deforms and not still:
-                ux, uy, uz = _target_velocity(target, triangle, weights, dt, surfaces)
-                vx += turn[1, 0, 0] * ux + turn[1, 0, 1] * uy + turn[1, 0, 2] * uz
-                vy += turn[1, 1, 0] * ux + turn[1, 1, 1] * uy + turn[1, 1, 2] * uz
-                vz += turn[1, 2, 0] * ux + turn[1, 2, 1] * uy + turn[1, 2, 2] * uz
+                ux, uy, uz = matrix_times_vector(turn[1], *_target_velocity(target, triangle, weights, dt, surfaces))
+                vx, vy, vz = vx + ux, vy + uy, vz + uz
             if bends and not still:
-                ux, uy, uz = _sensor_velocity(sensor, i, along, dt, surfaces)
-                vx -= turn[2, 0, 0] * ux + turn[2, 0, 1] * uy + turn[2, 0, 2] * uz
-                vy -= turn[2, 1, 0] * ux + turn[2, 1, 1] * uy + turn[2, 1, 2] * uz
-                vz -= turn[2, 2, 0] * ux + turn[2, 2, 1] * uy + turn[2, 2, 2] * uz
+                ux, uy, uz = matrix_times_vector(turn[2], *_sensor_velocity(sensor, i, along, dt, surfaces))
+                vx, vy, vz = vx - ux, vy - uy, vz - uz
             write_vector(contacts.surface_velocity, block, 0, lane, vx, vy, vz)
 
 

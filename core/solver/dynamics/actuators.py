@@ -8,6 +8,7 @@ that no gain asks for a small step.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -295,14 +296,10 @@ class DriveCommands:
 
     def __init__(self, scenario: Scenario):
         self._scenario = scenario
-        self._drives = {
-            i: body.drive for i, body in enumerate(scenario.bodies) if body.drive is not None and body.drive.leader is None
-        }
+        drives = [(i, body.drive) for i, body in enumerate(scenario.bodies) if body.drive is not None]
+        self._drives = {i: drive for i, drive in drives if drive.leader is None}
         self._targets = {body: drive.target for body, drive in self._drives.items()}
-        self._coupled = {body: 1 for body in self._drives}
-        for other in scenario.bodies:
-            if other.drive is not None and other.drive.leader is not None:
-                self._coupled[other.drive.leader] += 1
+        self._coupled = Counter(i if drive.leader is None else drive.leader for i, drive in drives)
         self._controllers = {
             body: GripControl(drive.max_speed, drive.max_force, drive.settling)
             for body, drive in self._drives.items()

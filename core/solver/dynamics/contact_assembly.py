@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...compiled.kernels import inlined, kernel
+from ...compiled.kernels import addressed_kernel, inlined, kernel
 from ...effects.engine.compiled_program import TexelMotion, has_effects, may_pull
 from ...laws.contact_law import LINEAR_EXPONENT, ContactLaw, read_law
 from ...laws.friction import bristle_step, deflection_scale, friction_tangent, max_bristle_deflection, next_deflection
@@ -26,12 +26,13 @@ from ..detection.detection_data import (
     NORMAL_BIAS,
     NORMAL_SLOPE,
     POINT,
+    DetectionData,
     read_vector,
 )
 from ..solver_model import SolverModel, State
 from ..workspace import SUMS, Workspace
 from .effect_kernels import FULL_STEP, apply_effects, lane_range, press_texel, write_tangent
-from .friction_state import motion_values, point_law, relative_motion, row_of, row_velocity, velocity_at
+from .friction_state import motion_values, point_law, relative_motion, row_of, row_velocity, velocity_at, write_pair_motion
 
 
 class Tangent(NamedTuple):
@@ -132,13 +133,17 @@ def linearise_contact(
     )  # fmt: skip
 
 
-@inlined
-def sum_pair_contacts(pair: int, dt: float, model: SolverModel, state: State, workspace: Workspace) -> None:
+@addressed_kernel
+def sum_pair_contacts(
+    pair: int, dt: float, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace
+) -> None:
     """Sum up the contacts of a pair, linearised at the velocities that are guessed."""
+    if workspace.contacts.number[pair] == 0:
+        return
     a, b = model.pairs.sensor_body[pair], model.pairs.target_body[pair]
-    bodies, pairs = workspace.bodies, workspace.pairs
-    relative_motion(a, b, bodies.step_motion, state.position, bodies.rotation, pairs.motion[pair])
-    relative_motion(a, b, bodies.known_step_motion, state.position, bodies.rotation, pairs.known_motion[pair])
+    bodies, known = workspace.bodies, workspace.pairs.known_motion[pair]
+    write_pair_motion(pair, model, state, workspace)
+    relative_motion(a, b, bodies.known_step_motion, state.position, bodies.rotation, known)
     law, unknown = read_law(model.pairs.law, pair), model.bodies.first_unknown
     alike = law.exponent == LINEAR_EXPONENT and len(model.points.multipliers) == 0 and not workspace.contacts.deforming[pair]
     if alike and unknown[a] < 0 and unknown[b] < 0 and not has_effects(model.pairs.sensor[pair], model.effects):

@@ -21,7 +21,7 @@ from ...effects.engine.compiled_program import (
     has_effects,
     write_base_law,
 )
-from ...laws.contact_law import LINEAR_EXPONENT, ContactLaw, read_law, whole_texel_law, with_friction
+from ...laws.contact_law import LINEAR_EXPONENT, ContactLaw, read_law, whole_texel_law
 from ..detection.detection_data import DEPTH, EXTRA_VISCOSITY, FRICTION_SCALE, LANES, NORMAL_BIAS, NORMAL_SLOPE
 from ..solver_model import SolverModel, State
 from ..workspace import EffectWork, Workspace
@@ -110,21 +110,6 @@ def write_tangent(
 
 
 @kernel
-def force_and_friction_law(
-    pair: int, block: int, lane: int, law: ContactLaw, model: SolverModel, contacts: TexelContacts
-) -> tuple[float, ContactLaw]:
-    """Normal force of a contact point (N), and its law with the friction that the effects make."""
-    share = model.pairs.force_share[pair]
-    factor, viscous = contacts.friction_factor[block, lane], share * contacts.extra_viscosity[block, lane]
-    return share * contacts.force[block, lane], with_friction(law, factor, viscous)
-
-
-# Bring the memory of the sensors' effects to the end of a step (kernels).
-#
-# Each contact point has a memory of its own, whatever presses on it; of several targets at one point the deepest counts.
-
-
-@kernel
 def commit_effect_memory(dt: float, model: SolverModel, state: State, workspace: Workspace) -> None:
     """Bring the memory of all effects to the step's end, at the velocities of its end."""
     for pair in range(len(model.pairs.sensor)):
@@ -141,23 +126,15 @@ def commit_effect_memory(dt: float, model: SolverModel, state: State, workspace:
 def _record_pair(pair: int, dt: float, model: SolverModel, workspace: Workspace) -> None:
     """Record the contacts of the points of a pair's sensor at the step's end."""
     contacts, law = workspace.contacts, read_law(model.pairs.law, pair)
-    motion = motion_values(workspace.pairs.motion[pair])
+    motion, recorded = motion_values(workspace.pairs.motion[pair]), workspace.effects.points
     for r in range(contacts.number[pair]):
         b, lane = row_of(r, pair, contacts)
         point = model.pairs.first_point[pair] + contacts.slots[b, lane] - model.pairs.first_slot[pair]
         vx, vy, vz, rate = row_velocity(b, lane, motion, contacts.deforming[pair], contacts)
         slide_step = dt * math.sqrt(max(vx * vx + vy * vy + vz * vz - rate * rate, 0.0))
         p, end = point_law(law, model.points.multipliers, point), contacts.rows[b, DEPTH + lane] + dt * rate
-        _record_deepest(point, pair, TexelMotion(end, rate, slide_step, 0.0), p, model, workspace.effects.points)
-
-
-@kernel
-def _record_deepest(
-    point: int, pair: int, motion: TexelMotion, law: ContactLaw, model: SolverModel, recorded: TexelContacts
-) -> None:
-    """Record the contact of a point, if no other contact is deeper."""
-    if model.pairs.overlap_share[pair] * motion.depth > recorded.depth[0, point]:
-        press_texel(recorded, 0, point, pair, motion, law, model)
+        if model.pairs.overlap_share[pair] * end > recorded.depth[0, point]:  # no other contact is deeper
+            press_texel(recorded, 0, point, pair, TexelMotion(end, rate, slide_step, 0.0), p, model)
 
 
 @kernel

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...compiled.kernels import inlined, kernel
+from ...compiled.kernels import addressed_kernel, inlined, kernel
+from ...geometry.rotations import matrix_times_vector
 from ...laws.contact_law import ContactLaw, scaled_law
 from ...laws.friction import deflection_scale, next_deflection
 from ..detection.deformation import frame_at
@@ -18,6 +19,7 @@ from ..detection.detection_data import (
     NORMAL,
     OTHER,
     POINT,
+    DetectionData,
     SurfaceMotion,
     read_vector,
     write_vector,
@@ -137,17 +139,19 @@ def row_velocity(
     return vx, vy, vz, vx * nx + vy * ny + vz * nz
 
 
-@inlined
+@addressed_kernel
 def update_pair_friction(
-    pair: int, dt: float, model: SolverModel, surfaces: SurfaceMotion, state: State, workspace: Workspace
+    pair: int, dt: float, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace
 ) -> None:
     """Bring the bristle deflections of a pair to the step's end, in the sensor's axes at that time."""
+    if workspace.contacts.number[pair] == 0:
+        return
     write_pair_motion(pair, model, state, workspace)
     _write_motion_at_step_end(pair, dt, model, workspace)
     if workspace.contacts.deforming[pair]:
         _rotate_surface_velocities(pair, workspace)
-    if surfaces.sensor_deforms[model.pairs.sensor[pair]]:
-        _rotate_rows(pair, model, surfaces, workspace)
+    if detection.surfaces.sensor_deforms[model.pairs.sensor[pair]]:
+        _rotate_rows(pair, model, detection.surfaces, workspace)
     _update_bristles(pair, motion_values(workspace.pairs.known_motion[pair]), state, workspace)
 
 
@@ -157,11 +161,8 @@ def _rotate_surface_velocities(pair: int, workspace: Workspace) -> None:
     contacts, rotation = workspace.contacts, workspace.pairs.rotations[pair, 0]
     for r in range(contacts.number[pair]):
         b, lane = row_of(r, pair, contacts)
-        u = read_vector(contacts.surface_velocity, b, 0, lane)
-        for k in range(3):
-            contacts.surface_velocity[b, k * LANES + lane] = (
-                rotation[k, 0] * u[0] + rotation[k, 1] * u[1] + rotation[k, 2] * u[2]
-            )
+        turned = matrix_times_vector(rotation, *read_vector(contacts.surface_velocity, b, 0, lane))
+        write_vector(contacts.surface_velocity, b, 0, lane, *turned)
 
 
 @kernel
@@ -238,6 +239,5 @@ def _rotate_rows(pair: int, model: SolverModel, surfaces: SurfaceMotion, workspa
                 for axis in range(3):
                     turn[row, column] += after[3 + 3 * axis + row] * frame[point, 3 + 3 * axis + column]
         for first in (NORMAL, BRISTLE):
-            x, y, z = read_vector(rows, block, first, lane)
-            for k in range(3):
-                rows[block, first + k * LANES + lane] = turn[k, 0] * x + turn[k, 1] * y + turn[k, 2] * z
+            turned = matrix_times_vector(turn, *read_vector(rows, block, first, lane))
+            write_vector(rows, block, first, lane, *turned)

@@ -29,11 +29,7 @@ def is_first_part(pair: int, pairs: Pairs) -> bool:
 @inlined
 def is_last_part(pair: int, pairs: Pairs) -> bool:
     """True for the last contact part of this sensor–target pair."""
-    return (
-        pair + 1 == len(pairs.sensor)
-        or pairs.sensor[pair] != pairs.sensor[pair + 1]
-        or pairs.target[pair] != pairs.target[pair + 1]
-    )
+    return pair + 1 == len(pairs.sensor) or is_first_part(pair + 1, pairs)
 
 
 @inlined

@@ -13,8 +13,10 @@ import numpy as np
 
 from ...compiled.kernels import inlined, kernel
 from ...geometry.rotations import (
+    matrix_times_vector,
     project_on_axis,
     rotate_quaternion,
+    to_body_axes,
     write_rotation,
     write_step_motion,
     write_twist_map,
@@ -34,26 +36,6 @@ from .actuators import place_driven, prepare_driven
 
 LARGEST_TURN = 0.25
 """Largest rotation of one midpoint step, radians: its iterations then converge after a few."""
-
-
-@kernel
-def matrix_times_vector(matrix: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Return a (3, 3) matrix times a vector."""
-    return (
-        matrix[0, 0] * x + matrix[0, 1] * y + matrix[0, 2] * z,
-        matrix[1, 0] * x + matrix[1, 1] * y + matrix[1, 2] * z,
-        matrix[2, 0] * x + matrix[2, 1] * y + matrix[2, 2] * z,
-    )
-
-
-@kernel
-def to_body_axes(rotation: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Return a vector of the world in the axes of a body with the given rotation."""
-    return (
-        rotation[0, 0] * x + rotation[1, 0] * y + rotation[2, 0] * z,
-        rotation[0, 1] * x + rotation[1, 1] * y + rotation[2, 1] * z,
-        rotation[0, 2] * x + rotation[1, 2] * y + rotation[2, 2] * z,
-    )
 
 
 @kernel
@@ -125,24 +107,16 @@ def mean_angular_velocity(
     return matrix_times_vector(rotation, pace * qx, pace * qy, pace * qz)
 
 
-@kernel
-def angular_velocity_of(
-    rotation: np.ndarray, inverse: np.ndarray, lx: float, ly: float, lz: float
-) -> tuple[float, float, float]:
-    """Angular velocity (rad/s) of a body whose angular momentum is `l` (kg·m²/s), both in world axes."""
-    bx, by, bz = to_body_axes(rotation, lx, ly, lz)
-    wx, wy, wz = matrix_times_vector(inverse, bx, by, bz)
-    return matrix_times_vector(rotation, wx, wy, wz)
-
-
 @inlined
-def write_rotation_at_end(body: int, dt: float, model: SolverModel, state: State, workspace: Workspace) -> None:
+def write_end(body: int, dt: float, model: SolverModel, state: State, workspace: Workspace) -> None:
     """Write orientation and spin of a free body at the step's end, and by how much its energy differs from what was reckoned.
 
     A body that nothing touches keeps its angular momentum and its energy. Torques bring it momentum, but the spin that follows
     depends on how the body lies at the end: its energy grows by more or less than the torques' impulse times the mean of the
     spins at both ends, which is what the work of its contacts is reckoned with.
     """
+    if model.bodies.mode[body] != FREE:
+        return
     velocity, work = state.velocity[body], workspace.bodies
     quaternion, rotation, extra = work.end_quaternion[body], work.end_rotation[body], work.spin_correction[body]
     before, inertia = work.velocity_before[body], work.inertia[body]
@@ -152,7 +126,8 @@ def write_rotation_at_end(body: int, dt: float, model: SolverModel, state: State
         quaternion[i] = state.quaternion[body, i]
     rotate_quaternion(quaternion, dt * velocity[3], dt * velocity[4], dt * velocity[5])
     write_rotation(quaternion, rotation)
-    ex, ey, ez = angular_velocity_of(rotation, model.bodies.inverse_inertia[body], lx, ly, lz)
+    wx, wy, wz = matrix_times_vector(model.bodies.inverse_inertia[body], *to_body_axes(rotation, lx, ly, lz))
+    ex, ey, ez = matrix_times_vector(rotation, wx, wy, wz)
     work.end_spin[body, 0], work.end_spin[body, 1], work.end_spin[body, 2] = ex, ey, ez
     first = before[3] - extra[0], before[4] - extra[1], before[5] - extra[2]
     gx, gy, gz = matrix_times_vector(inertia, velocity[3] - before[3], velocity[4] - before[4], velocity[5] - before[5])
@@ -188,11 +163,6 @@ def number_unknowns(mode: np.ndarray, drive_of: np.ndarray) -> tuple[np.ndarray,
     first_unknown = np.where(free, 6 * (np.cumsum(free) - 1), -1)
     first_unknown[mode == DRIVEN] = drive_unknown[drive_of[mode == DRIVEN]]
     return first_unknown, drive_unknown, int(6 * np.count_nonzero(free) + drives)
-
-
-def driven_bodies(mode: np.ndarray) -> np.ndarray:
-    """Indices of the driven bodies."""
-    return np.flatnonzero(mode == DRIVEN)
 
 
 def pairs_with_account(mode: np.ndarray, pairs: Pairs) -> np.ndarray:
@@ -332,13 +302,6 @@ def is_moved_by_path(body: int, model: SolverModel, state: State) -> bool:
         for i in range(6):
             moves = moves or state.velocity[body, i] != 0.0
     return moves
-
-
-@inlined
-def write_end(body: int, dt: float, model: SolverModel, state: State, workspace: Workspace) -> None:
-    """Write orientation and spin of a free body at the step's end (see :func:`.write_rotation_at_end`)."""
-    if model.bodies.mode[body] == FREE:
-        write_rotation_at_end(body, dt, model, state, workspace)
 
 
 @inlined

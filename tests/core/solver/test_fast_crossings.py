@@ -10,7 +10,7 @@ from solver_scenes import LEVEL, box, cube_on_pad, pressed
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.rotations import quaternion_product, rotation_vectors
 from palpate.core.model.body import Body, Motion
-from palpate.core.solver.fast_crossings import BodiesInFrame, _entering, _travel, path_of_moved_bodies
+from palpate.core.solver.fast_crossings import CrossingLimits, _entering, _travel, path_of_moved_bodies
 from palpate.core.solver.simulation import run
 
 
@@ -98,8 +98,8 @@ def test_the_quick_bound_is_never_below_the_fastest_step():
         else:
             relative = quaternion_product(turns[1:], turns[:-1] * np.array([1.0, -1, -1, -1]))
             velocities = np.concatenate([np.diff(places, axis=0), rotation_vectors(relative)], axis=2) / dt
-        bodies = BodiesInFrame(velocities, places[0], turns[0], places[-1], turns[-1], np.array([moved]), radius)
+        limits = CrossingLimits(np.zeros((0, 2), np.int64), np.zeros(0), np.array([moved]), radius)
         cosines = np.abs((turns[1:] * turns[:-1]).sum(axis=2))
         farthest = (np.linalg.norm(np.diff(places, axis=0), axis=2) + 2 * np.arccos(np.minimum(cosines, 1)) * radius).max()
-        bound = _travel(0, bodies, dt)
+        bound = _travel(0, limits, dt, velocities, (places[0], turns[0]), (places[-1], turns[-1]))
         assert farthest * (1 - 1e-9) <= bound <= 2 * farthest * (1 + 1e-9)

@@ -13,6 +13,7 @@ from palpate.core.model.body import Body, Motion
 from palpate.core.model.scenario import Scenario, Target
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import SensorParameters
+from palpate.core.solver.detection.narrow_phase import count_too_deep
 from palpate.core.solver.simulation import Simulation, run
 
 DEPTH = 1e-3
@@ -118,7 +119,7 @@ def test_texels_that_come_out_in_a_hole_are_no_longer_sunk():
     counts = []
     for _ in range(3):
         simulation.advance()
-        counts.append(simulation._count_too_deep(0))
+        counts.append(count_too_deep(0, *simulation.arrays))
     assert counts[1:] == [9, 0]
     assert not (simulation._state.triangle == -2).any()
 
