@@ -66,11 +66,12 @@ def find_sample_faults(stimuli: Sequence[Stimulus]) -> list[DataFault]:
 
 
 def _equal_rows(stimulus: Stimulus) -> np.ndarray:
-    """Samples whose responses all equal those of the sample before, (T,) bool; channels that never change do not count."""
+    """Samples whose responses all equal the last known ones before, (T,) bool; channels that never change do not count."""
     values = np.concatenate(stimulus.trial.responses, axis=1)
     alive = np.fmax.reduce(values, axis=0) > np.fmin.reduce(values, axis=0)
-    before, after = values[:-1, alive], values[1:, alive]
-    same = (before == after) | (np.isnan(before) & np.isnan(after))
+    last = np.maximum.accumulate(np.where(np.isnan(values), 0, np.arange(len(values))[:, None]), axis=0)
+    before, after = np.take_along_axis(values, last, axis=0)[:-1, alive], values[1:, alive]
+    same = (before == after) | np.isnan(after)
     silent = ((after == _untouched(stimulus, values)[alive]) | np.isnan(after)).all(axis=1)
     return np.concatenate([[False], same.all(axis=1) & np.isfinite(after).any(axis=1) & ~silent])
 

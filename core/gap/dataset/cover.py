@@ -80,7 +80,8 @@ def read_cover(sensor: Mapping[str, Any], path: Path) -> tuple[Texels, Cover]:
         return flat_texels(places, np.full(len(places), area)), Cover(surface, weights, surface.area / area)
     strips = _strips(sensor["strips"], f"strips of '{path.name}'", size)
     surface = _surface(size, words, min(map(_width, strips)) / POINTS_PER_STRIP, where)
-    covered = np.array([_covered(strip, surface) for strip in strips]) * surface.area
+    cell = size / [len(np.unique(values)) for values in surface.position[:, :2].T]
+    covered = np.array([_covered(strip, surface, cell) for strip in strips]) * surface.area
     areas = covered.sum(axis=1)
     (missed,) = np.nonzero(areas <= 0.0)
     if len(missed):
@@ -172,20 +173,13 @@ def _load_at_depth(places: np.ndarray, surface: Texels, depth: float) -> np.ndar
     return np.where(weights > NEGLIGIBLE * weights.max(axis=1, keepdims=True), weights, 0.0)
 
 
-def _covered(corners: np.ndarray, surface: Texels) -> np.ndarray:
-    """Share of each point's cell that a polygon covers, (m,): even-odd rule at a grid of points of the cell."""
-    x, y = surface.position[:, 0], surface.position[:, 1]
-    step_x, step_y = (_spacing(values) or float(np.sqrt(surface.area[0])) for values in (x, y))
+def _covered(corners: np.ndarray, surface: Texels, cell: np.ndarray) -> np.ndarray:
+    """Share of each point's cell that a polygon covers, (m,): even-odd rule at a grid of points of the cell, `cell` (2,) wide."""
     offsets = (np.arange(SUBDIVISIONS) + 0.5) / SUBDIVISIONS - 0.5
-    px, py = x + (offsets * step_x)[:, None, None], y + (offsets * step_y)[:, None]
+    px = surface.position[:, 0] + (offsets * cell[0])[:, None, None]
+    py = surface.position[:, 1] + (offsets * cell[1])[:, None]
     inside = np.zeros((SUBDIVISIONS, SUBDIVISIONS, len(surface)), bool)
     for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         if ay != by:
             inside ^= ((ay > py) != (by > py)) & (px < (bx - ax) * (py - ay) / (by - ay) + ax)
     return np.asarray(inside.mean(axis=(0, 1)))
-
-
-def _spacing(values: np.ndarray) -> float:
-    """Distance between neighbouring values; zero if all are equal."""
-    distinct = np.unique(np.round(values, 12))
-    return float(np.diff(distinct).min()) if len(distinct) > 1 else 0.0

@@ -169,7 +169,7 @@ def read_rig(path: str | Path) -> Rig:
         parameters=parameters,
         given=frozenset(set(sensor) & set(SENSOR_PARAMETERS)),
         grid=grid,
-        indenter=None if found.indenter is None else _indenter(found.indenter, path),
+        indenter=None if found.indenter is None else _indenter(found.indenter, f"[indenter] of '{path.name}'", path),
         trials=tuple(trials),
         words=sensor,
         warnings=(*warnings, *_channel_warnings(trials)),
@@ -349,18 +349,19 @@ def _probes(entries: list[dict[str, Any]], path: Path) -> dict[str, Indenter]:
     """The probes that recordings may name."""
     found: dict[str, Indenter] = {}
     for number, entry in enumerate(entries, start=1):
-        name = checked_name(entry.get("name", ""), f"[[probe]] {number} of '{path.name}'")
+        where = f"[[probe]] {number} of '{path.name}'"
+        name = checked_name(entry.get("name", ""), where)
         if name in found:
             raise FileError(f"'{path.name}' has a [[probe]] {name!r} twice: give each a name of its own.")
-        found[name] = _indenter(entry, path)
+        found[name] = _indenter(entry, where, path)
     return found
 
 
-def _indenter(words: dict[str, Any], path: Path) -> Indenter:
+def _indenter(words: dict[str, Any], where: str, path: Path) -> Indenter:
     """The indenter, or a probe."""
-    known_words(words, {"shape", "mesh", "name"}, f"[indenter] of '{path.name}'")
+    known_words(words, {"shape", "mesh", "name"}, where)
     if ("shape" in words) == ("mesh" in words):
-        raise FileError(f"[indenter] of '{path.name}' needs either a shape or a mesh, and not both.")
+        raise FileError(f"{where} needs either a shape or a mesh, and not both.")
     if "mesh" in words:
         mesh = _mesh(_inside(words["mesh"], "The indenter's mesh", path), "the indenter")
         return Indenter(turned_outwards(mesh, "the indenter"))
@@ -374,12 +375,12 @@ def _indenter(words: dict[str, Any], path: Path) -> Indenter:
     shape = words["shape"]
     if not isinstance(shape, dict) or len(shape) != 1 or next(iter(shape)) not in solids:
         raise FileError(
-            f"The indenter's shape of '{path.name}' is {shape!r}: write {{ sphere = radius }}, {{ box = [x, y, z] }} or "
+            f"The shape in {where} is {shape!r}: write {{ sphere = radius }}, {{ box = [x, y, z] }} or "
             "{ cylinder = [radius, height] }, in metres."
         )
     ((kind, size),) = shape.items()
     what, count, solid_of = solids[kind]
-    lengths = checked_lengths(size, count, f"The {kind}'s {what} of '{path.name}'")
+    lengths = checked_lengths(size, count, f"The {kind}'s {what} in {where}")
     solid = solid_of(*lengths)
     mesh = checked_mesh(solid.vertices, solid.faces, "the indenter")[0]
     return Indenter(mesh, lengths[0] if kind == "sphere" else None, lengths if kind == "box" else None)

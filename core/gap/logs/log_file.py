@@ -54,6 +54,8 @@ def read_log(path: str | os.PathLike) -> LogFile:
         There is no such file, it is none of the known formats, it is damaged, or too large.
     """
     path = Path(path)
+    if any("\ud800" <= letter <= "\udfff" for letter in path.name):  # bytes that are none, which TOML cannot hold
+        raise FileError(f"The name of the log {path.name!r} is not UTF-8: rename it.")
     with read_errors_said(path):
         if path.is_dir():
             return read_bag(path)

@@ -33,6 +33,8 @@ LARGEST_MOTION, LARGEST_FORCE, SMALLEST_MOTION = 1.5, 1e4, 1e-7
 """Metres and newtons beyond which a unit must be wrong: rigs for touch move by less and press with less than a ton."""
 FOLLOWS = 0.5
 """Correlation of a response with the stimulus from which on there is contact, however large the noise from sample to sample."""
+SECOND_LOGGER = "_readings"
+"""End of the name of a second logger's CSV file."""
 DIGITS = 10
 """Significant digits of the numbers in the CSV files."""
 
@@ -100,17 +102,19 @@ def write_rig(logs: Sequence[LogFile], answers: Answers, folder: str | os.PathLi
 
 
 def _file_names(recordings: Sequence[RecordingAnswer], folder: Path, logs: Sequence[LogFile]) -> dict[str, str]:
-    """Return the name of the CSV file of each recording; none of them is a log itself."""
+    """Return the name of the CSV file of each recording, without its ending; neither it nor that of a second logger is a log."""
     found: dict[str, str] = {}
+    files: set[str] = set()
     for recording in recordings:
         if recording.name in found:
             raise FileError(f"Two recordings are called '{recording.name}': give each a name of its own.")
         plain = "".join(c if c.isalnum() or c in "-_." else "_" for c in recording.name).strip(".") or "recording"
-        while plain.lower() in {name.lower() for name in found.values()}:
+        while not files.isdisjoint(own := {f"{plain}{end}.csv".lower() for end in ("", SECOND_LOGGER)}):
             plain += "_"
         found[recording.name] = plain
+        files |= own
     for log in logs:
-        for name in (RIG_NAME, *(f"{one}{end}.csv" for one in found.values() for end in ("", "_readings"))):
+        for name in (RIG_NAME, *(f"{one}{end}.csv" for one in found.values() for end in ("", SECOND_LOGGER))):
             if (folder / name).exists() and log.path.exists() and os.path.samefile(folder / name, log.path):
                 raise FileError(f"'{log.path}' is read and would be overwritten: write the rig into another folder.")
     return found
@@ -273,11 +277,11 @@ def _trial(
         second = start if abs(second - start) < 86400.0 else second
         late, why = _lateness(recording, driven, answered, start - second)
         notes.append(f"'{recording.name}': {why}.")
-        lines += [f"# {why}", f"readings = {toml_value({'file': f'{name}_readings.csv', 'late': late})}"]
+        lines += [f"# {why}", f"readings = {toml_value({'file': f'{name}{SECOND_LOGGER}.csv', 'late': late})}"]
     _check_contact(answered, recording.name)
     _write_csv(folder / f"{name}.csv", driven, start)
     if answered is not driven:
-        _write_csv(folder / f"{name}_readings.csv", answered, second)
+        _write_csv(folder / f"{name}{SECOND_LOGGER}.csv", answered, second)
     stamp = f"times count from {start:.3f} s of the log's clock; " if abs(start) > 1e-9 else ""
     return [*lines, f"# {stamp}read from {', '.join(recording.files)}", ""]
 

@@ -122,6 +122,16 @@ def test_strips_carry_what_lies_on_them(tmp_path):
     assert ((spread > 0).sum(axis=1) > (rig.cover.weights > 0).sum(axis=1)).all()
 
 
+@pytest.mark.parametrize("pitch", [0.018, 0.03])
+def test_a_cover_with_one_row_of_points_or_one_point_gives_strips_their_areas(tmp_path, pitch):
+    strip = [[-0.015, -0.009], [0.0, 0.009]]
+    words = f"strips = [{strip}]\ncover = {{ size = {list(SIZE)}, pitch = {pitch} }}"
+    text = RIG.replace(f"sensors = {PLACES}\ncover = {{ size = {list(SIZE)}, depth = {DEPTH} }}", words)
+    columns = [line.split(",")[:5] for line in recording(0).splitlines()]
+    rig = read_rig(write(tmp_path, text + '[[trial]]\nfile = "press_0.csv"\n', press_0=columns))
+    np.testing.assert_allclose(rig.texels.area, 0.5 * SIZE[0] * SIZE[1], rtol=1e-9)
+
+
 @pytest.mark.long("a whole diagnosis under a cover")
 def test_eight_transducers_of_which_nothing_is_wrong_but_creep(tmp_path):
     text = RIG.replace(f"k = {K}", f"k = {1.2 * K}")

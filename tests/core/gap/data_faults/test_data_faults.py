@@ -84,6 +84,15 @@ def test_a_fault_is_found_and_put_right(kind, names):
     assert not find_faults(mended, stimuli_of(mended))
 
 
+def test_missing_cells_do_not_end_the_run_of_a_logger_that_is_stuck():
+    rig, said = faulty("stuck-logger", ONE), []
+    for _ in range(2):
+        (fault,) = find_faults(rig, stimuli_of(rig))
+        said.append(fault.sentence)
+        rig.trials[1].reading[[130, 150, 151], [3, 5, 3]] = np.nan
+    assert said[0] == said[1]
+
+
 def low_passed(reading, time):
     keep = np.exp(-1.0 / (0.1 * cases.RATE))
     return lfilter([1.0 - keep], [1.0, -keep], reading, axis=0)

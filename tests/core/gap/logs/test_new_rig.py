@@ -131,6 +131,15 @@ def test_clocks_of_two_loggers_are_aligned_and_the_shift_is_a_parameter(tmp_path
     np.testing.assert_allclose(reading, 60.0 * np.maximum(depth, 0.0), atol=3e-4)
 
 
+def test_files_of_two_loggers_have_names_of_their_own(tmp_path):
+    logs = two_loggers(tmp_path)
+    answers = template(tmp_path, logs)
+    text = answers.read_text()
+    answers.write_text(text + text[text.index("[[recording]]") :].replace('"stage_1"', '"stage_1_readings"'))
+    new_rig(tmp_path / "rig", logs, answers)
+    assert sorted(one.name for one in read_rig(tmp_path / "rig" / "rig.toml").trials) == ["stage_1", "stage_1_readings_"]
+
+
 def test_a_shift_that_the_recordings_do_not_tell_is_asked(tmp_path):
     time = np.arange(COUNT) / RATE
     wave = 1e-3 * np.maximum(np.sin(2 * np.pi * time), 0.0)

@@ -56,6 +56,13 @@ def test_text_in_a_table_is_left_out_and_said(tmp_path):
     assert any("'state' holds no numbers" in note for note in log.notes) and any("1 cell with text" in n for n in log.notes)
 
 
+def test_a_name_that_no_text_can_hold_is_one_sentence(tmp_path):
+    path = tmp_path / os.fsdecode(b"pr\xff.csv")
+    path.write_text("t,F\n0,1\n")
+    with pytest.raises(FileError, match="is not UTF-8: rename it"):
+        read_log(path)
+
+
 # --- arrays
 
 
