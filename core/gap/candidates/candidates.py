@@ -217,8 +217,9 @@ class Candidate:
 
     def effect(self, values: dict[str, float], texels: int, gain: float) -> Effect:
         """Return the effect with some values and defaults for the others; parameters of single texels start equal."""
-        held = {name: value for name, value in self.form.neutral.items() if name not in self.form.defaults(gain)}
-        complete = {**held, **self.form.defaults(gain), **values}
+        free, whole = self.form.defaults(gain), form_of(self.kind.name, self.form.name)
+        known = {name: value for name, value in whole.neutral.items() if name not in free}  # what is not looked for
+        complete = {**known, **free, **values}
         spread = {
             p.name: tuple([float(complete[p.name])] * texels)  # type: ignore[arg-type]
             for p in self.form.parameters

@@ -102,7 +102,7 @@ def write_rig(logs: Sequence[LogFile], answers: Answers, folder: str | os.PathLi
 
 
 def _file_names(recordings: Sequence[RecordingAnswer], folder: Path, logs: Sequence[LogFile]) -> dict[str, str]:
-    """Return the name of the CSV file of each recording, without its ending; neither it nor that of a second logger is a log."""
+    """Return the name of each recording's CSV file, without its ending; neither it nor that of a second logger is a log."""
     found: dict[str, str] = {}
     files: set[str] = set()
     for recording in recordings:
