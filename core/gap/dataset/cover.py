@@ -174,7 +174,7 @@ def _load_at_depth(places: np.ndarray, surface: Texels, depth: float) -> np.ndar
 
 
 def _covered(corners: np.ndarray, surface: Texels, cell: np.ndarray) -> np.ndarray:
-    """Share of each point's cell, `cell` (2,) wide, that a polygon covers, (m,): even-odd rule at a grid of points of the cell."""
+    """Share of each cell, `cell` (2,) wide, that a polygon covers, (m,): even-odd rule at a grid of points of the cell."""
     offsets = (np.arange(SUBDIVISIONS) + 0.5) / SUBDIVISIONS - 0.5
     px = surface.position[:, 0] + (offsets * cell[0])[:, None, None]
     py = surface.position[:, 1] + (offsets * cell[1])[:, None]
