@@ -27,7 +27,7 @@ from .numba_internals import (
     types,
     typing,
 )
-from .numba_internals import carray as carray  # for kernels
+from .numba_internals import carray as carray  # of this package only: kernels elsewhere get it from here
 
 # Numba's dispatcher for kernels: every function is compiled once, and may be interpreted meanwhile.
 #

@@ -207,9 +207,10 @@ else:
 
 
 def call_of_range(function: Any, given: Any, plain: Callable[[int, int], None]) -> Callable[[int, int], None]:
-    """Return a call of an :func:`.addressed_kernel` of the first and the last of some numbers and of a tuple by reference.
+    """Return a function that calls an :func:`.addressed_kernel` for the numbers from `first` to `last`, excluded.
 
-    Numba's own way of calling takes longer than a step of a small sensor. Where kernels are interpreted `plain` is called.
+    Its third argument is the tuple `given`, by reference. Numba's own way of calling takes longer than a step of a small
+    sensor. Where kernels are interpreted `plain` is called.
     """
     address, place = address_of(function, 0, 0, given), address_of_fields(given)
     compiled = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p)(address) if address else None
@@ -220,6 +221,7 @@ def call_of_range(function: Any, given: Any, plain: Callable[[int, int], None]) 
         else:
             plain(first, last)
 
+    call.given = given  # type: ignore[attr-defined]  # its address is valid as long as it lives
     return call
 
 

@@ -213,7 +213,7 @@ def vertex_areas(mesh: TriangleMesh, chosen: np.ndarray) -> np.ndarray:
     chosen : (nt,) bool
     """
     share = triangle_areas(mesh)[chosen] / 3.0
-    return np.bincount(mesh.triangles[chosen].T.ravel(), np.tile(share, 3), len(mesh.vertices))
+    return np.bincount(mesh.triangles[chosen].T.ravel(), np.tile(share, 3), len(mesh.vertices)).astype(float)
 
 
 def mass_properties(mesh: TriangleMesh, mass: float, name: str) -> tuple[np.ndarray, np.ndarray, list[str]]:

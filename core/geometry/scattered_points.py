@@ -256,7 +256,7 @@ def _triangles_at(mesh: TriangleMesh) -> list[np.ndarray]:
 
 
 def _grouped(numbers: np.ndarray, count: int) -> list[np.ndarray]:
-    """Return for each number from zero to `count` the places, ascending, where it is among some."""
+    """Return for each number below `count` the places, ascending, where it is among `numbers`."""
     order = np.argsort(numbers, kind="stable")
     return np.split(order, np.searchsorted(numbers[order], np.arange(1, count)))
 

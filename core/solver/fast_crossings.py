@@ -88,9 +88,12 @@ class FastCrossings:
             Paths of the bodies, step by step.
         dt : float, seconds
         """
+        travel = np.linalg.norm(np.diff(positions, axis=0), axis=2).max(axis=0)
+        cosines = np.abs(np.einsum("sbi,sbi->sb", quaternions[1:], quaternions[:-1])).min(axis=0)
+        travel = travel + 2.0 * np.arccos(np.minimum(cosines, 1.0)) * self.limits.radius
         found = []
         for i, (sensor, target) in enumerate(self._pairs):
-            if self._warned[i]:
+            if self._warned[i] or travel[sensor.body] + travel[target.body] < self.limits.limits[i]:
                 continue
             deepest = self._deepest_entry(sensor, target, positions, quaternions, self.limits.limits[i])
             if deepest > 0.0:

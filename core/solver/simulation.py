@@ -164,7 +164,7 @@ class Simulation:
         computed in one call. The digest of the scenario is left out on request, because it takes a tenth of a short run.
         """
         first = self.frame
-        seen = self._seen(self.scenario.frame_end - first + 1)
+        seen = self._seen(max(1, self.scenario.frame_end - first + 1))
         count, at = len(seen.may_cross), 1
         self._observe_first(seen.part(slice(0, 1)))
         while at < count:

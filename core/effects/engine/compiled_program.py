@@ -357,7 +357,7 @@ def compile_program(stacks: Sequence[Sequence[Effect]], dt: ArrayLike) -> Effect
         first_friction_law=np.array(first_friction_law, dtype=np.int64),
         friction_law=friction_law,
         friction_row=friction_row,
-        constants=constants.reshape(-1, constants.shape[2]),
+        constants=constants.reshape(len(tables) * len(lengths), constants.shape[2]),
         addresses=_ADDRESSES,
         state_size=state_size,
     )

@@ -99,10 +99,11 @@ class ReadoutChain:
     def __init__(self, effects: Iterable[Effect], transducers: TransducerArray):
         self.transducers = transducers
         self._links: list[Callable[[np.ndarray, np.ndarray], np.ndarray]] = []
-        conversion = partial(_converted, transducers)
+        conversion, converted = partial(_converted, transducers), False
         for item, form in in_signal_order(effects, readout=True):
-            if form.after_conversion and conversion not in self._links:
+            if form.after_conversion and not converted:
                 self._links.append(conversion)
+                converted = True
             values = complete_values(item, transducers.gain)
             if form.law is not None:
                 self._links.append(_Law(form, values, len(transducers.position)))
@@ -112,7 +113,7 @@ class ReadoutChain:
                 self._links.append(partial(_changed, form.memoryless, values, transducers, item.seed))
             if form.delay is not None:
                 self._links.append(_Delay(form.delay(values), len(transducers.position)))
-        if conversion not in self._links:
+        if not converted:
             self._links.append(conversion)
 
     @classmethod
@@ -150,10 +151,12 @@ def _changed(
     time: np.ndarray,
     signal: np.ndarray,
 ) -> np.ndarray:
+    """Apply a formula without memory."""
     return formula(signal, time, values, transducers, seed)
 
 
 def _coupled(weights: Weights, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
+    """Apply a linear coupling of texels."""
     return coupled(signal, weights)
 
 
