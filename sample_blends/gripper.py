@@ -115,6 +115,7 @@ def close(fingers, grip, speed: float, max_force: float, axes=("Z", "Z")) -> Non
     max_force : float, N
         Of the motor, on each finger.
     axes : two of str
+        Local axis of each finger, as "Z" or "-X".
     """
     first = fingers[0]
     for pad, axis in zip(fingers, axes, strict=True):

@@ -67,5 +67,5 @@ def _manifest(folder: Path, _stamp: tuple[int, ...]) -> Manifest | None:
     """Return the manifest in a sensor's folder, as long as its stamp stays; None when it cannot be read."""
     try:
         return read_manifest(folder)
-    except (FileError, OSError):  # who reads the bake says so
+    except FileError:  # who reads the bake says so
         return None

@@ -18,6 +18,7 @@ from mathutils import Vector
 from ...core.errors import FileError, SceneError
 from ...core.io.file_writing import atomic_write
 from ..scene import participants
+from ..session import fcurves
 
 NEED_GL = {"BLENDER_EEVEE_NEXT", "BLENDER_EEVEE", "BLENDER_WORKBENCH"}
 """Engines that need OpenGL, from a graphics card or from Mesa's software renderer."""
@@ -262,28 +263,24 @@ def _camera_view(scene) -> tuple[object, float, float]:
 def _settings(scene, path: Path, frame: int, samples: int | None, size) -> Iterator[None]:
     """Change the settings of a scene for one render, then restore them."""
     render, image = scene.render, scene.render.image_settings
-    frame_before = scene.frame_current
-    try:
-        with TemporaryChanges() as changes:
-            # Blender 5.0 has media types, which decide about the formats to choose from, as these do about the colours.
-            kinds = ("media_type", "file_format", "color_mode", "color_depth")
-            changes.keep(image, *(name for name in kinds if hasattr(image, name)))
-            if hasattr(image, "media_type"):
-                image.media_type = "IMAGE"
-            image.file_format, image.color_depth = "PNG", "8"
-            image.color_mode = "RGBA" if render.film_transparent else "RGB"
-            changes.set(render, filepath=str(path), use_file_extension=False, use_overwrite=True)
-            if size is not None:
-                changes.set(render, resolution_x=int(size[0]), resolution_y=int(size[1]), resolution_percentage=100)
-            if render.engine == "CYCLES" and scene.cycles.use_denoising and not can_denoise():
-                changes.set(scene.cycles, use_denoising=False)
-                samples = SAMPLES_WITHOUT_DENOISER * int(scene.cycles.samples if samples is None else samples)
-            if samples is not None:
-                if render.engine == "CYCLES":
-                    changes.set(scene.cycles, samples=int(samples))
-                elif hasattr(scene, "eevee"):
-                    changes.set(scene.eevee, taa_render_samples=int(samples))
-            scene.frame_set(frame)
-            yield
-    finally:
-        scene.frame_set(frame_before)
+    with fcurves.frame_kept(scene), TemporaryChanges() as changes:
+        # Blender 5.0 has media types, which decide about the formats to choose from, as these do about the colours.
+        kinds = ("media_type", "file_format", "color_mode", "color_depth")
+        changes.keep(image, *(name for name in kinds if hasattr(image, name)))
+        if hasattr(image, "media_type"):
+            image.media_type = "IMAGE"
+        image.file_format, image.color_depth = "PNG", "8"
+        image.color_mode = "RGBA" if render.film_transparent else "RGB"
+        changes.set(render, filepath=str(path), use_file_extension=False, use_overwrite=True)
+        if size is not None:
+            changes.set(render, resolution_x=int(size[0]), resolution_y=int(size[1]), resolution_percentage=100)
+        if render.engine == "CYCLES" and scene.cycles.use_denoising and not can_denoise():
+            changes.set(scene.cycles, use_denoising=False)
+            samples = SAMPLES_WITHOUT_DENOISER * int(scene.cycles.samples if samples is None else samples)
+        if samples is not None:
+            if render.engine == "CYCLES":
+                changes.set(scene.cycles, samples=int(samples))
+            elif hasattr(scene, "eevee"):
+                changes.set(scene.eevee, taa_render_samples=int(samples))
+        scene.frame_set(frame)
+        yield

@@ -169,8 +169,10 @@ def _patch(pixels: np.ndarray, width: int, height: int) -> np.ndarray:
     from scipy.spatial import ConvexHull, QhullError
 
     image = Image.new("1", (width, height))
+    corners: list[tuple[float, float]] = []
     with suppress(QhullError, ValueError):  # fewer than three points, or all on a line
         corners = [(float(x), float(y)) for x, y in pixels[ConvexHull(pixels).vertices]]
+    if corners:
         ImageDraw.Draw(image).polygon(corners, fill=1, outline=1)
     inside = np.array(image, dtype=bool)
     for x, y in np.floor(pixels).astype(int):

@@ -37,7 +37,7 @@ def may_deform(obj) -> bool:
 
 
 def has_animated_scale(obj) -> bool:
-    """Return True when keyframes or drivers change the scale of an object or of one of its parents."""
+    """Return True when keyframes, drivers or NLA strips change the scale of an object or of one of its parents."""
     while obj is not None:
         if fcurves.animated_paths(obj) & SCALE_PROPERTIES:
             return True

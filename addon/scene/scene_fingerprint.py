@@ -264,8 +264,7 @@ def _constant_scales(obj) -> str:
 def _constant_drive_target(obj) -> str:
     """Return the target of an object's drive as text; empty without a drive, and where the target is animated."""
     path = moved_bodies.target_path(obj)
-    is_animated = any(curve.data_path == path for curve in fcurves.curves_of(obj))
-    return "" if path is None or is_animated else repr((path, obj.path_resolve(path)))
+    return "" if path is None or path in fcurves.animated_paths(obj) else repr((path, obj.path_resolve(path)))
 
 
 def _digest(*parts: str) -> str:

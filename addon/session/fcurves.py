@@ -99,21 +99,33 @@ def has_other_values(block, time: float) -> bool:
     return False
 
 
-def animated_paths(obj) -> set[str]:
-    """Return the data paths of the properties that keyframes or drivers of an object animate."""
-    paths = {curve.data_path for curve in of_object(obj) or ()}
-    if obj.animation_data is not None:
-        paths |= {driver.data_path for driver in obj.animation_data.drivers}
-    return paths
+def animated_paths(block) -> set[str]:
+    """Return the data paths of the properties of a data-block that keyframes, drivers or NLA strips animate."""
+    return {curve.data_path for curve in curves_of(block)}
 
 
 def curves_of(block) -> list:
-    """Return all F-curves that animate properties of a data-block: those of its action, drivers, and those of NLA strips."""
+    """Return all F-curves that animate properties of a data-block: of its action, its drivers and evaluated NLA strips."""
     data = block.animation_data
     if data is None:
         return []
-    players = [data, *(strip for track in data.nla_tracks for strip in track.strips)]
+    players = [data, *_evaluated_strips(data)]
     return [*data.drivers, *(curve for player in players for curve in of_animation_data(player) or ())]
+
+
+def _evaluated_strips(data) -> list:
+    """Return the NLA strips that Blender evaluates: of a solo track, even if it is muted, or else of all that are not muted."""
+    tracks = [*data.nla_tracks] if data.use_nla else []
+    evaluated = [track for track in tracks if track.is_solo] or [track for track in tracks if not track.mute]
+    return [strip for track in evaluated for strip in _strips_in(track)]
+
+
+def _strips_in(container) -> Iterator:
+    """Yield the strips of a track, or of a meta strip, that are not muted."""
+    for strip in container.strips:
+        if not strip.mute:
+            yield strip
+            yield from _strips_in(strip)
 
 
 # The frame of the animation at which a scene stands. Keyframes, images and computed frames are counted in these frames.

@@ -122,7 +122,8 @@ def solver_is_ready() -> None:
         scene = window.scene
         if scene.session_uid in waiting:
             playing = window.screen.is_animation_playing
-            scene.frame_set(scene.frame_start if playing else scene.frame_current)
+            frame = (scene.frame_start, 0.0) if playing else (scene.frame_current, scene.frame_subframe)
+            scene.frame_set(frame[0], subframe=frame[1])
 
 
 def _not_computed(scene, run) -> str:

@@ -95,6 +95,14 @@ def test_without_opengl_it_is_one_sentence(pressed, tmp_path):
         assert ("choose Cycles" in run.stderr) == (status == 1)
 
 
+def test_a_render_keeps_the_scene_between_two_frames(scene, tmp_path):
+    bpy.ops.object.camera_add(location=(0.0, 0.0, 1.0))
+    scene.camera, scene.render.engine, scene.cycles.use_denoising = bpy.context.object, "CYCLES", False
+    scene.frame_set(3, subframe=0.5)
+    render.render_frame(scene, tmp_path / "a.png", 1, samples=1, size=(16, 12))
+    assert (scene.frame_current, scene.frame_subframe) == (3, 0.5)
+
+
 def test_what_moves_away_in_between_stays_in_the_picture(pressed):
     ball = pressed.objects["Ball"]
     x, y, _ = ball.location

@@ -9,6 +9,7 @@ import pytest
 from blender_scenes import ball, cube, grid, keyframe, press, reading_of, scenario_of
 from mathutils import Quaternion
 
+from palpate.addon.scene import scene_fingerprint
 from palpate.addon.session import transforms
 from palpate.core.errors import SceneError
 from palpate.core.geometry.mesh import face_normals
@@ -184,3 +185,47 @@ def test_a_pad_is_not_read_out():
     table = grid("Table", (0.1, 0.0, 0.0))
     table.palpate.role = "PAD"
     assert [(s.name, s.readout) for s in scenario_of(scene).sensors] == [("Pad", True), ("Table", False)]
+
+
+def pushed_down(obj):
+    """Move the action of an object to an NLA strip, and return the strip's track."""
+    data = obj.animation_data
+    action, slot = data.action, getattr(data, "action_slot", None)
+    track = data.nla_tracks.new()
+    strip = track.strips.new("Strip", 1, action)
+    if slot is not None:
+        strip.action_slot = slot
+    data.action = None
+    return track
+
+
+@pytest.mark.parametrize(
+    ("setting", "is_refused"), [({}, True), ({"mute": True}, False), ({"mute": True, "is_solo": True}, True)]
+)
+def test_a_free_body_that_an_nla_strip_moves_is_refused(setting, is_refused):
+    scene, _, target = press(frames=4)
+    target.animation_data_clear()
+    target.palpate.body, target.palpate.mass = "FREE", 0.1
+    target.keyframe_insert("location", frame=1)
+    track = pushed_down(target)
+    for name, value in setting.items():
+        setattr(track, name, value)
+    if is_refused:
+        with pytest.raises(SceneError, match="keyframes, drivers or NLA strips of its location"):
+            reading_of(scene)
+    else:
+        reading_of(scene)
+
+
+def test_a_scale_that_an_nla_strip_animates_is_that_of_its_keyframes():
+    scene, _, target = press(frames=6)
+    keyframe(target, "scale", {1: (1.0, 1.0, 1.0), 6: (1.2, 0.9, 1.4)})
+    scene.frame_set(1)
+    keyed = scenario_of(scene).targets[0].deformation.values
+    pushed_down(target)
+    np.testing.assert_array_equal(scenario_of(scene).targets[0].deformation.values, keyed)
+    fingerprints = set()
+    for frame in (1, 4):
+        scene.frame_set(frame)
+        fingerprints.add(scene_fingerprint.fingerprint(scene))
+    assert len(fingerprints) == 1

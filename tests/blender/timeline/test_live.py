@@ -51,6 +51,14 @@ def test_playing_gives_the_numbers_of_a_bake(tmp_path):
     assert recording.sensors["Pad"].contact[-1].any() and recording.sensors["Pad 2"].contact[-1].any()
 
 
+def test_each_scene_has_participants_of_its_own():
+    scene, pad, target = press(frames=2)
+    empty = bpy.data.scenes.new("Empty")
+    for role in ("SENSOR", "NONE"):
+        pad.palpate.role = target.palpate.role = role  # a change of any role is one of all scenes
+        assert [playback.has_participants(one) for one in (scene, empty)] == [role != "NONE", False]
+
+
 def test_scrubbing_reads_what_was_computed():
     scene, pad, _, _, free = press_and_drop(frames=8)
     play(scene, *range(1, 7))
