@@ -10,6 +10,7 @@ from scipy.ndimage import uniform_filter1d
 from scipy.optimize import least_squares
 from scipy.signal import TransferFunction, lsim
 
+from palpate.core.effects.engine.coupling_matrix import coupled
 from palpate.core.effects.engine.readout_chain import ReadoutChain, readings
 from palpate.core.effects.engine.registry import effect, form_of
 from palpate.core.effects.engine.specification import TransducerArray
@@ -354,8 +355,8 @@ def test_a_rim_reflects_between_texels_at_any_places(shape):
     position = np.random.default_rng(3).uniform(0.0, 0.02, (60, 3))
     array = TransducerArray(position, np.full(60, 4e-6))
     weights = stretched_exponential({"width": 0.004, "shape": shape, "lost": 0.0, "reflected": 1.0}, array)
-    np.testing.assert_allclose(weights.sums(60), 1.0, atol=1e-9)
-    np.testing.assert_allclose(weights.apply(np.ones((1, 60))), 1.0, atol=1e-9)
+    np.testing.assert_allclose(weights.sum(axis=0), 1.0, atol=1e-9)
+    np.testing.assert_allclose(coupled(np.ones((1, 60)), weights), 1.0, atol=1e-9)
 
 
 def test_a_stretched_exponential_couples_pairs_within_its_reach_alone():
@@ -364,11 +365,11 @@ def test_a_stretched_exponential_couples_pairs_within_its_reach_alone():
     position = np.stack([x.ravel(), y.ravel(), np.zeros(2500)], axis=1)
     array = TransducerArray(position, np.full(2500, 4e-6))
     found = stretched_exponential({"width": 0.003, "shape": 2.0, "lost": 1.0, "reflected": 0.0}, array)
-    assert found.matrix is None and len(found.weight) < 2500 * 270  # texels within 6 widths
-    np.testing.assert_allclose(found.sums(2500)[25 * 50 + 25], 1.0, rtol=1e-9)
+    assert found.nnz < 2500 * 270  # texels within 6 widths
+    np.testing.assert_allclose(found.sum(axis=0)[25 * 50 + 25], 1.0, rtol=1e-9)
     found = stretched_exponential({"width": 0.003, "shape": 2.0, "lost": 0.0, "reflected": 1.0}, array)
-    np.testing.assert_allclose(found.apply(np.ones((1, 2500))), 1.0, rtol=1e-12)
-    np.testing.assert_allclose(found.sums(2500), 1.0, rtol=1e-12)
+    np.testing.assert_allclose(coupled(np.ones((1, 2500)), found), 1.0, rtol=1e-12)
+    np.testing.assert_allclose(found.sum(axis=0), 1.0, rtol=1e-12)
 
 
 @pytest.mark.parametrize(
