@@ -99,6 +99,7 @@ LENGTHS = {
     "spacing": ("Spacing", "Distance between texels"),
     "lift": ("Lift", "Height of the texels above the surface"),
 }
+"""Name and tooltip, without a unit, of the settings of patterns that are lengths."""
 
 
 def _length(name: str, **more):

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from .. import response
 from ..geometry.texels import Texels
@@ -12,6 +13,9 @@ from ..model.recording import Recording
 from .figure_canvas import axes_in_inches, new_figure, save_figure
 from .figure_style import FONT, FigureStyle
 from .tactile_image import SensorView, draw_colour_bar
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 DPI = 160
 """Of a picture 1280 pixels wide: text then has its 8 pt when the picture is shown at eight inches."""
@@ -73,8 +77,13 @@ def label_picture(
     if image is not None:
         bar = axes_in_inches(figure, width - bar_room, y, 0.12, y_top - y)
         draw_colour_bar(figure, image, bar, scale, ink="white")
-    for words, (x, y) in labels:
-        first, _, rest = words.partition("\n")
-        figure.text(x, y, first, fontsize=FONT + 1.5, color="white", weight="bold", va="bottom", ha="left")
-        figure.text(x, y - 0.03 / height, rest, fontsize=FONT, color="#e3e8ee", va="top", ha="left", linespacing=1.35)
+    for words, place in labels:
+        _draw_label(figure, words, place)
     save_figure(figure, path, dpi)
+
+
+def _draw_label(figure: Figure, words: str, place: tuple[float, float]) -> None:
+    (x, y), (first, _, rest) = place, words.partition("\n")
+    below = y - 0.03 / float(figure.get_figheight())
+    figure.text(x, y, first, fontsize=FONT + 1.5, color="white", weight="bold", va="bottom", ha="left")
+    figure.text(x, below, rest, fontsize=FONT, color="#e3e8ee", va="top", ha="left", linespacing=1.35)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 _LOADED = 1e-3
 """Share of the largest net force below which a centre of pressure is not drawn: it would jump about."""
-STROKES = ((1.0, "-"), (0.8, (0, (4, 2))))
+_STROKES = ((1.0, "-"), (0.8, (0, (4, 2))))
 """Widths, as shares of a curve's, and dashes of the first and of the second line of a sensor."""
 
 
@@ -108,7 +108,7 @@ def curves_figure(
         for i, name in enumerate(names):
             width = width_below(len(names) - 1 - i)
             lines = panel.values(recording.sensors[name], texels[name], parameters[name])
-            for line, (share, dashes) in zip(lines, STROKES, strict=False):
+            for line, (share, dashes) in zip(lines, _STROKES, strict=False):
                 axes.plot(recording.times, line, color=SERIES[i % len(SERIES)], lw=share * width, ls=dashes)
         axes.set_ylabel(panel.label)
         tidy_axes(axes)
@@ -154,7 +154,7 @@ def _style_legend(axes: Axes, words: Sequence[str]) -> None:
         return
     handles = [
         Line2D([], [], color=INK, lw=1.5 * share, ls=dashes, label=word)
-        for word, (share, dashes) in zip(words, STROKES, strict=True)
+        for word, (share, dashes) in zip(words, _STROKES, strict=True)
     ]
     legend = axes.legend(
         handles=handles, loc="best", fontsize=SMALL, handlelength=1.8, borderaxespad=0.3, frameon=True, framealpha=0.75

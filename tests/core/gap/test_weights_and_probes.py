@@ -123,3 +123,6 @@ def test_a_rig_needs_no_indenter_where_all_recordings_name_a_probe(tmp_path):
     text = text.replace('.csv"\n', '.csv"\nprobe = "a"\n')
     assert read_rig(write(tmp_path, text + probe)).indenter is None
     assert "no [indenter]" in refusal(tmp_path, text.replace('probe = "a"\n', "", 1) + probe)
+    for wrong in ("shpe", "shape"):  # a mistake in a probe is not said of the indenter
+        said = refusal(tmp_path, text + probe.replace("shape = { sphere", f"{wrong} = {{ spher"))
+        assert "[[probe]] 1 of 'rig.toml'" in said and "[indenter]" not in said

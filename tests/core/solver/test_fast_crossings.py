@@ -11,7 +11,7 @@ from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.rotations import quaternion_product, rotation_vectors
 from palpate.core.model.body import Body, Motion
 from palpate.core.solver.fast_crossings import CrossingLimits, _entering, _travel, path_of_moved_bodies
-from palpate.core.solver.simulation import run
+from palpate.core.solver.simulation import Simulation, run
 
 
 def fall(mesh, speed, max_penetration, start=0.05, frames=6, fps=24.0, aside=0.0):
@@ -66,6 +66,14 @@ def test_a_free_body_and_a_fast_sensor_are_named():
     still = Body("cube", Motion.at_rest((0.0, 0.0, 0.06)))
     warnings = run(replace(scenario, bodies=(Body("pad", raised), still))).warnings
     assert [text for text in warnings if "'cube' goes 4." in text]
+
+
+def test_pairs_that_are_slow_in_a_frame_are_not_searched(monkeypatch):
+    path = np.tile([0.0, 0.0, 0.02], (2, 1))
+    found = Simulation(pressed(box(0.01, 0.01, 0.01), path))._fast_crossings
+    monkeypatch.setattr(found, "_deepest_entry", lambda *_: pytest.fail("it was searched"))
+    bodies = len(found.limits.radius)
+    assert found.warnings(1, np.zeros((3, bodies, 3)), np.tile([1.0, 0, 0, 0], (3, bodies, 1)), 1e-3) == []
 
 
 def test_segments_enter_from_outside_only():

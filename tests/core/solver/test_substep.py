@@ -121,6 +121,13 @@ def test_all_frames_at_once_are_those_of_each_frame(monkeypatch, make):
     assert any(arrays.contact.any() for arrays in expected.sensors.values()) or expected.warnings
 
 
+def test_a_run_that_is_over_is_its_last_frame():
+    simulation = Simulation(slipping_cube())
+    while simulation.frame < simulation.scenario.frame_end:
+        simulation.advance()
+    assert simulation.advance_all().frames.tolist() == [simulation.scenario.frame_end]
+
+
 def test_a_run_of_one_frame_is_its_first_observation():
     scenario = replace(slipping_cube(), frame_end=1)
     found = Simulation(scenario).advance_all()
