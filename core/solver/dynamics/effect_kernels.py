@@ -133,9 +133,8 @@ def _record_pair(pair: int, dt: float, model: SolverModel, workspace: Workspace)
         vx, vy, vz, rate = row_velocity(b, lane, motion, contacts.deforming[pair], contacts)
         slide_step = dt * math.sqrt(max(vx * vx + vy * vy + vz * vz - rate * rate, 0.0))
         p, end = point_law(law, model.points.multipliers, point), contacts.rows[b, DEPTH + lane] + dt * rate
-        if (
-            model.pairs.overlap_share[pair] * end > recorded.depth[0, point]
-        ):  # a point has one memory: that of its deepest contact
+        # Each contact point has a memory of its own, whatever presses on it; of several targets the deepest counts.
+        if model.pairs.overlap_share[pair] * end > recorded.depth[0, point]:
             press_texel(recorded, 0, point, pair, TexelMotion(end, rate, slide_step, 0.0), p, model)
 
 
