@@ -9,7 +9,7 @@ not drown all else.
 from __future__ import annotations
 
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -114,12 +114,17 @@ def draw(kind: str, number: int) -> Case:
     rng, pad, probe, names = _begun(kind, number)
     makers = {"own": OWN, "simulated": OWN, "third": THIRD}.get(kind, {**MAKERS, **OUTSIDE})
     way = list(POOR)[number % len(POOR)] if kind == "poor" else ""
-    times, paths = _trials(rng, probe, way)
+    time, programmes = np.arange(round(SECONDS * RATE) + 1) / RATE, _programmes(rng, way)
+    times, paths = [time] * len(programmes), [_path(time, knots, probe) for knots in programmes]
     plain = [touch(probe, pad, time, path) for time, path in zip(times, paths, strict=True)]
     found = [_calibrated(makers[name], name, rng, pad, probe, plain) for name in names]
     hidden = tuple(effect for effect, _ in found)
     contacts = _moved(hidden, pad, probe, plain)
-    signals = [respond(contact, pad, hidden) for contact in contacts]
+    pressed = [respond(contact, pad, hidden, slides=False) for contact in contacts]
+    signals = [
+        replace(one, shear=_shear(one.contact, knots, probe, pad, hidden))
+        for one, knots in zip(pressed, programmes, strict=True)
+    ]
     full = max(float(np.abs(s.reading - pad.zero).max()) for s in signals)
     noise = rng.uniform(0.003, 0.01) * full * (30.0 if way == "too noisy" else 1.0)
     coloured = kind in ("none", "simulated") and number % 3 == 2
@@ -221,20 +226,37 @@ def _noise(rng, shape, coloured: bool) -> np.ndarray:
 # --- what the probe does
 
 
-def _trials(rng, probe: Probe, way: str) -> tuple[list[np.ndarray], list[np.ndarray]]:
+Knots = list[tuple[float, float, float, float]]
+"""Times (s), x, y and depths (m) between which a probe moves on straight lines, the last of them until the end."""
+ACCELERATION_TIME = 0.1
+"""Seconds over which the speed changes from line to line: a stage that is told to move at 0.1 m/s accelerates at 1 m/s²."""
+LONGEST_STEP = 2.5e-4
+"""Metres between two times at which friction is integrated; half as long, net forces change by 2 to 40 % of their noise."""
+
+
+def _programmes(rng, way: str) -> list[Knots]:
     """Six programmes of 25 s: staircase, cycles, press and hold, slides, and two of all to check on; of some ways to be poor
     six times the same.
     """
     makers = [PROGRAMMES[way]] * 6 if way in PROGRAMMES else [_staircase, _cycles, _holds, _slides, _mixture, _mixture]
-    time = np.arange(round(SECONDS * RATE) + 1) / RATE
-    return [time] * len(makers), [_path(time, maker(rng), probe) for maker in makers]
+    return [maker(rng) for maker in makers]
 
 
-def _path(time: np.ndarray, knots: list[tuple[float, float, float, float]], probe: Probe) -> np.ndarray:
-    """Straight lines between (time, x, y, depth), the last of them until the end."""
-    knots = np.array(knots)
-    x, y, depth = (np.interp(time, knots[:, 0], knots[:, i]) for i in (1, 2, 3))
+def _path(time: np.ndarray, knots: Knots, probe: Probe) -> np.ndarray:
+    """(T, 3) metres: the probe's middle along straight lines, whose corners are rounded in time."""
+    at, *columns = np.array(knots).T
+    moments = time + np.linspace(-0.5, 0.5, 33)[:, None] * ACCELERATION_TIME
+    x, y, depth = (np.interp(moments, at, column).mean(axis=0) for column in columns)
     return np.stack([x, y, probe.lowest - depth], axis=1)
+
+
+def _shear(contact: Contact, knots: Knots, probe: Probe, pad: Pad, hidden: tuple[Hidden, ...]) -> np.ndarray:
+    """Friction at the samples, (T, n, 3) N, integrated with several steps from sample to sample where the probe is fast."""
+    moved = np.linalg.norm(np.diff(contact.path, axis=0), axis=1)
+    steps = max(int(np.ceil(moved.max() / LONGEST_STEP)), 1)
+    time = np.arange((len(contact.time) - 1) * steps + 1) / (RATE * steps)
+    fine = touch(probe, pad, time, _path(time, knots, probe), hidden)
+    return respond(fine, pad, tuple(replace(effect, reading=None) for effect in hidden)).shear[::steps]
 
 
 def _spots(rng, count: int) -> np.ndarray:

@@ -182,8 +182,7 @@ def faded(force: np.ndarray, memory: np.ndarray) -> np.ndarray:
 def _friction(signals: Signals, pad: Pad, hidden: tuple[Hidden, ...]) -> np.ndarray:
     """LuGre per texel (Canudas de Wit 1995): dz/dt = v - sigma0 |v| z / g.
 
-    Exact over a step for the mean velocity and the mean load of its ends: with those of one end, the force at 50 samples per
-    second would be off by three times its noise.
+    Exact over a step for the mean velocity and the mean load of its ends, which needs short steps (:func:`.cases.draw`).
     """
     v, normal, fn = signals.contact.sliding, signals.contact.normal, np.maximum(signals.force, 0.0)
     most, keep, gain, between = _bristles(pad, hidden, fn, v, signals.dt)

@@ -27,6 +27,10 @@ from .contact_law import ContactLaw, contact_law
 TAYLOR = tuple(1.0 / math.factorial(n + 1) for n in range(15))
 """Taylor coefficients of (1 - exp(-y)) / y without their signs, from y⁰ to y¹⁴."""
 
+RAMP_SERIES = 1e-4
+"""Decay over a step below which the effect of a changing force is computed by the first term of its series: there the next term
+and the rounding of the full expression are both below 1e-8 of the mean."""
+
 
 @inlined
 def decay_and_mean(x: float) -> tuple[float, float]:
@@ -73,6 +77,24 @@ def bristle_step(speed_squared: float, normal_force: float, dt: float, law: Cont
     held = g > 0.0  # without friction nothing holds the bristles
     keep, mean = decay_and_mean(law.sigma0 * dt * math.sqrt(speed_squared) / g if held else 0.0)
     return (keep if held else 0.0), (mean * dt if held else 0.0)
+
+
+@inlined
+def ramped_bristle_step(
+    speed_squared: float, force_before: float, force_after: float, dt: float, law: ContactLaw
+) -> tuple[float, float]:
+    """Return :func:`bristle_step` for a normal force that changes evenly over the step.
+
+    Bristles decay as under the mean force, towards a steady deflection that changes as the force does (first-order hold), so
+    that after a long slide they have the deflection that belongs to the force at the end.
+    """
+    mean_force = 0.5 * (force_before + force_after)
+    decay = sliding_decay(speed_squared, mean_force, law) * dt
+    held = decay >= 0.0
+    keep, mean = decay_and_mean(max(decay, 0.0))
+    change = (force_after - mean_force) / mean_force if mean_force > 0.0 else 0.0
+    lag = (1.0 + keep - 2.0 * mean) / decay if decay > RAMP_SERIES else decay / 6.0
+    return (keep if held else 0.0), (dt * (mean + change * lag) if held else 0.0)
 
 
 @inlined

@@ -17,11 +17,11 @@ from ...effects.engine import contact_forces
 from ...laws.contact_law import contact_law
 from ...laws.friction import (
     bristle_rate,
-    bristle_step,
     deflection_scale,
     friction_force,
     max_bristle_deflection,
     next_deflection,
+    ramped_bristle_step,
     turned_into_plane,
 )
 from ...model.sensor import Effect
@@ -50,11 +50,11 @@ class ContactSamples(NamedTuple):
     normal : (m, 3) float
         Direction of the normal force on the sensor.
     slip, mean_slip : (m, 3) float, m/s
-        Sliding velocity, and its mean with the sample before.
+        Sliding velocity, and its mean since the sample before.
     slip_squared, mean_slip_squared : (m,) float, m²/s²
         Squares of their magnitudes.
     time_step : (m,) float, s
-        Since the sample before.
+        In contact since the sample before.
     """
 
     sample: np.ndarray
@@ -147,12 +147,15 @@ def _contact_samples(
     texel, sample = map(np.ascontiguousarray, np.nonzero(pressed.T))
     own, before = column[texel], np.maximum(sample - 1, 0)
     slip, mean = np.zeros((len(sample), 3)), np.zeros((len(sample), 3))
-    if stimulus.slip is not None:
-        slip = stimulus.slip[sample, own]
-        mean = 0.5 * (slip + stimulus.slip[before, own])
+    if stimulus.slip is not None and stimulus.mean_slip is not None:
+        slip, mean = stimulus.slip[sample, own], stimulus.mean_slip[sample, own]
     continues = (sample > 0) & pressed[before, texel]
+    sinking = np.where(continues, 0.0, stimulus.rate[sample, own] * step[sample])  # while it sank in, it was touched
+    touched = np.divide(stimulus.depth[sample, own], sinking, out=np.ones(len(sample)), where=sinking > 0.0).clip(max=1.0)
     squares = dot(slip, slip), dot(mean, mean)
-    return ContactSamples(sample, texel, continues, count[texel], normal[sample, own], slip, mean, *squares, step[sample])
+    return ContactSamples(
+        sample, texel, continues, count[texel], normal[sample, own], slip, mean, *squares, step[sample] * touched
+    )
 
 
 def _equal_texels(arrays: list[np.ndarray], texels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -194,13 +197,9 @@ def sum_forces(samples, force, friction_load, viscous, parameters, work, total):
     """
     length, now, before = samples.time_step, samples.slip_squared, samples.mean_slip_squared
     keeps, gains, owns, fades = work[0], work[1], work[2], work[3]
-    for i in range(force.shape[0]):  # over a step the load is the mean of its ends, as the velocity is
-        load = (
-            0.5 * (friction_load[i] + friction_load[i - 1])
-            if samples.continues[i] and friction_load[i - 1] > 0.0
-            else friction_load[i]
-        )
-        keeps[i], gains[i] = bristle_step(before[i], load, length[i], parameters)
+    for i in range(force.shape[0]):
+        start = friction_load[i - 1] if samples.continues[i] else 0.0
+        keeps[i], gains[i] = ramped_bristle_step(before[i], start, friction_load[i], length[i], parameters)
     for i in range(force.shape[0]):
         owns[i] = bristle_rate(0.0, 1.0, now[i], friction_load[i], parameters)
         fades[i] = bristle_rate(-1.0, 0.0, now[i], friction_load[i], parameters)

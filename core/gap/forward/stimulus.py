@@ -57,6 +57,8 @@ class Stimulus:
         Speed of sliding over the sensor in contact.
     slip : (T, n, 3) float, m/s, or None
         The same as a vector in the sensor's frame; None if no net force was measured.
+    mean_slip : (T, n, 3) float, m/s, or None
+        Its mean since the sample before: how far the contact slid, over the time.
     overpressed : int
         Most texels at once that were pressed past their maximum penetration.
     """
@@ -68,6 +70,7 @@ class Stimulus:
     normal: np.ndarray | None
     slide_speed: np.ndarray
     slip: np.ndarray | None
+    mean_slip: np.ndarray | None
     overpressed: int = 0
 
     @property
@@ -124,6 +127,7 @@ def of_texels(stimulus: Stimulus, rig: Rig) -> Stimulus:
         normal=normal,
         slide_speed=mean(stimulus.slide_speed),
         slip=None if stimulus.slip is None else mean_vector(stimulus.slip),
+        mean_slip=None if stimulus.mean_slip is None else mean_vector(stimulus.mean_slip),
     )
 
 
@@ -158,10 +162,10 @@ def _raised(trial: Trial, rig: Rig, height: float) -> Trial:
 
 def _stimulus(trial: Trial, rig: Rig, texels: Texels) -> Stimulus:
     """The stimulus of the texels, at the poses and depths of a trial."""
-    along = None
+    along: Slides = (None, None)
     if np.ptp(trial.travel, axis=0).any():
-        velocity = np.gradient(trial.travel, trial.time, axis=0)
-        along = velocity[:, None, :1] * texels.tangent + velocity[:, None, 1:] * texels.bitangent
+        velocities = np.gradient(trial.travel, trial.time, axis=0), _mean_rate(trial.travel, trial.time)
+        along = tuple(v[:, None, :1] * texels.tangent + v[:, None, 1:] * texels.bitangent for v in velocities)
     if trial.stimulus == "pose":
         return _posed(trial, rig, texels, along)
     if trial.stimulus == "force" and trial.position is not None and rig.indenter_of(trial) is not None:
@@ -179,18 +183,20 @@ def texel_shares(rig: Rig) -> np.ndarray:
     return np.ones(len(rig.texels)) if rig.cover is None else rig.cover.share
 
 
-def _of_forces(trial: Trial, load: np.ndarray, normal: np.ndarray | None, along: np.ndarray | None) -> Stimulus:
+Slides = tuple[np.ndarray | None, ...]
+"""Velocity (T, n, 3) of a surface that slides by itself, and its mean since the sample before; None if it does not slide."""
+
+
+def _of_forces(trial: Trial, load: np.ndarray, normal: np.ndarray | None, along: Slides) -> Stimulus:
     """Stimulus of known forces (T, n)."""
     nothing = np.zeros_like(load)
     return Stimulus(trial, nothing, nothing, load, normal, *_slid(along, load))
 
 
-def _slid(along: np.ndarray | None, load: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
-    """Speed (T, n) and velocity (T, n, 3) of a surface that slides by itself, where it is loaded."""
-    if along is None:
-        return np.zeros_like(load), None
-    slip = along * (load > 0)[:, :, None]
-    return np.sqrt(dot(slip, slip)), slip
+def _slid(along: Slides, load: np.ndarray) -> tuple[np.ndarray, np.ndarray | None, np.ndarray | None]:
+    """Speed (T, n), velocity and mean velocity (T, n, 3) of a surface that slides by itself, where it is loaded."""
+    slip, mean = (None if velocity is None else velocity * (load > 0)[:, :, None] for velocity in along)
+    return (np.zeros_like(load) if slip is None else np.sqrt(dot(slip, slip))), slip, mean
 
 
 def joined_stimuli(stimuli: Sequence[Stimulus], texels: Texels) -> tuple[Stimulus, list[int]]:
@@ -214,10 +220,12 @@ def joined_stimuli(stimuli: Sequence[Stimulus], texels: Texels) -> tuple[Stimulu
             ends = [before.time[-1] + min(before.trial.step, pause / 3), after.time[0] - min(after.trial.step, pause / 3)]
             nothing = np.zeros((2, len(texels)))
             share = None if before.force_share is None else nothing
-            parts.append(Stimulus(replace(before.trial, time=np.array(ends)), nothing, nothing, share, None, nothing, None))
+            pausing = replace(before.trial, time=np.array(ends))
+            parts.append(Stimulus(pausing, nothing, nothing, share, None, nothing, None, None))
         starts.append(sum(len(part.time) for part in parts))
         parts.append(after)
-    missing = {"normal": -texels.normal, "slip": np.zeros((len(texels), 3))}
+    still = np.zeros((len(texels), 3))
+    missing = {"normal": -texels.normal, "slip": still, "mean_slip": still}
 
     def joined(name: str) -> np.ndarray | None:
         pairs = [(getattr(part, name), (len(part.time), len(texels), 3)) for part in parts]
@@ -225,15 +233,15 @@ def joined_stimuli(stimuli: Sequence[Stimulus], texels: Texels) -> tuple[Stimulu
             return None
         return np.concatenate([np.broadcast_to(missing[name], shape) if one is None else one for one, shape in pairs])
 
-    names = ("depth", "rate", "force_share", "normal", "slide_speed", "slip")
+    names = ("depth", "rate", "force_share", "normal", "slide_speed", "slip", "mean_slip")
     arrays: dict[str, Any] = {name: joined(name) for name in names}
     time = np.concatenate([part.time for part in parts])
     overpressed = max(one.overpressed for one in stimuli)
     return replace(stimuli[0], trial=replace(stimuli[0].trial, time=time), overpressed=overpressed, **arrays), starts
 
 
-def _posed(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) -> Stimulus:
-    """Stimulus of a trial with a known pose; `along` (T, n, 3) is the velocity of a surface that slides by itself."""
+def _posed(trial: Trial, rig: Rig, texels: Texels, along: Slides) -> Stimulus:
+    """Stimulus of a trial with a known pose."""
     assert trial.position is not None and trial.quaternion is not None
     reach = rig.parameters.max_penetration
     for _ in range(6):
@@ -246,15 +254,23 @@ def _posed(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) -> 
             f"The indenter of '{trial.name}.csv' goes right through the sensor (by more than {0.5e3 * reach:.3g} mm): "
             "check the pose's unit, its origin (the shape's centre) and the sign of z."
         )
-    velocity, spin = np.gradient(trial.position, trial.time, axis=0), _spin(trial.quaternion, trial.time)
-    rate, slide = np.zeros_like(depth), np.zeros_like(depth)
-    slip = None if trial.force is None else np.zeros_like(normal)
-    motion = tuple(np.ascontiguousarray(one, dtype=float) for one in (velocity, spin, trial.position))
-    nothing = np.zeros((0, 0, 3))
-    surface, kept = (nothing if one is None else np.ascontiguousarray(one) for one in (along, slip))
-    split_velocities(motion, surface, depth, normal, point, (rate, slide, kept))
+    time, turned, nothing = trial.time, trial.quaternion, np.zeros((0, 0, 3))
+    samples = np.arange(len(time))
+    before, after = np.maximum(samples - 1, 0), np.minimum(samples + 1, len(time) - 1)
+
+    def split(velocity: np.ndarray, spin: np.ndarray, surface: np.ndarray | None) -> tuple[np.ndarray, ...]:
+        parts = np.zeros_like(depth), np.zeros_like(depth), nothing if trial.force is None else np.zeros_like(normal)
+        motion = tuple(np.ascontiguousarray(one, dtype=float) for one in (velocity, spin, trial.position))
+        split_velocities(motion, nothing if surface is None else np.ascontiguousarray(surface), depth, normal, point, parts)
+        return parts
+
+    rate, slide, slip = split(np.gradient(trial.position, time, axis=0), _spin(turned, time, before, after), along[0])
     overpressed = int((depth > rig.parameters.max_penetration).sum(axis=1).max(initial=0))
-    return Stimulus(trial, depth, rate, None, normal, slide, slip, overpressed)
+    if trial.force is None:
+        return Stimulus(trial, depth, rate, None, normal, slide, None, None, overpressed)
+    spin = _spin(turned, time, before, np.maximum(samples, 1))
+    mean_slip = split(_mean_rate(trial.position, time), spin, along[1])[2]
+    return Stimulus(trial, depth, rate, None, normal, slide, slip, mean_slip, overpressed)
 
 
 @kernel
@@ -313,7 +329,7 @@ def _contact(trial: Trial, rig: Rig, texels: Texels, reach: float) -> Contact:
     return Simulation(scenario).contacts_along(1, trial.position, trial.quaternion)
 
 
-def _weighted(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) -> Stimulus:
+def _weighted(trial: Trial, rig: Rig, texels: Texels, along: Slides) -> Stimulus:
     """Stimulus of a known force at a known place.
 
     The indenter sinks in until springs of the rig's stiffness carry the force, and each texel carries its spring's share.
@@ -364,12 +380,15 @@ def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
 
 
-def _spin(quaternion: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Angular velocity in the sensor's frame by central differences, (T, 3) rad/s."""
-    turned = np.diff(quaternion, axis=0)
-    if not turned.any():
-        return np.zeros((len(time), 3))
+def _mean_rate(values: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Mean rate of columns (T, c) since the sample before; of the first sample, that of the second."""
+    rates = np.diff(values, axis=0) / np.diff(time)[:, None]
+    return np.concatenate([rates[:1], rates])
+
+
+def _spin(quaternion: np.ndarray, time: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Mean angular velocity in the sensor's frame between pairs of samples (p,), (p, 3) rad/s."""
+    if not np.diff(quaternion, axis=0).any():
+        return np.zeros((len(before), 3))
     conjugate = quaternion * np.array([1.0, -1.0, -1.0, -1.0])
-    before, after = np.maximum(np.arange(len(time)) - 1, 0), np.minimum(np.arange(len(time)) + 1, len(time) - 1)
-    turn = rotation_vectors(quaternion_product(quaternion[after], conjugate[before]))
-    return turn / (time[after] - time[before])[:, None]
+    return rotation_vectors(quaternion_product(quaternion[after], conjugate[before])) / (time[after] - time[before])[:, None]

@@ -68,14 +68,14 @@ def test_outcomes():
 
 
 def test_net_force_under_a_sliding_ball_is_that_of_the_other_code(tmp_path):
-    """Two integrations of the same friction, second order both; where they differ is less than the force's noise."""
+    """The other code takes several steps from sample to sample; where the two differ is a quarter of the force's noise."""
     case = cases.draw("none", 2)
     rig = read_rig(cases.write(case, tmp_path))
     names = ("k", "cn", "mus", "mud", "x0", "sigma0", "sigma1", "ct", "gain", "zero")
     true = Model(replace(rig.parameters, **{name: getattr(case.pad, name) for name in names}))
     for trial, (reading, force), measured in zip(rig.trials, case.clean, case.forces, strict=True):
         found = Predictor(trial, rig).predict(true)
-        assert np.sqrt(np.mean((found.force - force) ** 2)) < 0.6 * np.std(measured - force)
+        assert np.sqrt(np.mean((found.force - force) ** 2)) < 0.25 * np.std(measured - force)
         assert np.abs(found.reading - reading).max() < 0.01 * np.ptp(reading)
 
 

@@ -92,7 +92,21 @@ def test_a_turning_cylinder_rubs():
     np.testing.assert_allclose(found.depth[:, inside], 1e-3, rtol=1e-9)
     assert not found.depth[:, away > 0.0071].any()
     np.testing.assert_allclose(found.slide_speed[:, inside], np.tile(2.0 * away[inside], (26, 1)), atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(found.mean_slip[:, inside], axis=2), found.slide_speed[:, inside], atol=1e-9)
     assert np.abs(found.rate).max() < 1e-12
+
+
+def test_slides_of_the_steps_add_up_to_the_path():
+    """A ball that starts and stops between two samples has slid as far as its path is long."""
+    time = 0.02 * np.arange(60)
+    along = np.interp(time, [0.305, 0.695], [-2e-3, 2e-3])
+    one = trial(np.column_stack([0 * along, along, np.full(60, RADIUS - 3e-3)]), time=time)
+    found = stimulus_of(one, rig(BALL, one))
+    (whole,) = np.nonzero((found.depth > 0).all(axis=0))
+    assert len(whole)
+    steps, normal = np.diff(one.position, axis=0)[:, None], found.normal[1:, whole]
+    inward = (steps * normal).sum(axis=2, keepdims=True) * normal
+    np.testing.assert_allclose(0.02 * found.mean_slip[1:, whole], steps - inward, atol=1e-15)
 
 
 def test_depth_and_force_trials_load_all_texels_alike():
@@ -103,6 +117,7 @@ def test_depth_and_force_trials_load_all_texels_alike():
     found = stimulus_of(one, rig(None, one))
     np.testing.assert_array_equal(found.depth, np.tile(level[:, None], (1, 84)))
     np.testing.assert_allclose(found.slip[level > 0], np.tile([0.01, 0.0, 0.0], (np.count_nonzero(level), 84, 1)), atol=1e-15)
+    np.testing.assert_allclose(found.mean_slip, found.slip, atol=1e-15)
     pushed = stimulus_of(replace(one, stimulus="force"), rig(None, one))
     np.testing.assert_allclose(pushed.force_share.sum(axis=1), level)
 
