@@ -150,8 +150,9 @@ def _contact_samples(
     if stimulus.slip is not None and stimulus.mean_slip is not None:
         slip, mean = stimulus.slip[sample, own], stimulus.mean_slip[sample, own]
     continues = (sample > 0) & pressed[before, texel]
-    sinking = np.where(continues, 0.0, stimulus.rate[sample, own] * step[sample])  # while it sank in, it was touched
-    touched = np.divide(stimulus.depth[sample, own], sinking, out=np.ones(len(sample)), where=sinking > 0.0).clip(max=1.0)
+    sinking = stimulus.rate[sample, own] * step[sample]  # a texel that was not touched before has been while it sank in
+    touched = np.divide(stimulus.depth[sample, own], sinking, out=np.zeros(len(sample)), where=sinking > 0.0).clip(max=1.0)
+    touched[continues] = 1.0
     squares = dot(slip, slip), dot(mean, mean)
     return ContactSamples(
         sample, texel, continues, count[texel], normal[sample, own], slip, mean, *squares, step[sample] * touched

@@ -254,23 +254,35 @@ def _posed(trial: Trial, rig: Rig, texels: Texels, along: Slides) -> Stimulus:
             f"The indenter of '{trial.name}.csv' goes right through the sensor (by more than {0.5e3 * reach:.3g} mm): "
             "check the pose's unit, its origin (the shape's centre) and the sign of z."
         )
-    time, turned, nothing = trial.time, trial.quaternion, np.zeros((0, 0, 3))
+    rate, slide, slip, mean_slip = _velocities(trial, (depth, normal, point), along)
+    overpressed = int((depth > rig.parameters.max_penetration).sum(axis=1).max(initial=0))
+    return Stimulus(trial, depth, rate, None, normal, slide, slip, mean_slip, overpressed)
+
+
+def _velocities(
+    trial: Trial, contact: tuple[np.ndarray, ...], along: Slides
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray | None]:
+    """Rate of the depth, speed of sliding, slip and mean slip where an indenter touches texels; no slip without net forces.
+
+    `contact` is depth (T, n), normal and point (T, n, 3).
+    """
+    assert trial.position is not None and trial.quaternion is not None
+    depth, normal, point = contact
+    time, position, turned, nothing = trial.time, trial.position, trial.quaternion, np.zeros((0, 0, 3))
     samples = np.arange(len(time))
     before, after = np.maximum(samples - 1, 0), np.minimum(samples + 1, len(time) - 1)
 
     def split(velocity: np.ndarray, spin: np.ndarray, surface: np.ndarray | None) -> tuple[np.ndarray, ...]:
         parts = np.zeros_like(depth), np.zeros_like(depth), nothing if trial.force is None else np.zeros_like(normal)
-        motion = tuple(np.ascontiguousarray(one, dtype=float) for one in (velocity, spin, trial.position))
+        motion = tuple(np.ascontiguousarray(one, dtype=float) for one in (velocity, spin, position))
         split_velocities(motion, nothing if surface is None else np.ascontiguousarray(surface), depth, normal, point, parts)
         return parts
 
-    rate, slide, slip = split(np.gradient(trial.position, time, axis=0), _spin(turned, time, before, after), along[0])
-    overpressed = int((depth > rig.parameters.max_penetration).sum(axis=1).max(initial=0))
+    rate, slide, slip = split(np.gradient(position, time, axis=0), _spin(turned, time, before, after), along[0])
     if trial.force is None:
-        return Stimulus(trial, depth, rate, None, normal, slide, None, None, overpressed)
-    spin = _spin(turned, time, before, np.maximum(samples, 1))
-    mean_slip = split(_mean_rate(trial.position, time), spin, along[1])[2]
-    return Stimulus(trial, depth, rate, None, normal, slide, slip, mean_slip, overpressed)
+        return rate, slide, None, None
+    mean_slip = split(_mean_rate(position, time), _spin(turned, time, before, np.maximum(samples, 1)), along[1])[2]
+    return rate, slide, slip, mean_slip
 
 
 @kernel
@@ -332,7 +344,8 @@ def _contact(trial: Trial, rig: Rig, texels: Texels, reach: float) -> Contact:
 def _weighted(trial: Trial, rig: Rig, texels: Texels, along: Slides) -> Stimulus:
     """Stimulus of a known force at a known place.
 
-    The indenter sinks in until springs of the rig's stiffness carry the force, and each texel carries its spring's share.
+    The indenter sinks in until springs of the rig's stiffness carry the force, and each texel carries its spring's share. Where
+    net forces were measured, its motion along x and y slides over the sensor.
     """
     indenter = rig.indenter_of(trial)
     assert trial.position is not None and trial.quaternion is not None and trial.level is not None and indenter is not None
@@ -355,7 +368,7 @@ def _weighted(trial: Trial, rig: Rig, texels: Texels, along: Slides) -> Stimulus
             middle = high + np.divide(lack, total, out=np.full(len(states), 0.5), where=total > 0.0) * (low - high)
         assert part.position is not None
         part.position[:, 2] = middle
-        depth, normal, _, _ = _contact(part, rig, texels, reach)
+        depth, normal, point, _ = _contact(part, rig, texels, reach)
         carried = depth @ share
         over = rig.parameters.k * carried - wanted
         if number >= FIRST_BISECTIONS and (np.abs(over) <= PRECISION * wanted)[wanted > least].all():
@@ -371,8 +384,16 @@ def _weighted(trial: Trial, rig: Rig, texels: Texels, along: Slides) -> Stimulus
             f"{wanted[lost[0]]:.3g} N at x = {x:.3g} m, y = {y:.3g} m of '{trial.name}.csv' do not rest on the sensor: check "
             "the units of force, x and y, and k."
         )
-    load = np.where(wanted > 0.0, wanted / np.where(carried > 0.0, carried, 1.0), 0.0)[:, None] * depth
-    return _of_forces(trial, load[back], normal[back], along)
+    load = (np.where(wanted > 0.0, wanted / np.where(carried > 0.0, carried, 1.0), 0.0)[:, None] * depth)[back]
+    found = _of_forces(trial, load, normal[back], along)
+    if trial.force is None:
+        return found
+    level = np.array([1.0, 1.0, 0.0])  # how it sinks in follows from a force that is noisy, and is no sliding
+    beside = point[back] - (part.position - level * part.position)[back, None]
+    slide, slip, mean_slip = _velocities(replace(trial, position=level * trial.position), (load, normal[back], beside), along)[
+        1:
+    ]
+    return replace(found, slide_speed=slide, slip=slip, mean_slip=mean_slip)
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from palpate.core.errors import FileError, SceneError
 from palpate.core.gap.dataset.rig import grid_texels, read_rig
-from palpate.core.gap.forward.predictor import predictors_of
+from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.forward.stimulus import stimulus_of
 
 K, RADIUS = 80.0, 0.008
@@ -91,6 +91,29 @@ def test_weights_at_places_give_the_gain_of_each_texel(tmp_path):
     assert [one.name for one in found.findings if one.confidence >= 0.5] == ["gain-mismatch"]
     factors = np.asarray(found.best.model.effects[0].values["factor"])
     np.testing.assert_allclose(found.best.model.parameters.gain * factors, 300.0 * GAINS, rtol=0.01)
+
+
+def test_a_weight_that_slides_rubs_and_one_that_is_lifted_does_not(tmp_path):
+    """A block has the friction of steady sliding after 1 mm, and none where it was lifted before it was moved as far."""
+    speed, time = 2e-3, 0.02 * np.arange(120)
+    law = f"k = {K}\nmus = 0.5\nmud = 0.4\nx0 = 0.01\nsigma0 = 1e4\nsigma1 = 0.0\nct = 0.0"
+    text = WEIGHTS.replace(f"k = {K}", law).replace(f"sphere = {RADIUS}", "box = [0.05, 0.05, 0.01]")
+    lifted = np.abs(time - 1.2) < 0.05
+    ways = {
+        "a": (speed * np.clip(time - 0.2, 0.0, 2.0), 1.0),
+        "b": (np.where(time < 1.2, 0.0, 4e-3), np.where(lifted, 0.0, 1.0)),
+    }
+    for name, (x, force) in ways.items():
+        table = np.column_stack([time, x, 0.0 * x, force + 0.0 * x, np.ones((120, 3 + TEXELS))])
+        header = ["time", "x", "y", "force", "force_x", "force_y", "force_z", *(f"texel_{i}" for i in range(TEXELS))]
+        np.savetxt(tmp_path / f"{name}.csv", table, delimiter=",", header=",".join(header), comments="", fmt="%.9g")
+    (tmp_path / "rig.toml").write_text(text, encoding="utf-8")
+    rig = read_rig(tmp_path / "rig.toml")
+    slid, put = (predictor.predict(Model(rig.parameters)).force for predictor in predictors_of(rig.trials, rig))
+    steady = 0.4 + 0.1 * np.exp(-((speed / 0.01) ** 2))
+    np.testing.assert_allclose(slid[60:100], np.tile([steady, 0.0, -1.0], (40, 1)), rtol=1e-3, atol=1e-12)
+    assert not put[:, 0].any()
+    np.testing.assert_allclose(put[:, 2], np.where(lifted, 0.0, -1.0))
 
 
 def test_mistakes_with_weights_are_said(tmp_path):
