@@ -208,6 +208,8 @@ def check_attachments(scene, depsgraph, attachments: dict[str, np.ndarray]) -> N
 
 
 TRANSFORM_PATHS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle")
+"""Data paths that a bake keyframes."""
+DELTA_PATHS = ("delta_location", "delta_rotation_euler", "delta_rotation_quaternion")
 
 
 def check_movable(obj) -> None:
@@ -215,7 +217,7 @@ def check_movable(obj) -> None:
     kind = "Free" if obj.palpate.body == "FREE" else "Driven"
     if any(constraint.enabled for constraint in obj.constraints):
         raise SceneError(f"{kind} body '{obj.name}' has constraints: disable them, or set its body to Keyframed.")
-    if not obj.palpate.is_baked and fcurves.animated_paths(obj) & set(TRANSFORM_PATHS):
+    if fcurves.animated_paths(obj) & {*DELTA_PATHS, *(() if obj.palpate.is_baked else TRANSFORM_PATHS)}:
         raise SceneError(
             f"{kind} body '{obj.name}' has keyframes, drivers or NLA strips of its location or rotation: "
             + ("remove them, " if kind == "Free" else "put them on a parent that carries it, ")

@@ -217,6 +217,17 @@ def test_a_free_body_that_an_nla_strip_moves_is_refused(setting, is_refused):
         reading_of(scene)
 
 
+@pytest.mark.parametrize("path", ["location", "rotation_euler", "delta_location", "delta_rotation_quaternion"])
+def test_a_free_body_that_keyframes_move_is_refused(path):
+    scene, _, target = press(frames=4)
+    target.animation_data_clear()
+    target.palpate.body, target.palpate.mass = "FREE", 0.1
+    reading_of(scene)
+    target.keyframe_insert(path, frame=1)
+    with pytest.raises(SceneError, match="keyframes, drivers or NLA strips of its location"):
+        reading_of(scene)
+
+
 def test_a_scale_that_an_nla_strip_animates_is_that_of_its_keyframes():
     scene, _, target = press(frames=6)
     keyframe(target, "scale", {1: (1.0, 1.0, 1.0), 6: (1.2, 0.9, 1.4)})
