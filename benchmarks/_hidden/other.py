@@ -110,15 +110,18 @@ def _neighbours(values: np.ndarray) -> np.ndarray:
 
 
 def load_spreading(rng, strength) -> Hidden:
-    """A cover in bending: a few rounds of diffusion between neighbours, which keeps the sum."""
+    """A cover in bending: a few rounds of diffusion between neighbours, which keeps the sum.
+
+    It spreads what the texels under it carry; the probe touches its outer face, whose friction and net force stay.
+    """
 
     def act(s, pad):
-        share = min(0.2 * strength, 0.22)
+        share, carried = min(0.2 * strength, 0.22), s.reading - pad.zero
         for _ in range(4):
-            s.force = s.force + share * (_neighbours(s.force) - 4 * s.force)
-        return s.force
+            carried = carried + share * (_neighbours(carried) - 4 * carried)
+        return pad.zero + carried
 
-    return Hidden("load-spreading", "diffusion", force=act)
+    return Hidden("load-spreading", "diffusion", reading=act)
 
 
 def crosstalk(rng, strength) -> Hidden:

@@ -79,6 +79,16 @@ def test_net_force_under_a_sliding_ball_is_that_of_the_other_code(tmp_path):
         assert np.abs(found.reading - reading).max() < 0.01 * np.ptp(reading)
 
 
+def test_a_cover_leaves_the_net_force_as_it_is():
+    """A cover spreads what texels carry, and neither the touch of its outer face nor the friction there."""
+    number = next(number for number in range(99) if cases.answer_of("other", number) == ["load-spreading"])
+    case = cases.draw("other", number)
+    touched = world.touch(case.probe, case.pad, case.times[3], case.paths[3])
+    spread, plain = (world.respond(touched, case.pad, hidden) for hidden in (case.hidden, ()))
+    np.testing.assert_array_equal(world.net_force(spread), world.net_force(plain))
+    assert np.abs(spread.reading - plain.reading).max() > 0.01 * np.ptp(plain.reading)
+
+
 def test_a_wrongly_mounted_sensor_is_that_of_the_other_code(tmp_path):
     """The generator moves the ball into the sensor's frame, the library moves the texels: the six numbers mean the same."""
     values = {"x": 2e-3, "y": -1.5e-3, "z": 0.6e-3, "about_x": 0.04, "about_y": -0.03, "about_z": 0.1}
