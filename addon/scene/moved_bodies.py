@@ -219,7 +219,7 @@ def check_movable(obj) -> None:
         raise SceneError(f"{kind} body '{obj.name}' has constraints: disable them, or set its body to Keyframed.")
     if fcurves.animated_paths(obj) & {*DELTA_PATHS, *(() if obj.palpate.is_baked else TRANSFORM_PATHS)}:
         raise SceneError(
-            f"{kind} body '{obj.name}' has keyframes, drivers or NLA strips of its location or rotation: "
+            f"{kind} body '{obj.name}' has keyframes, drivers or NLA strips of its (delta) location or rotation: "
             + ("remove them, " if kind == "Free" else "put them on a parent that carries it, ")
             + "or set its body to Keyframed."
         )

@@ -182,7 +182,7 @@ def faded(force: np.ndarray, memory: np.ndarray) -> np.ndarray:
 def _friction(signals: Signals, pad: Pad, hidden: tuple[Hidden, ...]) -> np.ndarray:
     """LuGre per texel (Canudas de Wit 1995): dz/dt = v - sigma0 |v| z / g.
 
-    Exact over a step for the mean velocity and the mean load of its ends, which needs short steps (:func:`.cases.draw`).
+    Exact for a velocity and a load that stay over a step, for which it takes the means of its ends: steps have to be short.
     """
     v, normal, fn = signals.contact.sliding, signals.contact.normal, np.maximum(signals.force, 0.0)
     most, keep, gain, between = _bristles(pad, hidden, fn, v, signals.dt)

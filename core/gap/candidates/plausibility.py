@@ -11,8 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..dataset.trial import UNLOADED_SHARE
 from ..fitting.least_squares import Fit, TrialView
-from ..fitting.noise_floor import UNLOADED_SHARE
 from ..forward.contact_phases import relative_load
 from ..forward.predictor import Model
 from .candidates import Candidate, parameters_at_bounds

@@ -29,6 +29,8 @@ FAULT_KINDS = {
     "saturated-converter": "a converter at its rail",
 }
 """Kinds of faults, in words."""
+UNLOADED_SHARE = 0.03
+"""Share of the largest load of a trial up to which a texel counts as unloaded: the zero of load cells drifts."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +112,13 @@ class Trial:
     def changes(self) -> bool:
         """True if any channel of the responses has two different values."""
         return any((np.fmax.reduce(part, axis=0) > np.fmin.reduce(part, axis=0)).any() for part in self.responses)
+
+    @property
+    def rests(self) -> np.ndarray:
+        """(T - 1,) bool: True where a known force presses at both ends of the step from a sample to the next."""
+        assert self.level is not None
+        pressed = self.level > UNLOADED_SHARE * self.level.max(initial=0.0)
+        return pressed[1:] & pressed[:-1]
 
     def later(self, seconds: float) -> Trial:
         """Return the recording with its samples and temperatures later by a time, seconds."""

@@ -10,12 +10,10 @@ from itertools import pairwise
 import numpy as np
 
 from ...errors import FileError
-from ..dataset.trial import columns_at, runs
+from ..dataset.trial import UNLOADED_SHARE, columns_at, runs
 from ..forward.contact_phases import hold_rate_limit
 from ..forward.predictor import Predictor
 
-UNLOADED_SHARE = 0.03
-"""Share of the largest load of a trial up to which a texel counts as unloaded: the zero of load cells drifts."""
 SHORTEST_STRETCH = 8
 """Least number of samples of an unloaded stretch from which noise is measured, and of a hold whose load is compared."""
 SMALLEST_NOISE = 1e-4

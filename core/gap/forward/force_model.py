@@ -54,7 +54,7 @@ class ContactSamples(NamedTuple):
     slip_squared, mean_slip_squared : (m,) float, m²/s²
         Squares of their magnitudes.
     time_step : (m,) float, s
-        In contact since the sample before.
+        Time since the sample before during which the texel was touched.
     """
 
     sample: np.ndarray
@@ -95,7 +95,7 @@ class ContactHistory:
         normal = -rig.surface.normal[None] if stimulus.normal is None else stimulus.normal
         normal = np.broadcast_to(normal, (*load.shape, 3))
         arrays = [load, stimulus.rate, stimulus.slide_speed, normal[:1] if stimulus.normal is None else normal]
-        arrays += [] if stimulus.slip is None else [stimulus.slip]
+        arrays += [one for one in (stimulus.slip, stimulus.mean_slip) if one is not None]
         first, group = _equal_texels(arrays, touched_texels)
         one = touched_texels[first]
         count = np.bincount(group, texel_shares(rig)[touched_texels], minlength=len(one))
@@ -150,9 +150,8 @@ def _contact_samples(
     if stimulus.slip is not None and stimulus.mean_slip is not None:
         slip, mean = stimulus.slip[sample, own], stimulus.mean_slip[sample, own]
     continues = (sample > 0) & pressed[before, texel]
-    sinking = stimulus.rate[sample, own] * step[sample]  # a texel that was not touched before has been while it sank in
-    touched = np.divide(stimulus.depth[sample, own], sinking, out=np.zeros(len(sample)), where=sinking > 0.0).clip(max=1.0)
-    touched[continues] = 1.0
+    sinking = np.where(continues, 0.0, stimulus.rate[sample, own] * step[sample])  # while it sank in, it was touched
+    touched = np.divide(stimulus.depth[sample, own], sinking, out=np.ones(len(sample)), where=sinking > 0.0).clip(max=1.0)
     squares = dot(slip, slip), dot(mean, mean)
     return ContactSamples(
         sample, texel, continues, count[texel], normal[sample, own], slip, mean, *squares, step[sample] * touched
@@ -199,7 +198,7 @@ def sum_forces(samples, force, friction_load, viscous, parameters, work, total):
     length, now, before = samples.time_step, samples.slip_squared, samples.mean_slip_squared
     keeps, gains, owns, fades = work[0], work[1], work[2], work[3]
     for i in range(force.shape[0]):
-        start = friction_load[i - 1] if samples.continues[i] else 0.0
+        start = max(friction_load[i - 1], 0.0) if samples.continues[i] else 0.0
         keeps[i], gains[i] = ramped_bristle_step(before[i], start, friction_load[i], length[i], parameters)
     for i in range(force.shape[0]):
         owns[i] = bristle_rate(0.0, 1.0, now[i], friction_load[i], parameters)

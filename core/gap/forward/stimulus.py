@@ -254,35 +254,42 @@ def _posed(trial: Trial, rig: Rig, texels: Texels, along: Slides) -> Stimulus:
             f"The indenter of '{trial.name}.csv' goes right through the sensor (by more than {0.5e3 * reach:.3g} mm): "
             "check the pose's unit, its origin (the shape's centre) and the sign of z."
         )
-    rate, slide, slip, mean_slip = _velocities(trial, (depth, normal, point), along)
+    contact, (motion, mean_motion) = (depth, normal, point), _motions(trial)
+    rate, slide, slip = _split(motion, trial.position, contact, along[0], trial.force is not None)
+    mean_slip = None if slip is None else _split(mean_motion, _midway(trial.position), contact, along[1], True)[2]
     overpressed = int((depth > rig.parameters.max_penetration).sum(axis=1).max(initial=0))
     return Stimulus(trial, depth, rate, None, normal, slide, slip, mean_slip, overpressed)
 
 
-def _velocities(
-    trial: Trial, contact: tuple[np.ndarray, ...], along: Slides
-) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray | None]:
-    """Rate of the depth, speed of sliding, slip and mean slip where an indenter touches texels; no slip without net forces.
-
-    `contact` is depth (T, n), normal and point (T, n, 3).
-    """
+def _motions(trial: Trial) -> tuple[np.ndarray, np.ndarray]:
+    """Velocity and angular velocity of an indenter, (T, 6) m/s and rad/s: at the samples, and means since the sample before."""
     assert trial.position is not None and trial.quaternion is not None
-    depth, normal, point = contact
-    time, position, turned, nothing = trial.time, trial.position, trial.quaternion, np.zeros((0, 0, 3))
-    samples = np.arange(len(time))
+    time, samples = trial.time, np.arange(len(trial.time))
     before, after = np.maximum(samples - 1, 0), np.minimum(samples + 1, len(time) - 1)
+    motion = np.gradient(trial.position, time, axis=0), _spin(trial.quaternion, time, before, after)
+    mean_motion = _mean_rate(trial.position, time), _spin(trial.quaternion, time, before, np.maximum(samples, 1))
+    return np.concatenate(motion, axis=1), np.concatenate(mean_motion, axis=1)
 
-    def split(velocity: np.ndarray, spin: np.ndarray, surface: np.ndarray | None) -> tuple[np.ndarray, ...]:
-        parts = np.zeros_like(depth), np.zeros_like(depth), nothing if trial.force is None else np.zeros_like(normal)
-        motion = tuple(np.ascontiguousarray(one, dtype=float) for one in (velocity, spin, position))
-        split_velocities(motion, nothing if surface is None else np.ascontiguousarray(surface), depth, normal, point, parts)
-        return parts
 
-    rate, slide, slip = split(np.gradient(position, time, axis=0), _spin(turned, time, before, after), along[0])
-    if trial.force is None:
-        return rate, slide, None, None
-    mean_slip = split(_mean_rate(position, time), _spin(turned, time, before, np.maximum(samples, 1)), along[1])[2]
-    return rate, slide, slip, mean_slip
+def _midway(position: np.ndarray) -> np.ndarray:
+    """Places (T, 3) in the middle of the step to each sample."""
+    return 0.5 * (position + np.concatenate([position[:1], position[:-1]]))
+
+
+def _split(
+    motion: np.ndarray, centre: np.ndarray, contact: tuple[np.ndarray, ...], surface: np.ndarray | None, with_slip: bool
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """Rate of the depth and speed of sliding, (T, n) m/s, and slip (T, n, 3) where an indenter touches texels.
+
+    It moves and turns about its centre as `motion` (T, 6) says; `contact` is depth (T, n), normal and point (T, n, 3).
+    """
+    depth, normal, point = contact
+    nothing = np.zeros((0, 0, 3))
+    rate, slide, slip = np.zeros_like(depth), np.zeros_like(depth), np.zeros_like(normal) if with_slip else nothing
+    moved = tuple(np.ascontiguousarray(one, dtype=float) for one in (motion[:, :3], motion[:, 3:], centre))
+    along = nothing if surface is None else np.ascontiguousarray(surface)
+    split_velocities(moved, along, depth, normal, point, (rate, slide, slip))
+    return rate, slide, slip if with_slip else None
 
 
 @kernel
@@ -388,11 +395,14 @@ def _weighted(trial: Trial, rig: Rig, texels: Texels, along: Slides) -> Stimulus
     found = _of_forces(trial, load, normal[back], along)
     if trial.force is None:
         return found
-    level = np.array([1.0, 1.0, 0.0])  # how it sinks in follows from a force that is noisy, and is no sliding
-    beside = point[back] - (part.position - level * part.position)[back, None]
-    slide, slip, mean_slip = _velocities(replace(trial, position=level * trial.position), (load, normal[back], beside), along)[
-        1:
-    ]
+    assert part.position is not None
+    contact, centre = (load, normal[back], point[back]), part.position[back]
+    rested = np.append(True, trial.rests)
+    sideways = np.array([1.0, 1.0, 0.0, 1.0, 1.0, 1.0])  # its height follows from a force that is noisy
+    motion, mean_motion = (one * sideways for one in _motions(trial))
+    motion *= (rested & np.append(trial.rests, True))[:, None]
+    _, slide, slip = _split(motion, centre, contact, along[0], True)
+    mean_slip = _split(mean_motion * rested[:, None], _midway(centre), contact, along[1], True)[2]
     return replace(found, slide_speed=slide, slip=slip, mean_slip=mean_slip)
 
 

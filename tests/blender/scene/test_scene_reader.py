@@ -211,7 +211,7 @@ def test_a_free_body_that_an_nla_strip_moves_is_refused(setting, is_refused):
     for name, value in setting.items():
         setattr(track, name, value)
     if is_refused:
-        with pytest.raises(SceneError, match="keyframes, drivers or NLA strips of its location"):
+        with pytest.raises(SceneError, match="keyframes, drivers or NLA strips of its .delta. location"):
             reading_of(scene)
     else:
         reading_of(scene)
@@ -224,7 +224,7 @@ def test_a_free_body_that_keyframes_move_is_refused(path):
     target.palpate.body, target.palpate.mass = "FREE", 0.1
     reading_of(scene)
     target.keyframe_insert(path, frame=1)
-    with pytest.raises(SceneError, match="keyframes, drivers or NLA strips of its location"):
+    with pytest.raises(SceneError, match="keyframes, drivers or NLA strips of its .delta. location"):
         reading_of(scene)
 
 

@@ -109,6 +109,17 @@ def test_slides_of_the_steps_add_up_to_the_path():
     np.testing.assert_allclose(0.02 * found.mean_slip[1:, whole], steps - inward, atol=1e-15)
 
 
+def test_a_block_that_turns_about_a_texel_does_not_slide_there():
+    """Its origin is 0.1 m away, so that it moves and turns at once; the slip is second order in the step."""
+    time = 0.02 * np.arange(51)
+    texels = grid_texels(14, 6, 0.0034, 0.0034)
+    pivot, arm = texels.position[40], np.stack([np.cos(time), np.sin(time), 0.0 * time], axis=1)
+    turns = np.column_stack([np.cos(time / 2), 0.0 * time, 0.0 * time, np.sin(time / 2)])
+    one = trial(pivot + 0.1 * arm + [0.0, 0.0, 4e-3], turns, time)
+    found = stimulus_of(one, rig(Indenter(box(0.4, 0.4, 0.01), None, (0.4, 0.4, 0.01)), one))
+    assert np.linalg.norm(0.02 * found.mean_slip[1:, 40].sum(axis=0)) < 1e-5
+
+
 def test_depth_and_force_trials_load_all_texels_alike():
     time = 0.02 * np.arange(50)
     level = np.clip(np.sin(6 * time), 0, None) * 1e-3
@@ -227,3 +238,25 @@ def test_texels_that_are_never_touched_read_nothing():
         Model(SensorParameters())
     )
     assert not predicted.reading.any() and predicted.force is not None and not predicted.force.any()
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e-9])
+@pytest.mark.parametrize("edges", [(0.012, 0.015, 0.01), None])
+def test_friction_at_50_samples_per_second_is_that_of_short_steps(edges, shift):
+    """A block or a ball slides 2 mm a sample over texels of 3.4 mm, which its edge or its flank meets in between.
+
+    Steps of 0.5 ms are the reference; a height that varies by rounding changes nothing. Root mean squares are 0.8 % of the load
+    for the ball and 1 % for the block; with means of two velocities they were 2.5 and 1.3 %.
+    """
+    p = replace(SensorParameters(), k=60.0, cn=0.6, sigma0=60.0, sigma1=0.6, mus=0.5, mud=0.4, x0=0.02, ct=0.01)
+    shape_of = BALL if edges is None else Indenter(box(*edges), None, edges)
+
+    def force_at(time):
+        along = 0.1 * (np.clip(time - 0.2, 0.0, None) - np.clip(time - 0.5, 0.0, None)) - 0.015
+        height = (RADIUS if edges is None else edges[2] / 2) - 2e-3 + shift * np.sin(1e3 * time)
+        one = trial(np.column_stack([0.0 * time, along, height]), time=time)
+        return Predictor(one, rig(shape_of, one)).predict(Model(p)).force
+
+    short = force_at(5e-4 * np.arange(1601))[::40]
+    sampled = force_at(0.02 * np.arange(41))
+    assert np.sqrt(np.mean((sampled - short) ** 2)) < 0.015 * np.abs(short).max()
