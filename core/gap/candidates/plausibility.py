@@ -48,16 +48,21 @@ def _loss_comes_to_an_end(candidate: Candidate, found: Fit) -> bool:
 
 
 def _adhesion_pulls(model: Model, views: Sequence[TrialView]) -> bool:
-    """True if readings are negative where fitted adhesion predicts a pull, and there is such a place."""
+    """True if readings or net forces are negative where fitted adhesion predicts a pull, and there is such a place."""
+    if all(view.predictor.trial.reading is None for view in views):
+        return True  # only net forces were measured, in which a single texel's pull is not seen
     predicted, measured, p = [], [], model.parameters
     for view in views:
-        if view.predictor.trial.reading is not None:
-            both = view.predictor.predict(model).reading, view.predictor.trial.reading
-            reading, own = ((values - p.zero) / p.gain * abs(p.gain) / view.noise[0] for values in both)
-            predicted.append(reading[reading < PULL_LEVEL])
-            measured.append(own[reading < PULL_LEVEL])
-    if not predicted:
-        return True  # only net forces were measured, in which a single texel's pull is not seen
+        found, trial = view.predictor.predict(model), view.predictor.trial
+        up = view.predictor.rig.texels.normal.mean(axis=0)
+        for noise, expected, own in zip(view.noise, (found.reading, found.force), (trial.reading, trial.force), strict=True):
+            if expected is not None and own is not None:
+                pressing, seen = (
+                    -values @ up if own is trial.force else (values - p.zero) * np.sign(p.gain) for values in (expected, own)
+                )
+                is_pull = pressing < PULL_LEVEL * noise
+                predicted.append(pressing[is_pull] / noise)
+                measured.append(seen[is_pull] / noise)
     pull, seen = np.concatenate(predicted), np.concatenate(measured)
     return len(pull) > ENOUGH_SAMPLES and float(np.nanmean(seen)) < LEAST_PRESENT_SHARE * float(pull.mean()) < LEAST_MEAN_PULL
 
