@@ -2,6 +2,7 @@
 """An effect that the recordings refute where it is its own is not taken, however well its formula fits elsewhere."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import gap_cases as cases
 import numpy as np
@@ -73,3 +74,18 @@ def test_a_softening_comes_to_its_end_within_its_session(share_of_way, is_one):
     view_set = view_set_of(predictors, (noise[0].deviation, 1.0))
     found = fit(view_set.whole, Model(rig.parameters, (start,)), free, max_steps=0)
     assert is_plausible(candidate, found, view_set.whole) == is_one
+
+
+@pytest.mark.parametrize(("is_read", "is_weighed"), [(True, True), (False, True), (True, False), (False, False)])
+def test_a_pull_shows_in_readings_or_in_net_forces(is_read, is_weighed):
+    """A dead zone hides a pull from the readings; where a model says so, the net force has to show it."""
+    pull, dead = effect("adhesion", "constant", pull=0.3, depth=1e-3), effect("dead-zone", "hard", threshold=0.5)
+    rig = cases.rig(seed=4, trials=4)
+    model = Model(rig.parameters, (pull,) if is_read else (dead, pull))
+    trials = []
+    for predictor in predictors_of([replace(one, force=np.zeros((len(one.time), 3))) for one in rig.trials], rig):
+        true = predictor.predict(model if is_weighed else model.without(len(model.effects) - 1))
+        trials.append(replace(predictor.trial, reading=predictor.predict(model).reading, force=true.force))
+    views = view_set_of(predictors_of(trials, replace(rig, trials=tuple(trials))), (0.004, 0.01)).whole
+    candidate = Candidate(kind_of("adhesion"), form_of("adhesion", "constant"))
+    assert is_plausible(candidate, SimpleNamespace(model=model), views) == (is_read or is_weighed)
