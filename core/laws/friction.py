@@ -27,9 +27,9 @@ from .contact_law import ContactLaw, contact_law
 TAYLOR = tuple(1.0 / math.factorial(n + 1) for n in range(15))
 """Taylor coefficients of (1 - exp(-y)) / y without their signs, from y⁰ to y¹⁴."""
 
-RAMP_SERIES = 1e-4
-"""Decay over a step below which the effect of a changing force is computed by the first term of its series: there the next term
-and the rounding of the full expression are both below 1e-8 of the mean."""
+RAMP_SERIES = (12.0 * np.finfo(float).eps) ** (1.0 / 3.0)
+"""Decay x over a step below which the effect of a changing force is the first term of its series, x/6. There the next term,
+x²/12, is as large as the rounding of the full expression, ε/x; both are 2e-11."""
 
 
 @inlined

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..dataset.trial import UNLOADED_SHARE
+from ..dataset.trial import UNLOADED_SHARE, Trial
 from ..fitting.least_squares import Fit, TrialView
 from ..forward.contact_phases import relative_load
-from ..forward.predictor import Model
+from ..forward.predictor import Model, Prediction
 from .candidates import Candidate, parameters_at_bounds
 
 PULL_LEVEL = -0.5
@@ -51,20 +51,21 @@ def _adhesion_pulls(model: Model, views: Sequence[TrialView]) -> bool:
     """True if readings or net forces are negative where fitted adhesion predicts a pull, and there is such a place."""
     if all(view.predictor.trial.reading is None for view in views):
         return True  # only net forces were measured, in which a single texel's pull is not seen
-    predicted, measured, p = [], [], model.parameters
-    for view in views:
-        found, trial = view.predictor.predict(model), view.predictor.trial
-        up = view.predictor.rig.texels.normal.mean(axis=0)
-        for noise, expected, own in zip(view.noise, (found.reading, found.force), (trial.reading, trial.force), strict=True):
-            if expected is not None and own is not None:
-                pressing, seen = (
-                    -values @ up if own is trial.force else (values - p.zero) * np.sign(p.gain) for values in (expected, own)
-                )
-                is_pull = pressing < PULL_LEVEL * noise
-                predicted.append(pressing[is_pull] / noise)
-                measured.append(seen[is_pull] / noise)
-    pull, seen = np.concatenate(predicted), np.concatenate(measured)
+    predicted = np.concatenate([_pressing(view, view.predictor.predict(model), model) for view in views])
+    measured = np.concatenate([_pressing(view, view.predictor.trial, model) for view in views])
+    is_pull = predicted < PULL_LEVEL
+    pull, seen = predicted[is_pull], measured[is_pull]
     return len(pull) > ENOUGH_SAMPLES and float(np.nanmean(seen)) < LEAST_PRESENT_SHARE * float(pull.mean()) < LEAST_MEAN_PULL
+
+
+def _pressing(view: TrialView, one: Trial | Prediction, model: Model) -> np.ndarray:
+    """Readings and net forces of what a trial measured, in deviations of the noise; negative where the sensor is pulled."""
+    trial, p, found = view.predictor.trial, model.parameters, []
+    if trial.reading is not None and one.reading is not None:
+        found.append(np.ravel(one.reading - p.zero) * np.sign(p.gain) / view.noise[0])
+    if trial.force is not None and one.force is not None:
+        found.append(-one.force @ view.predictor.rig.texels.normal.mean(axis=0) / view.noise[1])
+    return np.concatenate(found)
 
 
 def _offset_is_present_unloaded(model: Model, views: Sequence[TrialView], is_common: bool) -> bool:

@@ -434,7 +434,7 @@ def _recorded(columns: dict[str, np.ndarray], file: Path, use: str, texels: int,
     answers = [None if part is None or np.isnan(part).all() else part for part in (parts.reading, parts.force)]
     found = replace(found, reading=answers[0], force=answers[1])
     weighs = kind == "force" and found.force is not None
-    if weighs and position is not None and np.diff(position, axis=0)[found.rests].any():
+    if weighs and position is not None and np.diff(position, axis=0)[found.stays_pressed].any():
         notes.append(
             f"'{file.name}': x or y changes while the weight presses, so it slides and has friction; where it was lifted, "
             "write a force of zero before and after."

@@ -30,7 +30,8 @@ FAULT_KINDS = {
 }
 """Kinds of faults, in words."""
 UNLOADED_SHARE = 0.03
-"""Share of the largest load of a trial up to which a texel counts as unloaded: the zero of load cells drifts."""
+"""Share of the largest load of a trial up to which a texel counts as unloaded, and a weight as lifted: the zero of load cells
+drifts."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +115,7 @@ class Trial:
         return any((np.fmax.reduce(part, axis=0) > np.fmin.reduce(part, axis=0)).any() for part in self.responses)
 
     @property
-    def rests(self) -> np.ndarray:
+    def stays_pressed(self) -> np.ndarray:
         """(T - 1,) bool: True where a known force presses at both ends of the step from a sample to the next."""
         assert self.level is not None
         pressed = self.level > UNLOADED_SHARE * self.level.max(initial=0.0)

@@ -397,12 +397,12 @@ def _weighted(trial: Trial, rig: Rig, texels: Texels, along: Slides) -> Stimulus
         return found
     assert part.position is not None
     contact, centre = (load, normal[back], point[back]), part.position[back]
-    rested = np.append(True, trial.rests)
+    pressed_before, pressed_after = np.append(True, trial.stays_pressed), np.append(trial.stays_pressed, True)
     sideways = np.array([1.0, 1.0, 0.0, 1.0, 1.0, 1.0])  # its height follows from a force that is noisy
     motion, mean_motion = (one * sideways for one in _motions(trial))
-    motion *= (rested & np.append(trial.rests, True))[:, None]
+    motion *= (pressed_before & pressed_after)[:, None]
     _, slide, slip = _split(motion, centre, contact, along[0], True)
-    mean_slip = _split(mean_motion * rested[:, None], _midway(centre), contact, along[1], True)[2]
+    mean_slip = _split(mean_motion * pressed_before[:, None], _midway(centre), contact, along[1], True)[2]
     return replace(found, slide_speed=slide, slip=slip, mean_slip=mean_slip)
 
 
