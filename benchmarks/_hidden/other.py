@@ -49,21 +49,24 @@ def softening(rng, strength) -> Hidden:
 
 
 def hysteresis(rng, strength) -> Hidden:
-    """Preisach: a crowd of relays in each texel, each on above one depth and off below a smaller one."""
+    """Preisach: a crowd of relays in each transducer, each on above one load and off below a smaller one.
+
+    The net force stays: unloaded by more than it was loaded with, a pad would give out work in every press.
+    """
     count, deep = 160, 3.2e-3
-    off = deep * rng.uniform(0, 1, count)
-    on = off + deep * rng.uniform(0.1, 0.3) * rng.uniform(0, 1, count)
+    off = rng.uniform(0, 1, count)
+    on = off + rng.uniform(0.1, 0.3) * rng.uniform(0, 1, count)
     share = min(0.5 * strength, 0.9)
 
     def act(s, pad):
-        state = np.zeros((s.depth.shape[1], count), bool)
-        for t in range(len(s.time)):
-            depth = s.depth[t][:, None]
-            state = (state & (depth > off)) | (depth > on)
-            s.force[t] = (1 - share) * s.force[t] + share * pad.k * deep * state.mean(axis=1)
-        return s.force
+        state, top = np.zeros((s.depth.shape[1], count), bool), pad.gain * pad.k * deep
+        for t, reading in enumerate(s.reading):
+            load = (reading[:, None] - pad.zero) / top
+            state = (state & (load > off)) | (load > on)
+            s.reading[t] = (1 - share) * reading + share * (pad.zero + top * state.mean(axis=1))
+        return s.reading
 
-    return Hidden("hysteresis", "crowd of relays", elastic=act)
+    return Hidden("hysteresis", "crowd of relays", reading=act)
 
 
 def creep(rng, strength) -> Hidden:

@@ -89,6 +89,22 @@ def test_a_cover_leaves_the_net_force_as_it_is():
     assert np.abs(spread.reading - plain.reading).max() > 0.01 * np.ptp(plain.reading)
 
 
+@pytest.mark.parametrize("family", [own.OWN, other.MAKERS, third.THIRD], ids=["own", "other", "third"])
+def test_no_pad_gives_out_work(family):
+    """Nothing that is hidden in the force makes the probe gain work from first touch to last; one per mille is rounding."""
+    time = np.arange(2500) / 100.0
+    depth = 3e-3 * np.maximum(np.sin(2.0 * np.pi * time / 5.0), -0.1) * (0.5 + time / 50.0)
+    pad = world.Pad(60.0, 0.0, 0.5, 0.4, 0.01, 30.0, 0.3, 0.01, 1.0, 0.0, "N")
+    probe = world.Probe(None, (0.04, 0.07, 0.02))
+    path = np.stack([np.zeros_like(time), np.zeros_like(time), probe.lowest - depth], axis=1)
+    touched = world.touch(probe, pad, time, path)
+    for maker in family.values():
+        hidden = maker(np.random.default_rng(0), 0.6)
+        force = world.respond(touched, pad, (hidden,), slides=False).force.mean(axis=1)
+        work = float(0.5 * (force[1:] + force[:-1]) @ np.diff(depth))
+        assert work > -1e-3 * 0.5 * pad.k * depth.max() ** 2, hidden.name
+
+
 def test_a_wrongly_mounted_sensor_is_that_of_the_other_code(tmp_path):
     """The generator moves the ball into the sensor's frame, the library moves the texels: the six numbers mean the same."""
     values = {"x": 2e-3, "y": -1.5e-3, "z": 0.6e-3, "about_x": 0.04, "about_y": -0.03, "about_z": 0.1}
