@@ -23,17 +23,21 @@ LEAST_SENSITIVITY = 1e-12
 
 
 def visible_parameters(views: Sequence[TrialView], found: Fit) -> tuple[FreeParameter, ...]:
-    """Return the free parameters of a fit that act on some views: without net forces, friction does not show."""
+    """Return the free parameters of a fit that some views identify.
+
+    Without net forces friction does not show, and of stiffness and gain only the product.
+    """
     if any(view.with_forces for view in views):
         return found.free
+    unseen = {*FITTED_FRICTION_PARAMETERS, *(["k"] if any(item.name == "gain" for item in found.free) else [])}
 
-    def acts_on_friction(item: FreeParameter) -> bool:
+    def is_seen(item: FreeParameter) -> bool:
         if item.effect < 0:
-            return item.name in FITTED_FRICTION_PARAMETERS
+            return item.name not in unseen
         effect = found.model.effects[item.effect]
-        return form_of(effect.name, effect.form).friction_law is not None
+        return form_of(effect.name, effect.form).friction_law is None
 
-    return tuple(item for item in found.free if not acts_on_friction(item))
+    return tuple(filter(is_seen, found.free))
 
 
 def ridged(gram: np.ndarray) -> np.ndarray:
