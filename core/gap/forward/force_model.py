@@ -162,18 +162,20 @@ def _equal_texels(arrays: list[np.ndarray], texels: np.ndarray) -> tuple[np.ndar
     """First of each group of texels that are equal in all arrays (g,), and the group of each texel (p,).
 
     Both count the given texels, and groups come in the order of their first ones. Arrays (T, n) or (T, n, 3) are compared in
-    random means of their samples. Texels that are touched at different times may share one of them, and not all.
+    random means of their samples, as long as some texels are equal in those before. Texels that are touched at different times
+    may share one of them, and not all.
     """
-    if not len(texels):
-        return texels, texels
     weights = np.random.default_rng(0).uniform(1.0, 2.0, (MEANS, max(len(values) for values in arrays)))
-    keys = []
+    group = np.zeros(len(texels), dtype=int)
     for values in arrays:
-        own, weight = values[:, texels].reshape(len(values), -1), weights[:, : len(values)]
+        if group.max(initial=-1) + 1 == len(group):
+            break
+        own = np.take(values, texels, axis=1).reshape(len(values), -1)
         quantum = EQUAL_WITHIN * max(float(np.abs(own).max(initial=0.0)) * len(values), 1e-300)
-        keys += [mean.reshape(len(texels), -1).T for mean in np.round(weight @ own / quantum) + 0.0]  # no -0.0
-    groups: dict[bytes, int] = {}
-    group = np.array([groups.setdefault(row.tobytes(), len(groups)) for row in np.concatenate(keys).T], dtype=int)
+        means = np.round(weights[:, : len(values)] @ own / quantum) + 0.0  # no -0.0
+        rows = means.reshape(MEANS, len(texels), -1).transpose(1, 0, 2)
+        groups: dict[tuple[int, bytes], int] = {}
+        group = np.array([groups.setdefault((g, row.tobytes()), len(groups)) for g, row in zip(group, rows, strict=True)])
     return np.unique(group, return_index=True)[1], group
 
 
