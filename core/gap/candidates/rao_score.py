@@ -11,7 +11,7 @@ import numpy as np
 from ...effects.engine.registry import form_of
 from ...model.sensor import Effect
 from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
-from ..fitting.least_squares import Fit, FreeParameter, TrialView, coordinates_of, derivatives, with_coordinates
+from ..fitting.least_squares import BASE, Fit, FreeParameter, TrialView, coordinates_of, derivatives, with_coordinates
 from ..forward.predictor import Model
 
 RIDGE = 1e-10
@@ -25,11 +25,13 @@ LEAST_SENSITIVITY = 1e-12
 def visible_parameters(views: Sequence[TrialView], found: Fit) -> tuple[FreeParameter, ...]:
     """Return the free parameters of a fit that some views identify.
 
-    Without net forces friction does not show, and of stiffness and gain only the product.
+    Without net forces friction does not show, and readings of known depths tell only the product of stiffness and gain.
     """
     if any(view.with_forces for view in views):
         return found.free
-    unseen = {*FITTED_FRICTION_PARAMETERS, *(["k"] if any(item.name == "gain" for item in found.free) else [])}
+    trials, unseen = [view.predictor.trial for view in views], set(FITTED_FRICTION_PARAMETERS)
+    if "gain" in {item.name for item in found.free if item.effect == BASE} and all(one.stimulus != "force" for one in trials):
+        unseen.add("k")
 
     def is_seen(item: FreeParameter) -> bool:
         if item.effect < 0:

@@ -74,13 +74,21 @@ def test_friction_is_looked_for_where_forces_are(beside):
     assert not any(view.with_forces for view in seen)
 
 
+@pytest.mark.parametrize("has_load", [False, True])
 @pytest.mark.parametrize(("free", "seen"), [(["k", "cn", "gain", "mus"], ["cn", "gain"]), (["k", "cn", "mus"], ["k", "cn"])])
-def test_without_net_forces_readings_tell_the_product_of_stiffness_and_gain(free, seen):
-    """With both free, a fit to a part of the readings took the stiffness by 3 % off what net forces say (11 of their noise)."""
+def test_without_net_forces_readings_of_depths_tell_the_product_of_stiffness_and_gain(free, seen, has_load):
+    """With both free, a fit to a part of the readings took the stiffness by 3 % off what net forces say (11 of their noise).
+
+    Readings of a known load tell the gain alone.
+    """
     rig = cases.rig(trials=2, seconds=4.0)
     trials = [replace(trial, force=np.zeros((len(trial.time), 3))) for trial in rig.trials]
     views = view_set_of([Predictor(trial, rig) for trial in trials], (1.0, 1.0))
     found = fit(views.whole, Model(rig.parameters), free_base_parameters(rig.parameters, free, 1.0), max_steps=0)
+    if has_load:
+        load = SimpleNamespace(predictor=SimpleNamespace(trial=replace(trials[0], stimulus="force")), with_forces=False)
+        assert [item.name for item in visible_parameters([*views.few_samples, load], found)] == free[:-1]
+        return
     assert [item.name for item in visible_parameters(views.whole, found)] == free
     assert [item.name for item in visible_parameters(views.few_samples, found)] == seen
     assert [item.name for item in ScoreTest(views.few_texels, found).free] == seen
