@@ -11,7 +11,7 @@ import numpy as np
 from ...effects.engine.registry import form_of
 from ...model.sensor import Effect
 from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
-from ..fitting.least_squares import BASE, Fit, FreeParameter, TrialView, coordinates_of, derivatives, with_coordinates
+from ..fitting.least_squares import Fit, FreeParameter, TrialView, coordinates_of, derivatives, with_coordinates
 from ..forward.predictor import Model
 
 RIDGE = 1e-10
@@ -23,23 +23,17 @@ LEAST_SENSITIVITY = 1e-12
 
 
 def visible_parameters(views: Sequence[TrialView], found: Fit) -> tuple[FreeParameter, ...]:
-    """Return the free parameters of a fit that some views identify.
-
-    Without net forces friction does not show, and readings of known depths tell only the product of stiffness and gain.
-    """
+    """Return the free parameters of a fit that act on some views: without net forces, friction does not show."""
     if any(view.with_forces for view in views):
         return found.free
-    trials, unseen = [view.predictor.trial for view in views], set(FITTED_FRICTION_PARAMETERS)
-    if "gain" in {item.name for item in found.free if item.effect == BASE} and all(one.stimulus != "force" for one in trials):
-        unseen.add("k")
 
-    def is_seen(item: FreeParameter) -> bool:
+    def acts_on_friction(item: FreeParameter) -> bool:
         if item.effect < 0:
-            return item.name not in unseen
+            return item.name in FITTED_FRICTION_PARAMETERS
         effect = found.model.effects[item.effect]
-        return form_of(effect.name, effect.form).friction_law is None
+        return form_of(effect.name, effect.form).friction_law is not None
 
-    return tuple(filter(is_seen, found.free))
+    return tuple(item for item in found.free if not acts_on_friction(item))
 
 
 def ridged(gram: np.ndarray) -> np.ndarray:

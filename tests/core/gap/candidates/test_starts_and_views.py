@@ -15,7 +15,7 @@ from palpate.core.gap.base.base_model import friction_parameters_to_search, prep
 from palpate.core.gap.base.quantities import friction_kinds
 from palpate.core.gap.candidates.candidates import Candidate, _halton_points, candidates, scales_of, search_range
 from palpate.core.gap.candidates.direct_estimates import distinct, few_levels, unresponsive_texels
-from palpate.core.gap.candidates.rao_score import ScoreTest, visible_parameters
+from palpate.core.gap.candidates.rao_score import ScoreTest
 from palpate.core.gap.candidates.starting_points import starting_points
 from palpate.core.gap.candidates.view_set import view_set_of
 from palpate.core.gap.data_faults.data_fault import DataFault
@@ -72,26 +72,6 @@ def test_friction_is_looked_for_where_forces_are(beside):
     seen = views.quick(Candidate(creep, creep.forms[0]), model)
     assert seen is (views.few_samples if beside else views.few_texels)
     assert not any(view.with_forces for view in seen)
-
-
-@pytest.mark.parametrize("has_load", [False, True])
-@pytest.mark.parametrize(("free", "seen"), [(["k", "cn", "gain", "mus"], ["cn", "gain"]), (["k", "cn", "mus"], ["k", "cn"])])
-def test_without_net_forces_readings_of_depths_tell_the_product_of_stiffness_and_gain(free, seen, has_load):
-    """With both free, a fit to a part of the readings took the stiffness by 3 % off what net forces say (11 of their noise).
-
-    Readings of a known load tell the gain alone.
-    """
-    rig = cases.rig(trials=2, seconds=4.0)
-    trials = [replace(trial, force=np.zeros((len(trial.time), 3))) for trial in rig.trials]
-    views = view_set_of([Predictor(trial, rig) for trial in trials], (1.0, 1.0))
-    found = fit(views.whole, Model(rig.parameters), free_base_parameters(rig.parameters, free, 1.0), max_steps=0)
-    if has_load:
-        load = SimpleNamespace(predictor=SimpleNamespace(trial=replace(trials[0], stimulus="force")), with_forces=False)
-        assert [item.name for item in visible_parameters([*views.few_samples, load], found)] == free[:-1]
-        return
-    assert [item.name for item in visible_parameters(views.whole, found)] == free
-    assert [item.name for item in visible_parameters(views.few_samples, found)] == seen
-    assert [item.name for item in ScoreTest(views.few_texels, found).free] == seen
 
 
 @pytest.mark.parametrize("swapped", [False, True])
