@@ -51,7 +51,7 @@ def softening(rng, strength) -> Hidden:
 def hysteresis(rng, strength) -> Hidden:
     """Preisach: a crowd of relays in each transducer, each on above one load and off below a smaller one.
 
-    The net force stays: unloaded by more than it was loaded with, a pad would give out work in every press.
+    Relays in the force would generate energy in every press, so the net force is unchanged.
     """
     count, deep = 160, 3.2e-3
     off = rng.uniform(0, 1, count)

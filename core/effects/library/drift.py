@@ -92,7 +92,7 @@ KIND = Kind(
             memoryless=listed,
             after_conversion=True,
             is_apart=True,
-            error=0.01,  # of linear and warm-up it leaves 0.0094 at most, and 0.0006 where these take as long as a recording
+            error=0.01,  # of linear and warm-up it leaves 0.0094 at most (benchmarks/RESULTS.md)
         ),
         Form(
             "shifted-power",

@@ -162,7 +162,7 @@ def _equal_texels(arrays: list[np.ndarray], texels: np.ndarray) -> tuple[np.ndar
     """First of each group of texels that are equal in all arrays (g,), and the group of each texel (p,).
 
     Both count the given texels, and groups come in the order of their first ones. Arrays (T, n) or (T, n, 3) are compared in
-    random means of their samples, as long as some texels are equal in those before. Texels that are touched at different times
+    random means of their samples, one after the other until no two texels are equal. Texels that are touched at different times
     may share one of them, and not all.
     """
     weights = np.random.default_rng(0).uniform(1.0, 2.0, (MEANS, max(len(values) for values in arrays)))

@@ -90,8 +90,8 @@ def test_a_cover_leaves_the_net_force_as_it_is():
 
 
 @pytest.mark.parametrize("family", [own.OWN, other.MAKERS, third.THIRD], ids=["own", "other", "third"])
-def test_no_pad_gives_out_work(family):
-    """Nothing that is hidden in the force makes the probe gain work from first touch to last; one per mille is rounding."""
+def test_no_hidden_effect_generates_energy(family):
+    """The work of the probe on the pad is not negative, within the error of the trapezoidal rule."""
     time = np.arange(900) / 50.0
     depth = 3e-3 * np.maximum(np.sin(2.0 * np.pi * time / 6.0), -0.1) * (0.5 + time / 50.0)
     pad = world.Pad(60.0, 0.0, 0.5, 0.4, 0.01, 30.0, 0.3, 0.01, 1.0, 0.0, "N")
