@@ -68,7 +68,7 @@ def read_mat(path: Path) -> LogFile:
                     f"'{path.name}' has objects of MATLAB's and more than {_LARGEST_UNLISTED >> 20} MB: save the arrays alone."
                 ) from None
         file.seek(0)
-        found = scipy.io.loadmat(file, squeeze_me=True, struct_as_record=False)
+        found = scipy.io.loadmat(file, simplify_cells=True)
     for name, value in found.items():
         if not name.startswith("__"):
             arrays |= _members(name, value)
@@ -79,9 +79,9 @@ def read_mat(path: Path) -> LogFile:
 
 def _members(name: str, value: Any) -> Iterator[tuple[str, np.ndarray]]:
     """Yield the arrays of a variable; the fields of a structure are named after it."""
-    if hasattr(value, "_fieldnames"):
-        for field in value._fieldnames:  # noqa: SLF001
-            yield from _members(f"{name}/{field}", getattr(value, field))
+    if isinstance(value, dict):
+        for field, part in value.items():
+            yield from _members(f"{name}/{field}", part)
     elif isinstance(value, np.ndarray) and value.dtype.kind in _NUMBERS:
         yield name, value
 

@@ -9,7 +9,8 @@ where the messages have them, else those at which messages were recorded.
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterable, Iterator, Mapping
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -51,36 +52,30 @@ class TopicColumns:
     """
 
     def __init__(self, topic: str, path: Path):
-        self._topic, self._path = topic, path
-        self._places_of: dict[str, int] = {}
-        self._values = array("d")
-        self._starts = array("Q", [0])
-        self._places = array("Q")
+        self._topic, self._path, self._number_count = topic, path, 0
+        self._columns: dict[str, tuple[array[int], array[float]]] = defaultdict(lambda: (array("Q"), array("d")))
+        """Rows and numbers of each column: not every message has all of them."""
         self._recorded, self._stamps = array("d"), array("d")
 
     def add(self, message: Any, nanoseconds: int) -> None:
         """Take the numbers of a message that was recorded at a time."""
-        self._recorded.append(nanoseconds * 1e-9)
-        stamp = _stamp(message)
-        self._stamps.append(np.nan if stamp is None else stamp)
         for name, number in _numbers(message, "", 0):
-            self._places.append(self._places_of.setdefault(name, len(self._places_of)))
-            self._values.append(number)
-            if len(self._places_of) > MOST_COLUMNS:
+            rows, numbers = self._columns[name]
+            rows.append(len(self._recorded))
+            numbers.append(number)
+            self._number_count += 1
+            if len(self._columns) > MOST_COLUMNS:
                 break
-        self._starts.append(len(self._values))
-        require_size(len(self._values), len(self._places_of), self._path)
+        require_size(self._number_count, len(self._columns), self._path)
+        self._recorded.append(nanoseconds * 1e-9)
+        self._stamps.append(_stamp(message))
 
     def table(self) -> tuple[LogTable | None, str]:
         """Return the table, None if there are too few messages, and what is said about its times."""
         count = len(self._recorded)
-        names = list(self._places_of)
-        if count < FEWEST_ROWS or not names:
+        if count < FEWEST_ROWS or not self._columns:
             return None, ""
-        require_size(count * len(names), len(names), self._path)
-        values = np.full((count, len(names)), np.nan)
-        rows = np.repeat(np.arange(count), np.diff(np.array(self._starts)).astype(np.int64))
-        values[rows, np.array(self._places)] = np.array(self._values)
+        require_size(count * len(self._columns), len(self._columns), self._path)
         time, stamps, said = np.array(self._recorded), np.array(self._stamps), ""
         if np.isfinite(stamps).all() and np.ptp(stamps) > 0.0:
             difference = float(np.abs((stamps - stamps[0]) - (time - time[0])).max())
@@ -90,12 +85,16 @@ class TopicColumns:
                     "those of the recorder, which were taken."
                 )
             time = time if said else stamps
-        columns = {TIME: time, **{name: column for name, column in zip(names, cleaned(values).T) if name != TIME}}
+        columns = {TIME: time}
+        for name, (rows, numbers) in self._columns.items():
+            if name != TIME:
+                columns[name] = np.full(count, np.nan)
+                columns[name][np.array(rows)] = cleaned(np.array(numbers))
         return LogTable(self._topic, columns, {TIME: "s"}), said
 
 
-def _stamp(message: Any) -> float | None:
-    """Return the time in the header of a message, or in that of its first part, in seconds."""
+def _stamp(message: Any) -> float:
+    """Return the time in the header of a message, or in that of its first part, in seconds; NaN without one."""
     header = _part(message, "header")
     if header is None:
         parts = _part(message, "transforms")
@@ -104,26 +103,23 @@ def _stamp(message: Any) -> float | None:
     seconds = _part(stamp, "sec", "secs")
     nanoseconds = _part(stamp, "nanosec", "nsec", "nsecs")
     if not isinstance(seconds, int | np.integer) or not isinstance(nanoseconds, int | np.integer):
-        return None
+        return np.nan
     return float(seconds) + 1e-9 * float(nanoseconds)
 
 
-def _part(message: Any, *names: str) -> Any:
-    for name in names:
-        found = message.get(name) if isinstance(message, Mapping) else getattr(message, name, None)
-        if found is not None:
-            return found
-    return None
-
-
-def _items(message: Any) -> Iterable[tuple[str, Any]]:
+def _parts(message: Any) -> Mapping[str, Any]:
+    """Return the parts of a message by their names; none of a number or a text."""
     if isinstance(message, Mapping):
-        return ((str(name), value) for name, value in message.items())
+        return message
     if not is_dataclass(message):
-        return ()
+        return {}
     # constants of a message's type are no measurements; rosbags marks them so, and the name of the type
-    own = [item.name for item in fields(message) if "ClassVar" not in str(item.type)]
-    return ((name, getattr(message, name)) for name in own)
+    return {item.name: getattr(message, item.name) for item in fields(message) if "ClassVar" not in str(item.type)}
+
+
+def _part(message: Any, *names: str) -> Any:
+    parts = _parts(message)
+    return next((parts[name] for name in names if parts.get(name) is not None), None)
 
 
 def _numbers(message: Any, before: str, depth: int) -> Iterator[tuple[str, float]]:
@@ -131,7 +127,7 @@ def _numbers(message: Any, before: str, depth: int) -> Iterator[tuple[str, float
     if depth == 0 and is_dataclass(message) and hasattr(message, "point_step"):
         yield from _points(message)
         return
-    for name, value in _items(message) if depth <= DEEPEST else ():
+    for name, value in _parts(message).items() if depth <= DEEPEST else ():
         full, is_list = f"{before}{name}", isinstance(value, list | tuple)
         if name in ("header", "stamp", "layout"):
             continue
