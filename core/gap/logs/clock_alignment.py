@@ -100,8 +100,6 @@ def clock_shift(first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, 
 
 def _shift_of(cause: np.ndarray, answer: np.ndarray, step: float, offset: float) -> ClockShift | None:
     """Return the shift at which two series of changes agree best, None if one of them is constant."""
-    if not cause.any() or not answer.any():
-        return None
     lags, correlation = _correlation(cause, answer)
     size = np.abs(correlation)
     top, away, _ = peak_of(size)

@@ -58,7 +58,7 @@ BY_SIZE: dict[str, tuple[tuple[float, str], ...]] = {
 press a skin with 0.1 to 100 N while scales show grams, and nobody presses a sensor at 200 °C or at 70 K. Temperatures that are
 larger than both are counts of a converter."""
 _BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(]\s*(?P<unit>[^\])]+?)\s*[\])]\s*$")
-_RATE = re.compile(r"/\s*(ms|s|sec|min|h)$")
+RATE = re.compile(r"/\s*(ms|s|sec|min|h)$")
 """The end of a unit of something that is no reading: speeds, and loads over time."""
 
 
@@ -123,11 +123,6 @@ def meaning_in(table: str, column: str, stated: str) -> Meaning:
     longer = meaning_of(f"{table.rpartition('/')[2]} {column}") if table and found.weight <= 1 else found
     best = max(found, longer, key=lambda one: one.weight)
     return replace(best, unit=stated or best.unit)
-
-
-def is_rate(unit: str) -> bool:
-    """Return True if a unit is that of something per time."""
-    return _RATE.search(unit) is not None
 
 
 def _words(text: str) -> list[str]:
@@ -207,12 +202,6 @@ def time_unit(values: np.ndarray, stated: str) -> tuple[str, str, bool]:
     if 0.0 < step <= 0.5:
         return "s", f"samples are {step:.3g} s apart", False
     return "ms" if step <= 500.0 else "us", f"samples are {step:.4g} apart", True
-
-
-def is_since_1970(values: np.ndarray, unit: str) -> bool:
-    """Return True if all time stamps in a unit are so large that they must count from 1970."""
-    known = finite(values)
-    return len(known) > 0 and float(known.min()) * LOG_UNITS["s"][unit] > SINCE_1970
 
 
 def unit_of(kind: str, stated: str, size: float) -> tuple[str, str, bool]:

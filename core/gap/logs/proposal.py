@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from ...errors import FileError
-from ..dataset.column_names import FORCE, NUMBER, POSE, PRESSURES, QUANTITIES, READING_UNITS, SLIDE, TURN, numbered
+from ..dataset.column_names import FORCE, LOG_UNITS, NUMBER, POSE, PRESSURES, QUANTITIES, READING_UNITS, SLIDE, TURN, numbered
 from .column_behaviour import LEAST_CONTACT, contact_of, correlation, finite, is_clock, is_force, is_unordered, missing_code
-from .column_meaning import Family, families, is_rate, is_since_1970, meaning_in, meaning_of, name_and_unit, time_unit, unit_of
+from .column_meaning import RATE, SINCE_1970, Family, families, meaning_in, meaning_of, name_and_unit, time_unit, unit_of
 from .guess import UNKNOWN, Guess, Proposal
 from .log_table import FEWEST_ROWS, FRAMES, LogFile, LogTable, with_distinct_names
 
@@ -215,7 +215,7 @@ class _Logger:
         """Return the likely source of each quantity."""
         found = {"time": self._time()}
         others = self.names_but({name for names in self.candidates.values() for name in names} | set(found["time"].columns))
-        others = [name for name in others if not is_rate(self.meanings[name].unit)]
+        others = [name for name in others if not RATE.search(self.meanings[name].unit)]
         no_clocks = [name for name in others if not self._rises(name, strictly=True)]
         texels = families(no_clocks or others, self._follows)
         for group in (POSE, TURN, FORCE):
@@ -280,7 +280,8 @@ class _Logger:
             is_thin = False
         elif not is_only_named:
             reason = f"{reason}; it is the column that rises like a clock"
-            is_thin = is_thin or len(rising) > 1 or not is_since_1970(self.parts(best)[0], unit)
+            is_since_1970 = np.nanmin(self.parts(best)[0]) * LOG_UNITS["s"][unit] > SINCE_1970
+            is_thin = is_thin or len(rising) > 1 or not is_since_1970
         return self.guess("time", {"name": short if is_of_each else best, "unit": unit}, reason, is_thin)
 
     def _rises(self, name: str, strictly: bool = False) -> bool:
