@@ -31,7 +31,7 @@ def read_text(path: Path) -> LogFile:
         kept[name] = np.ascontiguousarray(values)
     notes += [f"'{path.name}': {counted(text, 'cell')} with text count as missing."] if text else []
     units = {name: unit for name, unit in found.units.items() if name in kept}
-    return LogFile(path, "table of text", (LogTable("", kept, units),), tuple(notes))
+    return LogFile(path, (LogTable("", kept, units),), tuple(notes))
 
 
 READERS: dict[str, Callable[[Path], LogFile]] = {

@@ -21,8 +21,8 @@ LARGEST_FILE = 2 * 2**30
 MOST_COLUMNS = 5000
 FEWEST_ROWS = 8
 """Samples of a trial, see :mod:`..dataset.rig`; shorter arrays are settings and no recordings."""
-FRAMES, MOST_FRAME_ROWS = "frames", 512
-"""Kind of a log that several files are together, and rows of a matrix that may be one of them."""
+MOST_FRAME_ROWS = 512
+"""Rows of a matrix that may be a frame."""
 
 
 @dataclass(frozen=True)
@@ -63,20 +63,20 @@ class LogFile:
     Attributes
     ----------
     path : Path
-    kind : str
-        Of the file, as "CSV".
     tables : tuple of LogTable
     notes : tuple of str
         What was left out, one sentence each.
     label : str
         Name by which answers know it, where the name of the file alone is not enough.
+    has_frames : bool
+        True if several files are this log together, a sample each.
     """
 
     path: Path
-    kind: str
     tables: tuple[LogTable, ...]
     notes: tuple[str, ...] = ()
     label: str = ""
+    has_frames: bool = False
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
@@ -146,7 +146,7 @@ def _joined_frames(logs: list[LogFile]) -> list[LogFile]:
         {"texel": (rows, columns)},
     )
     note = f"{len(logs)} files are taken for frames of {rows} × {columns} texels, in the order of the {name} in their names."
-    return [replace(logs[0], kind=FRAMES, tables=(table,), notes=(note, *logs[0].notes), label=f"{len(logs)} frames")]
+    return [replace(logs[0], tables=(table,), notes=(note, *logs[0].notes), label=f"{len(logs)} frames", has_frames=True)]
 
 
 def require_size(values: int, columns: int, path: Path) -> None:

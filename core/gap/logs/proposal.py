@@ -15,7 +15,7 @@ from ..dataset.column_names import FORCE, LOG_UNITS, NUMBER, POSE, PRESSURES, QU
 from .column_behaviour import LEAST_CONTACT, contact_of, correlation, finite, is_clock, is_force, is_unordered, missing_code
 from .column_meaning import RATE, SINCE_1970, Family, families, meaning_in, meaning_of, name_and_unit, time_unit, unit_of
 from .guess import UNKNOWN, Guess, Proposal
-from .log_table import FEWEST_ROWS, FRAMES, LogFile, LogTable, with_distinct_names
+from .log_table import FEWEST_ROWS, LogFile, LogTable, with_distinct_names
 
 BEGINNING = 0.05
 """Share of a recording at its beginning whose median counts as the value without load."""
@@ -56,7 +56,7 @@ def propose(logs: Sequence[LogFile], name: str = "rig") -> Proposal:
         raise FileError("No logs are given: name at least one file.")
     logs = with_distinct_names(logs)
     for log in logs:
-        if max(table.sample_count for table in log.tables) < FEWEST_ROWS and log.kind != FRAMES:
+        if max(table.sample_count for table in log.tables) < FEWEST_ROWS and not log.has_frames:
             raise FileError(
                 f"'{log.path.name}' has less than {FEWEST_ROWS} samples, and a recording needs as many: leave it out."
             )
@@ -260,7 +260,7 @@ class _Logger:
             unit = time_unit(self.parts(named[0])[0], self.meanings[named[0]].unit)[0]
             reason = "of its name, but it falls: cut the file where the clock was reset, or name another column"
             return self.guess("time", {"name": named[0], "unit": unit}, reason, is_thin=True)
-        if self.logs[0].kind == FRAMES:
+        if self.logs[0].has_frames:
             reason = (
                 "each file is a frame without a time, in the order of the load; where rows are samples, name the files instead"
             )
@@ -314,10 +314,10 @@ class _Logger:
         group = [one for axis in POSE for one in self.candidates.get(axis, [])] if quantity in POSE else [name]
         is_heat = quantity == "temperature"
         size = float(np.nanmedian(self.parts(name)[0])) if is_heat else max(map(self.span, group))
-        is_ros = name.startswith("/") and self.logs[0].kind != "table of text" and not stated
+        is_topic = name.startswith("/") and self.tables[0].name != ""
         if not kind:
             unit, reason, is_thin = "", "of its name", False
-        elif is_ros and (kind == "m" or quantity in FORCE):
+        elif is_topic and not stated and (kind == "m" or quantity in FORCE):
             unit, reason, is_thin = kind, "ROS says so", False
         else:
             unit, reason, is_thin = unit_of(kind, stated, size)

@@ -43,7 +43,7 @@ def read_npz(path: Path) -> LogFile:
                 require_size(total, 0, path)
                 values = np.frombuffer(member.read(), kind, count)
                 arrays[name] = values.reshape(shape, order="F" if is_fortran else "C")
-    return _log(path, "NPZ", arrays, {}, notes)
+    return _log(path, arrays, {}, notes)
 
 
 def read_mat(path: Path) -> LogFile:
@@ -74,7 +74,7 @@ def read_mat(path: Path) -> LogFile:
             arrays |= _members(name, value)
             if type(value).__name__ == "MatlabOpaque" or (isinstance(value, np.ndarray) and value.dtype.names):
                 notes.append(f"'{path.name}': '{name}' is an object of MATLAB's (a timetable or a class) and was left out.")
-    return _log(path, "MAT", arrays, {}, notes)
+    return _log(path, arrays, {}, notes)
 
 
 def _members(name: str, value: Any) -> Iterator[tuple[str, np.ndarray]]:
@@ -106,10 +106,10 @@ def read_hdf5(path: Path, kind: str = "HDF5") -> LogFile:
             arrays[name] = item[()]
             unit = item.attrs.get("unit", item.attrs.get("units", ""))
             units[name] = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else unit
-    return _log(path, kind, arrays, {name: unit for name, unit in units.items() if isinstance(unit, str) and unit}, notes)
+    return _log(path, arrays, {name: unit for name, unit in units.items() if isinstance(unit, str) and unit}, notes)
 
 
-def _log(path: Path, kind: str, arrays: dict[str, np.ndarray], units: dict[str, str], notes: list[str]) -> LogFile:
+def _log(path: Path, arrays: dict[str, np.ndarray], units: dict[str, str], notes: list[str]) -> LogFile:
     """Return the tables of some arrays, whose names have that of a group before a slash; what is too short is left out.
 
     The samples of an array lie along the axis whose length most arrays have.
@@ -139,4 +139,4 @@ def _log(path: Path, kind: str, arrays: dict[str, np.ndarray], units: dict[str, 
     for (group, count), table in tables.items():  # of one group the longest table has its name
         if count < max(other for name, other in tables if name == group):
             tables[group, count] = replace(table, name=f"{group}[{count}]")
-    return LogFile(path, kind, tuple(tables.values()), tuple(notes))
+    return LogFile(path, tuple(tables.values()), tuple(notes))

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -35,17 +36,17 @@ def read_mcap(path: Path) -> LogFile:
             with damage_said(path, "MCAP"):
                 message = decode(content)
             topics.setdefault(topic, TopicColumns(topic, path)).add(message, time)
-    return _log(path, "MCAP", topics, left_out)
+    return _log(path, topics, left_out)
 
 
-def _log(path: Path, kind: str, topics: dict[str, TopicColumns], left_out: dict[str, str]) -> LogFile:
+def _log(path: Path, topics: dict[str, TopicColumns], left_out: dict[str, str]) -> LogFile:
     """Return the log of some topics; raise FileError if none has enough messages with numbers."""
     made = [topic.table() for topic in topics.values()]
     tables = tuple(table for table, _ in made if table is not None)
     if not tables:
         raise FileError(f"'{path.name}' has no topic with numbers in eight messages or more: give a log of measurements.")
     notes = [f"'{path.name}': {topic} ({kind or 'no type'}) is not read." for topic, kind in left_out.items()]
-    return LogFile(path, kind, tables, (*notes, *(said for _, said in made if said)))
+    return LogFile(path, tables, (*notes, *(said for _, said in made if said)))
 
 
 def _messages(file: Any, path: Path, topics: dict[str, TopicColumns]) -> Iterator[tuple[str, str, int, bytes, Decoder | None]]:
@@ -119,8 +120,7 @@ def read_bag(path: Path) -> LogFile:
             raise FileError(f"'{path.name}' holds more than {LARGEST_FILE >> 30} GB: record the topics of the sensor alone.")
         logs = [file for file in files if file.suffix == ".mcap"]
         if len(logs) == 1:
-            found = read_mcap(logs[0])
-            return LogFile(path, "ROS 2 bag", found.tables, found.notes)
+            return replace(read_mcap(logs[0]), path=path)
         if not logs and not any(file.suffix == ".db3" for file in files):
             raise FileError(f"'{path}' holds no bag: give a folder with metadata.yaml and a .db3 or .mcap file.")
     highlevel, typesys = (imported(f"rosbags.{one}", f"'{path.name}'", INSTALL) for one in ("highlevel", "typesys"))
@@ -135,4 +135,4 @@ def read_bag(path: Path) -> LogFile:
             with damage_said(path, "a bag"):
                 message = reader.deserialize(content, connection.msgtype)
             topics.setdefault(connection.topic, TopicColumns(connection.topic, path)).add(message, time)
-    return _log(path, "ROS 1 bag" if path.suffix == ".bag" else "ROS 2 bag", topics, left_out)
+    return _log(path, topics, left_out)
