@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import FileError, read_errors_said
+from ...io.csv_table import is_number
 from ...io.input_files import read_bounded
 from ..dataset.rig import Rig
 from ..selection.findings import Diagnosis
@@ -106,11 +107,7 @@ def read_by_hand(path: Path, rigs: Iterable[str]) -> Mapping[str, float]:
         where = f"Line {number} of '{path.name}'"
         if len(row) != 2 or row[0].strip() not in known:
             raise FileError(f"{where} names no rig of the table: write the name of a rig and its error, as in rig,0.0113.")
-        try:
-            value = float(row[1])
-        except ValueError:
-            value = math.nan
-        if not 0.0 < value < math.inf:
+        if not (is_number(row[1]) and 0.0 < float(row[1]) < math.inf):
             raise FileError(f"{where} has the error {row[1].strip()!r:.40}: write a share of the range above zero, as 0.0113.")
-        found[row[0].strip()] = value
+        found[row[0].strip()] = float(row[1])
     return found
