@@ -70,7 +70,7 @@ def plan_experiment(rig: Rig, wishes: Wishes) -> Job[ExperimentPlan]:
     Parameters
     ----------
     rig : Rig
-    wishes : Wishes, optional
+    wishes : Wishes
 
     Yields
     ------
@@ -175,15 +175,14 @@ class _Search:
         yield Progress("signals of every kind", 20, 100)
         pairs = [(kind, other) for kind in kinds for other in kinds if kind != other]
         before = {pair: signals.separation(products, *pair) for pair in pairs}
-        open_ones = {pair for pair in pairs if not choose_pair or not before[pair].is_separated}
-        wanted = [pair for pair in pairs if pair in open_ones or pair[::-1] in open_ones]
+        wanted = [pair for pair in pairs if not (choose_pair and before[pair].is_separated and before[pair[::-1]].is_separated)]
+        if not wanted:
+            return None, list(before.values())
         after: dict[str, dict[Pair, Separation]] = {}
-        for number, (name, (_, further)) in enumerate(self._further.items() if wanted else ()):
+        for number, (name, (_, further)) in enumerate(self._further.items()):
             yield Progress(f"the programme '{name}'", 20 + 80 * number // len(self._further), 100)
             joined = products + signals.products([further])
             after[name] = {pair: signals.separation(joined, *pair) for pair in wanted}
-        if not wanted:
-            return None, list(before.values())
         question = _worthwhile(wanted, before, after) if choose_pair else wanted
         # The mean logarithm of the separations counts, not the least one, because no programme may separate one of the pairs.
         worth = {name: np.mean([np.log(max(own[pair].deviations, 1e-3)) for pair in question]) for name, own in after.items()}
