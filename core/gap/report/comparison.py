@@ -184,11 +184,8 @@ def squared_errors(predictor: Predictor, model: Model, result: Diagnosis) -> np.
 
 def rms_by_texel(result: Diagnosis, model: Model) -> np.ndarray:
     """Return the root mean square error of each texel over the fitted trials, (n,) float, as a share of the range."""
-    total, count = np.zeros(len(result.rig.texels)), 0
-    for predictor in result.of("fit"):
-        square = squared_errors(predictor, model, result)
-        total, count = total + square.sum(axis=0), count + len(square)
-    return np.sqrt(total / max(count, 1))
+    squares = [squared_errors(predictor, model, result) for predictor in result.of("fit")]
+    return np.asarray(np.sqrt(np.sum([square.sum(axis=0) for square in squares], axis=0) / sum(map(len, squares))))
 
 
 LEAST_LEVEL = 0.01

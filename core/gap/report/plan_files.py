@@ -13,6 +13,7 @@ import numpy as np
 
 from ...io.file_writing import atomic_write, write_text
 from ...io.hidden_folder import FileList
+from ..dataset.column_names import TURN
 from ..planning.experiment_plan import ExperimentPlan, PlannedExperiment
 from ..planning.paths import Trajectory
 from ..planning.separation import LEAST_SHARE, Separation
@@ -113,10 +114,9 @@ def write_trajectory(trajectory: Trajectory, path: Path) -> None:
     """Write the samples of a trajectory as the columns that a recording of a rig has: SI units, one header line."""
     trial = trajectory.trial
     columns = {"time": trial.time}
-    if trial.position is not None:
+    if trial.position is not None and trial.quaternion is not None:
         columns |= dict(zip("xyz" if trial.level is None else "xy", trial.position.T, strict=False))
-    if trial.quaternion is not None:
-        columns |= dict(zip(("qw", "qx", "qy", "qz"), trial.quaternion.T, strict=True))
+        columns |= dict(zip(TURN, trial.quaternion.T, strict=True))
     if trial.level is not None:
         columns[trial.stimulus] = trial.level
     rows = np.stack([*columns.values()], axis=1)

@@ -233,7 +233,7 @@ def loops(result: Diagnosis) -> Figure:
     if trial.reading is not None:
         x = over[:, channel]
     elif s.slide_speed.any():
-        travel = trial.travel if trial.travel.any() else trial.position[:, :2] if trial.position is not None else trial.travel
+        travel = trial.travel if trial.position is None or trial.travel.any() else trial.position[:, :2]
         x, label = 1e3 * travel[:, int(np.argmax(np.ptp(travel, axis=0)))], "travel (mm)"
     else:
         x, label = 1e3 * s.depth.max(axis=1), "depth (mm)"
