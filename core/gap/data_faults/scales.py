@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -45,28 +45,26 @@ def _signs(recorded: Mapping[str, Responses], part: str, expected: float) -> lis
     """Readings or net forces whose sign is not that of compression, or (`expected` 0) not that of the other recordings."""
     found = {name: correlation(own) for name, own in recorded.items()}
     common = expected or float(np.sign(sum(np.sign(value) for value in found.values())))
-    wrong = tuple(name for name, value in found.items() if value * common < OPPOSITE)
-    if not wrong:
-        return []
     what, goes = ("readings", "go") if part == "reading" else ("net force", "goes")
     against = "compression counts as positive" if expected else "the other recordings say otherwise"
-    said = (
-        f"the {what} of '{wrong[0]}.csv' {goes} the other way (correlation with the load {found[wrong[0]]:.2f}), and {against}"
-    )
-    return [DataFault("sign", wrong, said, partial(_scaled, part=part, factor=-1.0))]
+    said = f"the {what} of '{{name}}.csv' {goes} the other way (correlation with the load {{value:.2f}}), and {against}"
+    return _of_other_sign(found, common, said, partial(_scaled, part=part, factor=-1.0))
 
 
 def _friction_signs(stimuli: Sequence[Stimulus]) -> list[DataFault]:
     """Net forces along the surface that do work on the surface that slides, where friction takes work from it."""
     found = {s.trial.name: _work_share(s.trial.travel, s.trial.force) for s in stimuli if s.trial.force is not None}
-    wrong = tuple(name for name, value in found.items() if value < OPPOSITE)
-    if not wrong:
-        return []
     said = (
-        f"the net force along the surface of '{wrong[0]}.csv' drives the slide instead of resisting it (its work is "
-        f"{found[wrong[0]]:.2f} of what a force along the travel would do), but forces act on the sensor"
+        "the net force along the surface of '{name}.csv' drives the slide instead of resisting it (its work is "
+        "{value:.2f} of what a force along the travel would do), but forces act on the sensor"
     )
-    return [DataFault("sign", wrong, said, partial(_scaled, part="force", factor=np.array([-1.0, -1.0, 1.0])))]
+    return _of_other_sign(found, 1.0, said, partial(_scaled, part="force", factor=np.array([-1.0, -1.0, 1.0])))
+
+
+def _of_other_sign(found: Mapping[str, float], common: float, said: str, correct: Callable[[Trial], Trial]) -> list[DataFault]:
+    """The fault of the recordings whose value clearly has not the common sign; `said` is for the first of them."""
+    wrong = tuple(name for name, value in found.items() if value * common < OPPOSITE)
+    return [DataFault("sign", wrong, said.format(name=wrong[0], value=found[wrong[0]]), correct)] if wrong else []
 
 
 def _work_share(travel: np.ndarray, force: np.ndarray) -> float:
