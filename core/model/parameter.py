@@ -80,6 +80,12 @@ class Parameter:
         size = abs(gain)
         return replace(self, default=self.default * size, low=self.low * size, high=self.high * size)
 
+    @property
+    def force_dimension(self) -> int:
+        """Power of force in the dimension of the parameter."""
+        inverse = {"1/N": -1, "unit/N": -1, "1/N²": -2, "1/N³": -3, "1/N⁴": -4}
+        return 1 if self.unit.startswith(("N", "J")) else inverse.get(self.unit, 0)
+
     def unit_of(self, sensor_unit: str) -> str:
         """Return the unit of the parameter on a sensor that reports in `sensor_unit`; "1" where it has none."""
         return self.unit.replace("unit", sensor_unit)

@@ -146,20 +146,20 @@ def _bristle_starts(views: Sequence[TrialView], model: Model) -> list[Model]:
     return [replace(model, parameters=replace(p, sigma0=float(x))) for x in stiffnesses]
 
 
-def identified_base_parameters(rig: Rig, predictors: Sequence[Predictor]) -> list[str]:
-    """Return the names of the base model's parameters that these recordings identify.
+def identified_base_parameters(rig: Rig, predictors: Sequence[Predictor], with_forces: bool = True) -> list[str]:
+    """Return the names of the base model's parameters that these recordings identify, or their readings alone.
 
     Readings under a known depth or pose identify only the product of gain and stiffness. It is fitted as `k` if the readings
     are in newtons or if the rig gives the gain, and as `gain` otherwise.
     """
     has_readings = any(p.trial.reading is not None for p in predictors)
-    has_forces = any(p.trial.force is not None for p in predictors)
+    has_forces = with_forces and any(p.trial.force is not None for p in predictors)
     depth_known = any(p.trial.stimulus != "force" for p in predictors)
     force_known = any(p.trial.stimulus == "force" for p in predictors)
-    slides = any(p.trial.force is not None and p.stimulus.slide_speed.any() for p in predictors)
+    slides = has_forces and any(p.trial.force is not None and p.stimulus.slide_speed.any() for p in predictors)
     own_unit, gain_given = rig.parameters.unit != "N", "gain" in rig.given
     names: list[str] = []
-    if depth_known and not (own_unit and has_readings and not gain_given and not has_forces):
+    if depth_known and not (own_unit and has_readings and not (gain_given or has_forces or force_known)):
         names.append("k")
     if depth_known and rig.parameters.normal_law == "linear":
         names.append("cn")

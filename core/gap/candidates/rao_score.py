@@ -10,8 +10,8 @@ import numpy as np
 
 from ...effects.engine.registry import form_of
 from ...model.sensor import Effect
-from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
-from ..fitting.least_squares import Fit, FreeParameter, TrialView, coordinates_of, derivatives, with_coordinates
+from ..base.base_model import identified_base_parameters
+from ..fitting.least_squares import BASE, Fit, FreeParameter, TrialView, coordinates_of, derivatives, with_coordinates
 from ..forward.predictor import Model
 
 RIDGE = 1e-10
@@ -23,17 +23,19 @@ LEAST_SENSITIVITY = 1e-12
 
 
 def visible_parameters(views: Sequence[TrialView], found: Fit) -> tuple[FreeParameter, ...]:
-    """Return the free parameters of a fit that act on some views: without net forces, friction does not show."""
+    """Return the free parameters of a fit that some views identify: without net forces neither friction nor their unit."""
     if any(view.with_forces for view in views):
         return found.free
+    predictors = [view.predictor for view in views]
+    identified = identified_base_parameters(predictors[0].rig, predictors, with_forces=False)
 
-    def acts_on_friction(item: FreeParameter) -> bool:
+    def is_seen(item: FreeParameter) -> bool:
         if item.effect < 0:
-            return item.name in FITTED_FRICTION_PARAMETERS
+            return item.effect != BASE or item.name in identified
         effect = found.model.effects[item.effect]
-        return form_of(effect.name, effect.form).friction_law is not None
+        return form_of(effect.name, effect.form).friction_law is None
 
-    return tuple(item for item in found.free if not acts_on_friction(item))
+    return tuple(filter(is_seen, found.free))
 
 
 def ridged(gram: np.ndarray) -> np.ndarray:

@@ -15,8 +15,8 @@ import numpy as np
 from ...jobs import Job, Progress
 from ...model.sensor import Effect
 from ..candidates.candidates import DIRECTLY_ESTIMATED, Candidate, is_free_already
-from ..candidates.rao_score import ScoreTest
-from ..fitting.least_squares import Fit, fit
+from ..candidates.rao_score import ScoreTest, visible_parameters
+from ..fitting.least_squares import Fit, FreeParameter, fit
 from .score import Hypothesis
 from .screening import LATER_STARTS, Screening, free_with
 
@@ -115,16 +115,17 @@ def _ranked(entries: list[_Entry], gram: np.ndarray, along: np.ndarray) -> list[
 
 def _fitted(screening: Screening, base: Hypothesis, pair: tuple[_Entry, _Entry]) -> list[Hypothesis]:
     """Two effects fitted together, first to a part of the data; empty if the signature of one of them is not there."""
-    model, free = base.fit.model, tuple(base.fit.free)
+    model, own = base.fit.model, tuple[FreeParameter, ...]()
     for one in pair:
         form = one.candidate.form
         keeps = form.placement is not None or form.jumps_at  # its change is not proportional to it
         effect = one.effect if keeps else one.candidate.scaled(one.effect, one.length, abs(model.parameters.gain))
-        free = free_with(free, model, one.candidate, effect, screening.scales)
+        own = free_with(own, model, one.candidate, effect, screening.scales)
         model = model.with_effect(effect)
     views = screening.view_set.few_samples
-    quick = fit(views, model, free, max_steps=10, tolerance=1e-3, with_equations=False)
-    found = screening.final_fit(quick.model, free, len(base.fit.free))
+    seen = (*visible_parameters(views, base.fit), *own)
+    quick = fit(views, model, seen, max_steps=10, tolerance=1e-3, with_equations=False)
+    found = screening.final_fit(quick, (*base.fit.free, *own), len(base.fit.free))
     for index, one in enumerate(pair):
         if not screening.shows_signature(one.candidate, with_effect_last(found, index)):
             return []
