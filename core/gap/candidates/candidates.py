@@ -43,8 +43,6 @@ bound is the 0.5 of crosstalk between wires, so any number between does the same
 spreading in two of the 133 rigs of base 126900."""
 LEAST_WARMTH = 1.0
 """Range of temperatures (K) from which on what follows them can be told from what does not. Chosen by eye."""
-INVERSE_FORCES = {1: "1/N", 2: "1/N²", 3: "1/N³", 4: "1/N⁴"}
-"""Units of coefficients by the power of the force in them."""
 SIGNED_CORRELATION, LEAST_SIGNED = 0.5, 0.1
 """Channels are signed if at least this share of them follows the load with this correlation, and as many with its negative.
 Chosen by eye: of eFlesh's channels 12 rise and 3 fall under a normal force, and 8 and 19 in shear; the texels of each other
@@ -137,7 +135,7 @@ def search_range(parameter: Parameter, scales: Scales, form: Form) -> tuple[floa
     """Return the range of values in which a parameter of a form would show in recordings of these scales, inside its bounds."""
     warmth = max(scales.warmth, LEAST_WARMTH)
     speed = scales.rate if form.friction_law is None else scales.sliding_speed
-    longest = 2.0 * scales.seconds
+    coefficient, longest = scales.force**parameter.force_dimension, 2.0 * scales.seconds
     if form.neutral.get(parameter.name) == 0.0:  # a delay is compared with the time in which a load comes
         longest = max(min(longest, LARGE * scales.depth / scales.rate), LARGE * scales.step)
     known = {
@@ -148,7 +146,7 @@ def search_range(parameter: Parameter, scales: Scales, form: Form) -> tuple[floa
         "m/s": (0.02 * speed, 2.0 * speed),
         "N·s": (0.1 * scales.force * scales.seconds, 50.0 * scales.force * scales.seconds),
         "J": (0.1 * scales.force * scales.depth, 50.0 * scales.force * speed * scales.seconds),
-        **{unit: (0.02 / scales.force**power, 2.0 / scales.force**power) for power, unit in INVERSE_FORCES.items()},
+        **dict.fromkeys(("1/N", "1/N²", "1/N³", "1/N⁴"), (0.02 * coefficient, 2.0 * coefficient)),
         "s/m": (0.02 / speed, 2.0 / speed),
         "unit/s": (-0.5 * scales.reading / scales.seconds, 0.5 * scales.reading / scales.seconds),
         "rad": (-0.1, 0.1),

@@ -6,4 +6,4 @@ recordings can show (``identifiability``), and three tests of a residual: for st
 lines.
 """
 
-__all__ = ["identifiability", "intervals", "least_squares", "noise_floor", "residual_tests"]
+__all__ = ["force_scale", "identifiability", "intervals", "least_squares", "noise_floor", "residual_tests"]

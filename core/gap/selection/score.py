@@ -158,8 +158,9 @@ class Score:
     def measure_formula_errors(self, base: Hypothesis, singles: Sequence[Hypothesis]) -> None:
         """Measure φ on these recordings by leaving one form out, for kinds of which two forms or more explain something alone.
 
-        The second best form leaves so much more than the best, as a share of the change that the best one makes. Forms of a
-        kind may be alike, so φ is at least that of textbooks; a form that states its φ keeps it.
+        The second best form leaves so much more than the best, as a share of the change that the best one makes. The error of a
+        formula is at most what the best form leaves. Forms of a kind may be alike, so φ is at least that of textbooks; a form
+        that states its φ keeps it.
         """
         least, found = self.value(base), dict[str, list[Hypothesis]]()
         for one in sorted(singles, key=self.value, reverse=True):
@@ -170,7 +171,8 @@ class Score:
         for own in found.values():
             if len(own) > 1:
                 (first, allowed), (second, _) = self.parts(own[0]), self.parts(own[1])
-                share = (second[0] - first[0]) / np.maximum(allowed[0] / self.formula_error(own[0].forms[0]), 1e-12)
+                error = np.minimum(second[0] - first[0], first[0] + self.noise.error)
+                share = error / np.maximum(allowed[0] / self.formula_error(own[0].forms[0]), 1e-12)
                 share = np.clip(share, FORMULA_ERROR, LARGEST_FORMULA_ERROR)
                 kind = kind_of(own[0].names[0])
                 errors |= {f"{kind.name}/{form.name}": share for form in kind.forms if form.error is None}
