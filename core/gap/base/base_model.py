@@ -11,6 +11,7 @@ import numpy as np
 
 from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
 from ..dataset.rig import FORCE, Rig
+from ..fitting.force_scale import at_measured_forces
 from ..fitting.least_squares import FRICTION_LEVEL, RECORDING, Fit, FreeParameter, TrialView, fit, free_base_parameters
 from ..fitting.noise_floor import ChannelNoise, force_noise, reading_noise, with_repeats
 from ..forward.predictor import CONTACT_HEIGHT, NEUTRAL_NUMBERS, Model, Predictor, number_name
@@ -100,7 +101,8 @@ def base_fit(rig: Rig, views: Sequence[TrialView], full: float) -> Fit:
         Range of the readings.
     """
     predictors = [view.predictor for view in views]
-    start = start_model(rig, predictors)
+    stated = start_model(rig, predictors)
+    start = at_measured_forces(stated, free_parameters(rig, predictors, stated, full), views)
     free = free_parameters(rig, predictors, start, full)
     stiffness_is_open = "sigma0" not in rig.given and any(item.name == "sigma0" for item in free)
     others = _bristle_starts(views, start) if stiffness_is_open else []
@@ -149,17 +151,20 @@ def _bristle_starts(views: Sequence[TrialView], model: Model) -> list[Model]:
 def identified_base_parameters(rig: Rig, predictors: Sequence[Predictor], with_forces: bool = True) -> list[str]:
     """Return the names of the base model's parameters that these recordings identify, or their readings alone.
 
-    Readings under a known depth or pose identify only the product of gain and stiffness. It is fitted as `k` if the readings
-    are in newtons or if the rig gives the gain, and as `gain` otherwise.
+    Readings at a known depth or pose identify only the product of gain and stiffness. It is fitted as `k` if the readings
+    are in newtons or if the rig gives the gain, and as `gain` otherwise. Known loads identify both, if readings of a load and
+    readings at a depth have a factor in common.
     """
     has_readings = any(p.trial.reading is not None for p in predictors)
     has_forces = with_forces and any(p.trial.force is not None for p in predictors)
-    depth_known = any(p.trial.stimulus != "force" for p in predictors)
-    force_known = any(p.trial.stimulus == "force" for p in predictors)
+    depths, loads = ([p.trial for p in predictors if (p.trial.stimulus == "force") is known] for known in (False, True))
+    loads = [trial for trial in loads if np.any(trial.level)]
+    depth_known, force_known = bool(depths), bool(loads)
+    shared = set.intersection(*({t.factor if isinstance(t.factor, str) else "" for t in own} for own in (depths, loads)))
     slides = has_forces and any(p.trial.force is not None and p.stimulus.slide_speed.any() for p in predictors)
     own_unit, gain_given = rig.parameters.unit != "N", "gain" in rig.given
     names: list[str] = []
-    if depth_known and not (own_unit and has_readings and not (gain_given or has_forces or force_known)):
+    if depth_known and not (own_unit and has_readings and not (gain_given or has_forces or shared)):
         names.append("k")
     if depth_known and rig.parameters.normal_law == "linear":
         names.append("cn")

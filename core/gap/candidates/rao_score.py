@@ -23,7 +23,10 @@ LEAST_SENSITIVITY = 1e-12
 
 
 def visible_parameters(views: Sequence[TrialView], found: Fit) -> tuple[FreeParameter, ...]:
-    """Return the free parameters of a fit that some views identify: without net forces neither friction nor their unit."""
+    """Return the free parameters of a fit that some views identify.
+
+    Without net forces they show no friction, and readings at known depths do not determine the scale of forces.
+    """
     if any(view.with_forces for view in views):
         return found.free
     predictors = [view.predictor for view in views]

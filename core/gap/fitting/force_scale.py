@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The scale of forces, which readings under known depths do not tell.
+"""The scale of forces, which readings at known depths do not determine.
 
-With all forces λ times as large, and what is divided by a force λ times as small (the gain, above all), a model predicts the
-same readings. So a fit to readings alone leaves λ open, and measured net forces give it.
+If all forces are λ times as large, and the gain and all other parameters change by the power of λ that their dimension has, a
+model predicts the same readings. So a fit to readings alone leaves λ open. Measured net forces determine it.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from ..forward.predictor import Model
 from .least_squares import BASE, FreeParameter, TrialView
 
 
-def with_scaled_forces(model: Model, free: Sequence[FreeParameter], scale: float) -> Model:
-    """Return a model with forces that are `scale` times as large: in its effects and the free parameters of its base."""
-    p, names = model.parameters, [item.name for item in free if item.effect == BASE]
-    changed = {name: getattr(p, name) * scale ** SENSOR_PARAMETERS[name].force_dimension for name in names}
-    return Model(replace(p, **changed), tuple(_scaled(effect, scale) for effect in model.effects), model.recordings)
-
-
 def at_measured_forces(model: Model, free: Sequence[FreeParameter], views: Sequence[TrialView]) -> Model:
-    """Return a model with its forces at the scale at which net forces fit best, which are proportional to it."""
+    """Return a model with the same readings and with the scale of forces that fits the net forces best.
+
+    Net forces are a linear function of the scale. It is open if stiffness and gain are both free and no load is known;
+    otherwise the model is returned as it is.
+    """
+    names = {item.name for item in free if item.effect == BASE}
+    if not names >= {"k", "gain"} or any(view.predictor.trial.stimulus == "force" for view in views):
+        return model
     dot = square = 0.0
     for view in views:
         before, doubled = (view.residual(one)[:, len(view.texels) :] for one in (model, with_scaled_forces(model, free, 2.0)))
@@ -37,8 +37,18 @@ def at_measured_forces(model: Model, free: Sequence[FreeParameter], views: Seque
     return with_scaled_forces(model, free, scale) if scale > 0.0 else model
 
 
+def with_scaled_forces(model: Model, free: Sequence[FreeParameter], scale: float) -> Model:
+    """Return a model with forces that are `scale` times as large.
+
+    The parameters of its effects change, and those of its base model that are free; others keep their values.
+    """
+    p, names = model.parameters, [item.name for item in free if item.effect == BASE]
+    changed = {name: getattr(p, name) * scale ** SENSOR_PARAMETERS[name].force_dimension for name in names}
+    return Model(replace(p, **changed), tuple(_scaled(effect, scale) for effect in model.effects), model.recordings)
+
+
 def _scaled(effect: Effect, scale: float) -> Effect:
-    """An effect whose parameters have the dimensions that the library states."""
+    """An effect in which forces are `scale` times as large, by the dimensions of its parameters."""
     powers = {p.name: p.force_dimension for p in form_of(effect.name, effect.form).parameters}
     values = {
         name: tuple(x * scale**power for x in value) if isinstance(value, tuple) else value * scale**power

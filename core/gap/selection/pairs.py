@@ -115,7 +115,8 @@ def _ranked(entries: list[_Entry], gram: np.ndarray, along: np.ndarray) -> list[
 
 def _fitted(screening: Screening, base: Hypothesis, pair: tuple[_Entry, _Entry]) -> list[Hypothesis]:
     """Two effects fitted together, first to a part of the data; empty if the signature of one of them is not there."""
-    model, own = base.fit.model, tuple[FreeParameter, ...]()
+    model = base.fit.model
+    own: tuple[FreeParameter, ...] = ()
     for one in pair:
         form = one.candidate.form
         keeps = form.placement is not None or form.jumps_at  # its change is not proportional to it
@@ -125,7 +126,7 @@ def _fitted(screening: Screening, base: Hypothesis, pair: tuple[_Entry, _Entry])
     views = screening.view_set.few_samples
     seen = (*visible_parameters(views, base.fit), *own)
     quick = fit(views, model, seen, max_steps=10, tolerance=1e-3, with_equations=False)
-    found = screening.final_fit(quick, (*base.fit.free, *own), len(base.fit.free))
+    found = screening.final_fit(quick.model, (*base.fit.free, *own), len(base.fit.free))
     for index, one in enumerate(pair):
         if not screening.shows_signature(one.candidate, with_effect_last(found, index)):
             return []

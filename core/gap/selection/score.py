@@ -158,8 +158,8 @@ class Score:
     def measure_formula_errors(self, base: Hypothesis, singles: Sequence[Hypothesis]) -> None:
         """Measure φ on these recordings by leaving one form out, for kinds of which two forms or more explain something alone.
 
-        The second best form leaves so much more than the best, as a share of the change that the best one makes. The error of a
-        formula is at most what the best form leaves. Forms of a kind may be alike, so φ is at least that of textbooks; a form
+        It is what the second best form leaves beyond the best, or what the best leaves, up to its error, if that is less, as a
+        share of the change that the best one makes. Forms of a kind may be alike, so φ is at least that of textbooks; a form
         that states its φ keeps it.
         """
         least, found = self.value(base), dict[str, list[Hypothesis]]()

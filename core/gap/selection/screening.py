@@ -223,10 +223,9 @@ class Screening:
         found = fit(self.views.fitted, one.fit.model, one.fit.free, max_steps=REFINED_STEPS, tolerance=FIT_TOLERANCE)
         return one if found.sse.sum() >= before else self.hypothesis(found)
 
-    def final_fit(self, first: Fit, free: Sequence[FreeParameter], frozen: int) -> Fit:
-        """Fit a model to everything after a first fit, keeping `frozen` derivatives (see :func:`.least_squares.fit`)."""
-        open_scale = _has_scale(free) and not _has_scale(first.free)
-        found = at_measured_forces(first.model, free, self.views.fitted) if open_scale else first.model
+    def final_fit(self, found: Model, free: Sequence[FreeParameter], frozen: int) -> Fit:
+        """Fit a model to everything; the first `frozen` derivatives are kept (see :func:`.least_squares.fit`)."""
+        found = at_measured_forces(found, free, self.views.fitted)
         frozen = next((i for i, item in enumerate(free) if item.name in FITTED_FRICTION_PARAMETERS), frozen)
         return fit(
             self.views.fitted, found, free, max_steps=FINAL_STEPS, tolerance=FINAL_TOLERANCE, frozen=min(frozen, len(free))
@@ -291,7 +290,7 @@ class Screening:
         for one in first_fits:
             yield Progress(f"fitting {one.candidate.name} to everything", 0, 1)
             free = free_with(parent.fit.free, parent.fit.model, one.candidate, one.fit.model.effects[-1], self.scales)
-            found = self.final_fit(one.fit, free, len(parent.fit.free))
+            found = self.final_fit(one.fit.model, free, len(parent.fit.free))
             if self.shows_signature(one.candidate, found):
                 made.append(self.hypothesis(found))
         return made
@@ -336,11 +335,6 @@ def share_left(found: Fit, before: float) -> float:
     """Return which share a fit leaves of a sum of squares, both beyond the noise's."""
     count = float(found.count.sum())
     return 1.0 - (before - float(found.sse.sum())) / max(before - count, 0.01 * count)
-
-
-def _has_scale(free: Sequence[FreeParameter]) -> bool:
-    """True if stiffness and gain are both free, which readings of known depths do not tell apart."""
-    return {"k", "gain"} <= {item.name for item in free if item.effect == BASE}
 
 
 def _left(one: Hypothesis) -> float:

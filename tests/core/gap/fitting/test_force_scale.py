@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The scale of forces, which readings of known depths do not tell and net forces do."""
+"""The scale of forces, which readings at known depths do not determine and net forces do."""
 
 from dataclasses import replace
 
@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from palpate.core.effects.engine.registry import library
+from palpate.core.gap.base.base_model import base_fit, identified_base_parameters
 from palpate.core.gap.candidates.candidates import Candidate, scales_of
 from palpate.core.gap.candidates.rao_score import ScoreTest, visible_parameters
 from palpate.core.gap.candidates.view_set import view_set_of
@@ -69,7 +70,7 @@ def test_net_forces_tell_the_scale():
     ids=["open gain", "given gain", "known loads beside depths"],
 )
 def test_without_net_forces_stiffness_or_gain_is_held(given, stimuli, seen):
-    """Both free, a fit to a part of the readings took the stiffness 3 % off what net forces say, 11 deviations of noise."""
+    """A fit with both took the stiffness 3 % off what net forces say, 11 deviations of their noise."""
     rig, trials = recorded()
     if stimuli == "mixed":
         trials[0] = replace(trials[0], stimulus="force", level=np.ones(len(trials[0].time)))
@@ -80,3 +81,44 @@ def test_without_net_forces_stiffness_or_gain_is_held(given, stimuli, seen):
     assert [item.name for item in visible_parameters(views.whole, found)] == ["k", "cn", "gain", "zero", "mus"]
     assert [item.name for item in visible_parameters(views.few_samples, found)] == seen
     assert [item.name for item in ScoreTest(views.few_texels, found).free] == seen
+
+
+@pytest.mark.parametrize("k", [6.0, 600.0, 6e5])
+def test_a_base_fit_finds_a_stiffness_far_from_the_stated_one(k):
+    """The rig states 60 N/m and no gain; noise of 0.3 % of the range. From there a fit ended at 190 N/m for one of 600."""
+    rng, (rig, trials) = np.random.default_rng(0), recorded()
+    true = replace(rig.parameters, k=k, cn=0.01 * k)
+    made = [Predictor(trial, replace(rig, parameters=true)).predict(Model(true)) for trial in trials]
+    full, largest = (max(float(np.ptp(values)) for values in part) for part in zip(*((m.reading, m.force) for m in made)))
+    measured = [
+        replace(
+            trial,
+            reading=one.reading + 0.003 * full * rng.normal(size=one.reading.shape),
+            force=one.force + 0.003 * largest * rng.normal(size=one.force.shape),
+        )
+        for trial, one in zip(trials, made, strict=True)
+    ]
+    rig = replace(rig, given=frozenset({"k"}), trials=tuple(measured))
+    views = view_set_of([Predictor(trial, rig) for trial in measured], (0.003 * full, 0.003 * largest)).whole
+    found = base_fit(rig, views, full)
+    assert found.mean == pytest.approx(1.0, abs=0.05)
+    assert [found.model.parameters.k, found.model.parameters.gain] == pytest.approx([k, 3.0], rel=0.005)
+    assert found.model.parameters.cn == pytest.approx(true.cn, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("factors", "level", "names"),
+    [
+        ((1.0, 1.0), 1.0, ["k", "cn", "gain"]),
+        (("a", "a"), 1.0, ["k", "cn", "gain"]),
+        (("a", 1.0), 1.0, ["cn", "gain"]),
+        (("a", "b"), 1.0, ["cn", "gain"]),
+        ((1.0, 1.0), 0.0, ["cn", "gain"]),
+    ],
+)
+def test_known_loads_identify_the_stiffness_where_they_share_a_factor_with_depths(factors, level, names):
+    """Elsewhere stiffness, gain and the factors are known only as products; a load of zero says nothing."""
+    rig, trials = recorded()
+    depth, load = (replace(trial, force=None, tared=True, factor=own) for trial, own in zip(trials, factors, strict=True))
+    load = replace(load, stimulus="force", level=np.full(len(load.time), level))
+    assert identified_base_parameters(rig, [Predictor(depth, rig), Predictor(load, rig)]) == names

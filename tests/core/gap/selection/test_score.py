@@ -178,7 +178,7 @@ def test_alternatives_to_an_effect_are_all_fitted_models_with_the_same_other_eff
 
 
 def test_a_form_left_out_shows_the_error_of_formulas():
-    """The second best form leaves a tenth of the change more: so may nature's, but for one that leaves next to nothing.
+    """The second best form leaves a tenth of the change more, which is allowed, unless the best leaves less than that.
 
     A form of its own statement keeps that.
     """
