@@ -158,7 +158,7 @@ def identified_base_parameters(rig: Rig, predictors: Sequence[Predictor], with_f
     has_readings = any(p.trial.reading is not None for p in predictors)
     has_forces = with_forces and any(p.trial.force is not None for p in predictors)
     depths, loads = ([p.trial for p in predictors if (p.trial.stimulus == "force") is known] for known in (False, True))
-    loads = [trial for trial in loads if np.any(trial.level)]
+    loads = [trial for trial in loads if trial.level is not None and trial.level.any()]
     depth_known, force_known = bool(depths), bool(loads)
     shared = set.intersection(*({t.factor if isinstance(t.factor, str) else "" for t in own} for own in (depths, loads)))
     slides = has_forces and any(p.trial.force is not None and p.stimulus.slide_speed.any() for p in predictors)

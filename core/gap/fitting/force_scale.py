@@ -7,13 +7,15 @@ model predicts the same readings. So a fit to readings alone leaves λ open. Mea
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from ...effects.engine.registry import form_of
-from ...model.sensor import Effect
+from ...model.parameter import Parameter, numbers_of
+from ...model.sensor import Values
 from ...model.sensor_parameters import SENSOR_PARAMETERS
 from ..forward.predictor import Model
 from .least_squares import BASE, FreeParameter, TrialView
@@ -43,16 +45,15 @@ def with_scaled_forces(model: Model, free: Sequence[FreeParameter], scale: float
     The parameters of its effects change, and those of its base model that are free; others keep their values.
     """
     p, names = model.parameters, [item.name for item in free if item.effect == BASE]
-    changed = {name: getattr(p, name) * scale ** SENSOR_PARAMETERS[name].force_dimension for name in names}
-    return Model(replace(p, **changed), tuple(_scaled(effect, scale) for effect in model.effects), model.recordings)
+    base = _scaled({name: getattr(p, name) for name in names}, numbers_of(SENSOR_PARAMETERS), scale)
+    effects = (replace(e, values=_scaled(e.values, form_of(e.name, e.form).parameters, scale)) for e in model.effects)
+    return Model(replace(p, **base), tuple(effects), model.recordings)
 
 
-def _scaled(effect: Effect, scale: float) -> Effect:
-    """An effect in which forces are `scale` times as large, by the dimensions of its parameters."""
-    powers = {p.name: p.force_dimension for p in form_of(effect.name, effect.form).parameters}
-    values = {
-        name: tuple(x * scale**power for x in value) if isinstance(value, tuple) else value * scale**power
-        for name, value in effect.values.items()
-        if (power := powers.get(name, 0))
+def _scaled(values: Values, parameters: Iterable[Parameter], scale: float) -> dict[str, Any]:
+    """Values of parameters where forces are `scale` times as large, by the dimensions of the parameters."""
+    factors = {p.name: scale**p.force_dimension for p in parameters}
+    return {
+        name: tuple(x * factors[name] for x in value) if isinstance(value, tuple) else value * factors[name]
+        for name, value in values.items()
     }
-    return replace(effect, values={**effect.values, **values})
