@@ -596,7 +596,7 @@ def free_base_parameters(parameters: SensorParameters, wanted: Sequence[str], fu
         if name in ("k", "sigma0", "x0"):
             return FreeParameter(BASE, name, value * 1e-5, value * 1e5, log=True)
         low, high, scale = {
-            "cn": (0.0, 1e6 * parameters.k, 0.01 * parameters.k),
+            "cn": (0.0, 10.0 * parameters.k, 0.01 * parameters.k),
             "gain": (-1e6 * abs(value), 1e6 * abs(value), abs(value)),
             "zero": (-100 * full - abs(value), 100 * full + abs(value), full),
             "mus": (0.0, 20.0, 0.1),
