@@ -93,6 +93,10 @@ def texel_stiffness(pressure: float, area: float, texels: int, compression: floa
         raise ParameterError(f"The sensor's area is {area:g} m²: give a finite value above zero, in m².")
     if not 1 <= texels <= MOST_TEXELS:
         raise ParameterError(f"The number of texels is {texels}: give at least one and at most {MOST_TEXELS:g}.")
+    if not (np.isfinite(compression) and compression > 0):
+        raise ParameterError(f"The compression is {compression:g} m: give a finite value above zero.")
+    if not np.isfinite(pressure):
+        raise ParameterError(f"The pressure is {pressure:g} Pa: give a finite value.")
     return pressure * area / (texels * compression)
 
 

@@ -135,7 +135,7 @@ def search_range(parameter: Parameter, scales: Scales, form: Form) -> tuple[floa
     """Return the range of values in which a parameter of a form would show in recordings of these scales, inside its bounds."""
     warmth = max(scales.warmth, LEAST_WARMTH)
     speed = scales.rate if form.friction_law is None else scales.sliding_speed
-    coefficient, longest = scales.force**parameter.force_dimension, 2.0 * scales.seconds
+    longest = 2.0 * scales.seconds
     if form.neutral.get(parameter.name) == 0.0:  # a delay is compared with the time in which a load comes
         longest = max(min(longest, LARGE * scales.depth / scales.rate), LARGE * scales.step)
     known = {
@@ -146,7 +146,6 @@ def search_range(parameter: Parameter, scales: Scales, form: Form) -> tuple[floa
         "m/s": (0.02 * speed, 2.0 * speed),
         "N·s": (0.1 * scales.force * scales.seconds, 50.0 * scales.force * scales.seconds),
         "J": (0.1 * scales.force * scales.depth, 50.0 * scales.force * speed * scales.seconds),
-        **dict.fromkeys(("1/N", "1/N²", "1/N³", "1/N⁴"), (0.02 * coefficient, 2.0 * coefficient)),
         "s/m": (0.02 / speed, 2.0 / speed),
         "unit/s": (-0.5 * scales.reading / scales.seconds, 0.5 * scales.reading / scales.seconds),
         "rad": (-0.1, 0.1),
@@ -154,6 +153,9 @@ def search_range(parameter: Parameter, scales: Scales, form: Form) -> tuple[floa
         "1/K": (-0.5 / warmth, 0.5 / warmth),
         "unit/K": (-0.5 * scales.reading / warmth, 0.5 * scales.reading / warmth),
     }
+    if parameter.unit.startswith("1/N"):
+        size = scales.force**parameter.force_dimension
+        known[parameter.unit] = 0.02 * size, 2.0 * size
     low, high = known.get(parameter.unit, (parameter.low, parameter.high))
     if parameter.low < 0.0 < low:  # either sign is possible
         low, high = -SIGNED_SHARE * high, SIGNED_SHARE * high

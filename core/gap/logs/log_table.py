@@ -22,7 +22,7 @@ MOST_COLUMNS = 5000
 FEWEST_ROWS = 8
 """Samples of a trial, see :mod:`..dataset.rig`; shorter arrays are settings and no recordings."""
 MOST_FRAME_ROWS = 512
-"""Rows of a matrix that may be a frame."""
+"""Rows of a matrix that may be a frame; longer ones are recordings. Chosen by eye: a tactile array has fewer rows."""
 
 
 @dataclass(frozen=True)

@@ -29,10 +29,15 @@ def recorded():
     return rig, [replace(trial, force=np.zeros((len(trial.time), 3))) for trial in rig.trials]
 
 
-@pytest.mark.parametrize(("kind", "form"), FORMS, ids=[f"{kind.name}/{form.name}" for kind, form in FORMS])
-def test_readings_do_not_tell_the_scale_of_forces(kind, form):
+@pytest.fixture(scope="module")
+def predictor():
     rig, trials = recorded()
-    predictor = Predictor(trials[0], rig)
+    return Predictor(trials[0], rig)
+
+
+@pytest.mark.parametrize(("kind", "form"), FORMS, ids=[f"{kind.name}/{form.name}" for kind, form in FORMS])
+def test_readings_do_not_tell_the_scale_of_forces(predictor, kind, form):
+    rig = predictor.rig
     scales = scales_of([predictor], Model(rig.parameters))
     one = Candidate(kind, form)
     values = list(one.starting_values(scales, 3.0, 2))[1]
