@@ -34,7 +34,7 @@ from .rule_numbers import SURE
 from .score import ONE_SESSION, OWN_NUMBERS, Hypothesis
 from .screening import Screening
 from .search import TOTAL_WORK, Search, Start
-from .verdict import closed_shares, judge, with_best_forms, with_best_kinds
+from .verdict import closed_shares, judge, with_best_forms
 
 BASE_MODEL, VERDICT = 40, 950
 """Work that is done when the fit of the base model and the verdict begin, of :data:`.search.TOTAL_WORK`."""
@@ -58,8 +58,7 @@ def diagnose(rig: Rig) -> Job[Diagnosis]:
     is_repeated = begun.result.noise[begun.main_quantity].source == MEASURED_REPEATS
     has_few_values = begun.view_set.repeats_few_values(begun.result.base.model)
     search = Search(_starts(begun), MOST_SQUARE - 1.0 if is_repeated else None, has_few_values)
-    chosen = yield from search.run()
-    named = with_best_kinds(search, chosen)
+    named = yield from search.run()
     best = yield from search.predicting(named)
     yield Progress("verdict", VERDICT, TOTAL_WORK)
     if best is named:

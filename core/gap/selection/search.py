@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...jobs import Job, Progress, Result, part_of_job, run_job
+from ...jobs import Job, Progress, Result, part_of_job
 from .noise_level import measured_noise, noise_level
 from .pairs import best_pairs
 from .rule_numbers import DRAWS, LEAST_WEIGHT
@@ -94,14 +94,17 @@ class Search:
     def best(self) -> Hypothesis:
         """Return the smallest model within one standard error of the best.
 
-        Of those with as many names, one with far fewer numbers, or with none at a bound, is taken if it does as well.
+        Of those with as many names, one with far fewer numbers, or with none at a bound, is taken if it does as well. If it
+        leaves a gap, it gives way to one that leaves nothing beyond the noise, whatever its formulas might leave elsewhere.
         """
         top = max(self.tried, key=self.score.value)
         near = [one for one in self.tried if one is top or self.score.is_near(top, one)]
         near = [one for one in near if one.price_count == min(one.price_count for one in near)]
         best = max(near, key=self.score.value)
         simpler = [one for one in near if self.score.is_near(best, one) and self.score.is_simpler(one, best)]
-        return max(simpler, key=self.score.value) if simpler else best
+        best = max(simpler, key=self.score.value) if simpler else best
+        exact = [one for one in self.tried if one.price_count == best.price_count and self.score.reaches_noise(one)]
+        return max(exact, key=self.score.value) if exact and self.score.leaves_gap(best) else best
 
     def predicting(self, named: Hypothesis) -> Job[Hypothesis]:
         """Return the model that predicts best of all that hold the effects of the chosen one, while it leaves a gap.
@@ -140,16 +143,16 @@ class Search:
             base = better
         return base
 
-    def in_place_of(self, one: Hypothesis, index: int) -> tuple[Hypothesis, dict[str, list[Hypothesis]]]:
+    def in_place_of(self, one: Hypothesis, index: int) -> Job[tuple[Hypothesis, dict[str, list[Hypothesis]]]]:
         """Return a model without one of its effects, and the fitted forms of each kind in its place, itself included."""
-        parent = run_job(self._replaced(one, index))
+        parent = yield from self._replaced(one, index)
         found, place = self._forms_in_place(one, index, parent), _place(one, index, parent)
         best = {name: max(map(self.score.value, forms)) for name, forms in found.items()}
         for name in sorted(best, key=lambda name: -best[name])[:ALL_FORMS]:
             if name not in self._done[place]:
                 screening, start = self._screening(parent), self._start(one, index, parent)
                 labels = self._done[place] | {one.forms[index]}
-                made = run_job(screening.other_forms(parent, name, labels, self._most_left(parent), start))
+                made = yield from screening.other_forms(parent, name, labels, self._most_left(parent), start)
                 self._note(place, made, name)
         return parent, self._forms_in_place(one, index, parent)
 
@@ -239,7 +242,7 @@ class Search:
         while best is not self.best():
             best = self.refined(self.best())
             for index in range(len(best.names)):
-                yield from self._replaced(best, index)
+                yield from self.in_place_of(best, index)
             self._weigh()
 
     def _replaced(self, one: Hypothesis, index: int) -> Job[Hypothesis]:

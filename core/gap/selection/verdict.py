@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...effects.engine.registry import form_of, library
+from ...jobs import run_job
 from ..candidates.candidates import NOT_FITTED, parameters_at_bounds
 from ..fitting.identifiability import curvature_ratio, indistinguishable, unidentifiable
 from .findings import ClosedShares, Diagnosis, Finding
@@ -22,30 +23,10 @@ NEARLY_WITHOUT = "the model without it does nearly as well, for one name less"
 """Why a name is not sure, in words."""
 
 
-def with_best_kinds(search: Search, best: Hypothesis) -> Hypothesis:
-    """Return the model, or one with another kind in a place where that explains more by all its forms, or is simpler.
-
-    A kind that leaves a gap gives way to one that leaves nothing beyond the noise, whatever its formulas might leave elsewhere.
-    """
-    score = search.score
-    for index, name in enumerate(best.names):
-        _, others = search.in_place_of(best, index)
-        exact = [one for forms in others.values() for one in forms if score.reaches_noise(one)]
-        if exact and score.leaves_gap(best):
-            return max(exact, key=score.value)
-        own = float(score.values_of_kind(others[name], search.library[name])[0])
-        for other, forms in others.items():
-            one = max(forms, key=score.value)
-            better = float(score.values_of_kind(forms, search.library[other])[0]) > own
-            if better and not _contains(one, best, index) or score.is_near(best, one) and score.is_simpler(one, best):
-                return one
-    return best
-
-
 def with_best_forms(search: Search, best: Hypothesis) -> Hypothesis:
     """Return the model with that form of each kind which describes the recordings best; the names stay."""
     for name in best.names:
-        _, others = search.in_place_of(best, best.names.index(name))
+        _, others = run_job(search.in_place_of(best, best.names.index(name)))
         forms = [search.refined(one) if one.number_count < best.number_count else one for one in others[name]]
         best = search.score.best_form(forms)
     return best
@@ -107,7 +88,7 @@ def weighed_kinds(search: Search, best: Hypothesis, index: int) -> tuple[float, 
     and those that can do whatever this one does (see :func:`_contains`) and do no better.
     """
     score, name = search.score, best.names[index]
-    parent, others = search.in_place_of(best, index)
+    parent, others = run_job(search.in_place_of(best, index))
     values = {other: score.values_of_kind(forms, search.library[other]) for other, forms in others.items()}
     is_enough = not score.leaves_gap(best)
 
@@ -126,7 +107,7 @@ def weighed_kinds(search: Search, best: Hypothesis, index: int) -> tuple[float, 
 def _judged(search: Search, best: Hypothesis, index: int, result: Diagnosis) -> Finding:
     """An effect that the rule chose, with its confidence and its rivals."""
     score, name, form = search.score, best.names[index], best.forms[index].split("/")[1]
-    parent, others = search.in_place_of(best, index)
+    parent, others = run_job(search.in_place_of(best, index))
     confidence, rivals = weighed_kinds(search, best, index)
     curvature = curvature_ratio(result.of("fit"), best.fit.model)
     known = set(best.names) | set(rivals)

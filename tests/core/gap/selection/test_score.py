@@ -55,6 +55,12 @@ def rule(error=0.01):
     return Score(NoiseLevel(count, count, np.full(2, error)), MEASURED, PRICE, drawn_weights(BLOCKS))
 
 
+def done(value):
+    """A job that is finished."""
+    return value
+    yield
+
+
 def test_the_score_is_the_logarithm_of_what_is_left_and_allowed():
     one = model(3.0, "creep/power", changes=(4.0,))
     expected = -0.5 * rule_numbers.STRETCHES * np.log(2.0 + rule_numbers.FORMULA_ERROR * 4.0 + 0.01) - PRICE
@@ -101,7 +107,7 @@ def test_a_kind_with_a_tenth_of_the_weight_is_a_rival(left, rivals):
     best, other = model(1.0, "creep/power", changes=(4.0,)), model(left, "lag/first-order", changes=(4.0,))
     found = search.Search({})
     found.score, found.library = rule(), Counter(creep=4, lag=4)
-    found.in_place_of = lambda *_: (model(4.0), {"creep": [best], "lag": [other]})
+    found.in_place_of = lambda *_: done((model(4.0), {"creep": [best], "lag": [other]}))
     assert verdict.weighed_kinds(found, best, 0)[1] == rivals
 
 
@@ -128,7 +134,7 @@ def test_a_kind_that_leaves_more_than_its_error_is_refuted_where_another_does_no
     best, other = model(1.0, "hysteresis/play", changes=(20.0,)), model(1.6, "softening/peak", changes=(4.0,))
     found = search.Search({})
     found.score, found.library = rule(), Counter(hysteresis=1, softening=1)
-    found.in_place_of = lambda *_: (model(4.0), {"hysteresis": [best], "softening": [other]})
+    found.in_place_of = lambda *_: done((model(4.0), {"hysteresis": [best], "softening": [other]}))
     assert found.score.value(other) > found.score.value(best)
     weight, rivals = verdict.weighed_kinds(found, best, 0)
     assert weight == pytest.approx(found.score.weight(best, model(4.0))) and not rivals
@@ -139,10 +145,9 @@ def test_a_kind_that_leaves_a_gap_gives_way_to_one_that_reaches_the_noise(left, 
     """The kind that fits may leave 3.8, so that its score is lower than that of one which leaves 0.3 and may leave nothing."""
     best, other = model(1.3, "misalignment/tilt"), model(left, "adhesion/constant", changes=(75.0,))
     found = search.Search({})
-    found.score, found.library = rule(), Counter(misalignment=1, adhesion=1)
-    found.in_place_of = lambda *_: (model(9.0), {"misalignment": [best], "adhesion": [other]})
+    found.score, found.tried = rule(), [model(9.0), best, other]
     assert found.score.value(best) > found.score.value(other)
-    assert verdict.with_best_kinds(found, best) is (other if gives_way else best)
+    assert found.best() is (other if gives_way else best)
 
 
 @pytest.mark.parametrize(("left", "helps"), [(2.9, False), (1.8, True)])
