@@ -134,7 +134,10 @@ def scored_rigs(folder: Path) -> str:
     for kind in sorted({one["kind"] for one in results}):
         counts = Counter(one["outcome"] for one in results if one["kind"] == kind)
         rows.append(f"| {kind} | {counts.total()} | {', '.join(f'{n} {word}' for word, n in counts.most_common())} |")
-    rows += ["", *(f"{one['number']}: {one['answer']}: {one['said']}" for one in results if one["outcome"] != "right")]
+    for one in results:
+        if one["outcome"] != "right":
+            said = ", ".join(f"{name} {confidence:.2f}" for name, _, confidence in one["said"]) or one["verdict"]
+            rows.append(f"\n{one['number']}: {' + '.join(one['answer']) or 'nothing'}: {said}")
     cpu = [one["seconds"] for one in results]
     return "\n".join([*rows, f"CPU seconds: median {np.median(cpu):.0f}, nine of ten below {np.quantile(cpu, 0.9):.0f}."])
 
@@ -157,9 +160,10 @@ def examine_rig(folder: str, case: str, answer: dict) -> dict:
     return {
         "kind": "outside" if is_outside else str(len(hidden)),
         "number": case,
-        "answer": " + ".join(hidden) or "nothing",
-        "said": " + ".join(sorted(sure)) or result.verdict,
+        "answer": hidden or sorted({name for names in accepted for name in names}),
+        "said": [(SYNONYMS.get(one.name, one.name), one.form, one.confidence) for one in result.findings],
+        "ambiguous": result.ambiguous,
+        "verdict": result.verdict,
         "outcome": "right" if is_right else "part" if said == "right" else said,
-        "confidences": {one.name: one.confidence for one in result.findings},
         "seconds": round(time.process_time() - began, 1),
     }

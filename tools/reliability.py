@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How often the names that ``palpate gap`` says are right, by the confidence at which it says them.
 
-``python tools/reliability.py RESULTS.jsonl …`` takes results of ``make bench ONLY=gap`` (build/gap), prints the counts and
-draws docs/images/gap-reliability.png. Names below one half count, too: they are what cases without a sure name offer.
+``python tools/reliability.py RESULTS.jsonl …`` takes results of ``make bench ONLY=gap`` (build/gap) and of
+``python -m benchmarks foreign --rigs DIR`` (DIR/results.jsonl), prints the counts and draws docs/images/gap-reliability.png.
+Names below one half count, too: they are what cases without a sure name offer.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ FAMILIES = (
     ("the library's formulas", ("own",), "#1f5fa8", "s"),
     ("other formulas", ("other", "two", "three", "poor"), "#c4541a", "o"),
     ("a third family, on which nothing was set", ("third", "pairs"), "#2a7f3f", "^"),
+    ("rigs of another generator", ("0", "1", "2", "3", "outside"), "#6a3d9a", "D"),
 )
 """Words, kinds of cases, colour and mark of what is drawn."""
 

@@ -28,7 +28,7 @@ from ..candidates.rao_score import ScoreTest
 from ..candidates.starting_points import is_large_shift, starting_points
 from ..candidates.view_set import ViewSet
 from ..fitting.force_scale import at_measured_forces
-from ..fitting.least_squares import BASE, Fit, FreeParameter, TrialView, fit
+from ..fitting.least_squares import Fit, FreeParameter, TrialView, fit
 from ..forward.predictor import Model
 from .blocks import Blocks, Views
 from .rule_numbers import FIT_TOLERANCE
@@ -144,9 +144,7 @@ class Screening:
         """Return the candidates that could show in the fitted recordings."""
         return candidates([view.predictor for view in self.view_set.whole], model)
 
-    def with_one_more(
-        self, parent: Hypothesis, kinds: set[str] | None = None, most_left: float = 1.0, start: Hypothesis | None = None
-    ) -> Job[list[Hypothesis]]:
+    def with_one_more(self, parent: Hypothesis, kinds: set[str] | None = None, most_left: float = 1.0) -> Job[list[Hypothesis]]:
         """Return the parent with one effect more, for the kinds that promise most, in one form of each.
 
         It is a form that is free to follow any law, or that those do not follow, if the kind has one that promises anything, so
@@ -160,11 +158,9 @@ class Screening:
             Only these.
         most_left : float
             Share of the parent's gap that a fit to a part of the data may leave at most, for one to everything to follow.
-        start : Hypothesis, optional
-            The same effects with other parameter values, from which the fits start instead.
         """
         is_first = not (parent.names or self.assumed)  # an assumption about recordings is like an effect
-        parent, tests = start or parent, _Tests(self.view_set, (start or parent).fit, parent.fit)
+        tests = _Tests(self.view_set, parent.fit)
         by_kind: dict[str, list[Candidate]] = {}
         for candidate in self._candidates_beside(parent):
             by_kind.setdefault(candidate.name, []).append(candidate)
@@ -193,29 +189,22 @@ class Screening:
         return made
 
     def other_forms(
-        self, parent: Hypothesis, name: str, done: Collection[str], most_left: float = 1.0, start: Hypothesis | None = None
+        self, parent: Hypothesis, name: str, done: Collection[str], most_left: float = 1.0
     ) -> Job[list[Hypothesis]]:
         """Return the parent with the forms of a kind that were not fitted yet, so that it is judged by its whole library.
 
-        Forms that leave more than `most_left` of the gap in a part of the data are left out, and fits begin at `start`, as in
-        :meth:`with_one_more`.
+        Forms that leave more than `most_left` of the gap in a part of the data are left out, as in :meth:`with_one_more`.
         """
-        parent, tests = start or parent, _Tests(self.view_set, (start or parent).fit, parent.fit)
+        tests = _Tests(self.view_set, parent.fit)
         own = [one for one in self._candidates_beside(parent) if one.name == name and one.label not in done]
         fitted = [self._first_fit(one, tests) for one in self._promises(parent, tests, own)]
         return (yield from self._final_fits([one for one in fitted if one.may_leave(most_left)], parent))
 
     def without(self, one: Hypothesis, index: int) -> Hypothesis:
         """Return a model without one of its effects, fitted again."""
-        model, free = one.fit.model.without(index), _without(one, index)
-        return self.hypothesis(fit(self.views.fitted, model, free, max_steps=8, tolerance=1e-4))
-
-    def start_without(self, one: Hypothesis, index: int, parent: Hypothesis) -> Hypothesis:
-        """Return a model without one of its effects: base model refitted, other values kept. Its sums are the parent's."""
-        model, free = one.fit.model.without(index), _without(one, index)
-        base = [item for item in free if item.effect == BASE]
-        again = fit(self.views.fitted, model, base, max_steps=8, tolerance=1e-3, with_equations=False)
-        return replace(parent, fit=replace(again, free=tuple(free)))
+        free = [item for item in one.fit.free if item.effect != index]
+        free = [replace(item, effect=item.effect - 1) if item.effect > index else item for item in free]
+        return self.hypothesis(fit(self.views.fitted, one.fit.model.without(index), free, max_steps=8, tolerance=1e-4))
 
     def refined(self, one: Hypothesis) -> Hypothesis:
         """Return a model at the end of its fit: final fits are cut short, as most models are far behind the best."""
@@ -281,7 +270,7 @@ class Screening:
             with_equations=False,
             initial_derivatives=None if is_far else test.initial_derivatives,
         )
-        left, rank = (share_left(found, before) for before in (tests.gap(test), test.least))
+        left, rank = (share_left(found, before) for before in (test.total, test.least))
         return FirstFit(left, rank, one, found)
 
     def _final_fits(self, first_fits: Iterable[FirstFit], parent: Hypothesis) -> Job[list[Hypothesis]]:
@@ -297,21 +286,11 @@ class Screening:
 
 
 class _Tests:
-    """Score tests of one fit, on the views that candidates need; `parent` is the fit whose residual is to be reduced."""
+    """Score tests of one fit, on the views that candidates need."""
 
-    def __init__(self, view_set: ViewSet, found: Fit, parent: Fit):
-        self.view_set, self.found, self.parent = view_set, found, parent
+    def __init__(self, view_set: ViewSet, found: Fit):
+        self.view_set, self.found = view_set, found
         self._made: dict[int, ScoreTest] = {}
-        self._gaps: dict[int, float] = {}
-
-    def gap(self, test: ScoreTest) -> float:
-        """Sum of squares of the parent's residual on the views of a test."""
-        if self.parent is self.found:
-            return test.total
-        if id(test) not in self._gaps:
-            residuals = [view.residual(self.parent.model) for view in test.views]
-            self._gaps[id(test)] = float(sum(v.squares(r).sum() for v, r in zip(test.views, residuals, strict=True)))
-        return self._gaps[id(test)]
 
     def of(self, candidate: Candidate) -> ScoreTest:
         """Return the test on the smallest view in which a candidate can be tested."""
@@ -340,9 +319,3 @@ def share_left(found: Fit, before: float) -> float:
 def _left(one: Hypothesis) -> float:
     """Mean square on unseen blocks, summed over readings and forces."""
     return float((one.sums.left.sum(axis=0) / one.sums.count.sum(axis=0).clip(1.0)).sum())
-
-
-def _without(one: Hypothesis, index: int) -> list[FreeParameter]:
-    """Free parameters of a model after removal of one effect."""
-    free = [item for item in one.fit.free if item.effect != index]
-    return [replace(item, effect=item.effect - 1) if item.effect > index else item for item in free]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Search for sets of effects: all alone, pairs on top of the best kinds, triples on top of the best pairs, then exchanges.
 
-An exchange replaces one effect by every kind. Its fits start from the fitted values of the other effects.
+An exchange replaces one effect by every kind, on top of the model that was fitted again without it.
 
 Two assumptions about how recordings differ are candidates like any effect: a factor and a zero of each (which costs a name),
 and one session in their order (what the sensor remembers goes on, which costs none).
@@ -55,8 +55,7 @@ class Search:
     repeat_error: float | None = None
     has_few_values: bool = False
     tried: list[Hypothesis] = field(default_factory=list)
-    _done: dict[object, set[str]] = field(default_factory=dict)
-    _begun: dict[object, Hypothesis] = field(default_factory=dict)
+    _done: dict[tuple[str, ...], set[str]] = field(default_factory=dict)
     _at_end: set[Hypothesis] = field(default_factory=set)
     _made: dict[str, tuple[Screening, Hypothesis]] = field(default_factory=dict)
 
@@ -146,14 +145,13 @@ class Search:
     def in_place_of(self, one: Hypothesis, index: int) -> Job[tuple[Hypothesis, dict[str, list[Hypothesis]]]]:
         """Return a model without one of its effects, and the fitted forms of each kind in its place, itself included."""
         parent = yield from self._replaced(one, index)
-        found, place = self._forms_in_place(one, index, parent), _place(one, index, parent)
+        found, done = self._forms_in_place(one, index, parent), self._done[parent.key]
         best = {name: max(map(self.score.value, forms)) for name, forms in found.items()}
         for name in sorted(best, key=lambda name: -best[name])[:ALL_FORMS]:
-            if name not in self._done[place]:
-                screening, start = self._screening(parent), self._start(one, index, parent)
-                labels = self._done[place] | {one.forms[index]}
-                made = yield from screening.other_forms(parent, name, labels, self._most_left(parent), start)
-                self._note(place, made, name)
+            if name not in done:
+                screening, labels = self._screening(parent), done | {one.forms[index]}
+                made = yield from screening.other_forms(parent, name, labels, self._most_left(parent))
+                self._note(parent, made, name)
         return parent, self._forms_in_place(one, index, parent)
 
     def _forms_in_place(self, one: Hypothesis, index: int, parent: Hypothesis) -> dict[str, list[Hypothesis]]:
@@ -191,7 +189,7 @@ class Search:
             alone = [other for other in self.tried if other.names == one.names and not other.assumed]
             leads = [self.score.lead(one, other) for other in alone]
             if all(apart > error for apart, error in leads):
-                self._note(base.key, [one])
+                self._note(base, [one])
 
     def _remembering(self, screening: Screening) -> set[str]:
         """Kinds whose effects go on from recording to recording: they predict something else in a session."""
@@ -253,36 +251,20 @@ class Search:
         parent = max(known, key=self.score.value) if known else self._screening(one).without(one, index)
         if not known:
             self.tried.append(parent)
-        yield from self._grow(parent, _place(one, index, parent), self._start(one, index, parent))
+        yield from self._grow(parent)
         return parent
 
-    def _start(self, one: Hypothesis, index: int, parent: Hypothesis) -> Hypothesis:
-        """Initial model of the fits that replace an effect: the other effects keep their fitted values.
-
-        In the parent, which was refitted without the effect, they compensate for it.
-        """
-        place = _place(one, index, parent)
-        if place == parent.key:
-            return parent
-        if place not in self._begun:
-            self._begun[place] = self._screening(parent).start_without(one, index, parent)
-        return self._begun[place]
-
-    def _grow(self, parent: Hypothesis, place: object = None, start: Hypothesis | None = None) -> Job[None]:
-        """Add one effect to a model.
-
-        With `place` and `start` it replaces an effect of another model, from whose values the fits start.
-        """
-        place = parent.key if place is None else place
-        if place not in self._done:
+    def _grow(self, parent: Hypothesis) -> Job[None]:
+        """Add one effect to a model."""
+        if parent.key not in self._done:
             most_left = self._most_left(parent) if parent.names else 1.0
-            made = yield from self._screening(parent).with_one_more(parent, most_left=most_left, start=start)
-            self._note(place, made)
+            made = yield from self._screening(parent).with_one_more(parent, most_left=most_left)
+            self._note(parent, made)
 
-    def _note(self, place: object, made: list[Hypothesis], *names: str) -> None:
-        """Record fitted models, and the kinds whose forms have all been tried, under a key from :func:`_place`."""
+    def _note(self, parent: Hypothesis, made: list[Hypothesis], *names: str) -> None:
+        """Record models with one effect more than another, and the kinds whose forms have all been tried on top of it."""
         self.tried += made
-        self._done.setdefault(place, set()).update(names, (one.forms[-1] for one in made))
+        self._done.setdefault(parent.key, set()).update(names, (one.forms[-1] for one in made))
 
     def _most_left(self, parent: Hypothesis) -> float:
         """Share of the parent's gap that one effect more may leave if it is to matter.
@@ -310,11 +292,6 @@ class Search:
         price = float(np.log(max(len(self.library) + len(self.starts) - 1, 1)))
         self.score = Score(noise, count.sum(axis=0) > 0, price, self._weights(), has_few_values=self.has_few_values)
         self.score.measure_formula_errors(self.base, [one for one in self.tried if len(one.names) == one.price_count == 1])
-
-
-def _place(one: Hypothesis, index: int, parent: Hypothesis) -> object:
-    """Key of an effect's position in a model; that of the model without it if no other effect remains."""
-    return (one.key, one.forms[index]) if parent.names else parent.key
 
 
 def _holds(one: Hypothesis, best: Hypothesis) -> bool:

@@ -313,21 +313,6 @@ def test_names_hold_and_no_number_is_idle_or_a_cliff(searches):
                 assert changed, name
 
 
-@pytest.mark.slow("whole diagnoses of three sensors")
-def test_fits_of_alternatives_start_from_the_fitted_values_of_the_other_effects(searches):
-    """Only the base model is refitted, which lowers the sum of squares."""
-    _, one = searches["creep"]
-    (screening, _), alone = one.under(""), one.best()
-    views, lag = screening.views.fitted, Effect("lag", "first-order", {"time": 0.4})
-    both = fit(views, alone.fit.model.with_effect(lag), alone.fit.free, max_steps=3)
-    pair = screening.hypothesis(both)
-    start = screening.start_without(pair, 1, alone)
-    assert start.fit.model.effects == both.model.effects[:1] != alone.fit.model.effects and start.forms == alone.forms
-    assert start.fit.free == alone.fit.free
-    kept = sum(view.squares(view.residual(both.model.without(1))).sum() for view in views)
-    assert alone.fit.sse.sum() < start.fit.sse.sum() < kept
-
-
 @pytest.mark.parametrize(
     ("name", "form", "values", "shows"),
     [
