@@ -50,8 +50,6 @@ rigs 89 of 92 effects that were missing from a model belonged to the five kinds 
 TRIED_FORMS = 2
 """Forms of a kind that are fitted alone to a part of the data: for speed. On 82 development rigs one of the two forms that
 promise most left least for 350 of 371 kinds; for hidden kinds among the others it left at most 0.02 of the gap more."""
-ALL_FORMS = 2
-"""Kinds of which all forms are fitted to everything, so that a kind is judged by its whole library: for speed."""
 
 
 @dataclass(frozen=True)
@@ -149,7 +147,7 @@ class Screening:
 
         It is a form that is free to follow any law, or that those do not follow, if the kind has one that promises anything, so
         that kinds compete at equal freedom. Alone, the two forms that promise most are compared, of these or of all if there is
-        none, and the best kinds come in all their forms.
+        none.
 
         Parameters
         ----------
@@ -182,11 +180,7 @@ class Screening:
             best_fits.setdefault(fitted.candidate.name, fitted)
             if is_first:
                 self.alone.setdefault(fitted.candidate.label, fitted.fit.model.effects[-1])
-        made = yield from self._final_fits(list(best_fits.values())[:TRIED_KINDS], parent)
-        made.sort(key=_left)
-        for name in [one.names[-1] for one in made[:ALL_FORMS]] if is_first else []:
-            made += yield from self.other_forms(parent, name, [one.forms[-1] for one in made])
-        return made
+        return (yield from self._final_fits(list(best_fits.values())[:TRIED_KINDS], parent))
 
     def other_forms(
         self, parent: Hypothesis, name: str, done: Collection[str], most_left: float = 1.0
@@ -314,8 +308,3 @@ def share_left(found: Fit, before: float) -> float:
     """Return which share a fit leaves of a sum of squares, both beyond the noise's."""
     count = float(found.count.sum())
     return 1.0 - (before - float(found.sse.sum())) / max(before - count, 0.01 * count)
-
-
-def _left(one: Hypothesis) -> float:
-    """Mean square on unseen blocks, summed over readings and forces."""
-    return float((one.sums.left.sum(axis=0) / one.sums.count.sum(axis=0).clip(1.0)).sum())

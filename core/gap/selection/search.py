@@ -20,9 +20,11 @@ from .noise_level import measured_noise, noise_level
 from .pairs import best_pairs
 from .rule_numbers import DRAWS, LEAST_WEIGHT
 from .score import ONE_SESSION, Hypothesis, Score, drawn_weights
-from .screening import ALL_FORMS, Screening
+from .screening import Screening
 
 MOST_EFFECTS = 3
+ALL_FORMS = 2
+"""Kinds of which all forms are fitted to everything, so that a kind is judged by its whole library: for speed."""
 LEAST_REMEMBERED = 1e-6
 """Change of a prediction, in deviations of the noise, that is more than rounding."""
 TOTAL_WORK = 1000
@@ -69,6 +71,8 @@ class Search:
         if not self.is_open(self.base):
             return self.base
         yield from _in_stage(ALONE, self._grow(self.base))
+        self._weigh(is_noise_measured=True)
+        yield from _in_stage(ALONE, self._all_forms(self.base, _by_kind({one.forms[-1]: one for one in self.tried[1:]})))
         self._weigh(is_noise_measured=True)
         self.refined(self.best())
         self._weigh(is_noise_measured=True)
@@ -136,18 +140,20 @@ class Search:
         return base
 
     def in_place_of(self, one: Hypothesis, index: int) -> Job[tuple[Hypothesis, dict[str, list[Hypothesis]]]]:
-        """Return a model without one of its effects, and the fitted forms of each kind in its place, itself included."""
-        parent = yield from self._replaced(one, index)
-        found, done = self._forms_in_place(one, index, parent), self._done[parent.key]
-        best = {name: max(map(self.score.value, forms)) for name, forms in found.items()}
-        for name in sorted(best, key=lambda name: -best[name])[:ALL_FORMS]:
-            if name not in done:
-                screening, labels = self._screening(parent), done | {one.forms[index]}
-                made = yield from screening.other_forms(parent, name, labels, self._most_left(parent))
-                self._note(parent, made, name)
-        return parent, self._forms_in_place(one, index, parent)
+        """Replace an effect by every kind; return the refitted model without it, and the best fit of each form in its place.
 
-    def _forms_in_place(self, one: Hypothesis, index: int, parent: Hypothesis) -> dict[str, list[Hypothesis]]:
+        Fits are by kind, the model's own included.
+        """
+        key = (*sorted(form for i, form in enumerate(one.forms) if i != index), one.assumed)
+        known = [other for other in [*self.tried, self.under(one.assumed)[1]] if other.key == key]
+        parent = max(known, key=self.score.value) if known else self._screening(one).without(one, index)
+        if not known:
+            self.tried.append(parent)
+        yield from self._grow(parent)
+        yield from self._all_forms(parent, self._in_place(one, index, parent))
+        return parent, self._in_place(one, index, parent)
+
+    def _in_place(self, one: Hypothesis, index: int, parent: Hypothesis) -> dict[str, list[Hypothesis]]:
         """The best fit of each form that replaces an effect, by kind."""
         best = {one.forms[index]: one}
         for other in [other for other in self.tried if other.names and other.key != one.key]:
@@ -155,10 +161,15 @@ class Search:
                 is_near = self.score.weight(other, one) * max(self.library[one.names[index]], 1) > LEAST_WEIGHT
                 other = self.refined(other) if is_near else other  # a kind counts by the mean over its library
                 best[other.forms[-1]] = max(best.get(other.forms[-1], other), other, key=self.score.value)
-        found: dict[str, list[Hypothesis]] = {}
-        for label, fitted in best.items():
-            found.setdefault(label.split("/")[0], []).append(fitted)
-        return found
+        return _by_kind(best)
+
+    def _all_forms(self, parent: Hypothesis, found: dict[str, list[Hypothesis]]) -> Job[None]:
+        """Fit all forms of the best kinds on top of a model, so that a kind is judged by its whole library."""
+        best, done = {name: max(map(self.score.value, forms)) for name, forms in found.items()}, self._done[parent.key]
+        for name in sorted(best, key=lambda name: -best[name])[:ALL_FORMS]:
+            if name not in done:
+                made = yield from self._screening(parent).other_forms(parent, name, done, self._most_left(parent))
+                self._note(parent, made, name)
 
     # --- stages
 
@@ -217,22 +228,10 @@ class Search:
                 yield from self._grow(best)
                 self._weigh()
 
-    def _replaced(self, one: Hypothesis, index: int) -> Job[Hypothesis]:
-        """Replace an effect by every kind; return the refitted model without it."""
-        forms = tuple(form for i, form in enumerate(one.forms) if i != index)
-        key = (*sorted(forms), one.assumed)
-        known = [other for other in [*self.tried, self.under(one.assumed)[1]] if other.key == key]
-        parent = max(known, key=self.score.value) if known else self._screening(one).without(one, index)
-        if not known:
-            self.tried.append(parent)
-        yield from self._grow(parent)
-        return parent
-
     def _grow(self, parent: Hypothesis) -> Job[None]:
         """Add one effect to a model."""
         if parent.key not in self._done:
-            most_left = self._most_left(parent) if parent.names else 1.0
-            made = yield from self._screening(parent).with_one_more(parent, most_left=most_left)
+            made = yield from self._screening(parent).with_one_more(parent, most_left=self._most_left(parent))
             self._note(parent, made)
 
     def _note(self, parent: Hypothesis, made: list[Hypothesis], *names: str) -> None:
@@ -243,8 +242,11 @@ class Search:
     def _most_left(self, parent: Hypothesis) -> float:
         """Share of the parent's gap that one effect more may leave if it is to matter.
 
-        It must pay for its name, and come as near to the best model as a name costs.
+        It must pay for its name, and come as near to the best model as a name costs. Alone each may leave everything: forms
+        show the error of formulas.
         """
+        if not parent.names:
+            return 1.0
         least = max(self.score.value(parent), self.score.value(self.best()) - self.score.price)
         return self.score.most_left(parent, least)
 
@@ -266,6 +268,14 @@ class Search:
         price = float(np.log(max(len(self.library) + len(self.starts) - 1, 1)))
         self.score = Score(noise, count.sum(axis=0) > 0, price, self._weights(), has_few_values=self.has_few_values)
         self.score.measure_formula_errors(self.base, [one for one in self.tried if len(one.names) == one.price_count == 1])
+
+
+def _by_kind(best: dict[str, Hypothesis]) -> dict[str, list[Hypothesis]]:
+    """Models by the kind of the form that they are for."""
+    found: dict[str, list[Hypothesis]] = {}
+    for label, one in best.items():
+        found.setdefault(label.split("/")[0], []).append(one)
+    return found
 
 
 def _holds(one: Hypothesis, best: Hypothesis) -> bool:
