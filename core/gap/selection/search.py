@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Search for sets of effects: all alone, pairs on top of the best kinds, triples on top of the best pairs, then exchanges.
+"""Search for sets of effects: all kinds alone, the most promising pairs, and then steps from the best model.
 
-An exchange replaces one effect by every kind, on top of the model that was fitted again without it.
+A step replaces one effect by every kind, on top of the model that was fitted again without it, or adds one. The search ends
+when no step improves the model.
 
 Two assumptions about how recordings differ are candidates like any effect: a factor and a zero of each (which costs a name),
 and one session in their order (what the sensor remembers goes on, which costs none).
@@ -23,12 +24,13 @@ from .score import ONE_SESSION, Hypothesis, Score, drawn_weights
 from .screening import Screening
 
 MOST_EFFECTS = 3
+"""Names of a model, its recordings' own numbers included."""
 ALL_FORMS = 2
 """Kinds of which all forms are fitted to everything, so that a kind is judged by its whole library: for speed."""
 LEAST_REMEMBERED = 1e-6
 """Change of a prediction, in deviations of the noise, that is more than rounding."""
 TOTAL_WORK = 1000
-ALONE, DIFFERENCES, FURTHER_EFFECTS, EXCHANGES, PREDICTION = 60, 330, 500, 770, 860
+ALONE, DIFFERENCES, STEPS, PREDICTION = 60, 330, 500, 860
 """Work that is done when each stage of the search begins, and all work of a diagnosis."""
 
 Start = Callable[[], tuple[Screening, Hypothesis]]
@@ -71,7 +73,6 @@ class Search:
         if not self.is_open(self.base):
             return self.base
         yield from _in_stage(ALONE, self._grow(self.base))
-        self._weigh(is_noise_measured=True)
         yield from _in_stage(ALONE, self._all_forms(self.base, _by_kind({one.forms[-1]: one for one in self.tried[1:]})))
         self._weigh(is_noise_measured=True)
         self.refined(self.best())
@@ -80,7 +81,7 @@ class Search:
             yield from _in_stage(DIFFERENCES, self._assume_differences())
             self.tried += yield from _in_stage(DIFFERENCES, best_pairs(self._screening(self.base), self.base))
         self._weigh()
-        yield from _in_stage(EXCHANGES, self._improve())
+        yield from _in_stage(STEPS, self._improve())
         return self.best()
 
     def is_open(self, one: Hypothesis) -> bool:
