@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Search for sets of effects: all kinds alone, the most promising pairs, and then steps from the best model.
+"""Search for sets of effects: all alone, pairs on top of the best kinds, triples on top of the best pairs, then exchanges.
 
-A step replaces one effect by every kind, on top of the model that was fitted again without it, or adds one. The search ends
-when no step improves the model.
+An exchange replaces one effect by every kind, on top of the model that was fitted again without it.
 
 Two assumptions about how recordings differ are candidates like any effect: a factor and a zero of each (which costs a name),
 and one session in their order (what the sensor remembers goes on, which costs none).
@@ -23,14 +22,15 @@ from .rule_numbers import DRAWS, LEAST_WEIGHT
 from .score import ONE_SESSION, Hypothesis, Score, drawn_weights
 from .screening import Screening
 
+BEAMS = {1: 3, 2: 2}
+"""Models on top of which a further effect is looked for, by their number of names: for speed."""
 MOST_EFFECTS = 3
-"""Names of a model, its recordings' own numbers included."""
 ALL_FORMS = 2
 """Kinds of which all forms are fitted to everything, so that a kind is judged by its whole library: for speed."""
 LEAST_REMEMBERED = 1e-6
 """Change of a prediction, in deviations of the noise, that is more than rounding."""
 TOTAL_WORK = 1000
-ALONE, DIFFERENCES, STEPS, PREDICTION = 60, 330, 500, 860
+ALONE, DIFFERENCES, FURTHER_EFFECTS, EXCHANGES, PREDICTION = 60, 330, 500, 770, 860
 """Work that is done when each stage of the search begins, and all work of a diagnosis."""
 
 Start = Callable[[], tuple[Screening, Hypothesis]]
@@ -80,8 +80,13 @@ class Search:
         if self.is_open(self.best()):
             yield from _in_stage(DIFFERENCES, self._assume_differences())
             self.tried += yield from _in_stage(DIFFERENCES, best_pairs(self._screening(self.base), self.base))
+        for size in range(1, MOST_EFFECTS):
+            self._weigh()
+            if not self.is_open(self.best()):
+                break
+            yield from _in_stage(FURTHER_EFFECTS, self._extend(size))
         self._weigh()
-        yield from _in_stage(STEPS, self._improve())
+        yield from _in_stage(EXCHANGES, self._reconsider())
         return self.best()
 
     def is_open(self, one: Hypothesis) -> bool:
@@ -208,6 +213,20 @@ class Search:
                 kinds.add(effect.name)
         return kinds
 
+    def _extend(self, size: int) -> Job[None]:
+        """Try one effect more on top of the best models of a size that could still become the best."""
+        for parent in self._beam(size):
+            if self._could_lead(parent):
+                parent = self.refined(parent)
+                self._weigh()
+                if self._could_lead(parent):
+                    yield from self._grow(parent)
+
+    def _could_lead(self, parent: Hypothesis) -> bool:
+        """Return whether one effect more could make a model the best."""
+        lacks = self.score.value(self.best()) - self.score.value(parent)
+        return self.score.most_to_gain(parent) > max(0.0, lacks)
+
     def refined(self, one: Hypothesis) -> Hypothesis:
         """Return a model with effects at the end of its fit, and put it in its place."""
         if not one.names or one in self._at_end:
@@ -217,17 +236,22 @@ class Search:
         self._at_end.add(better)
         return better
 
-    def _improve(self) -> Job[None]:
-        """Replace each effect of the best model by every kind, and add one more, until neither improves the model."""
+    def _beam(self, size: int) -> list[Hypothesis]:
+        """The best models of a number of names, of different kinds."""
+        chosen: dict[object, Hypothesis] = {}
+        for one in sorted(self.tried, key=self.score.value, reverse=True):
+            if one.price_count == size:
+                chosen.setdefault((frozenset(one.names), one.assumed), one)
+        return list(chosen.values())[: BEAMS[size]]
+
+    def _reconsider(self) -> Job[None]:
+        """Replace each effect of the best model by every kind, until no replacement improves the model."""
         best = None
         while best is not self.best():
             best = self.refined(self.best())
             for index in range(len(best.names)):
                 yield from self.in_place_of(best, index)
             self._weigh()
-            if best is self.best() and best.price_count < MOST_EFFECTS and self.is_open(best):
-                yield from self._grow(best)
-                self._weigh()
 
     def _grow(self, parent: Hypothesis) -> Job[None]:
         """Add one effect to a model."""

@@ -179,7 +179,7 @@ def test_alternatives_to_an_effect_are_all_fitted_models_with_the_same_other_eff
     found.score, found.library = rule(), Counter(creep=1, lag=1, hysteresis=1)
     found.tried = [parent, one, better, model(1.1, "stiffening/foam", "hysteresis/play"), worse]
     found._at_end = set(found.tried)
-    assert found._forms_in_place(one, 1, parent) == {"lag": [one], "hysteresis": [better]}
+    assert found._in_place(one, 1, parent) == {"lag": [one], "hysteresis": [better]}
 
 
 def test_a_form_left_out_shows_the_error_of_formulas():
