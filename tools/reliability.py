@@ -25,6 +25,8 @@ BINS = (0.0, 0.4, 0.5, 0.8, 0.9, 0.95, 0.98, 1.0)
 """Ends of the bins of confidence. Doubts without a rival are below 0.4, those with one above."""
 LEAST_DRAWN = 5
 """Names in a bin that is drawn; the table has the others, too."""
+LARGEST = 0.9995
+"""Where a confidence of 1 is drawn: results hold three digits, and no logistic scale reaches 1."""
 TICKS = (0.1, 0.3, 0.5, 0.8, 0.9, 0.95, 0.98, 0.995, 0.999)
 """Confidences that are written at the axis."""
 FAMILIES = (
@@ -102,7 +104,7 @@ def draw(rows: Sequence[dict[str, Any]], path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(5.0, 4.4), dpi=150, layout="constrained")
+    figure = Figure(figsize=(6.0, 4.4), dpi=150, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     line = np.linspace(0.02, 0.999, 1000)
@@ -112,16 +114,15 @@ def draw(rows: Sequence[dict[str, Any]], path: Path) -> None:
         bins = [one for one in found if one.count >= LEAST_DRAWN]
         if bins:
             share, ends = np.array([one.share for one in bins]), np.array([one.interval for one in bins]).T
-            mean, spread = [one.mean for one in bins], np.abs(ends - share)
+            mean, spread = [min(one.mean, LARGEST) for one in bins], np.abs(ends - share)
             axes.errorbar(mean, share, yerr=spread, fmt=mark, color=colour, markersize=4, capsize=2, elinewidth=1, label=words)
-            side = 1 if mark == FAMILIES[-1][-1] else -1  # marks that lie upon each other have their labels on both sides
-            where = {"textcoords": "offset points", "xytext": (5 * side, -2), "ha": "left" if side > 0 else "right"}
-            for one, low in zip(bins, ends[0], strict=True):
-                axes.annotate(f"{one.right}/{one.count}", (one.mean, low), fontsize=6, color=colour, **where)
+            below = {"textcoords": "offset points", "xytext": (0, -8), "ha": "center"}
+            for one, at, low in zip(bins, mean, ends[0], strict=True):
+                axes.annotate(f"{one.right}/{one.count}", (at, low), fontsize=6, color=colour, **below)
     axes.set_xscale("logit")  # most names are near 1
     axes.set_xticks(TICKS, [f"{tick:g}" for tick in TICKS])
     axes.set_xticks([], minor=True)
-    axes.set(xlabel="confidence that is said", ylabel="share of names that are right", xlim=(0.05, 0.9996), ylim=(-0.06, 1.05))
+    axes.set(xlabel="confidence that is said", ylabel="share of names that are right", xlim=(0.05, 0.9999), ylim=(-0.06, 1.05))
     axes.legend(loc="lower right", frameon=False, fontsize=8)
     figure.savefig(path, metadata={"Software": None})
 
