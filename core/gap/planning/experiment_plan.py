@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from ...effects.engine.registry import library
 from ...effects.engine.specification import FIT
 from ...errors import ParameterError
 from ...jobs import Job, Progress
+from ...model.sensor import Effect
 from ..base.base_model import free_parameters, prepared, start_model
 from ..base.contact_heights import with_starting_heights
 from ..base.quantities import friction_kinds
@@ -33,7 +34,8 @@ Pair = tuple[str, str]
 class PlannedExperiment:
     """A further recording that separates kinds of effects, along the trajectory of the programme that was chosen.
 
-    `before` and `after` separate each kind and each other one, by the recordings alone and with the further one.
+    `before` and `after` separate each kind and each other one, by the recordings alone and with the further one. Without net
+    forces in the recordings `has_forces` is false, and the further one has none.
     """
 
     programme: str
@@ -41,6 +43,7 @@ class PlannedExperiment:
     before: tuple[Separation, ...]
     after: tuple[Separation, ...]
     limits: Limits
+    has_forces: bool
 
 
 @dataclass(frozen=True)
@@ -133,10 +136,13 @@ def plan_after(result: Diagnosis, wishes: Wishes | None = None) -> Job[PlannedEx
         ground = Ground(result.predictors, wishes.limits(result.predictors))
     except ParameterError:
         return None  # the sentence says what to record; a limit that nobody gave is no reason to fail
-    search = _Search(ground, fitted, result.base.model, result.base.free, result.noise)
+    base = replace(result.base.model, parameters=result.best.model.parameters)
+    search = _Search(ground, fitted, base, result.base.free, result.noise)
     groups = [tuple(name for name in group if name in search.kinds) for group in result.ambiguous]
     kinds = next((group for group in groups if len(group) > 1), ())
-    return (yield from search.run(kinds, choose_pair=False))[0] if kinds else None
+    own = [result.best.model.effects[one.effect] for one in result.findings if one.rivals]
+    known = {one.name: one for one in [*own, *(other for found in result.findings for other in found.alternatives)]}
+    return (yield from search.run(kinds, choose_pair=False, known=known))[0] if kinds else None
 
 
 class _Search:
@@ -152,13 +158,13 @@ class _Search:
     ):
         self._ground, self._fitted, self._model, self._free, self._noise = ground, list(fitted), model, free, noise
         has_readings = any(p.trial.reading is not None for p in self._fitted)
-        has_forces = any(p.trial.force is not None for p in self._fitted)
+        self._has_forces = any(p.trial.force is not None for p in self._fitted)
         self._further: dict[str, tuple[Trajectory, Predictor]] = {}
         for name, programme in ground.programmes().items():
             trajectory = ground.trajectory(programme)
             samples = len(trajectory.trial.time)
             reading = np.zeros((samples, len(ground.rig.texels))) if has_readings else None
-            force = np.zeros((samples, 3)) if has_forces else None
+            force = np.zeros((samples, 3)) if self._has_forces else None
             trial = replace(trajectory.trial, reading=reading, force=force)
             self._further[name] = trajectory, Predictor(trial, ground.rig)
         every = [*self._fitted, *(further for _, further in self._further.values())]
@@ -167,10 +173,17 @@ class _Search:
         self._candidates = [*found, *(one for one in more if one.name not in names)]
         self.kinds = tuple(dict.fromkeys(one.name for one in self._candidates))
 
-    def run(self, kinds: Sequence[str], choose_pair: bool) -> Job[tuple[PlannedExperiment | None, list[Separation]]]:
-        """Return the experiment for some kinds, or for the pair of them that is worth it, and what recordings separate."""
-        tried = self._candidates if choose_pair else [one for one in self._candidates if one.name in kinds]
-        signals = Signals(self._model, self._free, tried, self._fitted, self._noise)
+    def run(
+        self, kinds: Sequence[str], choose_pair: bool, known: Mapping[str, Effect] | None = None
+    ) -> Job[tuple[PlannedExperiment | None, list[Separation]]]:
+        """Return the experiment for some kinds, or for the pair of them that is worth it, and what recordings separate.
+
+        Kinds that were fitted are `known` as they are; the others come in all their forms.
+        """
+        forms = {name: one.form for name, one in (known or {}).items()}
+        tried = [one for one in self._candidates if forms.get(one.name, one.form.name) == one.form.name]
+        tried = tried if choose_pair else [one for one in tried if one.name in kinds]
+        signals = Signals(self._model, self._free, tried, self._fitted, self._noise, known)
         products = signals.products(self._fitted)
         yield Progress("signals of every kind", 20, 100)
         pairs = [(kind, other) for kind in kinds for other in kinds if kind != other]
@@ -188,7 +201,8 @@ class _Search:
         worth = {name: np.mean([np.log(max(own[pair].deviations, 1e-3)) for pair in question]) for name, own in after.items()}
         best = max(worth, key=lambda name: worth[name])
         alone, together = (tuple(found[pair] for pair in question) for found in (before, after[best]))
-        experiment = PlannedExperiment(best, self._further[best][0], alone, together, self._ground.limits)
+        trajectory, limits = self._further[best][0], self._ground.limits
+        experiment = PlannedExperiment(best, trajectory, alone, together, limits, self._has_forces)
         return experiment, list(before.values())
 
 

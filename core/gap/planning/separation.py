@@ -1,20 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How well recordings separate two kinds of effects, as the forward model predicts it.
 
-Each form of a kind is put on the base model with several values. What that changes in the predicted readings and net forces is
-a signal of the kind. The base model's parameters and the signals of a form of the rival imitate as much of it as they can, by
-least squares; what the best form leaves separates the two. Sums of products of signals are kept: a further recording is added.
+Each form of a kind is put on the base model with several values, or about those that were fitted. What that changes in the
+predicted readings and net forces is a signal of the kind. The base model's parameters and the signals of a form of the rival
+imitate as much of it as they can, by least squares; what the best form leaves separates the two (a T-optimal design: Atkinson
+and Fedorov, Biometrika 62, 1975). Sums of products of signals are kept: a further recording is added.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...effects.engine.specification import scalar
 from ...model.sensor import Effect
-from ..candidates.candidates import Candidate, scales_of
+from ..candidates.candidates import Candidate, Scales, scales_of
 from ..fitting.least_squares import FreeParameter, TrialView, coordinates_of, derivatives
 from ..fitting.noise_floor import ChannelNoise
 from ..forward.predictor import Model, Predictor
@@ -35,8 +37,8 @@ MOST_SAMPLES, LEAST_RATE = 600, 20.0
 """Samples to which a recording is thinned, as long as so many a second are left."""
 PATTERNS = 2
 """Random patterns of parameters of single texels whose signals are compared."""
-TEXEL_STEP = 0.1
-"""Change of a parameter of single texels of which the derivative is taken, as a share of its size."""
+STEP = 0.1
+"""Change of a parameter of single texels, or of a fitted effect, of which the derivative is taken, as a share of its size."""
 LARGEST = 1e9
 """Signals with larger changes, in standard deviations of the noise, are left out: the form blows up at these values."""
 RANK = 1e-9
@@ -108,6 +110,8 @@ class Signals:
         The recordings.
     noise : (ChannelNoise, ChannelNoise)
         Of readings and net forces.
+    known : mapping of str to Effect, optional
+        Kinds that were fitted: the signal is that of the fitted effect, and small steps of its parameters imitate others.
     """
 
     def __init__(
@@ -117,21 +121,25 @@ class Signals:
         candidates: Sequence[Candidate],
         fitted: Sequence[Predictor],
         noise: tuple[ChannelNoise, ChannelNoise],
+        known: Mapping[str, Effect] | None = None,
     ):
         scales = scales_of(fitted, model)
         self._model, self._free, self._noise, self._touched = model, tuple(free), noise, IN_CONTACT * scales.force
         forces = [float(np.nanmax(np.abs(p.trial.force))) for p in fitted if p.trial.force is not None]
         read = any(p.trial.reading is not None for p in fitted)
         full = scales.reading / noise[0].deviation if read else max(forces) / noise[1].deviation
+        self._known = known or {}
         self._typical = TYPICAL * full  # in units of the noise
         gain = model.parameters.gain
         self._effects: list[tuple[Effect, dict[str, float]]] = []
         self._forms: dict[str, list[tuple[range, range]]] = {}  # columns in sums of products: common ones, and of texels
         p, q = len(self._free), 0
         for one in candidates:
-            texel = {item.name: TEXEL_STEP * item.scale for item in one.free_parameters(0, scales, gain) if item.per_texel}
-            starts: list[dict[str, float]] = [{}] if texel else list(one.starting_values(scales, gain, STARTS))
-            self._effects += [(one.effect(values, scales.texels, gain), texel) for values in starts]
+            texel = {item.name: STEP * item.scale for item in one.free_parameters(0, scales, gain) if item.per_texel}
+            starts = (
+                [one.effect({}, scales.texels, gain)] if texel else _effects_of(one, scales, gain, self._known.get(one.name))
+            )
+            self._effects += [(effect, texel) for effect in starts]
             own = PATTERNS * len(texel) or len(starts)
             self._forms.setdefault(one.name, []).append((range(p, p + own), range(q, q + len(texel))))
             p, q = p + own, q + len(texel)
@@ -184,6 +192,7 @@ class Signals:
     def separation(self, products: Products, kind: str, other: str) -> Separation:
         """Return how well a kind that acts is separated from a rival."""
         base, signals = range(len(self._free)), [column for common, _ in self._forms[kind] for column in common]
+        signals = signals[:1] if kind in self._known else signals
         whole, alone = np.diagonal(products.common)[signals], _residuals(products, base, (), signals)
         left = np.min([_residuals(products, (*base, *common), texel, signals) for common, texel in self._forms[other]], axis=0)
         acts = alone > RANK * np.maximum(whole, 1e-300)
@@ -191,6 +200,17 @@ class Signals:
             return Separation(kind, other, 0.0, 0.0)
         size = self._typical * np.sqrt(products.loaded * left[acts] / whole[acts])
         return Separation(kind, other, float(np.median(left[acts] / alone[acts])), float(np.median(size)))
+
+
+def _effects_of(one: Candidate, scales: Scales, gain: float, fitted: Effect | None) -> list[Effect]:
+    """A form with values over the ranges in which it would show, or about those to which it was fitted."""
+    if fitted is None:
+        return [one.effect(values, scales.texels, gain) for values in one.starting_values(scales, gain, STARTS)]
+    effects = [fitted]
+    for item in one.free_parameters(0, scales, gain):
+        moved = item.from_coordinate(item.to_coordinate(scalar(fitted.values, item.name)) + STEP)
+        effects.append(replace(fitted, values={**fitted.values, item.name: float(moved)}))
+    return effects
 
 
 def _residuals(products: Products, columns: Sequence[int], texel: Sequence[int], signals: Sequence[int]) -> np.ndarray:

@@ -43,9 +43,10 @@ def planned_sentence(words: Mapping[str, Any]) -> str:
     what = " from ".join(words["between"])
     before, after = words["separation_before"], words["separation_after"]
     if after < LEAST_GAIN * before:
+        forces = "" if words["net_forces"] else ", or record net forces"
         return (
             f"No programme within these limits separates {what} better than your recordings ({before:.3g} standard deviations "
-            f"of the noise): allow more depth, speed, duration or places. The best one is {words['file']}."
+            f"of the noise): allow more depth, speed, duration or places{forces}. The best one is {words['file']}."
         )
     return (
         f"{words['file']} is a trajectory of {words['limits']['duration']:.3g} s ({words['programme']}) that separates {what} "
@@ -62,6 +63,7 @@ def experiment_words(experiment: PlannedExperiment, file: str) -> dict[str, Any]
         "separation_before": round(min(one.deviations for one in experiment.before), 3),
         "separation_after": round(min(one.deviations for one in experiment.after), 3),
         "limits": asdict(experiment.limits),
+        "net_forces": experiment.has_forces,
         "before": _pairs(experiment.before),
         "after": _pairs(experiment.after),
     }

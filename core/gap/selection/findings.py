@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...model.sensor import Effect
 from ..base.recording_differences import RecordingDifferences
 from ..candidates.candidates import Scales
 from ..data_faults.data_fault import DataFault
@@ -43,6 +44,8 @@ class Finding:
         What is wrong with its parameters, in words: those at a bound.
     doubts : tuple of str
         Why else its name is not sure, in words; rivals and `unsettled` say their own.
+    alternatives : tuple of Effect
+        The rivals as they were fitted in its place, as far as they were.
     """
 
     effect: int
@@ -55,6 +58,7 @@ class Finding:
     closes: float = 0.0
     unsettled: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
+    alternatives: tuple[Effect, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -110,6 +110,7 @@ def _judged(search: Search, best: Hypothesis, index: int, result: Diagnosis) -> 
     parent, others = run_job(search.in_place_of(best, index))
     confidence, rivals = weighed_kinds(search, best, index)
     curvature = curvature_ratio(result.of("fit"), best.fit.model)
+    fitted = tuple(max(others[other], key=score.value).fit.model.effects[-1] for other in rivals)
     known = set(best.names) | set(rivals)
     rivals += [one for one in indistinguishable(result.coverage, name, curvature) if one not in known]
     doubts = () if confidence >= SURE or rivals else (NEARLY_WITHOUT,)
@@ -118,7 +119,7 @@ def _judged(search: Search, best: Hypothesis, index: int, result: Diagnosis) -> 
     nearest = min(left, key=lambda other: left[other], default="")
     leaves = left[nearest] / max(_excess(score, best), float(score.noise.error[score.measured].sum())) if nearest else np.inf
     closes = _share_of_gap(search, parent, best)
-    return Finding(index, name, form, round(confidence, 3), tuple(rivals), nearest, leaves, closes, doubts=doubts)
+    return Finding(index, name, form, round(confidence, 3), tuple(rivals), nearest, leaves, closes, (), doubts, fitted)
 
 
 def _judged_by_prediction(search: Search, named: Hypothesis, best: Hypothesis) -> Finding:

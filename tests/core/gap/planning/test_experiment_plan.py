@@ -20,9 +20,10 @@ from palpate.core.gap.fitting.noise_floor import ChannelNoise
 from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.planning.experiment_plan import plan_experiment
 from palpate.core.gap.planning.paths import Wishes
-from palpate.core.gap.planning.separation import STARTS, Signals
+from palpate.core.gap.planning.separation import LEAST_SEPARATION, STARTS, Signals
 from palpate.core.gap.report.plan_files import experiment_words, planned_sentence, table_rows, write_plan
 from palpate.core.jobs import run_job
+from palpate.core.model.sensor import Effect
 
 NOISES = ChannelNoise(0.005, 1.0, "given"), ChannelNoise(0.05, 1.0, "given")
 
@@ -72,6 +73,22 @@ def test_what_a_rival_leaves_is_that_of_least_squares_over_all_samples(rig):
                 assert found[form.name, other.name].share == pytest.approx(share, rel=0.02, abs=1e-5), (form.name, other.name)
 
 
+def test_kinds_that_were_fitted_are_separated_as_they_were_fitted(rig):
+    """Texels that lie lower read about what springs with a threshold read; other values differ more, and net forces do, too."""
+    model, depth = Model(replace(rig.parameters, cn=0.0)), 4e-4
+    height = Effect("misalignment", "tilt", {"about_x": 0.0, "about_y": 0.0, "z": -depth})
+    known = {"misalignment": height, "dead-zone": Effect("dead-zone", "hard", {"threshold": model.parameters.k * depth})}
+    free, found = free_base_parameters(model.parameters, ["k"], 1.0), []
+    for with_forces, effects in ((False, known), (True, known), (False, None)):
+        force = np.zeros((len(rig.trials[0].time), 3)) if with_forces else None
+        fitted = predictors_of([replace(rig.trials[0], force=force)], rig)
+        labels = [f"{one.name}/{one.form}" for one in known.values()]
+        forms = [one for one in candidates(fitted, model) if one.label in labels]
+        signals = Signals(model, free, forms, fitted, NOISES, effects)
+        found.append(signals.separation(signals.products(fitted), *known).deviations)
+    assert found[0] < 0.5 * LEAST_SEPARATION < LEAST_SEPARATION < min(found[1:]), found
+
+
 def test_a_plan_names_a_programme_and_writes_a_recording_that_a_rig_can_have(rig, tmp_path):
     plan = run_job(plan_experiment(rig, Wishes(between=("creep", "saturation"), duration=6.0)))
     one = plan.experiment
@@ -105,8 +122,8 @@ def test_a_programme_that_separates_no_more_is_not_recommended():
     words = {"file": "plan.csv", "programme": "stairs", "between": ["creep", "lag"], "limits": {"duration": 6.0}}
     words |= {"separation_before": 5.0, "separation_after": 9.0}
     assert planned_sentence(words).endswith("by 9 standard deviations of the noise; your recordings alone by 5.")
-    said = planned_sentence(words | {"separation_after": 5.2})
-    assert said.startswith("No programme within these limits separates creep from lag better") and "allow more depth" in said
+    said = planned_sentence(words | {"separation_after": 5.2, "net_forces": False})
+    assert said.startswith("No programme within these limits separates creep from lag better") and "record net forces" in said
 
 
 def test_options_of_a_plan_that_do_not_go_together_are_refused(rig, tmp_path, capsys):
