@@ -30,7 +30,6 @@ from ..forward.predictor import Model, Predictor, placed_stimulus, predictors_of
 from .blocks import Blocks, views_of
 from .check_recordings import checked
 from .findings import Diagnosis, Finding
-from .rule_numbers import SURE
 from .score import ONE_SESSION, OWN_NUMBERS, Hypothesis
 from .screening import Screening
 from .search import TOTAL_WORK, Search, Start
@@ -63,8 +62,8 @@ def diagnose(rig: Rig) -> Job[Diagnosis]:
     yield Progress("verdict", VERDICT, TOTAL_WORK)
     if best is named:
         best = with_best_forms(search, named)
-    elif search.score.weight(best, named) >= SURE:
-        named = best
+    elif search.best() is best:
+        named = best  # what joined to predict has earned its name
     return _concluded(begun, search, named, best)
 
 

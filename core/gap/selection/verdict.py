@@ -17,7 +17,8 @@ from .score import Hypothesis, Score
 from .search import Search
 
 JUST_UNSURE = SURE - 0.01
-"""Highest confidence of a name that has rivals, or that faults of the data may have brought about."""
+"""Highest confidence of a name that has rivals, that a smaller model does without, or that faults of the data may have brought
+about."""
 FAULTY = "the data have faults that were not put right"
 NEARLY_WITHOUT = "the model without it does nearly as well, for one name less"
 """Why a name is not sure, in words."""
@@ -125,7 +126,8 @@ def _judged(search: Search, best: Hypothesis, index: int, result: Diagnosis) -> 
 def _judged_by_prediction(search: Search, named: Hypothesis, best: Hypothesis) -> Finding:
     """One of the effects that help to predict and do not pay for their names; together they have one weight."""
     closes = _share_of_gap(search, named, best)
-    return Finding(0, "", "", round(search.score.weight(best, named), 3), (), closes=closes, doubts=(NEARLY_WITHOUT,))
+    confidence = min(search.score.weight(best, named), JUST_UNSURE)
+    return Finding(0, "", "", round(confidence, 3), (), closes=closes, doubts=(NEARLY_WITHOUT,))
 
 
 def _share_of_gap(search: Search, without: Hypothesis, best: Hypothesis) -> float:
