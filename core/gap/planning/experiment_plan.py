@@ -178,10 +178,12 @@ class _Search:
     ) -> Job[tuple[PlannedExperiment | None, list[Separation]]]:
         """Return the experiment for some kinds, or for the pair of them that is worth it, and what recordings separate.
 
-        Kinds that were fitted are `known` as they are; the others come in all their forms.
+        Kinds that were fitted are `known` as they are. Others come in all their forms, as do parameters of single texels.
         """
         forms = {name: one.form for name, one in (known or {}).items()}
-        tried = [one for one in self._candidates if forms.get(one.name, one.form.name) == one.form.name]
+        fitted = [one for one in self._candidates if one.form.name == forms.get(one.name) and not one.has_texel_parameters]
+        known = {one.name: known[one.name] for one in fitted} if known else {}
+        tried = [one for one in self._candidates if one.name not in known or one.form.name == forms[one.name]]
         tried = tried if choose_pair else [one for one in tried if one.name in kinds]
         signals = Signals(self._model, self._free, tried, self._fitted, self._noise, known)
         products = signals.products(self._fitted)
