@@ -10,13 +10,12 @@ and Fedorov, Biometrika 62, 1975). Sums of products of signals are kept: a furth
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from ...effects.engine.specification import scalar
 from ...model.sensor import Effect
-from ..candidates.candidates import Candidate, Scales, scales_of
+from ..candidates.candidates import Candidate, scales_of
 from ..fitting.least_squares import FreeParameter, TrialView, coordinates_of, derivatives
 from ..fitting.noise_floor import ChannelNoise
 from ..forward.predictor import Model, Predictor
@@ -37,8 +36,6 @@ MOST_SAMPLES, LEAST_RATE = 600, 20.0
 """Samples to which a recording is thinned, as long as so many a second are left."""
 PATTERNS = 2
 """Random patterns of parameters of single texels whose signals are compared."""
-STEP = 0.1
-"""Change of a parameter of single texels, or of a fitted effect, of which the derivative is taken, as a share of its size."""
 LARGEST = 1e9
 """Signals with larger changes, in standard deviations of the noise, are left out: the form blows up at these values."""
 RANK = 1e-9
@@ -111,7 +108,7 @@ class Signals:
     noise : (ChannelNoise, ChannelNoise)
         Of readings and net forces.
     known : mapping of str to Effect, optional
-        Kinds that were fitted: the signal is that of the fitted effect, and small steps of its parameters imitate others.
+        Kinds that were fitted: the signal is that of the fitted effect, and the derivatives by its parameters imitate others.
     """
 
     def __init__(
@@ -131,16 +128,21 @@ class Signals:
         self._known = known or {}
         self._typical = TYPICAL * full  # in units of the noise
         gain = model.parameters.gain
-        self._effects: list[tuple[Effect, dict[str, float]]] = []
+        self._effects: list[tuple[Effect, tuple[FreeParameter, ...]]] = []  # with parameters whose derivatives are signals, too
         self._forms: dict[str, list[tuple[range, range]]] = {}  # columns in sums of products: common ones, and of texels
         p, q = len(self._free), 0
         for one in candidates:
-            texel = {item.name: STEP * item.scale for item in one.free_parameters(0, scales, gain) if item.per_texel}
-            starts = (
-                [one.effect({}, scales.texels, gain)] if texel else _effects_of(one, scales, gain, self._known.get(one.name))
-            )
-            self._effects += [(effect, texel) for effect in starts]
-            own = PATTERNS * len(texel) or len(starts)
+            items = tuple(one.free_parameters(len(model.effects), scales, gain))
+            texel = tuple(item for item in items if item.per_texel)
+            if texel:
+                effects = [(one.effect({}, scales.texels, gain), texel)]
+            elif one.name in self._known:
+                effects = [(self._known[one.name], items)]
+            else:
+                starts = one.starting_values(scales, gain, STARTS)
+                effects = [(one.effect(values, scales.texels, gain), ()) for values in starts]
+            self._effects += effects
+            own = PATTERNS * len(texel) or sum(1 + len(with_derivatives) for _, with_derivatives in effects)
             self._forms.setdefault(one.name, []).append((range(p, p + own), range(q, q + len(texel))))
             p, q = p + own, q + len(texel)
         self._width = p, q
@@ -162,17 +164,18 @@ class Signals:
         derivatives(view, self._model, self._free, at, start, common[: len(self._free)], 0)
         row, own = len(self._free), 0
         rng = np.random.default_rng(0)
-        for effect, steps in self._effects:
-            there = view.residual(self._model.with_effect(effect))
-            if not steps:
-                common[row] = start - there
-                row += 1
-            for name, step in steps.items():
-                raised = tuple(np.asarray(effect.values[name]) + step)
-                moved = Effect(effect.name, effect.form, {**effect.values, name: raised})
-                texel[own] = (there - view.residual(self._model.with_effect(moved)))[:, :n]
+        for effect, items in self._effects:
+            model = self._model.with_effect(effect)
+            there, table = view.residual(model), np.empty((len(items), *start.shape))
+            derivatives(view, model, items, coordinates_of(model, items), there, table, 0)
+            if not any(item.per_texel for item in items):
+                common[row : row + 1 + len(items)] = start - there, *table
+                row += 1 + len(items)
+                continue
+            for change in table[:, :, :n]:
+                texel[own] = change
                 for _ in range(PATTERNS):
-                    common[row, :, :n] = texel[own] * rng.normal(size=n)
+                    common[row, :, :n] = change * rng.normal(size=n)
                     row += 1
                 own += 1
         for signal in (*common, *texel):
@@ -200,17 +203,6 @@ class Signals:
             return Separation(kind, other, 0.0, 0.0)
         size = self._typical * np.sqrt(products.loaded * left[acts] / whole[acts])
         return Separation(kind, other, float(np.median(left[acts] / alone[acts])), float(np.median(size)))
-
-
-def _effects_of(one: Candidate, scales: Scales, gain: float, fitted: Effect | None) -> list[Effect]:
-    """A form with values over the ranges in which it would show, or about those to which it was fitted."""
-    if fitted is None:
-        return [one.effect(values, scales.texels, gain) for values in one.starting_values(scales, gain, STARTS)]
-    effects = [fitted]
-    for item in one.free_parameters(0, scales, gain):
-        moved = item.from_coordinate(item.to_coordinate(scalar(fitted.values, item.name)) + STEP)
-        effects.append(replace(fitted, values={**fitted.values, item.name: float(moved)}))
-    return effects
 
 
 def _residuals(products: Products, columns: Sequence[int], texel: Sequence[int], signals: Sequence[int]) -> np.ndarray:

@@ -26,7 +26,7 @@ BEAMS = {1: 3, 2: 2}
 """Models on top of which a further effect is looked for, by their number of names: for speed."""
 MOST_EFFECTS = 3
 ALL_FORMS = 2
-"""Kinds of which all forms are fitted to everything, so that a kind is judged by its whole library: for speed."""
+"""Kinds of which all forms are fitted to everything: the best and its nearest rival, each judged by its whole library."""
 LEAST_REMEMBERED = 1e-6
 """Change of a prediction, in deviations of the noise, that is more than rounding."""
 TOTAL_WORK = 1000
