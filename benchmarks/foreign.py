@@ -158,7 +158,7 @@ def examine_rig(folder: str, case: str, answer: dict) -> dict:
         or (bool(hidden) and sure == set(hidden))
     )
     return {
-        "kind": "outside" if is_outside else str(len(hidden)),
+        "kind": "outside the library" if is_outside else str(len(hidden)),
         "number": case,
         "answer": hidden or sorted({name for names in accepted for name in names}),
         "said": [(SYNONYMS.get(one.name, one.name), one.form, one.confidence) for one in result.findings],

@@ -33,7 +33,7 @@ FAMILIES = (
     ("the library's formulas", ("own",), "#1f5fa8", "s"),
     ("other formulas", ("other", "two", "three", "poor"), "#c4541a", "o"),
     ("a third family, on which nothing was set", ("third", "pairs"), "#2a7f3f", "^"),
-    ("rigs of another generator", ("0", "1", "2", "3", "outside"), "#6a3d9a", "D"),
+    ("rigs of another generator", ("0", "1", "2", "3", "outside the library"), "#6a3d9a", "D"),
 )
 """Words, kinds of cases, colour and mark of what is drawn."""
 
